@@ -3,11 +3,11 @@
 from collections.abc import Callable
 import sys
 
-from cns_drake.base.own_packages import check_evaluation, leave_out_folder
+from cns_drake.base import check_evaluation, leave_out_folder
 
 leave_out_folder(sys.path)  # Before anything else is imported.
 
-from cns_drake.base.launch import start  # noqa: E402
+from cns_drake.base import start  # noqa: E402
 
 
 def main() -> None:
@@ -17,7 +17,7 @@ def main() -> None:
 
 def _load() -> Callable[[], None]:
     check_evaluation()
-    from cns_drake.command_line.cli import main as run
+    from cns_drake.command_line import main as run
 
     return run
 

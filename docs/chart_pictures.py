@@ -17,8 +17,8 @@ import numpy as np
 from scipy.signal import welch
 from sklearn.isotonic import isotonic_regression
 
-from cns_drake.motion.road_profile import RoadProfile
-from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
+from cns_drake.motion import RoadProfile
+from cns_drake.sensors import ImuErrors, ImuNoise
 from docs.picture_parts import (
     DPI,
     FONT,
@@ -27,18 +27,22 @@ from docs.picture_parts import (
     add_heading,
     make_plain,
 )
-from evaluation.results.charts.kinds import draw_chart
-from evaluation.results.headlines import SURVIVES, listed, survivors
-from evaluation.results.keys import OWN, STAGE
-from evaluation.results.method_names import title
-from evaluation.results.ranking import rank_methods
-from evaluation.results.styles import (
+from evaluation.results import (
     INK,
     METHOD_STYLES,
+    OWN,
     PALE,
+    STAGE,
+    SURVIVES,
+    Results,
+    Row,
+    draw_chart,
+    listed,
     method_styles,
+    rank_methods,
+    survivors,
+    title,
 )
-from evaluation.results.table import Results, Row
 
 # The methods that this project made; all others are published ones.
 OURS = {"layered-overlap", "learned"}

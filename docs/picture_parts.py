@@ -10,9 +10,7 @@ from matplotlib.figure import Figure
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from evaluation.results.styles import (
-    INK,
-)
+from evaluation.results import INK
 
 ROOT = Path(__file__).resolve().parents[1]
 # Charts are this wide [inches], and shown 830, 700 or 390 pixels wide.

@@ -21,27 +21,52 @@ from pydantic.fields import FieldInfo
 import typer
 
 from cns_drake import command_line as cli
-from cns_drake.city.plan import city_plan, stages
-from cns_drake.roads import roads_file
-from cns_drake.roads.route import Route, RouteLeg
-from cns_drake.roads.speeds import Speeds
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.sections import (
+from cns_drake.city import (
+    BuildingPlan,
+    CityPlan,
+    DistrictPlan,
+    Growth,
+    LinePlan,
+    ObjectPlan,
+    ParkingPlan,
+    PatchPlan,
+    RowPlan,
+    ScatterPlan,
+    Stage,
+    Stages,
+    StreetPlan,
+)
+from cns_drake.roads import (
+    JunctionEntry,
+    RoadEntry,
+    RoadsFile,
+    RoadStyle,
+    Route,
+    RouteLeg,
+    Speeds,
+)
+from cns_drake.scenarios import (
     DriverConfig,
     RideConfig,
+    Scenario,
     TrafficConfig,
     TransientConfig,
 )
-from cns_drake.sensors.camera.config import CameraSection
-from cns_drake.sensors.imu.config import ImuSection
-from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
-from cns_drake.sensors.odometry.config import OdometrySection
-from cns_drake.studies.drives.lost_structures import Losses
-from cns_drake.studies.drives.sampled_drives import DrawnRoute, Fleet
-from cns_drake.studies.experiments.experiment import Experiment, MadeMap
+from cns_drake.sensors import (
+    CameraSection,
+    ImuSection,
+    LidarSection,
+    OdometrySection,
+    WeatherConfig,
+)
+from cns_drake.studies import DrawnRoute, Experiment, Fleet, Losses, MadeMap
 from evaluation import command_line as evaluation_cli
-from evaluation.methods import MethodConfig, make_method, shipped_methods
-from evaluation.methods.published_networks import NetworkConfig
+from evaluation.methods import (
+    MethodConfig,
+    NetworkConfig,
+    make_method,
+    shipped_methods,
+)
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 Sections = dict[str, type[BaseModel]]
@@ -61,23 +86,23 @@ SCENARIO: Sections = {
     "Odometry": OdometrySection,
 }
 CITY: Sections = {
-    "roads.yaml": roads_file.RoadsFile,
-    "A road's style": roads_file.RoadStyle,
-    "A road": roads_file.RoadEntry,
-    "A junction": roads_file.JunctionEntry,
-    "city.yaml": city_plan.CityPlan,
-    "A district": city_plan.DistrictPlan,
-    "A patch": city_plan.PatchPlan,
-    "A building": city_plan.BuildingPlan,
-    "A row": city_plan.RowPlan,
-    "A parking lot": city_plan.ParkingPlan,
-    "An object": city_plan.ObjectPlan,
-    "A line": city_plan.LinePlan,
-    "A scatter": city_plan.ScatterPlan,
-    "A street": city_plan.StreetPlan,
-    "stages.yaml": stages.Stages,
-    "A stage": stages.Stage,
-    "A growth": stages.Growth,
+    "roads.yaml": RoadsFile,
+    "A road's style": RoadStyle,
+    "A road": RoadEntry,
+    "A junction": JunctionEntry,
+    "city.yaml": CityPlan,
+    "A district": DistrictPlan,
+    "A patch": PatchPlan,
+    "A building": BuildingPlan,
+    "A row": RowPlan,
+    "A parking lot": ParkingPlan,
+    "An object": ObjectPlan,
+    "A line": LinePlan,
+    "A scatter": ScatterPlan,
+    "A street": StreetPlan,
+    "stages.yaml": Stages,
+    "A stage": Stage,
+    "A growth": Growth,
 }
 EXPERIMENT: Sections = {
     "Experiment": Experiment,
@@ -167,7 +192,7 @@ def own_fields(model: type[BaseModel]) -> dict[str, FieldInfo]:
     methods, is in the tables of those.
     """
     shared: dict[str, FieldInfo] = {}
-    for base in (roads_file.RoadStyle, MethodConfig):
+    for base in (RoadStyle, MethodConfig):
         if issubclass(model, base) and model is not base:
             shared |= base.model_fields
     fields = model.model_fields

@@ -17,17 +17,17 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from cns_drake import Scenario, load_scenario, make_station
-from cns_drake.ageing.aged_pictures import air_view
-from cns_drake.pictures.aerial_pictures import draw_drives
-from cns_drake.pictures.camera_views import View, load_views
-from cns_drake.pictures.stage_pictures import draw_stages
-from cns_drake.pictures.stage_scene import StageScene
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.scene.map_folder import MapFolder
-from cns_drake.scene.semantics import CLASS_IDS
-from cns_drake.sensors.camera.config import CameraSection
-from cns_drake.sensors.lidar.config import WeatherConfig
+from cns_drake.ageing import air_view
+from cns_drake.pictures import (
+    StageScene,
+    View,
+    draw_drives,
+    draw_stages,
+    load_views,
+)
+from cns_drake.scenarios import plan_drive, shipped_maps
+from cns_drake.scene import CLASS_IDS, MapFolder
+from cns_drake.sensors import CameraSection, WeatherConfig
 from docs.picture_parts import (
     DPI,
     ROOT,
@@ -37,17 +37,14 @@ from docs.picture_parts import (
     with_name,
     write_tiles,
 )
-from evaluation.map_update.labels import Label
-from evaluation.map_update.sessions import read_session
-from evaluation.methods.layered_overlap import (
-    LayeredOverlap,
-    LayeredOverlapConfig,
-)
-from evaluation.results.sections import point_rendering
-from evaluation.results.styles import (
+from evaluation.map_update import Label, read_session
+from evaluation.methods import LayeredOverlap, LayeredOverlapConfig
+from evaluation.results import (
     GONE,
     INK,
     NEW,
+    OrthographicView,
+    render,
     unit_rgb,
 )
 
@@ -306,7 +303,7 @@ def maps(path: Path, file: str, middle: Sequence[float]) -> None:
     colours[[Label.KEPT, Label.GONE, Label.NEW]] = (120, 126, 134), GONE, NEW
     figure = Figure(figsize=(WIDTH, 2.7), layout="constrained")
     words = "older map: gone is red", "newer map: new is blue"
-    view = point_rendering.OrthographicView(-60.0, 28.0, 12.0)
+    view = OrthographicView(-60.0, 28.0, 12.0)
     for axes, side, text in zip(
         figure.subplots(1, 2), "AB", words, strict=True
     ):
@@ -315,7 +312,7 @@ def maps(path: Path, file: str, middle: Sequence[float]) -> None:
         labels = np.load(folder / "truth.npy")
         near = (np.abs(points - middle) < (42.0, 26.0, 26.0)).all(axis=1)
         rgb = colours[labels[near]].astype(np.uint8)
-        axes.imshow(point_rendering.render(points[near], rgb, view).image)
+        axes.imshow(render(points[near], rgb, view).image)
         axes.set_title(text, loc="left")
         axes.set_axis_off()
     figure.savefig(path, dpi=DPI, bbox_inches="tight")

@@ -10,7 +10,7 @@ the module that `__init__.pyi` names. `evaluation.drives` and
 
 from pkgutil import extend_path
 
-from cns_drake.base.public_names import attach
+from cns_drake.base import attach
 
 # Python prefers a package to a folder without `__init__`. With this line,
 # modules in a user's folder of the same name can be imported as well.

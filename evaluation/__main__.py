@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from cns_drake.base.launch import start
+from cns_drake.base import start
 
 
 def main() -> None:
@@ -11,7 +11,7 @@ def main() -> None:
 
 
 def _load() -> Callable[[], None]:
-    from evaluation.command_line.cli import main as run
+    from evaluation.command_line import main as run
 
     return run
 

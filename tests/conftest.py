@@ -13,7 +13,7 @@ from types import ModuleType
 
 import pytest
 
-from cns_drake.base.process import collect_garbage_seldom, num_cores
+from cns_drake.base import collect_garbage_seldom, num_cores
 
 # What is imported is there to stay: nobody looks for garbage in it.
 gc.disable()
@@ -190,8 +190,8 @@ def short_recording(small_map, tmp_path_factory):
     """Folder of a recording of 40 frames with the default LiDAR."""
     from helpers.small_map import scenario_values
 
-    from cns_drake.scenarios.scenario_files import make_scenario
-    from cns_drake.simulation.simulation import simulate
+    from cns_drake.scenarios import make_scenario
+    from cns_drake.simulation import simulate
 
     output = tmp_path_factory.mktemp("recordings")
     values = scenario_values(small_map) | {"frames": 40}

@@ -9,3 +9,7 @@
 - The past: `past_city`.
 - A map: `aged_map`, `stage_writer`, `aged_pictures`; `events`, `years`.
 """
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

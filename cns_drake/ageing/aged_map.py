@@ -22,26 +22,33 @@ from cns_drake.ageing.street_renewal import StreetRenewal
 from cns_drake.ageing.trees import Trees
 from cns_drake.ageing.yearly_draws import YearlyDraws
 from cns_drake.ageing.years import check_years
-from cns_drake.base.complete_files import draft_folder
-from cns_drake.base.csv_files import write_csv
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import is_there
-from cns_drake.base.progress import doing
-from cns_drake.base.yaml_files import read_yaml
-from cns_drake.city.geometry import Structure
-from cns_drake.city.growth.lot_uses import lot_objects, use_by_size
-from cns_drake.city.plants.plant_sizes import younger_plant
-from cns_drake.imports.map_files import YEAR_COLUMN
-from cns_drake.motion.trajectory import Trajectory
-from cns_drake.scenarios.drive_table import write_table
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import (
+from cns_drake.base import (
+    InputError,
+    doing,
+    draft_folder,
+    is_there,
+    read_yaml,
+    write_csv,
+)
+from cns_drake.city import Structure, lot_objects, use_by_size, younger_plant
+from cns_drake.imports import YEAR_COLUMN
+from cns_drake.motion import Trajectory
+from cns_drake.scenarios import (
     describe_scenario,
     load_scenario,
     make_paths_absolute,
+    plan_drive,
+    write_table,
 )
-from cns_drake.scene import map_folder
-from cns_drake.scene.map_folder import MapFolder
+from cns_drake.scene import (
+    LANES_NAME,
+    MESH_FOLDER,
+    ROADS_NAME,
+    STRUCTURES_NAME,
+    MapFolder,
+    check_new_map,
+    no_drives,
+)
 
 HISTORY_NAME = "history.csv"
 RATES_NAME = "rates.csv"
@@ -106,18 +113,18 @@ def age_map(
     wanted = check_years(years)
     if not 0 <= seed < _MAX_SEED:
         raise InputError(f"--seed: {seed}: not from 0 to {_MAX_SEED - 1}")
-    map_folder.check_new_map(output)
+    check_new_map(output)
     folder = MapFolder(source.resolve())
     drives = folder.recordable_drives()
     if not drives:
-        raise map_folder.no_drives(source)
+        raise no_drives(source)
     doing(f"reading {folder.name}")
     ways = [plan_drive(load_scenario(path)) for path in drives]
     world = OldWorld(folder)
     if min(wanted) < 0 and world.today is None:
         raise InputError(
             f"{source}: --years: {min(wanted)}: no building has a year in "
-            f"column {YEAR_COLUMN} of {map_folder.STRUCTURES_NAME}, as the "
+            f"column {YEAR_COLUMN} of {STRUCTURES_NAME}, as the "
             "past needs"
         )
     doing("looking for lots")
@@ -204,7 +211,7 @@ def _write_map(
     # Today is the first stage.
     others = [year for year in years if year != 0]
     stages = {f"{k:02d}": year for k, year in enumerate([0, *others], start=1)}
-    (draft / map_folder.MESH_FOLDER).mkdir()
+    (draft / MESH_FOLDER).mkdir()
     _copy_inputs(world.folder, drives, draft)
     writing = StageWriter(world, draft, seed)
     events = _write_stages(writing, world, city, stages)
@@ -271,8 +278,8 @@ def _copy_inputs(
         if way is not None:
             shutil.copyfile(way, draft / _way_name(path))
     for name in (
-        map_folder.ROADS_NAME,
-        map_folder.LANES_NAME,
+        ROADS_NAME,
+        LANES_NAME,
         folder.views.name,
     ):
         if is_there(folder.path / name):

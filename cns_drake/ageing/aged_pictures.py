@@ -7,10 +7,9 @@ import matplotlib.image
 import numpy as np
 
 from cns_drake.ageing.aged_map import AgedMap
-from cns_drake.base.progress import doing
-from cns_drake.pictures.camera_views import View
-from cns_drake.pictures.stage_scene import StageScene
-from cns_drake.scene.map_folder import stage_name
+from cns_drake.base import doing
+from cns_drake.pictures import StageScene, View
+from cns_drake.scene import stage_name
 
 PICTURES = "pictures"
 # Size of a picture in pixels.

@@ -11,20 +11,20 @@ from shapely.geometry import box
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.ageing.plots import Plot
-from cns_drake.city.dice import Rgb
-from cns_drake.city.geometry import (
+from cns_drake.city import (
     MeshShape,
     Part,
+    Rgb,
     Structure,
     assemble,
     block,
     from_above,
+    largest_rectangle,
     placed,
     polygons_of,
     unit_normals,
 )
-from cns_drake.city.geometry.rectangles import largest_rectangle
-from cns_drake.transient.scaffolds import scaffold
+from cns_drake.transient import scaffold
 
 # Height of a storey [m].
 _STOREY = 3.0

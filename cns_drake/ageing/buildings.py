@@ -15,9 +15,14 @@ from cns_drake.ageing.plots import PARTY_WALL, Plot, building_plot
 from cns_drake.ageing.standing_structures import StandingStructures
 from cns_drake.ageing.trees import Trees
 from cns_drake.ageing.yearly_draws import YearlyDraws
-from cns_drake.city.geometry import Model, Structure, from_above
-from cns_drake.city.growth.lot_uses import lot_objects, use_by_size
-from cns_drake.city.growth.lowering import top_of
+from cns_drake.city import (
+    Model,
+    Structure,
+    from_above,
+    lot_objects,
+    top_of,
+    use_by_size,
+)
 
 # Share of the demolished buildings that are replaced by others.
 _REPLACED = 0.85

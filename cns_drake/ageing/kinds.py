@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base import parse_yaml
 
 # Trees, the plants that grow.
 TREE = "tree"

@@ -11,9 +11,8 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.plots import PARTY_WALL, Plot
-from cns_drake.base.errors import InputError
-from cns_drake.city.geometry import Structure, polygons_of
-from cns_drake.city.placement.frontage import lines_along, lot_at
+from cns_drake.base import InputError
+from cns_drake.city import Structure, lines_along, lot_at, polygons_of
 
 # Widths of new plots along streets, tried in turn [m].
 _PLOT_WIDTHS = (22.0, 16.0, 11.0)

@@ -10,13 +10,20 @@ from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.ageing.plots import PARTY_WALL, Plot
-from cns_drake.city.buildings import ARCHETYPES, sample
-from cns_drake.city.geometry import Model, Structure, placed, polygons_of
-from cns_drake.city.geometry.rectangles import largest_rectangle
-from cns_drake.city.growth.building_sites import building_site
-from cns_drake.city.growth.lot_uses import lot_objects
-from cns_drake.city.growth.lowering import lowered, top_of
-from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.city import (
+    ARCHETYPES,
+    OBJECTS,
+    Model,
+    Structure,
+    building_site,
+    largest_rectangle,
+    lot_objects,
+    lowered,
+    placed,
+    polygons_of,
+    sample,
+    top_of,
+)
 
 # Archetypes that are built today -> their weight in the random choice among
 # those that fit.

@@ -13,12 +13,17 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.ageing import kinds
-from cns_drake.base.csv_files import read_records, read_rows
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular, is_there
-from cns_drake.base.number_format import number_within, whole_number
-from cns_drake.base.xml_elements import read_elements
-from cns_drake.city.geometry import (
+from cns_drake.base import (
+    InputError,
+    check_regular,
+    is_there,
+    number_within,
+    read_elements,
+    read_records,
+    read_rows,
+    whole_number,
+)
+from cns_drake.city import (
     BoxShape,
     CylinderShape,
     MeshShape,
@@ -28,17 +33,15 @@ from cns_drake.city.geometry import (
     SphereShape,
     Structure,
     from_above,
+    ground_footprint,
     read_mesh,
     triple,
 )
-from cns_drake.city.geometry.object_models import ground_footprint
-from cns_drake.imports.map_files import YEAR_COLUMN
-from cns_drake.roads.network import load_road_network
-from cns_drake.scene.map_folder import MESH_FOLDER, MapFolder
-from cns_drake.scene.surfaces import LARGEST_SIZE
-from cns_drake.scene.world import load_world
-from cns_drake.transient.ground_surface import GroundSurface
-from cns_drake.transient.structure_geometry import (
+from cns_drake.imports import YEAR_COLUMN
+from cns_drake.roads import load_road_network
+from cns_drake.scene import LARGEST_SIZE, MESH_FOLDER, MapFolder, load_world
+from cns_drake.transient import (
+    GroundSurface,
     PartGeometry,
     StructureGeometry,
     geometry_by_structure,

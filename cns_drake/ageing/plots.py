@@ -11,8 +11,7 @@ from shapely import affinity
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry import Model, Structure
-from cns_drake.city.geometry.rectangles import largest_rectangle
+from cns_drake.city import Model, Structure, largest_rectangle
 
 # Neighbours closer than this have blank walls towards each other [m].
 PARTY_WALL = 3.1

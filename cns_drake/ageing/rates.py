@@ -7,8 +7,7 @@ from pathlib import Path
 
 from scipy.stats import poisson
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.yaml_files import parse_yaml, read_yaml
+from cns_drake.base import InputError, parse_yaml, read_yaml
 
 # Not a rate, but the greatest distance that street furniture moves.
 MOVED = "moved"

@@ -6,21 +6,25 @@ from pathlib import Path
 import shutil
 
 from cns_drake.ageing.old_world import OldWorld
-from cns_drake.base.csv_files import write_csv
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import user_errors
-from cns_drake.city.generation.stage_sizes import (
+from cns_drake.base import InputError, user_errors, write_csv
+from cns_drake.city import (
+    Mesh,
+    MeshShape,
+    Structure,
     count_triangles,
     stage_size,
     triangles_in,
+    world_sdf,
 )
-from cns_drake.city.generation.world_sdf import world_sdf
-from cns_drake.city.geometry import Mesh, MeshShape, Structure
-from cns_drake.scene import map_folder
-from cns_drake.scene.labels import MAX_INSTANCE
-from cns_drake.scene.map_folder import stage_name
-from cns_drake.scene.material_cells import material_word, read_materials
-from cns_drake.scene.materials import USUAL_MATERIALS
+from cns_drake.scene import (
+    MAX_INSTANCE,
+    MESH_FOLDER,
+    STRUCTURES_NAME,
+    USUAL_MATERIALS,
+    material_word,
+    read_materials,
+    stage_name,
+)
 
 # Name of the stage of today, which is the first.
 TODAY = "01"
@@ -115,7 +119,7 @@ class StageWriter:
         """
         if name in self._triangles:
             return
-        place = Path(map_folder.MESH_FOLDER) / f"{name}.obj"
+        place = Path(MESH_FOLDER) / f"{name}.obj"
         path = self._world.folder.path / place
         if path.is_file():
             with user_errors(path):
@@ -155,7 +159,7 @@ class StageWriter:
         if any(row.get("kind") for row in rows):
             columns = list(dict.fromkeys([*columns, "kind"]))
         cells = ([row.get(name, "") for name in columns] for row in rows)
-        write_csv(self._draft / map_folder.STRUCTURES_NAME, columns, cells)
+        write_csv(self._draft / STRUCTURES_NAME, columns, cells)
 
     def _cell_of_old(self, row: Mapping[str, str]) -> str:
         """Returns the cell `material` of a structure of today.

@@ -10,9 +10,8 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.ageing.events import PUT_UP, TAKEN_DOWN, Event
 from cns_drake.ageing.old_world import OldWorld
-from cns_drake.city.geometry import Structure, part_triangles
-from cns_drake.scene.semantics import GROUND_CLASSES
-from cns_drake.scene.structure_table import StructureEntry
+from cns_drake.city import Structure, part_triangles
+from cns_drake.scene import GROUND_CLASSES, StructureEntry
 
 
 class StandingStructures:

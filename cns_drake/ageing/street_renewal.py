@@ -13,9 +13,9 @@ from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.rates import MOVED
 from cns_drake.ageing.standing_structures import StandingStructures
 from cns_drake.ageing.yearly_draws import YearlyDraws
-from cns_drake.city.geometry import Part, Structure, assemble, block
-from cns_drake.scene.materials import MATERIALS
-from cns_drake.transient.structure_geometry import StructureGeometry
+from cns_drake.city import Part, Structure, assemble, block
+from cns_drake.scene import MATERIALS
+from cns_drake.transient import StructureGeometry
 
 # Street furniture that moves does so by at least this distance [m].
 _LEAST_MOVE = 0.2

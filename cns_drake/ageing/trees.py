@@ -11,11 +11,9 @@ from cns_drake.ageing import kinds
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.standing_structures import StandingStructures
 from cns_drake.ageing.yearly_draws import YearlyDraws
-from cns_drake.city.geometry import Structure
-from cns_drake.city.plants.plant_sizes import scaled_plant
-from cns_drake.city.plants.trees import SPECIES
-from cns_drake.imports.named_randomness import random_generator
-from cns_drake.transient.structure_geometry import StructureGeometry
+from cns_drake.city import SPECIES, Structure, scaled_plant
+from cns_drake.imports import random_generator
+from cns_drake.transient import StructureGeometry
 
 # Least and greatest growth of a tree in a year [m].
 _GROWTH = (0.3, 0.5)

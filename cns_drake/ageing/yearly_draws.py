@@ -6,7 +6,7 @@ import numpy as np
 
 from cns_drake.ageing.rates import Tally
 from cns_drake.ageing.standing_structures import StandingStructures
-from cns_drake.imports.named_randomness import random_generator, random_share
+from cns_drake.imports import random_generator, random_share
 
 
 class YearlyDraws:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from itertools import pairwise
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 
 # A city ages by at most this many years, or was this many years younger.
 LAST_YEAR = 200

@@ -29,8 +29,11 @@ def attach(
     }
 
     def get(name: str) -> Any:
-        if name in homes:
-            return getattr(importlib.import_module(homes[name]), name)
+        home = homes.get(name)
+        if home == package:  # A module that is offered as a whole.
+            return importlib.import_module(f"{package}.{name}")
+        if home is not None:
+            return getattr(importlib.import_module(home), name)
         raise AttributeError(f"module {package!r} has no attribute {name!r}")
 
     return get, lambda: sorted(homes), list(homes)

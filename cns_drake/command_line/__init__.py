@@ -1,1 +1,5 @@
 """The command `cns-drake` and the diagram scripts."""
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -7,11 +7,15 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import shared_options
-from cns_drake.base.errors import InputError, did_you_mean, errors_at_option
-from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.number_format import whole_number
-from cns_drake.base.terminal import show
+from cns_drake.base import (
+    InputError,
+    did_you_mean,
+    errors_at_option,
+    shared_options,
+    show,
+    uninterrupted,
+    whole_number,
+)
 from cns_drake.command_line.suggestions import suggest_reproduction
 
 Years = Annotated[
@@ -106,10 +110,8 @@ def age(
     if len(maps) != 1:
         raise InputError(f"give one map, not {' '.join(maps) or 'none'}")
     with uninterrupted():
-        from cns_drake.ageing.aged_map import age_map
-        from cns_drake.ageing.aged_pictures import draw_pictures
-        from cns_drake.ageing.rates import read_rates
-        from cns_drake.scenarios.shipped import shipped_maps
+        from cns_drake.ageing import age_map, draw_pictures, read_rates
+        from cns_drake.scenarios import shipped_maps
 
     folder = shipped_maps().get(maps[0], Path(maps[0]))
     if not folder.is_dir():

@@ -6,10 +6,7 @@ that `--help` and `list` answer at once. Interrupts wait during imports.
 
 from collections.abc import Callable
 
-from cns_drake.base import program
-from cns_drake.base.commands import Command
-from cns_drake.base.program import example
-from cns_drake.base.progress_display import show_progress
+from cns_drake.base import Command, example, program, show_progress
 from cns_drake.command_line import exporting, learning, simulating, studying
 from cns_drake.command_line.ageing import age
 from cns_drake.command_line.importing import import_city

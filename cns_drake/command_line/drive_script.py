@@ -7,15 +7,14 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Literal
 
-from cns_drake.base import program, progress_display, terminal
-from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base import program, show_progress, terminal, uninterrupted
 from cns_drake.command_line import options
 from cns_drake.command_line.suggestions import suggest_export
 
 if TYPE_CHECKING:
-    from cns_drake.scenarios.scenario import Scenario
-    from cns_drake.sensors.lidar.config import WeatherConfig
-    from cns_drake.simulation.simulation import FinishedSimulation
+    from cns_drake.scenarios import Scenario
+    from cns_drake.sensors import WeatherConfig
+    from cns_drake.simulation import FinishedSimulation
 
 
 def run_drive(
@@ -77,9 +76,9 @@ def run_drive(
         run_drive("downtown_01", "recordings", frames=20)
     """
     with uninterrupted():  # Slow to import, not needed for `--help`.
-        from cns_drake.base.process import num_cores
-        from cns_drake.scenarios.scenario_files import load_scenario
-        from cns_drake.simulation.simulation import simulate
+        from cns_drake.base import num_cores
+        from cns_drake.scenarios import load_scenario
+        from cns_drake.simulation import simulate
 
     scenario = _changed_scenario(
         load_scenario(name_or_file),
@@ -95,7 +94,7 @@ def run_drive(
     )
     if frames is not None:
         scenario = scenario.replaced(frames=frames)
-    with progress_display.show_progress():
+    with show_progress():
         run = simulate(
             scenario,
             output,
@@ -205,4 +204,4 @@ def run_script(name: str, description: str) -> None:
         epilog=epilog,
         context_settings=program.WIDE_HELP,
     )(script)
-    program.run(app, Path(sys.argv[0]).name, progress_display.show_progress())
+    program.run(app, Path(sys.argv[0]).name, show_progress())

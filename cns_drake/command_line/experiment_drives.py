@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cns_drake.base.terminal import note
+from cns_drake.base import note
 
 if TYPE_CHECKING:
-    from cns_drake.base.jobs.cluster import Cluster
-    from cns_drake.scenarios.scenario import Scenario
+    from cns_drake.base import Cluster
+    from cns_drake.scenarios import Scenario
 
 
 def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
@@ -26,12 +26,8 @@ def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
     Raises:
         InputError: the experiment cannot be used.
     """
-    from cns_drake.scenarios.scenario_files import write_scenarios
-    from cns_drake.studies.experiments.experiment_files import (
-        load_experiment,
-    )
-    from cns_drake.studies.maps.experiment_maps import ExperimentRun
-    from cns_drake.studies.study import study_drives
+    from cns_drake.scenarios import write_scenarios
+    from cns_drake.studies import ExperimentRun, load_experiment, study_drives
 
     # Nothing is measured, and no program of the experiment runs.
     unused = {"tasks": {"place": {}}, "methods": {"solid": {}}, "charts": []}

@@ -10,10 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cns_drake.base import commands, shared_options
-from cns_drake.base.errors import InputError
-from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.terminal import next_command, note, show
+from cns_drake.base import (
+    InputError,
+    commands,
+    next_command,
+    note,
+    shared_options,
+    show,
+    uninterrupted,
+)
 from cns_drake.command_line import options
 from cns_drake.command_line.experiment_drives import varied_drives
 from cns_drake.command_line.suggestions import (
@@ -21,13 +26,13 @@ from cns_drake.command_line.suggestions import (
     suggest_page,
     suggest_recognition,
 )
-from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition import RetrievalProtocol
 
 if TYPE_CHECKING:
-    from cns_drake.base.jobs.cluster import Cluster
-    from cns_drake.drives.drive import Drive
-    from cns_drake.scenarios.scenario import Scenario
-    from cns_drake.studies.exports.pair_export import ExportOptions
+    from cns_drake.base import Cluster
+    from cns_drake.drives import Drive
+    from cns_drake.scenarios import Scenario
+    from cns_drake.studies import ExportOptions
 
 
 class Format(str, Enum):
@@ -189,7 +194,7 @@ def export(
     words = drives or []
     if layout in _PAIRS:
         with uninterrupted():
-            from cns_drake.base.jobs.cluster import choose_cluster
+            from cns_drake.base import choose_cluster
 
         cluster = choose_cluster(jobs, scheduler)
         learned = _learned_drives(words, vary, output, cluster)
@@ -202,7 +207,7 @@ def export(
             _write_overlap_table(learned, named, output, protocol, json=json)
             return
         with uninterrupted():
-            from cns_drake.studies.exports.pair_export import ExportOptions
+            from cns_drake.studies import ExportOptions
 
         settings = ExportOptions(
             "overlap" if layout == Format.OVERLAP else "pointnetvlad",
@@ -282,7 +287,7 @@ def _export_recording(
 ) -> None:
     """Converts a recording to the layout of a data set."""
     with uninterrupted():
-        from cns_drake.export.exporting import export_drive
+        from cns_drake.export import export_drive
 
     path = export_drive(
         Path(recording),
@@ -310,8 +315,8 @@ def _export_film(
 ) -> None:
     """Makes one film that shows a drive in every stage of its city."""
     with uninterrupted():
-        from cns_drake.scenarios.scenario_files import load_scenario
-        from cns_drake.simulation.film import make_film, with_some_traffic
+        from cns_drake.scenarios import load_scenario
+        from cns_drake.simulation import make_film, with_some_traffic
 
     drive = load_scenario(scenario)
     match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", size)
@@ -350,8 +355,7 @@ def _learned_drives(
     shipped drives if neither is given.
     """
     with uninterrupted():
-        from cns_drake.scenarios.scenario_files import load_scenario
-        from cns_drake.scenarios.shipped import recordable_drives
+        from cns_drake.scenarios import load_scenario, recordable_drives
 
     if not names and vary is None:
         names = list(recordable_drives())
@@ -375,15 +379,13 @@ def _write_overlap_table(
     `words` are the words of the command line that name the drives.
     """
     with uninterrupted():
-        from cns_drake.studies.exports import pair_export
+        from cns_drake.studies import write_overlap_table
 
     if len(drives) != 2:
         raise InputError(
             "--format overlap-table: give two drives, database and query"
         )
-    table = pair_export.write_overlap_table(
-        drives[0], drives[1], output, protocol
-    )
+    table = write_overlap_table(drives[0], drives[1], output, protocol)
     show({"output": [str(table)]}, str(table), json=json)
     suggest_recognition(drives, words, table, protocol)
 
@@ -403,12 +405,12 @@ def _write_training_data(
     drives for evaluation, which are not used for training.
     """
     with uninterrupted():
-        from cns_drake.scenarios.scenario_files import load_scenario
-        from cns_drake.studies.exports import pair_export
+        from cns_drake.scenarios import load_scenario
+        from cns_drake.studies import export_pairs
 
     tested = [load_scenario(name) for name in held_out]
     taken = {drive.name for drive in tested}
-    paths = pair_export.export_pairs(
+    paths = export_pairs(
         [drive for drive in learned if drive.name not in taken],
         tested,
         output,
@@ -433,10 +435,9 @@ def _write_truth(
         json: whether to print the counts of labels as JSON.
     """
     with uninterrupted():
-        from cns_drake.base.complete_files import check_new_folder
-        from cns_drake.studies.ground_truth.labelled_drive import open_labelled
-        from cns_drake.studies.ground_truth.map_truth import write_truth
-        from evaluation.map_update.labels import Label
+        from cns_drake.base import check_new_folder
+        from cns_drake.studies import open_labelled, write_truth
+        from evaluation.map_update import Label
 
     check_new_folder(output)
     first, second = open_labelled(a), open_labelled(b)
@@ -482,10 +483,9 @@ def _write_sessions(
 ) -> None:
     """Writes maps of two drives without labels."""
     with uninterrupted():
-        from cns_drake.base.complete_files import draft_folder
-        from cns_drake.drives.same_world import check_same_world
-        from evaluation.map_update.labels import SIDES
-        from evaluation.map_update.sessions import write_session
+        from cns_drake.base import draft_folder
+        from cns_drake.drives import check_same_world
+        from evaluation.map_update import SIDES, write_session
 
     for drive in drives:
         for text in drive.notes:
@@ -500,7 +500,7 @@ def _write_sessions(
 def _write_images(drive: Drive, output: Path, *, json: bool) -> None:
     """Writes bird's-eye images of a drive."""
     with uninterrupted():
-        from evaluation.real.image_sequences import write_images
+        from evaluation.real import write_images
 
     write_images(drive, output, note)
     show({"output": str(output)}, str(output), json=json)

@@ -9,15 +9,24 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import shared_options
-from cns_drake.base.errors import InputError, errors_at_option
-from cns_drake.base.files import natural_key
-from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.number_format import whole_number
-from cns_drake.base.terminal import note, show
-from cns_drake.imports.options import DriveOn, ImportOptions, Undated
-from cns_drake.imports.report import REPORT_NAME, ImportReport
-from cns_drake.scene.map_folder import MapFolder
+from cns_drake.base import (
+    InputError,
+    errors_at_option,
+    natural_key,
+    note,
+    shared_options,
+    show,
+    uninterrupted,
+    whole_number,
+)
+from cns_drake.imports import (
+    REPORT_NAME,
+    DriveOn,
+    ImportOptions,
+    ImportReport,
+    Undated,
+)
+from cns_drake.scene import MapFolder
 
 # Default share of the buildings that change between an added first stage and
 # today.
@@ -114,8 +123,8 @@ def import_city(
         dressed=not plain,
     )
     with uninterrupted():
-        from cns_drake.imports.import_map import import_city as write_city
-        from cns_drake.scenarios.drive_table import write_table
+        from cns_drake.imports import import_city as write_city
+        from cns_drake.scenarios import write_table
 
     with errors_at_option("--output", "output"):
         report = write_city(

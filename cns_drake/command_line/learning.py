@@ -8,9 +8,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import terminal
-from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.shared_options import Jobs, Scheduler
+from cns_drake.base import Jobs, Scheduler, terminal, uninterrupted
 
 
 class Variation(str, Enum):
@@ -70,11 +68,8 @@ def train(
             training takes about 1.5 times as long as without.
     """
     with uninterrupted():
-        from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.studies.training.weights import (
-            TrainingPlan,
-            make_weights,
-        )
+        from cns_drake.base import choose_cluster
+        from cns_drake.studies import TrainingPlan, make_weights
 
     cluster = choose_cluster(jobs, scheduler)
     fields: dict[str, int | bool] = {"seed": seed}

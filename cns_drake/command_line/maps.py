@@ -11,14 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import shared_options
-from cns_drake.base.errors import InputError
-from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.terminal import note, show
+from cns_drake.base import InputError, note, shared_options, show, uninterrupted
 from cns_drake.command_line.suggestions import suggest_reproduction
 
 if TYPE_CHECKING:
-    from cns_drake.scenarios.drive_table import DriveRow
+    from cns_drake.scenarios import DriveRow
 
 _HEADINGS = (
     "drive",
@@ -60,9 +57,8 @@ def list_drives(
             the drives of the shipped maps.
     """
     with uninterrupted():
-        from cns_drake.scenarios.drive_table import drive_rows
-        from cns_drake.scenarios.shipped import shipped_maps
-        from cns_drake.scene.map_folder import no_drives
+        from cns_drake.scenarios import drive_rows, shipped_maps
+        from cns_drake.scene import no_drives
 
     rows = []
     for folder in folders or shipped_maps().values():
@@ -145,12 +141,8 @@ def city(
             by their coordinates in the structures.csv of the last run.
     """
     with uninterrupted():
-        from cns_drake.city.generation.generate import (
-            differing_files,
-            generate_city,
-        )
-        from cns_drake.city.generation.starter import start_city
-        from cns_drake.scenarios.drive_table import write_table
+        from cns_drake.city import differing_files, generate_city, start_city
+        from cns_drake.scenarios import write_table
 
     if seed is not None and not new:
         raise InputError("--seed: has no effect without --new")

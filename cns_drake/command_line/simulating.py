@@ -9,16 +9,20 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cns_drake.base import shared_options
-from cns_drake.base.errors import InputError
-from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.progress import doing
-from cns_drake.base.terminal import next_command, note, show
+from cns_drake.base import (
+    InputError,
+    doing,
+    next_command,
+    note,
+    shared_options,
+    show,
+    uninterrupted,
+)
 from cns_drake.command_line import options
 from cns_drake.command_line.experiment_drives import varied_drives
 
 if TYPE_CHECKING:
-    from cns_drake.sensors.lidar.config import WeatherConfig
+    from cns_drake.sensors import WeatherConfig
 
 ReturnsModel = Literal["ideal", "calibrated"]
 Returns = Annotated[
@@ -90,7 +94,7 @@ def choose_returns(
         return returns, None
     from pydantic import ValidationError
 
-    from cns_drake.sensors.lidar.config import WeatherConfig
+    from cns_drake.sensors import WeatherConfig
 
     if returns == "ideal":
         raise InputError("--returns ideal: weather needs calibrated returns")
@@ -240,17 +244,15 @@ def scan(
         import numpy as np
         from pydrake.math import RigidTransform, RollPitchYaw
 
-        from cns_drake.base.complete_files import check_writable
-        from cns_drake.scene.surfaces import LARGEST_SIZE
-        from cns_drake.scene.world import load_world
-        from cns_drake.sensors.lidar.config import (
+        from cns_drake.base import check_writable
+        from cns_drake.scene import LARGEST_SIZE, load_world
+        from cns_drake.sensors import (
             WeatherConfig,
             make_lidar_config,
             make_pattern,
             make_returns,
         )
-        from cns_drake.simulation.scan_files import check_ending, save_scan
-        from cns_drake.simulation.scanning import scan_world
+        from cns_drake.simulation import check_ending, save_scan, scan_world
 
     if not np.isfinite(pose).all():
         raise InputError("--pose: not finite")
@@ -295,10 +297,9 @@ def generate(
     recordings are skipped.
     """
     with uninterrupted():
-        from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.scenarios.scenario_files import load_scenario
-        from cns_drake.scenarios.shipped import recordable_drives
-        from cns_drake.studies.recordings.recording import record_all
+        from cns_drake.base import choose_cluster
+        from cns_drake.scenarios import load_scenario, recordable_drives
+        from cns_drake.studies import record_all
 
     cluster = choose_cluster(jobs, scheduler)
     if not names and vary is None:

@@ -7,13 +7,15 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import shared_options
-from cns_drake.base.errors import InputError
-from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.terminal import note, resumable
+from cns_drake.base import (
+    InputError,
+    note,
+    resumable,
+    shared_options,
+    uninterrupted,
+)
 from cns_drake.command_line import options
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.protocol_options import with_protocols
+from evaluation.recognition import RetrievalProtocol, with_protocols
 
 
 @with_protocols("fair", "paper")
@@ -47,12 +49,9 @@ def reproduce(
             space, and does not change the results.
     """
     with uninterrupted():
-        from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.studies.recordings import reproduction
-        from evaluation.command_line.suggestions import (
-            name_tables,
-            suggest_comparison,
-        )
+        from cns_drake.base import choose_cluster
+        from cns_drake.studies import reproduce_maps
+        from evaluation.command_line import name_tables, suggest_comparison
 
     cluster = choose_cluster(jobs, scheduler)
     if pages and not recordings:
@@ -60,7 +59,7 @@ def reproduce(
             "--no-recordings and --pages exclude each other; give one of them"
         )
     with resumable():
-        report = reproduction.reproduce_maps(
+        report = reproduce_maps(
             maps,
             output,
             cluster,
@@ -132,13 +131,13 @@ def study(
             do nothing else.
     """
     with uninterrupted():
-        from cns_drake.studies.experiments.experiment import named_programs
-        from cns_drake.studies.experiments.experiment_files import (
+        from cns_drake.studies import (
             load_experiment,
+            named_programs,
             parse_override,
             shipped_experiments,
         )
-        from evaluation.study.chosen_methods import expanded_names
+        from evaluation.study import expanded_names
 
     if list_all:
         for known in shipped_experiments():
@@ -171,12 +170,9 @@ def study(
                         " with your permissions; read it, then add --allow-code"
                     )
     with uninterrupted():
-        from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.studies.study import run_study
-        from evaluation.command_line.suggestions import (
-            name_tables,
-            suggest_comparison,
-        )
+        from cns_drake.base import choose_cluster
+        from cns_drake.studies import run_study
+        from evaluation.command_line import name_tables, suggest_comparison
 
     with resumable():
         page = run_study(

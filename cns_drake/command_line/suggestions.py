@@ -10,13 +10,12 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.terminal import next_command
+from cns_drake.base import InputError, next_command
 
 if TYPE_CHECKING:
-    from cns_drake.drives.drive import Drive
-    from cns_drake.scenarios.scenario import Scenario
-    from evaluation.recognition.protocol import RetrievalProtocol
+    from cns_drake.drives import Drive
+    from cns_drake.scenarios import Scenario
+    from evaluation.recognition import RetrievalProtocol
 
 # Folder of recordings in the suggestions.
 _RECORDINGS = Path("drives")
@@ -67,8 +66,7 @@ def has_loop(drive: Drive) -> bool:
     """
     from scipy.spatial.distance import cdist
 
-    from evaluation.recognition.overlap_truth import compared_frames
-    from evaluation.recognition.protocol import RetrievalProtocol
+    from evaluation.recognition import RetrievalProtocol, compared_frames
 
     protocol = RetrievalProtocol(exclude_recent=_EXCLUDED)
     queries, places = compared_frames(drive, drive, protocol)

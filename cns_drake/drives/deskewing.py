@@ -4,8 +4,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError, poses
 from cns_drake.drives.drive import Drive
 from cns_drake.drives.mcap_drive import McapDrive
 

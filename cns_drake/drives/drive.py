@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from cns_drake.drives.lidar_fields import LidarField, lidar_field
 
 # W is the world, B the vehicle on the ground, I the IMU. The pose is X_WB. Both

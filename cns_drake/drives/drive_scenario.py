@@ -4,9 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 import re
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import is_there
-from cns_drake.base.yaml_files import read_yaml
+from cns_drake.base import InputError, is_there, read_yaml
 
 # Name of the file with the scenario, in the folder of an exported drive.
 SCENARIO = "scenario.yaml"

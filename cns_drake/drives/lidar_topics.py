@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from cns_drake.drives import ros_types
 
 LIDAR_TOPIC = "/lidar/points"

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from cns_drake.base import InputError, listed
 from cns_drake.base import points as point_arrays
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import listed
 from cns_drake.drives import mcap_messages, ros_types
 from cns_drake.drives.drive import ODOMETRY_DTYPE, Drive, index_instances
 from cns_drake.drives.lidar_topics import (

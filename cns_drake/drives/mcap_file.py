@@ -46,8 +46,7 @@ from mcap.records import (
 import numpy as np
 import zstandard
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular, user_errors
+from cns_drake.base import InputError, check_regular, user_errors
 
 _MAGIC = b"\x89MCAP0\r\n"
 # Opcode and length.

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError, value_errors
+from cns_drake.base import InputError, poses, value_errors
 from cns_drake.drives import ros_types
 
 # More bytes than a message of each type can need [bytes]. A few compressed

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.json_text import parse_json
+from cns_drake.base import InputError, parse_json, value_errors
 from cns_drake.drives import mcap_messages
 from cns_drake.drives.mcap_file import McapFile
 from cns_drake.drives.message_rows import MessageRows, check_agreement

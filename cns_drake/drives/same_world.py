@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from cns_drake.drives.drive import Drive
 
 

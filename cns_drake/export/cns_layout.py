@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 import yaml
 
-from cns_drake.base.points import encode_pcd
-from cns_drake.drives.mcap_drive import McapDrive
+from cns_drake.base import encode_pcd
+from cns_drake.drives import McapDrive
 from cns_drake.export.layout import (
     Layout,
     checked_name,

@@ -11,18 +11,30 @@ import os
 from pathlib import Path
 import shutil
 
-from cns_drake.base import complete_files, files
-from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.progress import doing, track
-from cns_drake.base.yaml_files import read_yaml
-from cns_drake.drives.deskewing import deskewed_notes, deskewed_scan
-from cns_drake.drives.mcap_drive import McapDrive, holds_mcap
+from cns_drake.base import (
+    InputError,
+    doing,
+    make_folder,
+    part_path,
+    read_yaml,
+    sole_writer,
+    track,
+    user_errors,
+    value_errors,
+    write_text,
+)
+from cns_drake.drives import (
+    McapDrive,
+    deskewed_notes,
+    deskewed_scan,
+    holds_mcap,
+)
 from cns_drake.export.cns_layout import CNS
 from cns_drake.export.kitti_layout import KITTI, kitti_layout
 from cns_drake.export.layout import Layout
 from cns_drake.export.mulran_layout import MULRAN
 from cns_drake.export.tum_layout import TUM
-from cns_drake.recording.rosbag2_metadata import to_yaml
+from cns_drake.recording import to_yaml
 
 _LAYOUTS = {"cns": CNS, "kitti": KITTI, "mulran": MULRAN, "tum": TUM}
 # File that shows that an export wrote a folder of drives.
@@ -84,16 +96,16 @@ def export_drive(
         )
     if layout.shared_outer_files:
         _check_shared_files(outer)
-    part = complete_files.part_path(folder)
-    with complete_files.sole_writer(folder):
+    part = part_path(folder)
+    with sole_writer(folder):
         try:
             for note in _notes(drive, layout):
                 on_note(note)
             _write_drive(drive, layout, part)
             for path, text in outer.items():
-                files.make_folder(path.parent)
-                complete_files.write_text(path, text)
-            with files.user_errors(folder):
+                make_folder(path.parent)
+                write_text(path, text)
+            with user_errors(folder):
                 os.replace(part, folder)
         finally:
             shutil.rmtree(part, ignore_errors=True)
@@ -118,7 +130,7 @@ def _check_shared_files(texts: Mapping[Path, str]) -> None:
         InputError: a file differs.
     """
     for path, text in texts.items():
-        with files.user_errors(path):
+        with user_errors(path):
             is_other = path.is_file() and path.read_bytes() != text.encode()
         if is_other:
             raise InputError(
@@ -148,7 +160,7 @@ def _notes(drive: McapDrive, layout: Layout) -> Iterator[str]:
 def _claim(output: Path, format_name: str) -> None:
     """Makes the folder of drives, or checks that an export has written it."""
     marker = output / _MARKER
-    with files.user_errors(output):
+    with user_errors(output):
         if marker.is_file():
             values = read_yaml(marker)
             found = values.get("format") if isinstance(values, dict) else None
@@ -168,14 +180,14 @@ def _claim(output: Path, format_name: str) -> None:
                 f"{output}: the folder holds other files; give a new or an "
                 "empty one"
             )
-    files.make_folder(output)
+    make_folder(output)
     explained = read_yaml(Path(__file__).with_name("layouts.yaml"))
     values = {
         "writer": "cns-drake export",
         "format": format_name,
         "files": explained[format_name],
     }
-    complete_files.write_text(marker, to_yaml(values))
+    write_text(marker, to_yaml(values))
 
 
 def _write_drive(
@@ -183,7 +195,7 @@ def _write_drive(
     layout: Layout,
     folder: Path,
 ) -> None:
-    with files.user_errors(folder):
+    with user_errors(folder):
         # An interrupted export may have left it behind.
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)

@@ -5,9 +5,8 @@ import re
 
 import numpy as np
 
-from cns_drake.base import poses
-from cns_drake.base.points import encode_bin
-from cns_drake.drives.mcap_drive import McapDrive
+from cns_drake.base import encode_bin, poses
+from cns_drake.drives import McapDrive
 from cns_drake.export.layout import (
     Layout,
     imu_files,

@@ -11,10 +11,9 @@ import re
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.poses import FARTHEST
-from cns_drake.drives.mcap_drive import McapDrive
-from cns_drake.recording.rosbag2_metadata import to_yaml
+from cns_drake.base import FARTHEST, InputError
+from cns_drake.drives import McapDrive
+from cns_drake.recording import to_yaml
 
 # Text that may become the name of a folder; it cannot lead out of its parent.
 _NAME = re.compile(r"\w[\w.-]*")

@@ -7,14 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.drives.drive_scenario import read_scenario
-from cns_drake.drives.mcap_drive import McapDrive
-from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.scene.map_folder import MapFolder
-from cns_drake.scene.semantics import moving_id
-from cns_drake.scene.structure_table import load_structure_table
-from cns_drake.scene.world import load_world, structures_in
+from cns_drake.base import InputError
+from cns_drake.drives import McapDrive, read_scenario
+from cns_drake.scenarios import shipped_maps
+from cns_drake.scene import (
+    MapFolder,
+    load_structure_table,
+    load_world,
+    moving_id,
+    structures_in,
+)
 
 
 class MarkedDrive(McapDrive):

@@ -2,10 +2,8 @@
 
 from pathlib import PurePosixPath
 
-from cns_drake.base import poses
-from cns_drake.base.points import encode_bin
-from cns_drake.drives import mulran_frames
-from cns_drake.drives.mcap_drive import McapDrive
+from cns_drake.base import encode_bin, poses
+from cns_drake.drives import ORIGIN, X_BS, McapDrive
 from cns_drake.export.layout import (
     Layout,
     checked_name,
@@ -17,8 +15,8 @@ from cns_drake.export.layout import (
 
 def _inner_files(drive: McapDrive) -> dict[str, str]:
     # The vehicle is where MulRan's mount of the LiDAR has it below this LiDAR.
-    X_UB = drive.X_WS @ poses.inverse(mulran_frames.X_BS)
-    X_UB[:, :3, 3] += mulran_frames.ORIGIN
+    X_UB = drive.X_WS @ poses.inverse(X_BS)
+    X_UB[:, :3, 3] += ORIGIN
     rows = X_UB[:, :3].reshape(-1, 12)
     return {
         "global_pose.csv": stamped_rows(drive.stamps_ns.tolist(), [rows], ","),

@@ -4,7 +4,7 @@ from pathlib import PurePosixPath
 
 from scipy.spatial.transform import Rotation
 
-from cns_drake.drives.mcap_drive import McapDrive
+from cns_drake.drives import McapDrive
 from cns_drake.export.layout import (
     Layout,
     checked_name,

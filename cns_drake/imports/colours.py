@@ -1,6 +1,6 @@
 """Colours and finishes of imported structures."""
 
-from cns_drake.city.geometry import Finish
+from cns_drake.city import Finish
 
 Rgb = tuple[float, float, float]
 # A roof of clay tiles.

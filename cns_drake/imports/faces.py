@@ -9,8 +9,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 from shapely.validation import make_valid
 
-from cns_drake.city.geometry import long_normals, triangulate
-from cns_drake.city.geometry.polygons import GRID
+from cns_drake.city import GRID, long_normals, triangulate
 from cns_drake.imports.faults import ImportFaults
 
 # Faces with less area are dropped [m^2].

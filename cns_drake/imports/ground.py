@@ -10,14 +10,7 @@ from scipy.ndimage import gaussian_filter
 import shapely
 from shapely.geometry import Point
 
-from cns_drake.city.geometry import (
-    Mesh,
-    MeshShape,
-    Model,
-    Part,
-    Structure,
-    hull_of,
-)
+from cns_drake.city import Mesh, MeshShape, Model, Part, Structure, hull_of
 from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.surface_samples import surface_samples

@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from shapely import STRtree
 
-from cns_drake.city.geometry import MeshShape
+from cns_drake.city import MeshShape
 from cns_drake.imports.former_buildings import with_former_buildings
 from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.named_randomness import random_share

@@ -12,11 +12,8 @@ from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 from threadpoolctl import threadpool_limits
 
-from cns_drake.base.complete_files import draft_folder
-from cns_drake.base.errors import InputError
-from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.progress import doing
-from cns_drake.city.geometry import Mesh, MeshShape
+from cns_drake.base import InputError, doing, draft_folder, uninterrupted
+from cns_drake.city import Mesh, MeshShape
 from cns_drake.imports import map_files, overview
 from cns_drake.imports.cityjson.city import import_cityjson
 from cns_drake.imports.dressing.dressed_city import dress_city
@@ -39,11 +36,13 @@ from cns_drake.imports.openstreetmap.traffic import lane_text_of_streets
 from cns_drake.imports.options import DriveOn, ImportOptions
 from cns_drake.imports.report import ImportReport
 from cns_drake.imports.staged_city import StagedCity, stage_city
-from cns_drake.roads.lane_path import POINT_SPACING
-from cns_drake.roads.u_turn import TIGHTEST_RADIUS
-from cns_drake.roads.waypoint_file import read_waypoints
-from cns_drake.roads.waypoints import load_waypoint_path
-from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER, check_new_map
+from cns_drake.roads import (
+    POINT_SPACING,
+    TIGHTEST_RADIUS,
+    load_waypoint_path,
+    read_waypoints,
+)
+from cns_drake.scene import LANES_NAME, MESH_FOLDER, check_new_map
 
 # A function that gets a map's folder, and the name of each stage -> the numbers
 # of structures and triangles in the stage.

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from cns_drake.city.geometry import (
+from cns_drake.city import (
     Finish,
     Mesh,
     MeshShape,
@@ -15,7 +15,7 @@ from cns_drake.city.geometry import (
     Structure,
     hull_of,
 )
-from cns_drake.scene.semantics import GROUND_CLASSES
+from cns_drake.scene import GROUND_CLASSES
 
 # Classes of the ground on which cars may drive.
 _GROUND_OF_CARS = GROUND_CLASSES - {"sidewalk"}

@@ -6,22 +6,20 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from cns_drake.city.generation.rendering import structures_csv
-from cns_drake.city.generation.stage_sizes import stage_size, triangles_in
-from cns_drake.city.generation.world_sdf import world_sdf
-from cns_drake.city.geometry.structures import Structure
+from cns_drake.city import (
+    Structure,
+    stage_size,
+    structures_csv,
+    triangles_in,
+    world_sdf,
+)
 from cns_drake.imports.dressing.dressed_city import Dressing
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.options import ImportOptions
 from cns_drake.imports.report import REPORT_NAME, ImportReport
 from cns_drake.imports.staged_city import StagedCity
-from cns_drake.scene.map_folder import (
-    MESH_FOLDER,
-    STRUCTURES_NAME,
-    MapFolder,
-    stage_name,
-)
+from cns_drake.scene import MESH_FOLDER, STRUCTURES_NAME, MapFolder, stage_name
 
 # Column of the structure table: the year in which a building was built.
 YEAR_COLUMN = "built"

@@ -19,7 +19,7 @@ from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.imported_objects import ImportedObject
-from cns_drake.scene.semantics import CLASS_RGB
+from cns_drake.scene import CLASS_RGB
 
 _DPI = 130
 # Length of the longer side of the map in the picture [in].

@@ -4,7 +4,7 @@ import numpy as np
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
-from cns_drake.city.geometry import long_normals
+from cns_drake.city import long_normals
 from cns_drake.imports.faces import LEAST_AREA, flat_surface, level_rings
 from cns_drake.imports.faults import ImportFaults
 

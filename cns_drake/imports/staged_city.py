@@ -8,13 +8,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from cns_drake.imports.building_years import stands_today
 from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.former_buildings import with_former_buildings
 from cns_drake.imports.imported_objects import ImportedObject, boxes_of
 from cns_drake.imports.options import ImportOptions
-from cns_drake.scene.labels import MAX_INSTANCE
+from cns_drake.scene import MAX_INSTANCE
 
 # Greatest distance of a structure from the middle of a city [m].
 _FARTHEST = 10_000.0

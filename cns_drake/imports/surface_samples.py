@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cns_drake.city.geometry import quartered
+from cns_drake.city import quartered
 
 # Triangles with longer edges are divided, so that parts far away can be left
 # out [spacings].

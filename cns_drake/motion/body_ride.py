@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.base.elementary import cos, sin
+from cns_drake.base import cos, sin
 from cns_drake.motion.frame_motion import FrameMotion, cross
 
 # Heave, roll and pitch.

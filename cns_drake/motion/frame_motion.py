@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.elementary import product, rotated
+from cns_drake.base import product, rotated
 
 
 class FrameMotion(NamedTuple):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.base.elementary import arctan2
+from cns_drake.base import arctan2
 from cns_drake.motion.splines import SplineDerivatives, make_uniform_spline
 
 if TYPE_CHECKING:

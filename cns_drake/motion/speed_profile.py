@@ -7,7 +7,7 @@ from pydrake.trajectories import BsplineTrajectory
 
 from cns_drake.motion.path_geometry import SmoothPath
 from cns_drake.motion.splines import REACH, make_uniform_spline
-from cns_drake.roads.speeds import Speeds
+from cns_drake.roads import Speeds
 
 # Distance between the knots of the time scaling [s]. The acceleration changes
 # within about two of them, so the jerk stays near (acceleration / knot period).

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from pydrake.math import inv
 
-from cns_drake.base.elementary import product, rotated
+from cns_drake.base import product, rotated
 from cns_drake.motion.body_ride import NUM_COORDINATES, BodyRide
 from cns_drake.motion.road_profile import RoadProfile
 from cns_drake.motion.suspension_data import (

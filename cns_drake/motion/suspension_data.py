@@ -9,8 +9,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import PrismaticJoint
 
-from cns_drake.base.errors import validated
-from cns_drake.base.yaml_files import read_yaml
+from cns_drake.base import read_yaml, validated
 
 
 class AxleRates(BaseModel):

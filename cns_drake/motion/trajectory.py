@@ -10,14 +10,13 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base.elementary import cos, product, rotated, sin
+from cns_drake.base import cos, product, rotated, sin
 from cns_drake.motion import speed_profile
 from cns_drake.motion.body_ride import BodyRide, RideMoments, ride_motion
 from cns_drake.motion.frame_motion import FrameMotion, cross
 from cns_drake.motion.path_geometry import PathJet, SmoothPath
 from cns_drake.motion.splines import SplineDerivatives
-from cns_drake.roads.lane_path import LanePath
-from cns_drake.roads.speeds import Speeds
+from cns_drake.roads import LanePath, Speeds
 
 _UP = np.array([[0.0, 0.0, 1.0]])
 

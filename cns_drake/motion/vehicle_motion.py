@@ -24,7 +24,7 @@ from pydrake.systems.framework import (
     ValueProducer,
 )
 
-from cns_drake.base.elementary import arctan2
+from cns_drake.base import arctan2
 from cns_drake.motion.path_geometry import PathJet
 from cns_drake.motion.trajectory import Moments, Trajectory, poses_and_motion
 

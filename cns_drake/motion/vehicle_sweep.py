@@ -12,7 +12,7 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
-from cns_drake.base.elementary import product, rotated
+from cns_drake.base import product, rotated
 from cns_drake.motion.trajectory import Trajectory
 
 

@@ -15,8 +15,7 @@ import numpy as np
 from cns_drake.pictures.camera_views import View
 from cns_drake.pictures.figure_files import save_figure
 from cns_drake.pictures.stage_scene import StageScene
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios import Scenario, plan_drive
 
 # Side of a picture from above [pixels].
 _SIDE = 600

@@ -17,8 +17,7 @@ from pydantic import (
 )
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cns_drake.base.errors import InputError, describe_validation_error
-from cns_drake.base.yaml_files import read_yaml
+from cns_drake.base import InputError, describe_validation_error, read_yaml
 
 _Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 # Nearer points are not in a picture [m].

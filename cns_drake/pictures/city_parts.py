@@ -5,13 +5,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from cns_drake.scene.perception_geometry import (
+from cns_drake.scene import (
+    CLASS_RGB,
+    TriangleSurface,
+    World,
     merge_surfaces,
     read_perception_geometry,
 )
-from cns_drake.scene.semantics import CLASS_RGB
-from cns_drake.scene.surfaces import TriangleSurface
-from cns_drake.scene.world import World
 
 # Colour of geometry without one in pictures.
 DEFAULT_RGB = (0.7, 0.7, 0.7)

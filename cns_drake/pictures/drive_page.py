@@ -26,11 +26,7 @@ from cns_drake.pictures.page_panel import (
     read_template,
 )
 from cns_drake.pictures.static_page import make_static_page
-from cns_drake.scene.perception_geometry import (
-    PerceptionGeometry,
-    read_perception_geometry,
-)
-from cns_drake.scene.world import World
+from cns_drake.scene import PerceptionGeometry, World, read_perception_geometry
 
 # Opacity of absent structures. They are hidden behind present ones, and cast no
 # shadow.

@@ -4,8 +4,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from cns_drake.base.complete_files import completing
-from cns_drake.base.files import make_folder
+from cns_drake.base import completing, make_folder
 
 
 def save_figure(figure: Figure, path: Path, dpi: float) -> None:

@@ -8,13 +8,14 @@ from pydrake.geometry import Meshcat, MeshcatCone, Rgba
 from pydrake.math import RigidTransform
 from pydrake.perception import BaseField, Fields, PointCloud
 
-from cns_drake.base.polylines import distances_along
+from cns_drake.base import distances_along
 from cns_drake.pictures.city_parts import DEFAULT_RGB, ColouredPart
-from cns_drake.scene.perception_geometry import (
+from cns_drake.scene import (
     PerceptionGeometry,
+    TriangleSurface,
     merge_surfaces,
+    merge_triangles,
 )
-from cns_drake.scene.surfaces import TriangleSurface, merge_triangles
 
 # Vertices are rounded to an invisible grid of 4 mm, because the zeros at the
 # end of each float compress well.

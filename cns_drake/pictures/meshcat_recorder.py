@@ -13,12 +13,11 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
 
-from cns_drake.base.complete_files import write_text
-from cns_drake.base.jpeg_images import to_jpeg
+from cns_drake.base import to_jpeg, write_text
 from cns_drake.pictures.drive_page import make_drive_page, moving_frames
 from cns_drake.pictures.drive_record import DriveRecord
 from cns_drake.pictures.page_panel import ShownStages
-from cns_drake.scene.world import World
+from cns_drake.scene import World
 
 # These limits keep the page of any drive below 25 MB.
 _MAX_SCANS = 160

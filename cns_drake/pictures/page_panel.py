@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from cns_drake.base.polylines import length_of
+from cns_drake.base import length_of
 from cns_drake.pictures import meshcat_drawing as drawing
 from cns_drake.pictures.drive_record import DriveRecord
-from cns_drake.scene.world import World
+from cns_drake.scene import World
 
 Rgb = tuple[float, float, float]
 

@@ -1,6 +1,6 @@
 """The other stage that a drive's web page shows for comparison."""
 
-from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios import Scenario
 
 
 def other_stage(scenario: Scenario) -> tuple[Scenario | None, str]:

@@ -8,8 +8,8 @@ import numpy as np
 from cns_drake.pictures.camera_views import View
 from cns_drake.pictures.figure_files import save_figure
 from cns_drake.pictures.stage_scene import StageScene
-from cns_drake.recording.schedule import FRAME_PERIOD
-from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.recording import FRAME_PERIOD
+from cns_drake.sensors import make_beam_pattern
 
 # Size of a camera's view [pixels].
 _WIDTH = 704

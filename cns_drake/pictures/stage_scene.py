@@ -10,12 +10,12 @@ from pydrake.math import RigidTransform
 
 from cns_drake.pictures.camera_views import View
 from cns_drake.pictures.city_parts import DEFAULT_RGB
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scene.perception_geometry import (
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.scene import (
     PerceptionGeometry,
+    load_world,
     read_perception_geometry,
 )
-from cns_drake.scene.world import load_world
 
 # Direction towards the sun.
 _SUN_W = np.array([0.45, -0.55, 0.70]) / np.linalg.norm([0.45, -0.55, 0.70])

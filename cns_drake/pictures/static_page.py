@@ -9,7 +9,7 @@ import zlib
 import numpy as np
 from pydrake.geometry import Meshcat
 
-from cns_drake.base.complete_files import write_text
+from cns_drake.base import write_text
 
 # Level of compression. Higher levels take many times as long for a few percent.
 _LEVEL = 4

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 from cns_drake.ray_casting.ray_groups import RayGroup
-from cns_drake.scene.surfaces import (
+from cns_drake.scene import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,

@@ -26,14 +26,13 @@ import weakref
 import numpy as np
 from pydrake.math import RotationMatrix
 
-from cns_drake.base.compilation import compiled
-from cns_drake.base.elementary import product, rotated
+from cns_drake.base import compiled, product, rotated
 from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.embree_primitives import ALL, Primitives
 from cns_drake.ray_casting.moving_groups import Placed
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import CERTAIN, Hits, Rays
-from cns_drake.scene.surfaces import TriangleSurface
+from cns_drake.scene import TriangleSurface
 
 # Least number of rays that a thread takes at once: a multiple of every packet
 # size, and large enough that the call costs little.

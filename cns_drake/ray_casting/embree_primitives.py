@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform
 from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.curved_proxies import circumscribe
 from cns_drake.ray_casting.ray_groups import Member, RayGroup
-from cns_drake.scene.surfaces import (
+from cns_drake.scene import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from cns_drake.base.elementary import product, rotated
+from cns_drake.base import product, rotated
 from cns_drake.ray_casting.curved_proxies import NearCurvedShapes
 from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
 from cns_drake.ray_casting.embree_primitives import (
@@ -30,7 +30,7 @@ from cns_drake.ray_casting.embree_primitives import (
 from cns_drake.ray_casting.moving_groups import Placed
 from cns_drake.ray_casting.ray_groups import Motion, RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
-from cns_drake.scene.surfaces import CapsuleSurface
+from cns_drake.scene import CapsuleSurface
 
 # Rays are cast in closed form if the sine of their angle to a capsule's axis is
 # below this.

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform
 
 from cns_drake.ray_casting.known_poses import NOTHING_KNOWN, KnownPoses
 from cns_drake.ray_casting.ray_groups import Motion, RayGroup
-from cns_drake.scene import surfaces
+from cns_drake.scene import EllipsoidSurface, HalfSpaceSurface, TriangleSurface
 
 
 class Ball(NamedTuple):
@@ -179,14 +179,14 @@ def _radius_about_F(group: RayGroup) -> float:
     """Returns the greatest distance of a group's geometry from origin F [m]."""
     radii = []
     for _, X_LG, surface in group.members:
-        if isinstance(surface, surfaces.TriangleSurface):
+        if isinstance(surface, TriangleSurface):
             p_LVset = surface.p_GVset @ X_LG.rotation().matrix().T
             p_LVset = p_LVset + X_LG.translation()
             radii.append(float(np.linalg.norm(p_LVset, axis=1).max(initial=0)))
             continue
-        if isinstance(surface, surfaces.EllipsoidSurface):
+        if isinstance(surface, EllipsoidSurface):
             radius = max(surface.semi_axes)
-        elif isinstance(surface, surfaces.HalfSpaceSurface):
+        elif isinstance(surface, HalfSpaceSurface):
             radius = np.inf
         else:
             radius = surface.radius + surface.length / 2.0

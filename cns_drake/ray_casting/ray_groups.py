@@ -10,9 +10,14 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform, inv
 
-from cns_drake.base.elementary import product, rotated, turns
-from cns_drake.scene import surfaces
-from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.base import product, rotated, turns
+from cns_drake.scene import (
+    EllipsoidSurface,
+    HalfSpaceSurface,
+    PerceptionGeometry,
+    Surface,
+    TriangleSurface,
+)
 
 # If the copies of a mesh have more triangles than this together, the mesh is
 # stored once and each copy is an instance. Rays on instances are slower; the
@@ -28,7 +33,7 @@ _MERGED_CUBE = 2000.0
 # Side of the cubes for other scenes, which are quick to rebuild [m].
 _MOVING_CUBE = 256.0
 # A member of a group: index of a geometry, its pose, its surface.
-Member = tuple[int, RigidTransform, surfaces.Surface]
+Member = tuple[int, RigidTransform, Surface]
 
 
 class Motion(NamedTuple):
@@ -108,7 +113,7 @@ class RayGroup:
 
     @property
     def is_half_space(self) -> bool:
-        return isinstance(self.members[0][2], surfaces.HalfSpaceSurface)
+        return isinstance(self.members[0][2], HalfSpaceSurface)
 
     def place(
         self, p_WO: np.ndarray, calc_X_WF: Callable[[FrameId], RigidTransform]
@@ -152,7 +157,7 @@ class RayGroup:
             (
                 # Comparing all triangles would take too long.
                 id(surface)
-                if isinstance(surface, surfaces.TriangleSurface)
+                if isinstance(surface, TriangleSurface)
                 else surface,
                 X_LG.GetAsMatrix34().tobytes(),
             )
@@ -235,7 +240,7 @@ def _members_by_frame(
         if frame_id in anchored_frames:
             X_FG = calc_X_WF(frame_id) @ X_FG
             frame_id = None
-        if isinstance(geometry.surface, surfaces.HalfSpaceSurface):
+        if isinstance(geometry.surface, HalfSpaceSurface):
             plane: Member = (index, RigidTransform(), geometry.surface)
             half_spaces.append(RayGroup(frame_id, X_FG.GetAsMatrix4(), [plane]))
             continue
@@ -282,9 +287,9 @@ def _group_of_one(
         return RayGroup(
             frame_id, X_FG.GetAsMatrix4(), [(index, RigidTransform(), surface)]
         )
-    if isinstance(surface, surfaces.EllipsoidSurface) and not surface.is_sphere:
+    if isinstance(surface, EllipsoidSurface) and not surface.is_sphere:
         stretch = np.diag([*surface.semi_axes, 1.0])
-        unit_sphere = surfaces.EllipsoidSurface((1.0, 1.0, 1.0))
+        unit_sphere = EllipsoidSurface((1.0, 1.0, 1.0))
         return RayGroup(
             frame_id,
             X_FG.GetAsMatrix4() @ stretch,
@@ -318,7 +323,7 @@ def _find_shared(
     num_triangles: Counter[int] = Counter()
     copies: Counter[int] = Counter()
     for _, geometry in geometries:
-        if isinstance(geometry.surface, surfaces.TriangleSurface):
+        if isinstance(geometry.surface, TriangleSurface):
             key = id(geometry.surface)
             copies[key] += 1
             num_triangles[key] += len(geometry.surface.triangles)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 
 # Value of `Hits.doubt` for certain hits, and for misses.
 CERTAIN = -1

@@ -24,17 +24,16 @@ from typing import Any, BinaryIO
 
 from mcap.writer import CompressionType, Writer
 
-from cns_drake.base.complete_files import (
+from cns_drake.base import (
+    InputError,
+    __version__,
     complete_part,
+    lock_file,
     part_path,
+    user_errors,
     write_part,
 )
-from cns_drake.base.errors import InputError
-from cns_drake.base.file_locks import lock_file
-from cns_drake.base.files import user_errors
-from cns_drake.base.version import __version__
-from cns_drake.drives import ros_types
-from cns_drake.drives.mcap_messages import STAMPED_RECORD, read_stamp
+from cns_drake.drives import STAMPED_RECORD, message_definition, read_stamp
 from cns_drake.recording import rosbag2_metadata
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.recording.rosbag2_metadata import Topic, to_yaml
@@ -223,7 +222,7 @@ class BagWriter:
         for topic in self._topics:
             kind = topic.message_type
             if kind not in schema_ids:
-                text = ros_types.message_definition(kind).encode()
+                text = message_definition(kind).encode()
                 schema_ids[kind] = writer.register_schema(kind, "ros2msg", text)
         channel_ids = {
             topic.name: writer.register_channel(

@@ -9,9 +9,13 @@ import struct
 
 import numpy as np
 
-from cns_drake.base.units import NS_PER_S
-from cns_drake.drives import ros_types
-from cns_drake.drives.point_cloud2 import point_field_datatype
+from cns_drake.base import NS_PER_S
+from cns_drake.drives import (
+    POINT_CLOUD,
+    make_message,
+    point_field_datatype,
+    serialize,
+)
 from cns_drake.recording import messages
 
 # Placeholder for the numbers that change in a message that is made once. It is
@@ -56,9 +60,9 @@ def _cloud_frame(dtype: np.dtype, frame_id: str) -> list[bytes]:
 
     They are the pieces between stamp, width, row step and data.
     """
-    data = ros_types.serialize(
-        ros_types.make_message(
-            ros_types.POINT_CLOUD,
+    data = serialize(
+        make_message(
+            POINT_CLOUD,
             header=messages.make_header(
                 frame_id, _PLACEHOLDER * NS_PER_S + _PLACEHOLDER
             ),

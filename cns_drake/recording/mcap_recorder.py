@@ -24,13 +24,14 @@ from pydrake.systems.sensors import (
     ImageRgba8U,
 )
 
-from cns_drake.drives import ros_types
-from cns_drake.drives.point_layouts import to_labels, to_layout
-from cns_drake.drives.sensor_names import (
+from cns_drake.drives import (
     BASE_FRAME,
     IMU_FRAME,
     MAP_FRAME,
     check_sensor_names,
+    serialize,
+    to_labels,
+    to_layout,
 )
 from cns_drake.recording import messages, object_messages, recorded_topics
 from cns_drake.recording.background_writer import BackgroundWriter
@@ -44,7 +45,7 @@ from cns_drake.recording.recorded_topics import (
 )
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
-from cns_drake.scene.drake_ports import optional_value
+from cns_drake.scene import optional_value
 
 _IMAGES = {"color": ImageRgba8U, "depth": ImageDepth32F, "label": ImageLabel16I}
 
@@ -490,7 +491,7 @@ class McapRecorder(LeafSystem):
         self, topic: Topic, message: Any, stamp_ns: int, sequence: int
     ) -> None:
         if not isinstance(message, bytes):
-            message = ros_types.serialize(message)
+            message = serialize(message)
         self._bag.write(topic.name, stamp_ns, message, sequence)
 
 

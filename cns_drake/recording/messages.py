@@ -12,10 +12,17 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.sensors import CameraInfo
 
-from cns_drake.base.jpeg_images import to_jpeg
-from cns_drake.base.units import NS_PER_S
-from cns_drake.drives import ros_types
-from cns_drake.drives.sensor_names import BASE_FRAME, IMU_FRAME, MAP_FRAME
+from cns_drake.base import NS_PER_S, to_jpeg
+from cns_drake.drives import (
+    BASE_FRAME,
+    COMPRESSED_IMAGE,
+    IMU,
+    IMU_FRAME,
+    MAP_FRAME,
+    ODOMETRY,
+    TF,
+    make_message,
+)
 
 IMAGE = "sensor_msgs/msg/Image"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
@@ -57,8 +64,8 @@ def make_imu(
         (REP 145).
     """
     force_variance, turn_variance = variances
-    return ros_types.make_message(
-        ros_types.IMU,
+    return make_message(
+        IMU,
         header=make_header(IMU_FRAME, stamp_ns),
         orientation=(0.0, 0.0, 0.0, 1.0) if quat_xyzw is None else quat_xyzw,
         orientation_covariance=_covariance(quat_xyzw, 0.0),
@@ -96,8 +103,8 @@ def make_odometry(
         stamp_ns: time of the message [ns].
     """
     twist = (V_WB_B.translational(), V_WB_B.rotational())
-    return ros_types.make_message(
-        ros_types.ODOMETRY,
+    return make_message(
+        ODOMETRY,
         header=make_header(MAP_FRAME, stamp_ns),
         child_frame_id=BASE_FRAME,
         pose=(_pose_fields(X_WB), EXACT_COVARIANCE),
@@ -116,8 +123,8 @@ def make_tf(
         stamp_ns: time of the poses [ns].
     """
     header = make_header(parent, stamp_ns)
-    return ros_types.make_message(
-        ros_types.TF,
+    return make_message(
+        TF,
         transforms=[
             (header, child, _pose_fields(X_PC)) for child, X_PC in X_PCs.items()
         ],
@@ -138,9 +145,7 @@ def to_quat_xyzw(R: RotationMatrix) -> tuple[float, float, float, float]:
 def make_header(frame_id: str, stamp_ns: int) -> Any:
     """Returns the header of a message."""
     stamp = divmod(stamp_ns, NS_PER_S)
-    return ros_types.make_message(
-        "std_msgs/msg/Header", stamp=stamp, frame_id=frame_id
-    )
+    return make_message("std_msgs/msg/Header", stamp=stamp, frame_id=frame_id)
 
 
 def make_image(
@@ -156,7 +161,7 @@ def make_image(
     """
     height, width, _ = pixels.shape
     data = np.ascontiguousarray(pixels).view(np.uint8).reshape(-1)
-    return ros_types.make_message(
+    return make_message(
         IMAGE,
         header=make_header(frame_id, stamp_ns),
         height=height,
@@ -182,8 +187,8 @@ def make_compressed_image(
 
     picture = Image.fromarray(np.ascontiguousarray(pixels))
     jpeg = to_jpeg(picture, _JPEG_QUALITY)
-    return ros_types.make_message(
-        ros_types.COMPRESSED_IMAGE,
+    return make_message(
+        COMPRESSED_IMAGE,
         header=make_header(frame_id, stamp_ns),
         format="jpeg",
         data=np.frombuffer(jpeg, np.uint8),
@@ -215,7 +220,7 @@ def make_camera_info(camera: CameraInfo, frame_id: str, stamp_ns: int) -> Any:
         stamp_ns: time of the message [ns].
     """
     K = rendered_intrinsics(camera)
-    return ros_types.make_message(
+    return make_message(
         CAMERA_INFO,
         header=make_header(frame_id, stamp_ns),
         height=camera.height(),

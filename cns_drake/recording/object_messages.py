@@ -5,9 +5,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base.units import NS_PER_S
-from cns_drake.drives import ros_types
-from cns_drake.drives.sensor_names import MAP_FRAME
+from cns_drake.base import NS_PER_S
+from cns_drake.drives import (
+    DETECTIONS_3D,
+    MAP_FRAME,
+    SCENE_UPDATE,
+    make_message,
+    serialize,
+)
 from cns_drake.recording import messages
 
 # Placeholders of numbers in a message: this and the following integers, which
@@ -111,7 +116,7 @@ class BoxMessages:
             objects.instance.tolist(), objects.semantic_classes, strict=True
         )
         message = self._make(list(pairs), marks)
-        self._data = np.frombuffer(ros_types.serialize(message), np.uint8)
+        self._data = np.frombuffer(serialize(message), np.uint8)
         floats, words = _number_views(self._data)
         with np.errstate(invalid="ignore"):
             which = floats - _FIRST_MARK
@@ -163,9 +168,7 @@ def marked_detections(
                 "id": instance,
             }
         )
-    return ros_types.make_message(
-        ros_types.DETECTIONS_3D, header=header, detections=detections
-    )
+    return make_message(DETECTIONS_3D, header=header, detections=detections)
 
 
 def marked_boxes(
@@ -196,8 +199,8 @@ def marked_boxes(
                 "cubes": [(*_box_fields(row), color)],
             }
         )
-    return ros_types.make_message(
-        ros_types.SCENE_UPDATE,
+    return make_message(
+        SCENE_UPDATE,
         deletions=[{"timestamp": stamp, "type": _DELETE_ALL}],
         entities=entities,
     )

@@ -5,19 +5,28 @@ from collections.abc import Iterable, Mapping
 
 from pydrake.math import RigidTransform
 
-from cns_drake.drives import ros_types
-from cns_drake.drives.sensor_names import BASE_FRAME, IMU_FRAME
+from cns_drake.drives import (
+    BASE_FRAME,
+    COMPRESSED_IMAGE,
+    DETECTIONS_3D,
+    IMU,
+    IMU_FRAME,
+    ODOMETRY,
+    POINT_CLOUD,
+    SCENE_UPDATE,
+    TF,
+)
 from cns_drake.recording import messages
 from cns_drake.recording.messages import CAMERA_INFO, ENCODINGS, IMAGE
 from cns_drake.recording.rosbag2_metadata import Topic
 
-TF_STATIC_TOPIC = Topic("/tf_static", ros_types.TF, latched=True)
-TF_TOPIC = Topic("/tf", ros_types.TF)
-ODOMETRY_TOPIC = Topic("/odometry", ros_types.ODOMETRY)
-IMU_TOPIC = Topic("/imu/data", ros_types.IMU)
-OBJECTS_TOPIC = Topic("/objects", ros_types.DETECTIONS_3D)
-BOXES_TOPIC = Topic("/objects/boxes", ros_types.SCENE_UPDATE)
-MOTION_TOPIC = Topic("/objects/motion", ros_types.POINT_CLOUD)
+TF_STATIC_TOPIC = Topic("/tf_static", TF, latched=True)
+TF_TOPIC = Topic("/tf", TF)
+ODOMETRY_TOPIC = Topic("/odometry", ODOMETRY)
+IMU_TOPIC = Topic("/imu/data", IMU)
+OBJECTS_TOPIC = Topic("/objects", DETECTIONS_3D)
+BOXES_TOPIC = Topic("/objects/boxes", SCENE_UPDATE)
+MOTION_TOPIC = Topic("/objects/motion", POINT_CLOUD)
 OBJECT_TOPICS = (OBJECTS_TOPIC, BOXES_TOPIC, MOTION_TOPIC)
 
 
@@ -98,12 +107,12 @@ def make_calibration(
 
 def points_topic(lidar_name: str) -> Topic:
     """Returns the topic of a LiDAR's points."""
-    return Topic(f"/{lidar_name}/points", ros_types.POINT_CLOUD)
+    return Topic(f"/{lidar_name}/points", POINT_CLOUD)
 
 
 def labels_topic(lidar_name: str) -> Topic:
     """Returns the topic of labels for points whose layout is not `cns`."""
-    return Topic(f"/{lidar_name}/labels", ros_types.POINT_CLOUD)
+    return Topic(f"/{lidar_name}/labels", POINT_CLOUD)
 
 
 def camera_topic(camera_name: str, kind: str) -> Topic:
@@ -115,7 +124,7 @@ def camera_topic(camera_name: str, kind: str) -> Topic:
             `label` or `camera_info`.
     """
     message_type = {
-        "image": ros_types.COMPRESSED_IMAGE,
+        "image": COMPRESSED_IMAGE,
         "camera_info": CAMERA_INFO,
     }
     return Topic(f"/{camera_name}/{kind}", message_type.get(kind, IMAGE))

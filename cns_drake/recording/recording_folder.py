@@ -3,9 +3,7 @@
 import os
 from pathlib import Path
 
-from cns_drake.base.complete_files import part_path
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import user_errors
+from cns_drake.base import InputError, part_path, user_errors
 
 
 class RecordingFolder:

@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from cns_drake.drives import ros_types
+from cns_drake.drives import message_hash
 
 # Version of the format of `metadata.yaml`.
 _VERSION = 8
@@ -37,7 +37,7 @@ def channel_metadata(topic: Topic) -> dict[str, str]:
     """Returns a channel's metadata for rosbag2: QoS and the type's hash."""
     return {
         "offered_qos_profiles": _qos_yaml(topic),
-        "topic_type_hash": ros_types.message_hash(topic.message_type),
+        "topic_type_hash": message_hash(topic.message_type),
     }
 
 

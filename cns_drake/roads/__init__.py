@@ -1,1 +1,5 @@
 """Road networks, and routes along their lanes."""
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

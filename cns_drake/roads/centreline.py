@@ -6,8 +6,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.base.elementary import arctan2, cos, power, sin, tan
-from cns_drake.base.units import wrapped
+from cns_drake.base import arctan2, cos, power, sin, tan, wrapped
 
 # The arcs at both ends of a segment may need this much more than its length, so
 # that they can meet in one point although corners are given in centimetres

@@ -13,7 +13,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 import shapely
 from shapely import STRtree
 
-from cns_drake.base.elementary import smooth_step
+from cns_drake.base import smooth_step
 from cns_drake.roads.car_outline import (
     FRONT,
     HALF_WIDTH,

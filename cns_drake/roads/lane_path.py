@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.polylines import distances_along
+from cns_drake.base import InputError, distances_along
 
 # A path must be longer than this to become a trajectory [m].
 _MIN_LENGTH = 20.0

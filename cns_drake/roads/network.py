@@ -11,8 +11,7 @@ import numpy as np
 from shapely import STRtree
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.units import wrapped
+from cns_drake.base import InputError, value_errors, wrapped
 from cns_drake.roads import carriageway
 from cns_drake.roads.centreline import Centreline, blend
 from cns_drake.roads.road import (

@@ -4,7 +4,7 @@ from collections import Counter, defaultdict
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.road import LaneRef
 from cns_drake.roads.route import MIN_LANE_CHANGE_LENGTH, Route, RouteLeg

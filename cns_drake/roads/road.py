@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.base.elementary import cos, sin
+from cns_drake.base import cos, sin
 from cns_drake.roads.centreline import Centreline, sample_stations
 from cns_drake.roads.roads_file import RoadEntry
 

@@ -5,8 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, Strict
 
-from cns_drake.base.errors import validated
-from cns_drake.base.yaml_files import read_yaml
+from cns_drake.base import read_yaml, validated
 
 # Greatest coordinate in a town, and greatest width [m].
 _LARGEST = 100_000.0

@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.elementary import cos, sin
+from cns_drake.base import cos, sin
 from cns_drake.roads.car_outline import swept_area
 from cns_drake.roads.centreline import Centreline, sample_stations
 

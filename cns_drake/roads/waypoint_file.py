@@ -5,10 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.csv_files import read_rows
-from cns_drake.base.errors import InputError
-from cns_drake.base.number_format import to_number
-from cns_drake.base.repetitions import repeated
+from cns_drake.base import InputError, read_rows, repeated, to_number
 
 # A greater coordinate is a mistake, not a place [m].
 _FARTHEST = 1_000_000.0

@@ -7,10 +7,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.base.elementary import arctan2, cos, sin, tan
-from cns_drake.base.errors import InputError
-from cns_drake.base.polylines import step_lengths
-from cns_drake.base.units import wrapped
+from cns_drake.base import (
+    InputError,
+    arctan2,
+    cos,
+    sin,
+    step_lengths,
+    tan,
+    wrapped,
+)
 from cns_drake.roads.centreline import Centreline
 from cns_drake.roads.lane_path import (
     DENSE_SPACING,

@@ -1,1 +1,5 @@
 """Scenarios, which describe drives; their files, and plans of drives."""
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -11,14 +11,18 @@ from pathlib import Path
 from typing import get_type_hints
 import zlib
 
-from cns_drake.base.csv_files import read_records, write_csv
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import is_there, user_errors
-from cns_drake.base.progress import doing
-from cns_drake.recording.schedule import frames_within
+from cns_drake.base import (
+    InputError,
+    doing,
+    is_there,
+    read_records,
+    user_errors,
+    write_csv,
+)
+from cns_drake.recording import frames_within
 from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scene.map_folder import MapFolder, drive_name
+from cns_drake.scene import MapFolder, drive_name
 
 
 @dataclass(frozen=True)
@@ -161,9 +165,11 @@ def _measured_row(
 
 def _stage_size(scenario: Scenario) -> tuple[int, int]:
     """Returns the numbers of structures and triangles of a stage."""
-    from cns_drake.scene.perception_geometry import read_perception_geometry
-    from cns_drake.scene.surfaces import TriangleSurface
-    from cns_drake.scene.world import load_world
+    from cns_drake.scene import (
+        TriangleSurface,
+        load_world,
+        read_perception_geometry,
+    )
 
     world = load_world(scenario.world_file, without=scenario.without)
     geometries = read_perception_geometry(world.scene_graph.model_inspector())

@@ -10,22 +10,32 @@ from pydrake.math import RigidTransform
 import shapely
 from shapely import STRtree
 
-from cns_drake.base.errors import InputError
-from cns_drake.motion import suspension, suspension_data
-from cns_drake.motion.trajectory import Trajectory
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.recording.schedule import frames_within
-from cns_drake.roads.driver_offsets import FINE_SPACING, driven_path, kerbs
-from cns_drake.roads.lane_path import POINT_SPACING, LanePath
-from cns_drake.roads.network import RoadNetwork, load_road_network
-from cns_drake.roads.route import make_lane_path
-from cns_drake.roads.u_turn import TIGHTEST_RADIUS
-from cns_drake.roads.waypoints import load_waypoint_path
+from cns_drake.base import InputError
+from cns_drake.motion import (
+    Suspension,
+    Trajectory,
+    load_car_masses,
+    load_suspension_rates,
+    ride_on_springs,
+)
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.recording import frames_within
+from cns_drake.roads import (
+    FINE_SPACING,
+    POINT_SPACING,
+    TIGHTEST_RADIUS,
+    LanePath,
+    RoadNetwork,
+    driven_path,
+    kerbs,
+    load_road_network,
+    load_waypoint_path,
+    make_lane_path,
+)
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
-from cns_drake.scene.perception_geometry import read_perception_geometry
-from cns_drake.scene.world import load_world
+from cns_drake.scene import load_world, read_perception_geometry
 
 # Heights above the path at which rays look for obstacles, from below the top of
 # a kerb up to the car's roof [m].
@@ -156,11 +166,11 @@ class DrivePlan:
         profile = ride.profile()
         if profile is None:
             return trajectory
-        springs = suspension.Suspension(
-            suspension_data.load_car_masses(vehicle_file()),
-            suspension_data.load_suspension_rates(suspension_file()),
+        springs = Suspension(
+            load_car_masses(vehicle_file()),
+            load_suspension_rates(suspension_file()),
         )
-        return suspension.ride_on_springs(
+        return ride_on_springs(
             trajectory, springs, profile, crossfall=ride.crossfall
         )
 

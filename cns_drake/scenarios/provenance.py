@@ -5,14 +5,19 @@ import json
 from pathlib import Path
 import platform
 
-from cns_drake.base.files import check_regular, is_there, user_errors
-from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
-from cns_drake.base.version import __version__, installed_versions
+from cns_drake.base import (
+    __version__,
+    check_regular,
+    code_digest,
+    fingerprint,
+    installed_versions,
+    is_there,
+    user_errors,
+)
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
-from cns_drake.scene.file_references import referenced_files
-from cns_drake.scene.file_watch import FileWatch
-from cns_drake.sensors.imu.config import KALIBR_FILE
+from cns_drake.scene import FileWatch, referenced_files
+from cns_drake.sensors import KALIBR_FILE
 
 # Packages that can influence a message's bytes.
 _PACKAGES = (

@@ -17,10 +17,9 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base.errors import validated
-from cns_drake.drives.sensor_names import check_sensor_name
-from cns_drake.roads.route import Route
-from cns_drake.roads.speeds import Speeds
+from cns_drake.base import validated
+from cns_drake.drives import check_sensor_name
+from cns_drake.roads import Route, Speeds
 from cns_drake.scenarios.sections import (
     REAL_DRIVER,
     DriverConfig,
@@ -29,15 +28,16 @@ from cns_drake.scenarios.sections import (
     TransientConfig,
 )
 from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.scene.map_folder import MapFolder
-from cns_drake.sensors.camera.config import CameraSection
-from cns_drake.sensors.imu.config import ImuSection
-from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
-from cns_drake.sensors.lidar.measurement import Echoes
-from cns_drake.sensors.odometry.config import OdometrySection
-from cns_drake.sensors.sensor_config import (
+from cns_drake.scene import MapFolder
+from cns_drake.sensors import (
+    CameraSection,
+    Echoes,
+    ImuSection,
+    LidarSection,
+    OdometrySection,
     Section,
     SensorConfig,
+    WeatherConfig,
     check_rate,
     field_off_by_default,
 )

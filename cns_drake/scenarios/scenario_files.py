@@ -7,19 +7,19 @@ import re
 
 import yaml
 
-from cns_drake.base.complete_files import write_text
-from cns_drake.base.errors import (
+from cns_drake.base import (
     InputError,
     did_you_mean,
+    make_folder,
+    read_yaml,
     validated,
     value_errors,
+    write_text,
 )
-from cns_drake.base.files import make_folder
-from cns_drake.base.yaml_files import read_yaml
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import shipped_drives, shipped_maps
-from cns_drake.scene.map_folder import MapFolder, drive_name
-from cns_drake.sensors.imu.config import KALIBR_FILE
+from cns_drake.scene import MapFolder, drive_name
+from cns_drake.sensors import KALIBR_FILE
 
 
 def make_scenario(values: dict, source: object) -> Scenario:

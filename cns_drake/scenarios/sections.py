@@ -7,8 +7,8 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from cns_drake.motion.road_profile import RoadProfile, RoughnessClass
-from cns_drake.sensors.sensor_config import Section, field_off_by_default
+from cns_drake.motion import RoadProfile, RoughnessClass
+from cns_drake.sensors import Section, field_off_by_default
 
 # More vehicles or pedestrians than any map can hold.
 _MOST_TRAFFIC = 2000

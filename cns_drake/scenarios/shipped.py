@@ -12,9 +12,8 @@ import tarfile
 import tempfile
 from types import MappingProxyType
 
-from cns_drake.base.errors import InputError, did_you_mean
-from cns_drake.base.files import cache_folder
-from cns_drake.scene.map_folder import MapFolder, drive_name, no_drives
+from cns_drake.base import InputError, cache_folder, did_you_mean
+from cns_drake.scene import MapFolder, drive_name, no_drives
 
 
 @functools.cache

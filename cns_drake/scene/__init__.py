@@ -1,1 +1,5 @@
 """SDF worlds, their structures, and the geometry that sensors see."""
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

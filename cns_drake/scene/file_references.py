@@ -7,8 +7,7 @@ import re
 import stat
 from xml.parsers import expat
 
-from cns_drake.base.files import user_errors
-from cns_drake.base.xml_elements import readable_xml
+from cns_drake.base import readable_xml, user_errors
 from cns_drake.scene.file_watch import FileWatch
 from cns_drake.scene.model_finder import ModelFinder
 

@@ -20,7 +20,7 @@ from typing import IO
 
 import numpy as np
 
-from cns_drake.base.system_libraries import missing_library
+from cns_drake.base import missing_library
 
 # Open3D returns what it has read before a fault, and warns.
 _FAULT = re.compile(

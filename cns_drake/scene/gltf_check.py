@@ -7,7 +7,7 @@ from collections import Counter
 import struct
 from typing import Any
 
-from cns_drake.base.json_text import parse_json
+from cns_drake.base import parse_json
 
 # Prefixes of glTF extensions that do not change shapes.
 _HARMLESS = (

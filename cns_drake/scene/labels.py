@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 
 # Greatest instance id of a structure.
 MAX_INSTANCE = 2**16 - 1

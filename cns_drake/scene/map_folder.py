@@ -4,8 +4,7 @@ import os
 from pathlib import Path
 import re
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular, listed
+from cns_drake.base import InputError, check_regular, listed
 
 ROADS_NAME = "roads.yaml"
 PLAN_NAME = "city.yaml"

@@ -13,7 +13,7 @@ from typing import Literal
 
 from pydantic import BaseModel
 
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base import parse_yaml
 
 
 class Material(BaseModel, frozen=True, extra="forbid"):

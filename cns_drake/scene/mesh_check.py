@@ -9,7 +9,7 @@ from pathlib import Path
 import re
 import struct
 
-from cns_drake.base.files import read_bytes
+from cns_drake.base import read_bytes
 from cns_drake.scene.gltf_check import check_gltf
 from cns_drake.scene.obj_check import LARGEST_FILE
 from cns_drake.scene.ply_check import check_ply

@@ -15,7 +15,7 @@ from pydrake.geometry import (
     RefineVolumeMeshIntoVtkFileContents,
 )
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.mesh_check import GLTF, check_mesh_file

@@ -11,8 +11,7 @@ import re
 from typing import NoReturn, cast
 from xml.etree import ElementTree
 
-from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.xml_elements import Element, read_elements
+from cns_drake.base import Element, InputError, read_elements, value_errors
 from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE
 

@@ -4,8 +4,7 @@ from collections.abc import Iterable
 import os
 from pathlib import Path
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.xml_elements import read_elements
+from cns_drake.base import InputError, read_elements
 
 # Environment variables of old and new Gazebo and of libsdformat that list
 # folders of models.

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 
-from cns_drake.base.files import read_bytes
+from cns_drake.base import read_bytes
 
 # Larger mesh files are refused [bytes].
 LARGEST_FILE = 1 << 28

@@ -17,7 +17,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from cns_drake.scene import surfaces
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.geometry_list import GeometryRecord, list_geometry

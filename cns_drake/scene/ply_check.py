@@ -7,7 +7,7 @@ import struct
 
 import numpy as np
 
-from cns_drake.base.repetitions import repeated
+from cns_drake.base import repeated
 
 # Elements of PLY that are no shapes.
 _NO_SHAPES = ("vertex", "face", "camera", "material")

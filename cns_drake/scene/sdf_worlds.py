@@ -35,7 +35,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from cns_drake.scene.model_check import SIZES, lacks_size, read_model
 from cns_drake.scene.model_finder import ModelFinder, model_file
 

@@ -8,9 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.csv_files import read_records
-from cns_drake.base.errors import InputError
-from cns_drake.base.number_format import to_number, whole_number
+from cns_drake.base import InputError, read_records, to_number, whole_number
 from cns_drake.scene.labels import MAX_INSTANCE, Labels, check_count
 from cns_drake.scene.material_cells import read_materials, write_materials
 from cns_drake.scene.materials import MATERIALS, USUAL_MATERIALS, Material

@@ -20,9 +20,14 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
-from cns_drake.base.errors import InputError, errors_at, value_errors
-from cns_drake.base.files import is_there, read_bytes
-from cns_drake.base.progress import doing
+from cns_drake.base import (
+    InputError,
+    doing,
+    errors_at,
+    is_there,
+    read_bytes,
+    value_errors,
+)
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.mesh_check import check_mesh_file

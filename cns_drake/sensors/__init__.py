@@ -1,1 +1,5 @@
 """The sensors of a vehicle: LiDARs, cameras, IMU and odometry."""
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

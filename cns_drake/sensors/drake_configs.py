@@ -23,7 +23,7 @@ from pydrake.perception import PointCloudToLcm
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.lcm import LcmBuses
 
-from cns_drake.base.errors import describe_validation_error
+from cns_drake.base import describe_validation_error
 from cns_drake.sensors.imu.config import ImuDescription, ImuSection
 from cns_drake.sensors.imu.imu import Imu, add_imu
 from cns_drake.sensors.lcm_publishing import (

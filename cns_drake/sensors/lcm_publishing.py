@@ -14,7 +14,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
 from pydrake.systems.primitives import ZeroOrderHold
 
-from cns_drake.scene.drake_releases import find_bus
+from cns_drake.scene import find_bus
 from cns_drake.sensors.system_names import check_unused_names
 
 # An interface on which messages are published.

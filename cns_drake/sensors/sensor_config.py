@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-from cns_drake.base.input_models import InputModel
-from cns_drake.base.units import NS_PER_S
+from cns_drake.base import NS_PER_S, InputModel
 
 if TYPE_CHECKING:
     from pydrake.geometry import SceneGraph
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from pydrake.systems.framework import DiagramBuilder, OutputPort, System
     from typing_extensions import Self
 
-    from cns_drake.recording.rosbag2_metadata import Topic
+    from cns_drake.recording import Topic
 
 # Greatest rate of a sensor [1/s].
 HIGHEST_RATE = 1000

@@ -1,1 +1,5 @@
 """Simulation of a scenario with a Drake Diagram."""
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

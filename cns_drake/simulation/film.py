@@ -12,23 +12,21 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from cns_drake.base.complete_files import check_writable, completing
-from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.processes import (
+from cns_drake.base import (
+    InputError,
     JobError,
     ProcessDiedError,
+    check_writable,
+    completing,
+    doing,
     run_process,
 )
-from cns_drake.base.progress import doing
-from cns_drake.motion.trajectory import Trajectory
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.sensors.camera.config import CameraSection
-from cns_drake.sensors.camera.renderer import check_renderer
+from cns_drake.motion import Trajectory
+from cns_drake.scenarios import Scenario, plan_drive
+from cns_drake.sensors import CameraSection, check_renderer
 from cns_drake.simulation.film_stage import FilmStage
 from cns_drake.simulation.scenario_traffic import load_ways
-from cns_drake.traffic.vehicle_placement import room_for_vehicles
-from cns_drake.traffic.walkers import room_for_walkers
+from cns_drake.traffic import room_for_vehicles, room_for_walkers
 
 # Images per second.
 RATE = 10

@@ -10,13 +10,10 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, Diagram
 from pydrake.systems.sensors import CameraInfo
 
-from cns_drake.base.jobs.step import Reporter, Step
-from cns_drake.base.progress import doing
-from cns_drake.pictures.meshcat_drawing import height_rgb
-from cns_drake.scenarios.planning import DrivePlan
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.sensors.camera.camera import optical_pose
-from cns_drake.sensors.camera.config import CameraSection
+from cns_drake.base import Reporter, Step, doing
+from cns_drake.pictures import height_rgb
+from cns_drake.scenarios import DrivePlan, Scenario
+from cns_drake.sensors import CameraSection, optical_pose
 from cns_drake.simulation.loaded_drive import load_drive
 from cns_drake.simulation.station import make_station
 

@@ -10,8 +10,8 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
-from cns_drake.ray_casting.known_poses import KnownPoses
-from cns_drake.traffic.traffic_motion import TrafficMotion
+from cns_drake.ray_casting import KnownPoses
+from cns_drake.traffic import TrafficMotion
 
 
 class FramePoses(LeafSystem):

@@ -6,13 +6,12 @@ import functools
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import RigidBody
 
-from cns_drake.base.progress import doing
-from cns_drake.drives.sensor_names import BASE_FRAME
-from cns_drake.motion.trajectory import Trajectory
-from cns_drake.scenarios.planning import DrivePlan, count_frames
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scene.world import World
-from cns_drake.sensors.carriers import sensor_pose
+from cns_drake.base import doing
+from cns_drake.drives import BASE_FRAME
+from cns_drake.motion import Trajectory
+from cns_drake.scenarios import DrivePlan, Scenario, count_frames
+from cns_drake.scene import World
+from cns_drake.sensors import sensor_pose
 from cns_drake.simulation.recording_schedule import (
     RecordingPlan,
     plan_recording,
@@ -22,7 +21,7 @@ from cns_drake.simulation.scenario_traffic import (
     with_traffic,
 )
 from cns_drake.simulation.stage_loading import load_stage
-from cns_drake.traffic import traffic_plan
+from cns_drake.traffic import TrafficPlan
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ class LoadedDrive:
     scenario: Scenario
     trajectory: Trajectory
     world: World
-    traffic: traffic_plan.TrafficPlan | None = None
+    traffic: TrafficPlan | None = None
 
     @functools.cached_property
     def recording(self) -> RecordingPlan:

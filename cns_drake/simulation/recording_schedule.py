@@ -4,19 +4,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
-from cns_drake.recording.recorded_topics import (
+from cns_drake.recording import (
     IMU_TOPIC,
     OBJECT_TOPICS,
     ODOMETRY_TOPIC,
     TF_TOPIC,
+    Schedule,
+    Topic,
     camera_topic,
     labels_topic,
+    make_schedule,
     points_topic,
     recording_topics,
 )
-from cns_drake.recording.rosbag2_metadata import Topic
-from cns_drake.recording.schedule import Schedule, make_schedule
-from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios import Scenario
 
 # Tolerance, in periods, for a time to count as a multiple of a period.
 _TOLERANCE = 1e-6

@@ -5,10 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.complete_files import completing
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder
-from cns_drake.base.points import encode_bin, encode_pcd, to_xyzi
+from cns_drake.base import (
+    InputError,
+    completing,
+    encode_bin,
+    encode_pcd,
+    make_folder,
+    to_xyzi,
+)
 
 
 def check_ending(path: Path) -> None:

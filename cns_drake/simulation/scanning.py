@@ -6,12 +6,14 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scene.world import World
-from cns_drake.sensors.lidar.adding import connect_lidar
-from cns_drake.sensors.lidar.beams import BeamPattern
-from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.returns.calibrated import CalibratedReturns
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.scene import World
+from cns_drake.sensors import (
+    BeamPattern,
+    CalibratedReturns,
+    Lidar,
+    connect_lidar,
+)
 
 
 def scan_world(

@@ -7,33 +7,34 @@ from pathlib import Path
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.elementary import arctan2
-from cns_drake.base.errors import InputError
-from cns_drake.motion.trajectory import Trajectory
-from cns_drake.recording.schedule import FRAME_PERIOD
-from cns_drake.roads.network import RoadNetwork, load_road_network
-from cns_drake.scenarios.planning import DrivePlan, count_frames
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.sections import TrafficConfig
-from cns_drake.scene.map_folder import MapFolder
-from cns_drake.scene.semantics import GROUND_CLASSES
-from cns_drake.scene.world import World
+from cns_drake.base import InputError, arctan2
+from cns_drake.motion import Trajectory
+from cns_drake.recording import FRAME_PERIOD
+from cns_drake.roads import RoadNetwork, load_road_network
+from cns_drake.scenarios import DrivePlan, Scenario, TrafficConfig, count_frames
+from cns_drake.scene import GROUND_CLASSES, MapFolder, World
 from cns_drake.simulation.stage_loading import load_stage
-from cns_drake.traffic import lane_graph, queues
-from cns_drake.traffic.ego_car import EgoBox, EgoPath
-from cns_drake.traffic.fcd_trace import read_fcd
-from cns_drake.traffic.fcd_traffic import play_trace
-from cns_drake.traffic.lane_file import LaneFile, read_lanes
-from cns_drake.traffic.road_lanes import make_lane_graph
-from cns_drake.traffic.road_walkways import make_walkways
-from cns_drake.traffic.traffic_motion import traffic_structures
-from cns_drake.traffic.traffic_plan import TrafficPlan
-from cns_drake.traffic.traffic_planning import plan_traffic
-from cns_drake.traffic.unmarked_crossings import with_unmarked_crossings
-from cns_drake.traffic.vehicle_placement import room_for_vehicles
-from cns_drake.traffic.walkers import room_for_walkers
-from cns_drake.traffic.walkway_clearing import kept_clear
-from cns_drake.transient.structure_geometry import geometry_by_structure
+from cns_drake.traffic import (
+    EgoBox,
+    EgoPath,
+    LaneFile,
+    LaneGraph,
+    TrafficPlan,
+    Walkway,
+    kept_clear,
+    make_lane_graph,
+    make_walkways,
+    plan_queues,
+    plan_traffic,
+    play_trace,
+    read_fcd,
+    read_lanes,
+    room_for_vehicles,
+    room_for_walkers,
+    traffic_structures,
+    with_unmarked_crossings,
+)
+from cns_drake.transient import geometry_by_structure
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
@@ -95,7 +96,7 @@ def plan_traffic_of_drive(
             ego_box=EGO_BOX,
         )
     if wanted.queues:
-        return queues.plan_queues(
+        return plan_queues(
             graph,
             seed=wanted.seed,
             duration=trajectory.duration,
@@ -134,8 +135,8 @@ def _plan_moving_traffic(
     scenario: Scenario,
     trajectory: Trajectory,
     ego: EgoPath,
-    graph: lane_graph.LaneGraph,
-    walkways: Sequence[lane_graph.Walkway],
+    graph: LaneGraph,
+    walkways: Sequence[Walkway],
 ) -> TrafficPlan:
     """Plans vehicles and pedestrians that move by their own rules.
 
@@ -205,8 +206,8 @@ def load_ways(
 def _check_room(
     wanted: TrafficConfig,
     where: str,
-    graph: lane_graph.LaneGraph,
-    walkways: Sequence[lane_graph.Walkway],
+    graph: LaneGraph,
+    walkways: Sequence[Walkway],
 ) -> None:
     """Checks that roads and sidewalks have room for the traffic."""
     room = room_for_vehicles(graph)

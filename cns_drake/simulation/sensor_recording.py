@@ -7,27 +7,31 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.sensors import RgbdSensor
 
-from cns_drake.drives.sensor_names import check_sensor_names
-from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.mcap_recorder import McapRecorder, RecordedCamera
-from cns_drake.recording.messages import ENCODINGS
-from cns_drake.recording.recorded_topics import (
+from cns_drake.drives import check_sensor_names
+from cns_drake.recording import (
+    ENCODINGS,
     IMU_TOPIC,
     ODOMETRY_TOPIC,
     TF_TOPIC,
+    BagWriter,
+    McapRecorder,
+    RecordedCamera,
+    Schedule,
+    Topic,
     camera_topic,
     depth_info_topic,
     make_calibration,
+    make_schedule,
     points_topic,
     recording_topics,
 )
-from cns_drake.recording.rosbag2_metadata import Topic
-from cns_drake.recording.schedule import Schedule, make_schedule
-from cns_drake.sensors.imu.imu import Imu
-from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.odometry.odometry import OdometrySensor
-from cns_drake.sensors.sensor_config import HIGHEST_RATE
-from cns_drake.sensors.system_names import check_unused_names
+from cns_drake.sensors import (
+    HIGHEST_RATE,
+    Imu,
+    Lidar,
+    OdometrySensor,
+    check_unused_names,
+)
 
 
 def add_mcap_recorder(

@@ -16,22 +16,19 @@ from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context
 
-from cns_drake.base import poses
-from cns_drake.base.jobs.fingerprint import code_digest
-from cns_drake.base.progress import doing
-from cns_drake.drives.drive import Drive, index_instances
-from cns_drake.drives.sensor_names import MAP_FRAME
-from cns_drake.motion.trajectory import pose_at
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.recording.messages import to_quat_xyzw
-from cns_drake.recording.schedule import frame_stamp_ns
-from cns_drake.scenarios.planning import DrivePlan
-from cns_drake.scenarios.provenance import digest_inputs
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import describe_scenario
-from cns_drake.scene.world import structures_in
-from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.sensors.lidar.beams import BeamPattern
+from cns_drake.base import code_digest, doing, poses
+from cns_drake.drives import MAP_FRAME, Drive, index_instances
+from cns_drake.motion import pose_at
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.recording import frame_stamp_ns, to_quat_xyzw
+from cns_drake.scenarios import (
+    DrivePlan,
+    Scenario,
+    describe_scenario,
+    digest_inputs,
+)
+from cns_drake.scene import structures_in
+from cns_drake.sensors import BeamPattern, sensor_pose
 from cns_drake.simulation.loaded_drive import load_drive
 from cns_drake.simulation.station import make_station
 

@@ -9,33 +9,42 @@ import time
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
-from cns_drake.base.complete_files import (
+from cns_drake.base import (
+    InputError,
+    __version__,
     check_folder_writable,
     check_writable,
+    doing,
+    interrupts_wait,
     write_text,
 )
-from cns_drake.base.errors import InputError
-from cns_drake.base.interrupts import interrupts_wait
-from cns_drake.base.progress import doing
-from cns_drake.base.version import __version__
-from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
-from cns_drake.pictures.page_panel import ShownStages
-from cns_drake.pictures.stage_comparison import other_stage
-from cns_drake.recording.background_writer import BackgroundWriter
-from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.recorded_topics import make_calibration
-from cns_drake.recording.recording_folder import RecordingFolder
-from cns_drake.recording.schedule import START_NS, frames_within
-from cns_drake.scenarios import provenance
-from cns_drake.scenarios.planning import DrivePlan
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import describe_scenario
-from cns_drake.scene.file_watch import FileWatch
-from cns_drake.sensors.camera.camera import optical_pose
-from cns_drake.sensors.camera.renderer import check_renderer
-from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.sensors.imu.config import KALIBR_FILE
-from cns_drake.sensors.lidar.config import describe_unit
+from cns_drake.pictures import MeshcatRecorder, ShownStages, other_stage
+from cns_drake.recording import (
+    START_NS,
+    BackgroundWriter,
+    BagWriter,
+    RecordingFolder,
+    frames_within,
+    make_calibration,
+)
+from cns_drake.scenarios import (
+    INPUTS_KEY,
+    DrivePlan,
+    Scenario,
+    combined_digest,
+    dependency_versions,
+    describe_scenario,
+    digest_inputs,
+    recording_fingerprint,
+)
+from cns_drake.scene import FileWatch
+from cns_drake.sensors import (
+    KALIBR_FILE,
+    check_renderer,
+    describe_unit,
+    optical_pose,
+    sensor_pose,
+)
 from cns_drake.simulation.loaded_drive import (
     LoadedDrive,
     load_drive,
@@ -136,7 +145,7 @@ def simulate(
             check_renderer()
         doing("reading the files of the drive")
         watch = FileWatch()
-        inputs = provenance.digest_inputs(scenario, watch)
+        inputs = digest_inputs(scenario, watch)
         drive = load_drive(plan)
         changed = watch.changed()
         if changed is not None:
@@ -223,7 +232,7 @@ def _make_bag(
                 sensor_pose(scenario.imu),
             ),
             "provenance.json": {
-                "versions": provenance.dependency_versions(),
+                "versions": dependency_versions(),
                 "inputs_sha256": inputs,
             },
             **imu_files,
@@ -233,7 +242,7 @@ def _make_bag(
         beside=imu_files | ({"calibration.yaml": units} if units else {}),
         custom_data={
             "cns_drake_version": __version__,
-            provenance.INPUTS_KEY: provenance.combined_digest(inputs),
+            INPUTS_KEY: combined_digest(inputs),
             **{
                 key: str(described[key])
                 for key in ("map", "stage", "world", "seed")
@@ -253,9 +262,7 @@ def _fingerprint(drive: LoadedDrive, inputs: dict[str, str]) -> str:
     # `frames` is set even for the whole drive, so that giving its number
     # explicitly makes no difference.
     return "\n".join(
-        provenance.recording_fingerprint(
-            drive.scenario.replaced(**update), inputs
-        )
+        recording_fingerprint(drive.scenario.replaced(**update), inputs)
         for update in ({}, {"frames": None})[: 1 + whole]
     )
 

@@ -7,13 +7,11 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.progress import doing
-from cns_drake.scenarios.planning import DrivePlan
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.shipped import vehicle_file
-from cns_drake.scene.world import World, load_world
-from cns_drake.traffic.lane_file import read_lanes
-from cns_drake.transient.changing import change_world
+from cns_drake.base import doing
+from cns_drake.scenarios import DrivePlan, Scenario, vehicle_file
+from cns_drake.scene import World, load_world
+from cns_drake.traffic import read_lanes
+from cns_drake.transient import change_world
 
 # Distance from the car's middle line to its sides, with a margin [m].
 _HALF_WIDTH = 1.3

@@ -11,30 +11,29 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
-from cns_drake.motion.vehicle_motion import VehicleMotion
-from cns_drake.motion.vehicle_sweep import VehicleSweep
-from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
-from cns_drake.recording.background_writer import BackgroundWriter
-from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.mcap_recorder import McapRecorder, RecordedSensor
-from cns_drake.recording.schedule import START_NS
-from cns_drake.scenarios.planning import DrivePlan
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.sensors.camera.camera import add_cameras
-from cns_drake.sensors.camera.camera_scene import CameraScene
-from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.sensors.imu.vehicle_imu import add_described_imu
-from cns_drake.sensors.lidar.adding import add_described_lidar
-from cns_drake.sensors.lidar.config import make_pattern
-from cns_drake.sensors.odometry.odometry import add_odometry
+from cns_drake.motion import VehicleMotion, VehicleSweep
+from cns_drake.pictures import MeshcatRecorder
+from cns_drake.recording import (
+    START_NS,
+    BackgroundWriter,
+    BagWriter,
+    McapRecorder,
+    RecordedSensor,
+)
+from cns_drake.scenarios import DrivePlan, Scenario
+from cns_drake.sensors import (
+    CameraScene,
+    add_cameras,
+    add_described_imu,
+    add_described_lidar,
+    add_odometry,
+    make_pattern,
+    sensor_pose,
+)
 from cns_drake.simulation.frame_poses import FramePoses
 from cns_drake.simulation.loaded_drive import LoadedDrive, load_drive
 from cns_drake.simulation.sensor_recording import connect_by_name
-from cns_drake.traffic.traffic_motion import (
-    TrafficMotion,
-    add_traffic,
-    connect_traffic,
-)
+from cns_drake.traffic import TrafficMotion, add_traffic, connect_traffic
 
 
 def make_station(

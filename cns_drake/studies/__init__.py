@@ -11,7 +11,9 @@ imports only packages that stand below it:
 - `experiments` reads the file of an experiment, and lists its conditions.
 """
 
-from cns_drake.base.own_packages import check_evaluation
+from cns_drake.base import attach, check_evaluation
 
 # Checked before a module in here imports `evaluation`.
 check_evaluation()
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

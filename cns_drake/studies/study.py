@@ -5,11 +5,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.errors import InputError, did_you_mean, errors_at
-from cns_drake.base.files import is_there
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.progress import doing
-from cns_drake.scenarios.scenario import Scenario
+from cns_drake.base import (
+    Cluster,
+    InputError,
+    did_you_mean,
+    doing,
+    errors_at,
+    is_there,
+)
+from cns_drake.scenarios import Scenario
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
 from cns_drake.studies.experiments.conditions import (
     Condition,
@@ -38,26 +42,27 @@ from cns_drake.studies.pairs.simulated_pairs import (
 from cns_drake.studies.tasks.map_task import DrivenMapTask
 from cns_drake.studies.tasks.seen_task import SeenTask
 from evaluation.methods import optional_methods
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.charts.kinds import check_chart
-from evaluation.results.keys import LEVEL
-from evaluation.results.page import write_page
-from evaluation.results.table import QUERIES, RESULTS
-from evaluation.study.chosen_methods import (
+from evaluation.recognition import RetrievalProtocol
+from evaluation.results import LEVEL, QUERIES, RESULTS, check_chart, write_page
+from evaluation.study import (
     STANDARD,
+    ChangeTask,
+    CostTask,
+    Engine,
+    LocaliseTask,
+    MapDrives,
     MethodChoice,
+    Pair,
+    PlaceTask,
+    PoseTask,
+    ShownCity,
+    Task,
+    add_city,
     choose_methods,
+    made_tasks,
+    recorded_pairs,
+    recorded_sections,
 )
-from evaluation.study.engine import Engine, made_tasks
-from evaluation.study.recorded_city import ShownCity, add_city
-from evaluation.study.recorded_study import recorded_sections
-from evaluation.study.recordings.map_drives import MapDrives
-from evaluation.study.recordings.recorded_pairs import recorded_pairs
-from evaluation.study.tasks.change import ChangeTask
-from evaluation.study.tasks.localise import LocaliseTask
-from evaluation.study.tasks.pair import Pair
-from evaluation.study.tasks.place import CostTask, PlaceTask, PoseTask
-from evaluation.study.tasks.task import Task
 
 TASKS: Mapping[str, type[Task]] = {
     task.name: task

@@ -18,3 +18,7 @@ seed. During the drive, the poses are interpolated from this plan.
   `overlaps`, `random_numbers`.
 - In a diagram: `traffic_motion`, `body_states`, `body_shapes`.
 """
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

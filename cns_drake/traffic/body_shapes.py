@@ -7,8 +7,7 @@ import numpy as np
 from pydrake.geometry import Box, Capsule, Cylinder, Mesh, Shape
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cns_drake.city.furniture.parked_cars import PAINTS, TRIM, WHITE
-from cns_drake.city.geometry.object_meshes import OBJECT_MESHES
+from cns_drake.city import OBJECT_MESHES, PAINTS, TRIM, WHITE
 from cns_drake.traffic.vehicle_kinds import VehicleKind
 
 Rgb = tuple[float, float, float]

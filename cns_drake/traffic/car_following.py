@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 from cns_drake.traffic.giving_way import find_prior
 from cns_drake.traffic.occupants import find_ahead
 from cns_drake.traffic.streets import speed_on

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import shapely
 
-from cns_drake.base.polylines import distances_along
-from cns_drake.roads.car_outline import outlines
+from cns_drake.base import distances_along
+from cns_drake.roads import outlines
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
 

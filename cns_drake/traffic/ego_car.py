@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from cns_drake.base.elementary import cos, sin
-from cns_drake.roads.car_outline import outlines
+from cns_drake.base import cos, sin
+from cns_drake.roads import outlines
 from cns_drake.traffic.lane_graph import LaneGraph
 
 # Time step of the plan [s].

@@ -10,9 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.polylines import step_lengths
-from cns_drake.base.xml_elements import Element, read_elements
+from cns_drake.base import (
+    Element,
+    InputError,
+    read_elements,
+    step_lengths,
+    value_errors,
+)
 from cns_drake.traffic.vehicle_kinds import KINDS
 
 # Greatest deviation of times from even spacing, because of rounding in the file

@@ -8,9 +8,7 @@ import zlib
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base.elementary import cos, sin
-from cns_drake.base.errors import InputError
-from cns_drake.base.polylines import step_lengths
+from cns_drake.base import InputError, cos, sin, step_lengths
 from cns_drake.traffic.ego_car import EgoBox, EgoPath
 from cns_drake.traffic.fcd_trace import FcdTrace, TracedObject, kind_name
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway

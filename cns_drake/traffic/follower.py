@@ -8,9 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from cns_drake.motion.speed_profile import KNOT_PERIOD
-from cns_drake.motion.splines import REACH
-from cns_drake.motion.trajectory import Trajectory
+from cns_drake.motion import KNOT_PERIOD, REACH, Trajectory
 from cns_drake.traffic.car_following import (
     BEFORE_LINE,
     SIGHT,

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 from cns_drake.traffic.conflicts import MERGE, SPLIT
 from cns_drake.traffic.streets import Streets
 from cns_drake.traffic.vehicle_records import CURRENT, NUM_PIECES, Traffic

@@ -6,7 +6,7 @@ lose, and no other vehicle has to brake hard.
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 from cns_drake.traffic.car_following import (
     HARDEST_BRAKING,
     free_acceleration,

@@ -9,10 +9,14 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import ConfigDict, Field
 
-from cns_drake.base.errors import InputError, validated, value_errors
-from cns_drake.base.files import read_bytes
-from cns_drake.base.input_models import InputModel
-from cns_drake.base.json_text import parse_json
+from cns_drake.base import (
+    InputError,
+    InputModel,
+    parse_json,
+    read_bytes,
+    validated,
+    value_errors,
+)
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_graph import LaneGraph, Piece, Walkway
 from cns_drake.traffic.polylines import resampled

@@ -8,7 +8,7 @@ import numpy as np
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.polylines import length_of
+from cns_drake.base import length_of
 
 
 @dataclass(frozen=True)

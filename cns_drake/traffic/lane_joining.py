@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.base.polylines import length_of
+from cns_drake.base import length_of
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.polylines import SPACING, resampled

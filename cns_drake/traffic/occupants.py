@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 from cns_drake.traffic.vehicle_records import CURRENT, Traffic
 
 # Number of the ego car among occupants.

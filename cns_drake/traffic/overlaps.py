@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 
 
 @compiled

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cns_drake.base.polylines import distances_along, step_lengths
+from cns_drake.base import distances_along, step_lengths
 
 # Greatest distance between the points of lanes and walkways [m].
 SPACING = 0.5

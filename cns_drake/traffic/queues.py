@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from cns_drake.base.elementary import arcsin, arctan2
+from cns_drake.base import arcsin, arctan2
 from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath
 from cns_drake.traffic.lane_graph import LaneGraph
 from cns_drake.traffic.tracks import Tracks

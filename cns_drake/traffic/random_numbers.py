@@ -5,7 +5,7 @@ A number depends only on the seed, the road user and the number of the draw.
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 
 
 @compiled

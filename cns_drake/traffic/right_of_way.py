@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 from cns_drake.traffic.conflicts import MERGE, SPLIT
 from cns_drake.traffic.ego_car import STEP
 from cns_drake.traffic.giving_way import (

@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from cns_drake.base.polylines import distances_along, length_of
-from cns_drake.roads.network import Connection, RoadNetwork
-from cns_drake.roads.road import ENDS, End, LaneRef, Road
+from cns_drake.base import distances_along, length_of
+from cns_drake.roads import ENDS, Connection, End, LaneRef, Road, RoadNetwork
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.polylines import resampled

@@ -7,10 +7,8 @@ import math
 import numpy as np
 import shapely
 
-from cns_drake.base.polylines import length_of
-from cns_drake.roads.centreline import blend
-from cns_drake.roads.network import RoadNetwork
-from cns_drake.roads.road import ENDS, End, Junction, Road
+from cns_drake.base import length_of
+from cns_drake.roads import ENDS, End, Junction, Road, RoadNetwork, blend
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.polylines import resampled
 from cns_drake.traffic.road_lanes import (

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 from cns_drake.traffic.ego_car import STEP
 from cns_drake.traffic.overlaps import boxes_overlap
 from cns_drake.traffic.polylines import SPACING

@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from cns_drake.base.compilation import compiled
-from cns_drake.base.elementary import arctan2
+from cns_drake.base import arctan2, compiled
 from cns_drake.traffic.conflicts import find_conflicts
 from cns_drake.traffic.ego_car import EgoBox, find_ego
 from cns_drake.traffic.lane_graph import LaneGraph, Piece

@@ -18,13 +18,11 @@ from pydrake.systems.framework import (
 )
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base.elementary import cos, product, sin
-from cns_drake.base.errors import InputError
-from cns_drake.ray_casting.known_poses import KnownPoses
-from cns_drake.recording.object_messages import RecordedObjects
-from cns_drake.scene.labels import MAX_INSTANCE
-from cns_drake.scene.structure_table import StructureEntry, StructureTable
-from cns_drake.sensors.system_names import check_unused_names
+from cns_drake.base import InputError, cos, product, sin
+from cns_drake.ray_casting import KnownPoses
+from cns_drake.recording import RecordedObjects
+from cns_drake.scene import MAX_INSTANCE, StructureEntry, StructureTable
+from cns_drake.sensors import check_unused_names
 from cns_drake.traffic.body_shapes import Limb, vehicle_limbs, walker_limbs
 from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
 from cns_drake.traffic.traffic_plan import TrafficPlan

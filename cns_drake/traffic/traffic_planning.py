@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cns_drake.motion.trajectory import Trajectory
+from cns_drake.motion import Trajectory
 from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.streets import make_streets

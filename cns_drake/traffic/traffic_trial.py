@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.elementary import arcsin, arctan2
-from cns_drake.motion.trajectory import Trajectory
+from cns_drake.base import arcsin, arctan2
+from cns_drake.motion import Trajectory
 from cns_drake.traffic.car_following import accelerations
 from cns_drake.traffic.ego_car import STEP, EgoBox
 from cns_drake.traffic.follower import Follower

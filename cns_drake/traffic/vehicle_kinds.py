@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import TypeAdapter
 
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base import parse_yaml
 
 # Longer vehicles leave their lane in turns [m].
 _LARGE_FROM = 5.8

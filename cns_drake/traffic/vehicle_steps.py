@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 from cns_drake.traffic.ego_car import STEP
 from cns_drake.traffic.random_numbers import uniform
 from cns_drake.traffic.vehicle_records import CURRENT, NUM_PIECES, Traffic

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.polylines import length_of
+from cns_drake.base import length_of
 from cns_drake.traffic.ego_car import STEP
 from cns_drake.traffic.lane_graph import Walkway
 from cns_drake.traffic.polylines import SPACING

@@ -2,8 +2,8 @@
 
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.scenarios.sections import TransientConfig
-from cns_drake.scene.world import World
+from cns_drake.scenarios import TransientConfig
+from cns_drake.scene import World
 from cns_drake.transient.furniture import move_furniture
 from cns_drake.transient.height_limit import limit_heights
 from cns_drake.transient.leaves import thin_leaves

@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 
-from cns_drake.scene.semantics import GROUND_CLASSES
+from cns_drake.scene import GROUND_CLASSES
 from cns_drake.transient.surroundings import Surroundings
 
 # Cause of these changes in the structure table.

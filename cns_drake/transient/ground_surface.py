@@ -9,14 +9,14 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from cns_drake.city.geometry import (
+from cns_drake.city import (
     UpperSides,
     from_above,
     polygons_of,
     turned_up,
     unit_normals,
 )
-from cns_drake.scene.semantics import GROUND_CLASSES
+from cns_drake.scene import GROUND_CLASSES
 from cns_drake.transient.structure_geometry import (
     PartGeometry,
     StructureGeometry,

@@ -7,9 +7,17 @@ from pydrake.geometry import Mesh as DrakeMesh
 from pydrake.math import RigidTransform
 from shapely.geometry import box
 
-from cns_drake.city.geometry import OBJECT_MESHES, Mesh, MeshShape, Model, Part
-from cns_drake.city.growth.lowering import STOREY, lowered, top_of
-from cns_drake.scene.surfaces import tessellate
+from cns_drake.city import (
+    OBJECT_MESHES,
+    STOREY,
+    Mesh,
+    MeshShape,
+    Model,
+    Part,
+    lowered,
+    top_of,
+)
+from cns_drake.scene import tessellate
 from cns_drake.transient.scene_editing import SceneEditing
 from cns_drake.transient.structure_geometry import (
     PartGeometry,

@@ -7,8 +7,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.polylines import length_of
-from cns_drake.city.geometry import Model, placed
+from cns_drake.base import length_of
+from cns_drake.city import Model, placed
 from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.surroundings import FARTHEST, Surroundings
 

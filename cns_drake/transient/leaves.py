@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cns_drake.scene.surfaces import TriangleSurface
+from cns_drake.scene import TriangleSurface
 from cns_drake.transient.surroundings import Surroundings, change_rng
 
 # Cause of these changes in the structure table.

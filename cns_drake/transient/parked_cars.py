@@ -7,10 +7,9 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely import Polygon
 
-from cns_drake.base.elementary import product
-from cns_drake.city.furniture.parked_cars import PARKED_CARS
-from cns_drake.city.geometry.models import Model, part_triangles
-from cns_drake.scene.semantics import GROUND_CLASSES
+from cns_drake.base import product
+from cns_drake.city import PARKED_CARS, Model, part_triangles
+from cns_drake.scene import GROUND_CLASSES
 from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.structure_geometry import StructureGeometry

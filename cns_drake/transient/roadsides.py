@@ -9,9 +9,9 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.yaml_files import parse_yaml
-from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.scene.semantics import GROUND_CLASSES
+from cns_drake.base import parse_yaml
+from cns_drake.city import OBJECTS
+from cns_drake.scene import GROUND_CLASSES
 from cns_drake.transient.kerb_stretches import straight_kerbs
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings, change_rng

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry import assemble, block
-from cns_drake.city.placement.objects import OBJECTS, pick_key
-from cns_drake.scene.semantics import GROUND_CLASSES
+from cns_drake.city import OBJECTS, assemble, block, pick_key
+from cns_drake.scene import GROUND_CLASSES
 from cns_drake.transient.kerb_stretches import KerbStretch, straight_kerbs
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings

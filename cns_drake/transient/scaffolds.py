@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry import Model, Part, assemble, bar, block, post
+from cns_drake.city import Model, Part, assemble, bar, block, post
 from cns_drake.transient.structure_geometry import StructureGeometry
 from cns_drake.transient.surroundings import FARTHEST, Surroundings
 

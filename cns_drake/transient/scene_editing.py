@@ -11,22 +11,25 @@ from pydrake import geometry
 from pydrake.common import MemoryFile
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cns_drake.base.elementary import product
-from cns_drake.base.errors import InputError
-from cns_drake.city.geometry import (
+from cns_drake.base import InputError, product
+from cns_drake.city import (
     OBJECT_MESHES,
     BoxShape,
     CylinderShape,
     Mesh,
+    Model,
+    Part,
     Shape,
     SphereShape,
 )
-from cns_drake.city.geometry.models import Model, Part
-from cns_drake.scene.labels import MAX_INSTANCE
-from cns_drake.scene.perception_geometry import GREY
-from cns_drake.scene.structure_table import StructureEntry, StructureTable
-from cns_drake.scene.surfaces import TriangleSurface
-from cns_drake.scene.world import World
+from cns_drake.scene import (
+    GREY,
+    MAX_INSTANCE,
+    StructureEntry,
+    StructureTable,
+    TriangleSurface,
+    World,
+)
 from cns_drake.transient.structure_geometry import (
     PartGeometry,
     StructureGeometry,

@@ -5,14 +5,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 import shapely
 
-from cns_drake.base.elementary import sin
-from cns_drake.city.geometry.triangles import (
-    from_above,
-    quartered,
-    turned_up,
-    unit_normals,
-)
-from cns_drake.scene.semantics import GROUND_CLASSES
+from cns_drake.base import sin
+from cns_drake.city import from_above, quartered, turned_up, unit_normals
+from cns_drake.scene import GROUND_CLASSES
 from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.scene_editing import SceneEditing, SurfaceLook
 from cns_drake.transient.structure_geometry import (

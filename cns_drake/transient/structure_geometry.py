@@ -12,17 +12,21 @@ from pydrake.math import RigidTransform
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.elementary import product
-from cns_drake.scene import surfaces
-from cns_drake.scene.geometry_list import list_geometry
-from cns_drake.scene.materials import Material
-from cns_drake.scene.perception_geometry import (
+from cns_drake.base import product
+from cns_drake.scene import (
+    CapsuleSurface,
+    CylinderSurface,
+    EllipsoidSurface,
     GeometryReader,
+    HalfSpaceSurface,
+    Material,
     PerceptionGeometry,
+    StructureEntry,
+    TriangleSurface,
+    World,
+    list_geometry,
+    structure_name,
 )
-from cns_drake.scene.structure_names import structure_name
-from cns_drake.scene.structure_table import StructureEntry
-from cns_drake.scene.world import World
 
 # Cars and people can pass below parts that are higher than this above a
 # structure's foot [m].
@@ -56,20 +60,18 @@ class PartGeometry:
     def p_WPs(self) -> np.ndarray:
         """Points (N, 3) in W whose convex hull contains the part [m]."""
         surface = self.geometry.surface
-        if isinstance(surface, surfaces.TriangleSurface):
+        if isinstance(surface, TriangleSurface):
             p_GPs = surface.p_GVset
-        elif isinstance(surface, surfaces.EllipsoidSurface):
+        elif isinstance(surface, EllipsoidSurface):
             p_GPs = _BOX * surface.semi_axes
-        elif isinstance(
-            surface, surfaces.CylinderSurface | surfaces.CapsuleSurface
-        ):
+        elif isinstance(surface, CylinderSurface | CapsuleSurface):
             r = surface.radius
             half = surface.length / 2
-            if isinstance(surface, surfaces.CapsuleSurface):
+            if isinstance(surface, CapsuleSurface):
                 half += r
             p_GPs = _BOX * (r, r, half)
         else:
-            assert isinstance(surface, surfaces.HalfSpaceSurface)
+            assert isinstance(surface, HalfSpaceSurface)
             p_GPs = np.zeros((0, 3))
         R, p = self.X_WG.rotation().matrix(), self.X_WG.translation()
         return product(p_GPs, R.T) + p
@@ -184,6 +186,6 @@ def triangle_corners(part: PartGeometry) -> np.ndarray:
     A part with a curved surface has no triangles.
     """
     surface = part.geometry.surface
-    if not isinstance(surface, surfaces.TriangleSurface):
+    if not isinstance(surface, TriangleSurface):
         return np.zeros((0, 3, 3))
     return part.p_WPs[surface.triangles]

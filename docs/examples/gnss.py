@@ -25,15 +25,14 @@ from pydrake.systems.framework import (
 )
 
 from cns_drake import Scenario, load_scenario, simulate
-from cns_drake.drives.ros_types import message_class
-from cns_drake.recording.messages import make_header
-from cns_drake.recording.rosbag2_metadata import Topic
-from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.sensors.noise_draws import noise_generator
-from cns_drake.sensors.sensor_config import (
+from cns_drake.drives import message_class
+from cns_drake.recording import Topic, make_header
+from cns_drake.sensors import (
     SensorConfig,
     Triple,
     field_off_by_default,
+    noise_generator,
+    sensor_pose,
 )
 
 FIX = "sensor_msgs/msg/NavSatFix"

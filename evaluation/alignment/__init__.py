@@ -5,6 +5,7 @@ loops by the `registration` of `submaps`, and `pose_graph` fits poses to the
 loops. `trajectory_errors` compares an estimated trajectory with ground truth.
 """
 
+from cns_drake.base import attach
 from evaluation.alignment.align import (
     Alignment,
     AlignmentReport,
@@ -14,3 +15,5 @@ from evaluation.alignment.align import (
 )
 
 __all__ = ["Alignment", "AlignmentReport", "When", "align", "in_one_world"]
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

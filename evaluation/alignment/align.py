@@ -24,11 +24,8 @@ from typing import Literal
 
 import numpy as np
 
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError
-from cns_drake.base.poses import yaw_pose
-from cns_drake.drives.drive import Drive
-from cns_drake.drives.same_world import check_same_map
+from cns_drake.base import InputError, poses, yaw_pose
+from cns_drake.drives import Drive, check_same_map
 from evaluation.alignment.loop_search import (
     SAME_PLACE,
     LoopSearch,
@@ -44,7 +41,7 @@ from evaluation.alignment.pose_graph import (
 )
 from evaluation.alignment.pose_guesses import find_candidates, find_guesses
 from evaluation.alignment.submaps import Submaps
-from evaluation.drives.drive_views import MovedDrive
+from evaluation.drives import MovedDrive
 
 When = Literal["auto", "always", "never"]
 

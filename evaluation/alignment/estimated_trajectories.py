@@ -26,12 +26,9 @@ import warnings
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError
-from cns_drake.drives.drive import Drive
-from cns_drake.drives.mcap_messages import checked_poses
-from evaluation.drives.sampling import travelled
-from evaluation.drives.trajectories import StampedPoses
+from cns_drake.base import InputError, poses
+from cns_drake.drives import Drive, checked_poses
+from evaluation.drives import StampedPoses, travelled
 
 Frame = Literal["lidar", "base_link"]
 # Length of the parts over which an odometry drifts [m].

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import poses
-from cns_drake.base.progress import track
+from cns_drake.base import poses, track
 from evaluation.alignment.registration import register
 from evaluation.alignment.submaps import Submaps
 

@@ -12,12 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.poses import yaw_pose
-from cns_drake.base.progress import track
-from cns_drake.base.units import wrapped
+from cns_drake.base import track, wrapped, yaw_pose
 from evaluation.alignment.submaps import Submaps
-from evaluation.drives.scan_clouds import cloud_at
-from evaluation.methods.scan_context import ScanContext
+from evaluation.drives import cloud_at
+from evaluation.methods import ScanContext
 
 # Candidates for each query. LT-mapper takes 3 with a score of at least 0.7.
 # Here no score is required: in a changed city, right candidates score 0.3 to

@@ -5,10 +5,10 @@ from functools import lru_cache
 import numpy as np
 
 from cns_drake.base import poses
-from cns_drake.drives.drive import Drive
+from cns_drake.drives import Drive
 from evaluation.alignment.registration import Surface, make_surface
-from evaluation.drives.sampling import sample_frames, travelled
-from evaluation.maps.voxel_maps import VoxelAccumulator
+from evaluation.drives import sample_frames, travelled
+from evaluation.maps import VoxelAccumulator
 
 # Distance between keyframes along the path [m].
 _SPACING = 10.0

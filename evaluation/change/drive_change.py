@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.json_text import json_values
-from cns_drake.drives.same_world import check_same_world
+from cns_drake.base import InputError, json_values
+from cns_drake.drives import check_same_world
 from evaluation.change.drive_maps import DriveMap
 from evaluation.change.tcr import (
     COVERAGE_RADIUS,
@@ -27,7 +26,7 @@ from evaluation.change.tcr import (
     covered,
     temporal_change,
 )
-from evaluation.maps.voxel_maps import VOXEL_SIZE
+from evaluation.maps import VOXEL_SIZE
 
 if TYPE_CHECKING:
     from evaluation.alignment import AlignmentReport

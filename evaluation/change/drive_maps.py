@@ -8,17 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.drives.drive import Drive
-from cns_drake.drives.same_world import Placed
-from evaluation.clouds.cloud_files import is_cloud, read_blocks
+from cns_drake.base import InputError
+from cns_drake.drives import Drive, Placed
+from evaluation.clouds import is_cloud, read_blocks
 from evaluation.drives import open_drive
-from evaluation.maps.voxel_maps import (
-    CELL_SIZE,
-    VoxelAccumulator,
-    VoxelMap,
-    map_drive,
-)
+from evaluation.maps import CELL_SIZE, VoxelAccumulator, VoxelMap, map_drive
 
 if TYPE_CHECKING:
     from evaluation.alignment import AlignmentReport, When

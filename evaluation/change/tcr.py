@@ -26,7 +26,7 @@ import math
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from evaluation.maps.voxel_maps import VOXEL_SIZE
+from evaluation.maps import VOXEL_SIZE
 
 # Points up to this far outside of a hull count as inside [m]: a tenth of a
 # voxel.

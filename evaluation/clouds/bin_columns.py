@@ -15,9 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular, user_errors
-from cns_drake.base.poses import FARTHEST
+from cns_drake.base import FARTHEST, InputError, check_regular, user_errors
 
 # KITTI's number of columns, used if the values do not show another.
 _USUAL = 4

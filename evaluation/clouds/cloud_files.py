@@ -6,10 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.files import check_regular, user_errors
-from cns_drake.base.points import check_range
-from cns_drake.base.poses import FARTHEST
+from cns_drake.base import (
+    FARTHEST,
+    InputError,
+    check_range,
+    check_regular,
+    user_errors,
+    value_errors,
+)
 from evaluation.clouds.bin_columns import find_layout
 from evaluation.clouds.notes import OnNote, no_note
 from evaluation.clouds.npy_files import read_npy_blocks

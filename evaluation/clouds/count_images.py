@@ -23,8 +23,7 @@ import zlib
 import numpy as np
 from PIL import Image
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular, user_errors
+from cns_drake.base import InputError, check_regular, user_errors
 
 # Side of a voxel and of a pixel [m].
 PIXEL = 0.4

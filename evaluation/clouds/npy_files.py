@@ -7,9 +7,8 @@ import warnings
 
 import numpy as np
 
+from cns_drake.base import check_regular, user_errors, value_errors
 from cns_drake.base import points as point_arrays
-from cns_drake.base.errors import value_errors
-from cns_drake.base.files import check_regular, user_errors
 from evaluation.clouds.notes import OnNote
 from evaluation.clouds.record_reading import check_size, read_records
 

@@ -9,8 +9,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from cns_drake.base.number_format import parse_rows
-from cns_drake.base.repetitions import repeated
+from cns_drake.base import parse_rows, repeated
 
 # Room for some tens of numbers with some tens of characters each.
 _LONGEST_LINE_BYTES = 1 << 16

@@ -4,10 +4,7 @@ Each command is a module, and imports its slow modules itself, so that the help
 comes at once.
 """
 
-from cns_drake.base import program
-from cns_drake.base.commands import Command
-from cns_drake.base.program import example
-from cns_drake.base.progress_display import show_progress
+from cns_drake.base import Command, example, program, show_progress
 from evaluation.command_line.compare import compare
 from evaluation.command_line.localise import localise
 from evaluation.command_line.map_update import map_update

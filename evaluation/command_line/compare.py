@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import shared_options, terminal
-from cns_drake.base.terminal import number_text
+from cns_drake.base import number_text, shared_options, terminal
 from evaluation.command_line.printed_text import interval_text
 
 if TYPE_CHECKING:
-    from evaluation.recognition.bootstrap import Interval
+    from evaluation.recognition import Interval
 
 
 def compare(
@@ -57,7 +56,7 @@ def compare(
             can compare tables with different conditions, such as a table of
             simulated drives and a table of real drives.
     """
-    from evaluation.results.table_comparison import compare_tables
+    from evaluation.results import compare_tables
 
     found = compare_tables(
         tables, metric, protocol, gate=verified, rankings=rankings

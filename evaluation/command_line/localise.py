@@ -16,10 +16,8 @@ from evaluation.command_line.trajectories import measure_estimate
 if TYPE_CHECKING:
     import numpy as np
 
-    from cns_drake.drives.drive import Drive
-    from evaluation.study.engine import Engine
-    from evaluation.study.tasks.localise import LocaliseTask
-    from evaluation.study.tasks.pair import Pair
+    from cns_drake.drives import Drive
+    from evaluation.study import Engine, LocaliseTask, Pair
 
 # Drift of the odometry by default, as a share of the distance.
 _USUAL_DRIFT = 0.01
@@ -115,18 +113,21 @@ def localise(
             localisation.csv contains all values of each query. With --track,
             the folder also contains a picture.
     """
-    from cns_drake.base.errors import InputError
-    from cns_drake.base.files import make_folder
-    from cns_drake.base.jobs.cluster import choose_cluster
-    from evaluation.localisation.estimators import make_estimator
-    from evaluation.localisation.initial_poses import Starts
-    from evaluation.localisation.localisation_map import FEWEST_POINTS
-    from evaluation.localisation.results import localisation_summary
-    from evaluation.localisation.settings import default_settings
-    from evaluation.localisation.tracking import tracking_summary
-    from evaluation.study import one_pair
-    from evaluation.study.chosen_methods import method_settings
-    from evaluation.study.tasks.localise import LocaliseTask
+    from cns_drake.base import InputError, choose_cluster, make_folder
+    from evaluation.localisation import (
+        FEWEST_POINTS,
+        Starts,
+        default_settings,
+        localisation_summary,
+        make_estimator,
+        tracking_summary,
+    )
+    from evaluation.study import (
+        LocaliseTask,
+        OpenSource,
+        method_settings,
+        pair_of,
+    )
 
     if estimate is not None:
         commands.check_only_with(context, "estimate", _WITH_ESTIMATE)
@@ -159,9 +160,9 @@ def localise(
     }
     if query_spacing is not None:
         settings["spacing"] = query_spacing
-    pair = one_pair.pair_of(
-        one_pair.OpenSource(source, columns),
-        one_pair.OpenSource(drive),
+    pair = pair_of(
+        OpenSource(source, columns),
+        OpenSource(drive),
         (source.name, drive.name),
     )
     task = LocaliseTask(settings, "localise")
@@ -201,12 +202,14 @@ def _localised(
     Raises:
         InputError: the scans cannot be localised.
     """
-    from cns_drake.base.errors import InputError
-    from evaluation.study import one_pair
-    from evaluation.study.tasks.localise import NOT_LOCALISED
+    from cns_drake.base import InputError
+    from evaluation.study import (
+        NOT_LOCALISED,
+        measure_pairs,
+    )
 
     notes: list[str] = []
-    engine = one_pair.measure_pairs(
+    engine = measure_pairs(
         "localise",
         [pair],
         [task],
@@ -224,10 +227,10 @@ def _write_results(
     engine: Engine, rows: np.ndarray, output: Path, *, track: bool
 ) -> None:
     """Writes the tables and, of a tracked drive, the picture."""
-    from evaluation.localisation.results import write_rows
+    from evaluation.localisation import write_rows
 
     if track:
-        from evaluation.results.track_figure import draw_track
+        from evaluation.results import draw_track
 
         draw_track(rows, output / "track")
     write_rows(rows, output / "localisation.csv")
@@ -247,7 +250,7 @@ def _check_together(
     Raises:
         InputError: an option cannot be used.
     """
-    from cns_drake.base.errors import InputError
+    from cns_drake.base import InputError
 
     for name in ("frame", "time_offset"):
         if name in commands.given_options(context):
@@ -280,11 +283,10 @@ def _opened(
     Raises:
         InputError: a path cannot be opened, or the drives cannot be aligned.
     """
-    from cns_drake.base.errors import InputError
-    from cns_drake.drives.drive import Drive
-    from cns_drake.drives.same_world import check_same_world
-    from evaluation.change.drive_maps import open_source
-    from evaluation.localisation.one_scan import OneScan
+    from cns_drake.base import InputError
+    from cns_drake.drives import Drive, check_same_world
+    from evaluation.change import open_source
+    from evaluation.localisation import OneScan
 
     source = open_source(place, lidar, columns)
     asked = open_source(query, lidar, columns)

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import terminal
-from cns_drake.base.shared_options import Json
+from cns_drake.base import Json, terminal
 from evaluation.command_line import options
 
 
@@ -51,11 +50,14 @@ def map_update(
             labels that were scored, A.npy and B.npy; created if it does not
             exist.
     """
-    from cns_drake.base.errors import InputError
-    from cns_drake.base.files import make_folder
-    from evaluation.map_update import sessions
-    from evaluation.study import one_pair
-    from evaluation.study.tasks.map_scores import GIVEN, LabelledMapTask
+    from cns_drake.base import InputError, make_folder
+    from evaluation.map_update import read_pair, write_labels
+    from evaluation.study import (
+        GIVEN,
+        LabelledMapTask,
+        measure_pairs,
+        pair_of_maps,
+    )
 
     if (labels_a is None) != (labels_b is None):
         raise InputError("--labels-a and --labels-b: give both")
@@ -63,19 +65,17 @@ def map_update(
         raise InputError("--baseline: not together with --labels-a")
     if output is not None:
         make_folder(output)
-    pair = sessions.read_pair(folder)
+    pair = read_pair(folder)
     given = [file for file in (labels_a, labels_b) if file is not None]
     method = (baseline or BaselineName.FREE_SPACE).value
     name = GIVEN if given else method
-    maps = one_pair.pair_of_maps(
-        pair.A.folder, pair.B.folder, folder.resolve().name
-    )
+    maps = pair_of_maps(pair.A.folder, pair.B.folder, folder.resolve().name)
     task = LabelledMapTask(folder, [] if given else [method], given)
-    engine = one_pair.measure_pairs("map-update", [maps], [task], output)
+    engine = measure_pairs("map-update", [maps], [task], output)
     found = engine.found(maps, task.name)[name]
     if output is not None:
         for session, labels in zip(pair, found.labels, strict=True):
-            sessions.write_labels(output / f"{session.side}.npy", labels)
+            write_labels(output / f"{session.side}.npy", labels)
         options.write_tables(engine)
     terminal.show(
         {"method": name, **found.scores}, _rows(name, found.scores), json=json

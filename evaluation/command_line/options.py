@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cns_drake.base import terminal
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError, terminal
 
 if TYPE_CHECKING:
-    from cns_drake.drives.drive import Drive
-    from evaluation.study.engine import Engine
+    from cns_drake.drives import Drive
+    from evaluation.study import Engine
 
 # Option: when drives are aligned to one world.
 When = Literal["auto", "always", "never"]
@@ -63,7 +62,7 @@ def open_noted(
 
 def write_tables(engine: Engine) -> None:
     """Writes both tables of an engine, and shows a note on them."""
-    from evaluation.results.table import QUERIES, RESULTS
+    from evaluation.results import QUERIES, RESULTS
 
     engine.write_tables()
     terminal.note(f"wrote {engine.output / RESULTS} and {QUERIES}")

@@ -10,25 +10,26 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from cns_drake.base import commands, shared_options, terminal
-from cns_drake.base.errors import InputError, errors_at_option
-from cns_drake.base.terminal import number_text
+from cns_drake.base import (
+    InputError,
+    commands,
+    errors_at_option,
+    number_text,
+    shared_options,
+    terminal,
+)
 from evaluation.command_line import options
 from evaluation.command_line.printed_text import NOT_FINITE, interval_text
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.protocol_options import with_protocol
+from evaluation.recognition import RetrievalProtocol, with_protocol
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from cns_drake.drives.drive import Drive
-    from evaluation.drives.drive_views import CountedDrive
-    from evaluation.methods.method import Method
-    from evaluation.recognition.metrics import Mode
-    from evaluation.recognition.place_outcome import PlaceOutcome
-    from evaluation.recognition.pose_errors import PoseMetrics
-    from evaluation.study.chosen_methods import MethodChoice
-    from evaluation.study.engine import Engine
+    from cns_drake.drives import Drive
+    from evaluation.drives import CountedDrive
+    from evaluation.methods import Method
+    from evaluation.recognition import Mode, PlaceOutcome, PoseMetrics
+    from evaluation.study import Engine, MethodChoice
 
 
 # Parameters that have an effect together with `--scores`.
@@ -124,11 +125,13 @@ def pr(
         chosen = _made(choice)
         _write_scores(chosen, database, query, scores, protocol, columns)
         return
-    from cns_drake.base import files
-    from cns_drake.drives.same_world import check_same_map, check_same_world
-    from evaluation.drives.drive_views import CountedDrive
-    from evaluation.recognition import overlap_truth
-    from evaluation.recognition.place_outcome import check_has_match
+    from cns_drake.base import make_folder
+    from cns_drake.drives import check_same_map, check_same_world
+    from evaluation.drives import CountedDrive
+    from evaluation.recognition import (
+        check_has_match,
+        write_overlaps,
+    )
 
     if turn_queries is not None:
         protocol = replace(protocol, turn_queries=turn_queries)
@@ -143,7 +146,7 @@ def pr(
     is_itself = database.resolve() == query.resolve()
     _check_together(protocol, database, query, overlaps, exact_overlaps)
     if output is not None:
-        files.make_folder(output)
+        make_folder(output)
     given = _choice_of(method, parameter)
     choice = given.at_height(sensor_height)
     chosen = _made(choice)
@@ -168,7 +171,7 @@ def pr(
     _show_notes(chosen, counted)
     if overlaps is not None:
         assert shares is not None
-        overlap_truth.write_overlaps(
+        write_overlaps(
             overlaps,
             outcome.columns["query_frame"],
             outcome.place_frames,
@@ -206,18 +209,22 @@ def _measured(
         method: the method, and its columns in the tables.
         output: folder for the tables; None if there is none.
     """
-    from evaluation.study import one_pair
-    from evaluation.study.one_pair import OpenSource
-    from evaluation.study.tasks.place import PlaceTask, PoseTask
+    from evaluation.study import (
+        OpenSource,
+        PlaceTask,
+        PoseTask,
+        measure_pairs,
+        pair_of,
+    )
 
-    pair = one_pair.pair_of(
+    pair = pair_of(
         OpenSource(places),
         OpenSource(queries),
         (places.name, queries.name),
         protocol,
         overlaps=overlaps,
     )
-    engine = one_pair.measure_pairs(
+    engine = measure_pairs(
         "pr",
         [pair],
         [PlaceTask({}, "pr"), PoseTask({}, "pr")],
@@ -256,7 +263,7 @@ def _check_together(
     Raises:
         InputError: an option needs another one, or a file cannot be used.
     """
-    from cns_drake.base import complete_files, files
+    from cns_drake.base import check_regular, check_writable
 
     for option, file in (
         ("--overlaps", overlaps),
@@ -271,9 +278,9 @@ def _check_together(
             f"is not {database}"
         )
     if overlaps is not None:
-        complete_files.check_writable(overlaps)
+        check_writable(overlaps)
     if exact_overlaps is not None:
-        files.check_regular(exact_overlaps)
+        check_regular(exact_overlaps)
 
 
 def _overlaps(
@@ -283,13 +290,17 @@ def _overlaps(
     exact_overlaps: Path | None,
 ) -> np.ndarray | None:
     """Returns the overlaps (Q, D) if matches are by overlap, otherwise None."""
-    from evaluation.recognition import overlap_truth
+    from evaluation.recognition import (
+        compared_frames,
+        overlap_matrix,
+        read_overlaps,
+    )
 
     if exact_overlaps is not None:
-        frames = overlap_truth.compared_frames(places, queries, protocol)
-        return overlap_truth.read_overlaps(exact_overlaps, *frames)
+        frames = compared_frames(places, queries, protocol)
+        return read_overlaps(exact_overlaps, *frames)
     if protocol.overlap is not None:
-        return overlap_truth.overlap_matrix(places, queries, protocol)
+        return overlap_matrix(places, queries, protocol)
     return None
 
 
@@ -302,9 +313,9 @@ def _write_scores(
     columns: int | None,
 ) -> None:
     """Writes the scores of `pr --scores`, and shows the notes on them."""
-    from evaluation.recognition import scan_folders
+    from evaluation.recognition import write_scores
 
-    num_ignored = scan_folders.write_scores(
+    num_ignored = write_scores(
         method,
         database,
         query,
@@ -322,8 +333,8 @@ def _write_scores(
 
 def _choice_of(name: str, assignments: list[str] | None) -> MethodChoice:
     """Returns a method with its settings."""
-    from evaluation.methods.own_files import load_method
-    from evaluation.study.chosen_methods import MethodChoice, method_settings
+    from evaluation.methods import load_method
+    from evaluation.study import MethodChoice, method_settings
 
     file = Path(name) if name.endswith(".py") else None
     if file is not None:
@@ -396,10 +407,7 @@ def _recognition_rows(
 
 def _pose_rows(pose: PoseMetrics) -> Iterator[tuple[str, str]]:
     """Yields names and values of the errors of poses."""
-    from evaluation.recognition.pose_errors import (
-        SUCCESS_ROTATION_DEG,
-        SUCCESS_TRANSLATION,
-    )
+    from evaluation.recognition import SUCCESS_ROTATION_DEG, SUCCESS_TRANSLATION
 
     yield (
         "translation error, median, 90 %",

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cns_drake.base.terminal import number_text
+from cns_drake.base import number_text
 
 if TYPE_CHECKING:
-    from evaluation.recognition.bootstrap import Interval
+    from evaluation.recognition import Interval
 
 # Note on a cloud, after the number of points.
 NOT_FINITE = "points are not finite, and left out"

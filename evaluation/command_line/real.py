@@ -49,10 +49,10 @@ def real(
             contains one random match of each query. By default all queries and
             all places are used.
     """
-    from cns_drake.base.jobs.cluster import choose_cluster
-    from evaluation.real.real_study import measure_real
-    from evaluation.results.table import RESULTS
-    from evaluation.study.chosen_methods import expanded_names
+    from cns_drake.base import choose_cluster
+    from evaluation.real import measure_real
+    from evaluation.results import RESULTS
+    from evaluation.study import expanded_names
 
     measure_real(
         folder,

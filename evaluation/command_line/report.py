@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 
 from cns_drake.base import shared_options, terminal
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.protocol_options import with_protocols
+from evaluation.recognition import RetrievalProtocol, with_protocols
 
 
 @with_protocols("fair")
@@ -37,14 +36,16 @@ def report(
         recordings: Folder that contains the recordings.
         output: Folder for the results; created if it does not exist.
     """
-    from cns_drake.base.jobs.cluster import choose_cluster
+    from cns_drake.base import choose_cluster
     from evaluation.command_line.suggestions import (
         name_tables,
         suggest_comparison,
     )
-    from evaluation.study.chosen_methods import choose_methods
-    from evaluation.study.recorded_study import study_recordings
-    from evaluation.study.recordings.recording_search import find_recordings
+    from evaluation.study import (
+        choose_methods,
+        find_recordings,
+        study_recordings,
+    )
 
     cluster = choose_cluster(jobs, scheduler)
     chosen = choose_methods(method or (), parameter or ())

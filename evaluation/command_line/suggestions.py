@@ -3,10 +3,8 @@
 import contextlib
 from pathlib import Path
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.terminal import next_command, note
-from evaluation.results.table import QUERIES, RESULTS
-from evaluation.results.table_comparison import compare_tables
+from cns_drake.base import InputError, next_command, note
+from evaluation.results import QUERIES, RESULTS, compare_tables
 
 
 def suggest_comparison(folder: Path) -> None:

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import commands, shared_options, terminal
-from cns_drake.base.terminal import number_text
+from cns_drake.base import commands, number_text, shared_options, terminal
 from evaluation.command_line import options
 from evaluation.command_line.printed_text import NOT_FINITE
 from evaluation.command_line.trajectories import compare_paths
 
 if TYPE_CHECKING:
-    from evaluation.change.drive_change import ChangeReport
+    from evaluation.change import ChangeReport
 
 
 # Parameters that have an effect together with `--paths`.
@@ -65,15 +64,14 @@ def tcr(
         )
         compare_paths(first, second, align, json=json)
         return
-    from cns_drake.base.files import make_folder
-    from evaluation.change.drive_change import (
+    from cns_drake.base import make_folder
+    from evaluation.change import (
+        maps_in_one_world,
         same_stage_partner,
         spread_over_grids,
     )
-    from evaluation.change.drive_maps import maps_in_one_world
-    from evaluation.results.keys import LAST, OWN, STAGE
-    from evaluation.study import one_pair
-    from evaluation.study.tasks.change import ChangeTask
+    from evaluation.results import LAST, OWN, STAGE
+    from evaluation.study import ChangeTask, measure_pairs, pair_of_drive_maps
 
     named = [path for path in (source, target, control) if path is not None]
     maps, alignments = maps_in_one_world(named, align, lidar, columns)
@@ -82,7 +80,7 @@ def tcr(
         (third, same_stage_partner(before, after, third)) for third in controls
     ]
     pairs = [
-        one_pair.pair_of_drive_maps(
+        pair_of_drive_maps(
             both,
             (before.name, after.name),
             factors={STAGE: stage} if controls else {},
@@ -93,9 +91,7 @@ def tcr(
     ]
     if output is not None:
         make_folder(output)
-    engine = one_pair.measure_pairs(
-        "tcr", pairs, [ChangeTask({}, "tcr")], output
-    )
+    engine = measure_pairs("tcr", pairs, [ChangeTask({}, "tcr")], output)
     report, *beside = (engine.found(pair, ChangeTask.name) for pair in pairs)
     for other in beside:
         report = report.beside(other)
@@ -119,7 +115,7 @@ def tcr(
 
 def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
     """Yields names and values of the results of `tcr`."""
-    from evaluation.change.tcr import COVERAGE_RADIUS
+    from evaluation.change import COVERAGE_RADIUS
 
     change = report.change
     source, target = report.source, report.target

@@ -11,8 +11,8 @@ from cns_drake.base import terminal
 from evaluation.command_line import options
 
 if TYPE_CHECKING:
-    from cns_drake.drives.drive import Drive
-    from evaluation.drives.comparison import DriveComparison, Driving
+    from cns_drake.drives import Drive
+    from evaluation.drives import DriveComparison, Driving
 
 
 def compare_paths(
@@ -26,7 +26,7 @@ def compare_paths(
         when: whether to first align the drives to one world.
         json: whether to print JSON.
     """
-    from evaluation.drives.comparison import compare_drives
+    from evaluation.drives import compare_drives
 
     found = compare_drives(*options.aligned((first, second), when))
     terminal.show(found.to_json(), _drive_rows(found), json=json)
@@ -49,9 +49,8 @@ def measure_estimate(
         time_offset: time to add to the times of the estimate [s].
         json: whether to print JSON.
     """
-    from evaluation.alignment.estimated_trajectories import trajectory_errors
-    from evaluation.drives.text_tables import parse_seconds
-    from evaluation.drives.trajectories import read_quaternions
+    from evaluation.alignment import trajectory_errors
+    from evaluation.drives import parse_seconds, read_quaternions
 
     found = read_quaternions(estimate, None, parse_seconds)
     errors = trajectory_errors(truth, found, frame, time_offset)

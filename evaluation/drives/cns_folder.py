@@ -18,13 +18,17 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.files import is_there, read_text
-from cns_drake.base.yaml_files import YamlLoader, parse_yaml
-from cns_drake.drives.drive import IMU_DTYPE
-from cns_drake.drives.drive_scenario import SCENARIO, read_scenario
-from evaluation.clouds.cloud_files import read_cloud
+from cns_drake.base import (
+    InputError,
+    YamlLoader,
+    is_there,
+    parse_yaml,
+    poses,
+    read_text,
+    value_errors,
+)
+from cns_drake.drives import IMU_DTYPE, SCENARIO, read_scenario
+from evaluation.clouds import read_cloud
 from evaluation.drives.scan_files import FileDrive, first_existing, list_stamped
 from evaluation.drives.text_tables import read_stamped_rows
 from evaluation.drives.trajectories import pose_matrices, read_quaternions

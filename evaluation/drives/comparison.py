@@ -10,10 +10,8 @@ import math
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.json_text import json_values
-from cns_drake.drives.drive import Drive
-from cns_drake.drives.same_world import check_same_world
+from cns_drake.base import InputError, json_values
+from cns_drake.drives import Drive, check_same_world
 from evaluation.drives.sampling import corners, travelled
 
 # Distance between the stations at which two drives are compared [m].

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from cns_drake.base import points
-from cns_drake.drives.drive import Drive
-from cns_drake.drives.lidar_fields import LidarField
+from cns_drake.drives import Drive, LidarField
 
 
 class DriveView(Drive):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,

@@ -4,8 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cns_drake.drives.drive import Drive
-from cns_drake.drives.same_world import check_same_world
+from cns_drake.drives import Drive, check_same_world
 from evaluation.drives.sampling import sample_frames
 
 

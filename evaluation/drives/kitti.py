@@ -30,13 +30,18 @@ import re
 import numpy as np
 from numpy.lib.recfunctions import append_fields
 
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.files import is_there, listed, read_bytes, read_text
-from cns_drake.base.json_text import parse_json
-from cns_drake.base.number_format import parse_rows
-from cns_drake.drives.drive import index_instances
-from cns_drake.drives.drive_scenario import SCENARIO, read_scenario
+from cns_drake.base import (
+    InputError,
+    is_there,
+    listed,
+    parse_json,
+    parse_rows,
+    poses,
+    read_bytes,
+    read_text,
+    value_errors,
+)
+from cns_drake.drives import SCENARIO, index_instances, read_scenario
 from evaluation.drives.scan_files import BinDrive, first_existing, read_packed
 from evaluation.drives.text_tables import (
     check_increasing,

@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.drives.drive_scenario import SCENARIO, read_scenario
-from cns_drake.drives.mulran_frames import X_BS
+from cns_drake.base import InputError
+from cns_drake.drives import SCENARIO, X_BS, read_scenario
 from evaluation.drives.scan_files import (
     BinDrive,
     first_existing,

@@ -3,10 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import listed
-from cns_drake.base.progress import doing
-from cns_drake.drives.drive import Drive
+from cns_drake.base import InputError, doing, listed
+from cns_drake.drives import Drive
 
 
 def open_drive(
@@ -38,7 +36,7 @@ def open_drive(
         raise InputError(f"{path}: no such file or folder")
     doing(f"opening {path.name}")
     fitting = find_readers(path)
-    from cns_drake.drives.mcap_drive import McapDrive
+    from cns_drake.drives import McapDrive
     from evaluation.drives.helipr import HeliprDrive
 
     if len(fitting) > 1:
@@ -71,7 +69,7 @@ def find_readers(path: Path) -> list[Any]:
     """Returns the drive classes whose format a file or folder has."""
     # Imported here: the readers' libraries are slow to load, and a map file
     # needs none of them.
-    from cns_drake.drives import mcap_drive
+    from cns_drake.drives import McapDrive, holds_mcap
     from evaluation.drives import (
         boreas,
         cns_folder,
@@ -82,7 +80,7 @@ def find_readers(path: Path) -> list[Any]:
     )
 
     readers = (
-        (mcap_drive.holds_mcap, mcap_drive.McapDrive),
+        (holds_mcap, McapDrive),
         (mulran.holds_mulran, mulran.MulranDrive),
         (helipr.holds_helipr, helipr.HeliprDrive),
         (nclt.holds_nclt, nclt.NcltDrive),

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from cns_drake.base import InputError, poses
 from cns_drake.base import points as clouds
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError
-from cns_drake.drives.drive import Drive
+from cns_drake.drives import Drive
 from evaluation.drives.query_sensor import QuerySensor
 
 

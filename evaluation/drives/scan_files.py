@@ -8,13 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.files import listed, read_bytes, user_errors
-from cns_drake.base.points import FARTHEST_RETURN, check_range
-from cns_drake.drives.drive import Drive
-from cns_drake.drives.lidar_fields import LidarField, lidar_field
-from evaluation.clouds.bin_columns import BinLayout, find_layout
-from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
+from cns_drake.base import (
+    FARTHEST_RETURN,
+    InputError,
+    check_range,
+    listed,
+    read_bytes,
+    user_errors,
+    value_errors,
+)
+from cns_drake.drives import Drive, LidarField, lidar_field
+from evaluation.clouds import SCAN_LIMIT_BYTES, BinLayout, find_layout
 from evaluation.drives.text_tables import check_increasing, parse_stamps_ns
 
 

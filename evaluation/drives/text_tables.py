@@ -8,10 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.files import decode_text, read_bytes
-from cns_drake.base.number_format import is_number, other_separator, parse_rows
-from cns_drake.base.units import NS_PER_S
+from cns_drake.base import (
+    NS_PER_S,
+    InputError,
+    decode_text,
+    is_number,
+    other_separator,
+    parse_rows,
+    read_bytes,
+    value_errors,
+)
 from evaluation.drives.table_headers import find_columns, split_header
 
 _NS_PER_US = 1000

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError, value_errors
+from cns_drake.base import InputError, poses, value_errors
 from evaluation.drives.text_tables import (
     check_finite,
     check_increasing,

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.drives.mulran_frames import ORIGIN
+from cns_drake.base import InputError
+from cns_drake.drives import ORIGIN
 
 # The zone of MulRan and HeLiPR.
 DATUM = "utm-52n"

@@ -7,3 +7,7 @@ another. `results` summarises the records of both. `robust_icp` and `fit` are
 parts of estimators, and `settings` contains the settings of estimators.
 `one_scan` reads a single cloud as a drive.
 """
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -22,9 +22,8 @@ from types import ModuleType
 import numpy as np
 import small_gicp
 
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError, did_you_mean
-from evaluation.alignment.registration import covariances
+from cns_drake.base import InputError, did_you_mean, poses
+from evaluation.alignment import covariances
 from evaluation.localisation.localisation_map import (
     FEWEST_POINTS,
     LocalisationMap,
@@ -39,7 +38,7 @@ from evaluation.localisation.settings import (
     SMALL_GICP_KINDS,
     Settings,
 )
-from evaluation.methods.own_files import run_module, with_named_faults
+from evaluation.methods import run_module, with_named_faults
 
 # An alignment ends when a step is below both of these [m, rad].
 _LEAST_MOVE = 1e-4

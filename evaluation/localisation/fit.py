@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from cns_drake.base import poses
-from evaluation.alignment.registration import Surface
+from evaluation.alignment import Surface
 
 # A point of a scan fits if a surface of the map is this near [m].
 _FIT = 0.15

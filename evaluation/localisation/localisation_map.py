@@ -8,23 +8,18 @@ from pathlib import Path
 import numpy as np
 import small_gicp
 
+from cns_drake.base import InputError, poses, track
 from cns_drake.base import points as clouds
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError
-from cns_drake.base.progress import track
-from cns_drake.drives.drive import Drive
-from evaluation.alignment.registration import Surface, make_surface
-from evaluation.clouds.cloud_files import read_blocks
-from evaluation.clouds.notes import OnNote, no_note
-from evaluation.drives.joined_drive import JoinedDrive
-from evaluation.drives.sampling import sample_frames
-from evaluation.drives.scan_clouds import within_range
+from cns_drake.drives import Drive
+from evaluation.alignment import Surface, make_surface
+from evaluation.clouds import OnNote, no_note, read_blocks
+from evaluation.drives import JoinedDrive, sample_frames, within_range
 from evaluation.localisation.settings import (
     MAX_RANGE,
     Settings,
 )
-from evaluation.maps.voxel_maps import VoxelAccumulator
-from evaluation.recognition.place_selection import KEEP_ALL, kept_places
+from evaluation.maps import VoxelAccumulator
+from evaluation.recognition import KEEP_ALL, kept_places
 
 # Distance between the scans of a drive that enter the map [m].
 _MAP_SPACING = 1.0

@@ -13,13 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cns_drake.base import InputError, errors_at, poses, track
 from cns_drake.base import points as clouds
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError, errors_at
-from cns_drake.base.progress import track
-from cns_drake.drives.drive import Drive
-from evaluation.drives.sampling import sample_frames
-from evaluation.drives.scan_clouds import cropped
+from cns_drake.drives import Drive
+from evaluation.drives import cropped, sample_frames
 from evaluation.localisation.estimators import Estimator
 from evaluation.localisation.fit import fit_at
 from evaluation.localisation.initial_poses import InitialPose, Starts
@@ -29,8 +26,8 @@ from evaluation.localisation.localisation_map import (
 )
 from evaluation.localisation.results import MEASURED, QUERY
 from evaluation.localisation.settings import MAX_RANGE, Settings
-from evaluation.maps.voxel_maps import downsample
-from evaluation.recognition.pose_errors import pose_error
+from evaluation.maps import downsample
+from evaluation.recognition import pose_error
 
 # A query is localised if the map's drive, or a point of the map's file, is this
 # near to its LiDAR [m].

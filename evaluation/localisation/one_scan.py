@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluation.clouds.cloud_files import read_cloud
-from evaluation.drives.scan_files import FileDrive
+from evaluation.clouds import read_cloud
+from evaluation.drives import FileDrive
 
 
 class OneScan(FileDrive):

@@ -6,16 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.csv_files import write_csv
-from cns_drake.base.json_text import json_values
-from evaluation.clouds.notes import OnNote
+from cns_drake.base import json_values, write_csv
+from evaluation.clouds import OnNote
 from evaluation.localisation.localisation_map import FEWEST_POINTS
-from evaluation.recognition.pose_errors import (
+from evaluation.recognition import (
     SUCCESS_ROTATION_DEG,
     SUCCESS_TRANSLATION,
+    Number,
+    auroc,
 )
-from evaluation.recognition.result_number import Number
-from evaluation.recognition.roc import auroc
 
 # Results with errors of at most these are right [m, deg].
 RIGHT_TRANSLATION = 0.3

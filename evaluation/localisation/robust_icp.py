@@ -20,7 +20,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
-from evaluation.alignment.registration import Surface
+from evaluation.alignment import Surface
 from evaluation.localisation.settings import MAX_RANGE
 
 # Sum of two points' variances across the plane in small_gicp's covariances;

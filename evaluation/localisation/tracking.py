@@ -5,15 +5,13 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError
-from cns_drake.base.progress import track
-from cns_drake.drives.drive import Drive
-from evaluation.drives.sampling import sample_frames, travelled
+from cns_drake.base import InputError, poses, track
+from cns_drake.drives import Drive
+from evaluation.drives import sample_frames, travelled
 from evaluation.localisation.initial_poses import InitialPose, Starts
 from evaluation.localisation.localiser import Localiser, Query, path_axes
 from evaluation.localisation.results import COLUMNS, QUERY, RIGHT_TRANSLATION
-from evaluation.recognition.result_number import Number
+from evaluation.recognition import Number
 
 # Distance driven between two aligned scans [m].
 SPACING = 2.0

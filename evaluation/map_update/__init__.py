@@ -6,3 +6,7 @@ predict labels; `scores` and `structures` compare predicted labels with the
 ground truth. `upkeep` updates a map by several drives, and `upkept_drive` shows
 the updated map in scans.
 """
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -18,8 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.progress import track
+from cns_drake.base import InputError, track
 from evaluation.map_update.free_space import by_free_space
 from evaluation.map_update.labels import SIDES, PairLabels
 from evaluation.map_update.nearest_points import nearest_distances

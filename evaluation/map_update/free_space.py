@@ -19,14 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.process import num_cores
-from cns_drake.base.progress import track
-from evaluation.drives.sampling import sample_frames
+from cns_drake.base import InputError, num_cores, track
+from evaluation.drives import sample_frames
 from evaluation.map_update.labels import SIDES
 from evaluation.map_update.nearest_points import nearest_distances
 from evaluation.map_update.sessions import Session
-from evaluation.recognition.seen_surfaces import SeenSurfaces
+from evaluation.recognition import SeenSurfaces
 
 # Side of a cell [m].
 _CELL = 0.2

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from cns_drake.base import poses
-from cns_drake.base.points import xyz
-from evaluation.maps.grid_cells import CELLS_PER_AXIS, cell_keys
+from cns_drake.base import poses, xyz
+from evaluation.maps import CELLS_PER_AXIS, cell_keys
 
 # Side of the cells of which each keeps one point [m].
 CELL = 0.1

@@ -23,17 +23,20 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import poses
-from cns_drake.base.complete_files import completing
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import is_there, listed, user_errors
-from cns_drake.base.points import encode_pcd, xyz
-from cns_drake.base.progress import track
-from cns_drake.drives.drive import Drive
-from evaluation.clouds.cloud_files import read_blocks, read_cloud
-from evaluation.clouds.npy_files import read_npy
-from evaluation.drives.sampling import sample_frames
-from evaluation.drives.trajectories import read_poses
+from cns_drake.base import (
+    InputError,
+    completing,
+    encode_pcd,
+    is_there,
+    listed,
+    poses,
+    track,
+    user_errors,
+    xyz,
+)
+from cns_drake.drives import Drive
+from evaluation.clouds import read_blocks, read_cloud, read_npy
+from evaluation.drives import read_poses, sample_frames
 from evaluation.map_update.labels import (
     MOVING_CLASSES,
     SIDES,

@@ -19,7 +19,7 @@ from evaluation.map_update.baselines import BASELINES
 from evaluation.map_update.labels import Label, PairLabels
 from evaluation.map_update.map_builder import CELL
 from evaluation.map_update.sessions import Session, SessionPair, scan_path
-from evaluation.maps.grid_cells import cell_keys
+from evaluation.maps import cell_keys
 
 # No map is updated: all drives are merged.
 NOT_MAINTAINED = "none"

@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.base import poses
-from cns_drake.base.points import xyz
-from cns_drake.drives.drive import Drive
-from evaluation.drives.drive_views import MovedDrive
+from cns_drake.base import poses, xyz
+from cns_drake.drives import Drive
+from evaluation.drives import MovedDrive
 from evaluation.map_update.upkeep import Updates
-from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
+from evaluation.recognition import TOLERANCE, SeenSurfaces
 
 # Of the new points in a direction, the nearest one is seen; directions are this
 # far apart [rad].

@@ -4,3 +4,7 @@
 `voxel_table`. `thumbnails` reduces single scans to small pictures, and
 `grid_cells` numbers the cells of grids.
 """
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from cns_drake.base.progress import track
-from cns_drake.drives.drive import Drive
-from evaluation.drives.drive_views import RecentScans
+from cns_drake.base import track
+from cns_drake.drives import Drive
+from evaluation.drives import RecentScans
 from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator, VoxelMap
 
 # Divisions of a cell's side for pictures, with a point in each 0.5 m.

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.base.points import from_xyz
-from cns_drake.base.progress import track
-from cns_drake.drives.drive import Drive
+from cns_drake.base import from_xyz, track
+from cns_drake.drives import Drive
 from evaluation.maps.voxel_table import SLOT, add_points, copy_voxels
 
 # Side of a voxel [m].

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 
 # One slot of the hash table of voxels: the number of a voxel, how many points
 # it has (0: the slot is free), and their sum relative to its corner [m]. A slot

@@ -12,3 +12,7 @@ own. Modules that only some methods need:
 - Networks with the weights of their authors: `published_networks`,
   `pointnetvlad_clouds`, `network_layers`, `sparse_convolution`.
 """
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

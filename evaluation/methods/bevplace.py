@@ -28,7 +28,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import correlate1d
 from scipy.special import softmax
 
-from evaluation.clouds.count_images import count_image
+from evaluation.clouds import count_image
 from evaluation.methods.network_layers import Weights
 from evaluation.methods.published_networks import Network
 from evaluation.methods.registry import register

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 
 # Fixed in the public program: side of a square that may contain one keypoint
 # [cells].

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 from evaluation.methods.btc_voxel_order import voxel_order
 
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
 
-from cns_drake.base.poses import make_pose
+from cns_drake.base import make_pose
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.overlap_layers import layer_cells
 from evaluation.methods.overlap_maps import (

@@ -22,11 +22,14 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from pydantic import computed_field
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular, user_errors
-from cns_drake.base.npz_files import read_npz
-from cns_drake.base.poses import yaw_pose
-from cns_drake.base.terminal import note
+from cns_drake.base import (
+    InputError,
+    check_regular,
+    note,
+    read_npz,
+    user_errors,
+    yaw_pose,
+)
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.network_layers import checked_weights
 from evaluation.methods.polar_images import (

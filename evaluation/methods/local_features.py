@@ -6,7 +6,7 @@ import numpy as np
 import scipy.special
 import small_gicp
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 
 
 def nearest_neighbours(points: np.ndarray, k: int) -> np.ndarray:

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from pydantic import PositiveFloat, PositiveInt
 
-from cns_drake.base.errors import InputError
-from evaluation.maps.voxel_maps import downsample
+from cns_drake.base import InputError
+from evaluation.maps import downsample
 from evaluation.methods.method import Method, MethodConfig, PlaceScan
 from evaluation.methods.registry import register
 

@@ -8,9 +8,8 @@ from typing import ClassVar, Generic, Literal, TypeVar
 import numpy as np
 from pydantic import ConfigDict, NonNegativeFloat
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.input_models import InputModel
-from cns_drake.drives.lidar_fields import LidarField
+from cns_drake.base import InputError, InputModel
+from cns_drake.drives import LidarField
 
 Descriptor = TypeVar("Descriptor")
 Database = TypeVar("Database")

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.special import erf
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 
 # Name of a parameter, such as `layer.weight` -> its values.
 Weights = Mapping[str, np.ndarray]

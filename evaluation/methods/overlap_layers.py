@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from evaluation.maps.grid_cells import extremes
+from evaluation.maps import extremes
 
 # Rows and columns of the grid: a cell's number, row times 256 plus column, is
 # a uint16.

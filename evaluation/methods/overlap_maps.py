@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 from evaluation.methods.overlap_layers import GRID, NUM_LAYERS
 
 # Rows and columns added around the cells of a place: twice the greatest step of

@@ -15,7 +15,7 @@ import traceback
 from types import ModuleType
 from typing import Any
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from evaluation.methods.method import Method, MethodConfig
 
 # Functions of the interface that a method's author may have written.

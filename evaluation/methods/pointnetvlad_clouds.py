@@ -15,7 +15,7 @@ import bisect
 
 import numpy as np
 
-from evaluation.maps.voxel_maps import downsample
+from evaluation.maps import downsample
 from evaluation.methods.sparse_convolution import coarser
 
 # Number of points of a cloud for PointNetVLAD.

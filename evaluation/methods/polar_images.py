@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from evaluation.maps.grid_cells import extremes
+from evaluation.maps import extremes
 
 RINGS = 64
 SECTORS = 192

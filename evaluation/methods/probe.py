@@ -29,8 +29,8 @@ import numpy as np
 from pydantic import PositiveFloat, PositiveInt
 from scipy.ndimage import gaussian_filter1d
 
-from cns_drake.base.poses import yaw_pose
-from evaluation.maps.grid_cells import packed_cells
+from cns_drake.base import yaw_pose
+from evaluation.maps import packed_cells
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register
 

@@ -17,9 +17,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import computed_field
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
-from cns_drake.base.npz_files import read_npz
+from cns_drake.base import InputError, read_bytes, read_npz
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.network_layers import Weights, checked_weights
 from evaluation.methods.pointnetvlad_clouds import prepare_cloud

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from cns_drake.base.errors import InputError, did_you_mean
+from cns_drake.base import InputError, did_you_mean
 from evaluation.methods.method import Method
 from evaluation.methods.own_files import named_faults
 

@@ -20,7 +20,7 @@ import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 import scipy.fft
 
-from cns_drake.base.poses import yaw_pose
+from cns_drake.base import yaw_pose
 from evaluation.methods.local_features import local_features, nearest_neighbours
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.radon import radon

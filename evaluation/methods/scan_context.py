@@ -35,8 +35,8 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 from scipy.spatial import cKDTree
 
-from cns_drake.base.poses import yaw_pose
-from evaluation.maps.voxel_maps import downsample
+from cns_drake.base import yaw_pose
+from evaluation.maps import downsample
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register
 

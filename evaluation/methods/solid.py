@@ -16,9 +16,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from cns_drake.base.poses import yaw_pose
-from cns_drake.drives.lidar_fields import LidarField
-from evaluation.maps.voxel_maps import Z_ORIGIN, downsample
+from cns_drake.base import yaw_pose
+from cns_drake.drives import LidarField
+from evaluation.maps import Z_ORIGIN, downsample
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register
 

@@ -9,7 +9,7 @@ its cell.
 
 import numpy as np
 
-from evaluation.maps.grid_cells import packed_cells
+from evaluation.maps import packed_cells
 
 
 def convolve(

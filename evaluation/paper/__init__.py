@@ -4,3 +4,7 @@
 shipped cities with them, `best_methods` says which methods are best, and
 `section` makes the section of a study's page.
 """
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -17,7 +17,7 @@ from evaluation.paper.best_methods import (
 )
 from evaluation.paper.findings import Finding
 from evaluation.paper.paper_values import Measured, StagePair, paper
-from evaluation.results.method_names import title
+from evaluation.results import title
 
 # Verdicts on a target.
 MET = "is met"

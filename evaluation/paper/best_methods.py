@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 import itertools
 
 from evaluation.paper.paper_values import Measured, StagePair, paper
-from evaluation.recognition.metrics import Mode
-from evaluation.results.method_names import in_table_order, title
+from evaluation.recognition import Mode
+from evaluation.results import in_table_order, title
 
 RING = title("ring++")
 

@@ -12,9 +12,7 @@ from evaluation.paper.best_methods import (
     listed_counts,
 )
 from evaluation.paper.paper_values import KAIST, Measured, StagePair, paper
-from evaluation.results.headlines import listed
-from evaluation.results.method_names import in_table_order, title
-from evaluation.results.summaries import LEAST_POINTS
+from evaluation.results import LEAST_POINTS, in_table_order, listed, title
 
 _SIGNIFICANCE = 0.05
 # Verdicts on a finding.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import functools
 from importlib import resources
 
-from evaluation.recognition.metrics import Mode
+from evaluation.recognition import Mode
 
 TITLE = "the paper “The City that Never Settles”"
 # Drives through a real city in the paper's tables.

@@ -11,13 +11,17 @@ from evaluation.paper.paper_values import (
     StagePair,
     paper,
 )
-from evaluation.recognition.metrics import MODES
-from evaluation.recognition.precision_recall import pr_curve
-from evaluation.recognition.query_outcomes import QueryOutcomes
-from evaluation.results.keys import OWN, STAGE, Key
-from evaluation.results.method_names import in_table_order
-from evaluation.results.page_frame import PageSection, page_section
-from evaluation.results.table import QueryRows, Results
+from evaluation.recognition import MODES, QueryOutcomes, pr_curve
+from evaluation.results import (
+    OWN,
+    STAGE,
+    Key,
+    PageSection,
+    QueryRows,
+    Results,
+    in_table_order,
+    page_section,
+)
 
 
 def paper_section(

@@ -14,21 +14,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import listed, read_bytes
-from cns_drake.base.jobs.file_digests import file_digests
-from cns_drake.drives.drive import Drive
-from cns_drake.drives.lidar_fields import lidar_field
-from evaluation.clouds.cloud_files import read_cloud
-from evaluation.clouds.notes import OnNote
-from evaluation.drives.helipr import read_helipr_scan
-from evaluation.drives.nclt import read_nclt_scan
-from evaluation.drives.opening import open_drive
-from evaluation.drives.scan_files import BinDrive, FileDrive
-from evaluation.drives.trajectories import read_poses, read_quaternions
+from cns_drake.base import InputError, file_digests, listed, read_bytes
+from cns_drake.drives import Drive, lidar_field
+from evaluation.clouds import OnNote, read_cloud
+from evaluation.drives import (
+    BinDrive,
+    FileDrive,
+    open_drive,
+    read_helipr_scan,
+    read_nclt_scan,
+    read_poses,
+    read_quaternions,
+)
 from evaluation.real.image_sequences import FOLDER as IMAGES
-from evaluation.study.sources import RecordingSource
-from evaluation.study.tasks.pair import NamedDrive
+from evaluation.study import NamedDrive, RecordingSource
 
 # Distance put between scans without poses [m]; no scan reaches so far.
 _APART = 1000.0

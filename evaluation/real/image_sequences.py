@@ -17,26 +17,28 @@ import numpy as np
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from cns_drake.base.complete_files import draft_folder
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import listed, user_errors
-from cns_drake.base.jobs.file_digests import file_digests
-from cns_drake.base.points import from_xyz, xyz
-from cns_drake.base.poses import yaw_pose
-from cns_drake.base.progress import track
-from cns_drake.drives.deskewing import deskewed_notes, deskewed_scan
-from cns_drake.drives.drive import Drive
-from evaluation.clouds.count_images import (
+from cns_drake.base import (
+    InputError,
+    draft_folder,
+    file_digests,
+    from_xyz,
+    listed,
+    track,
+    user_errors,
+    xyz,
+    yaw_pose,
+)
+from cns_drake.drives import Drive, deskewed_notes, deskewed_scan
+from evaluation.clouds import (
+    OnNote,
     check_image,
     count_image,
     image_points,
     read_image,
 )
-from evaluation.clouds.notes import OnNote
-from evaluation.drives.scan_files import FileDrive
-from evaluation.drives.trajectories import read_poses
-from evaluation.recognition.describing import Role
-from evaluation.study.tasks.pair import NamedDrive
+from evaluation.drives import FileDrive, read_poses
+from evaluation.recognition import Role
+from evaluation.study import NamedDrive
 
 # Name of the folder with a folder for each sequence.
 FOLDER = "kitti_bev"

@@ -31,10 +31,9 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.model_selection import PredefinedSplit, cross_val_score
 from threadpoolctl import threadpool_limits
 
-from cns_drake.base import terminal
-from cns_drake.base.progress import track
-from cns_drake.drives.drive import Drive
-from evaluation.clouds.count_images import count_image, image_points
+from cns_drake.base import terminal, track
+from cns_drake.drives import Drive
+from evaluation.clouds import count_image, image_points
 from evaluation.real.patch_features import describe, patches
 
 # Scans closer to each other than this are from one place [m].

@@ -4,15 +4,12 @@ from collections.abc import Iterator
 import math
 from typing import Any
 
-from cns_drake.base.jobs.step import Reporter
+from cns_drake.base import Reporter
 from evaluation.real.image_sequences import (
     ImageSource,
 )
-from evaluation.recognition.result_number import Number
-from evaluation.study.sources import DriveSource
-from evaluation.study.tasks.jobs import Jobs
-from evaluation.study.tasks.pair import Pair, Result
-from evaluation.study.tasks.task import Task
+from evaluation.recognition import Number
+from evaluation.study import DriveSource, Jobs, Pair, Result, Task
 
 # Number of random samples of patches for the classifier; their AUCs differ by
 # up to 0.04.

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base.polylines import step_lengths
+from cns_drake.base import step_lengths
 
 # Number of patches of a scan.
 _PATCHES = 16

@@ -15,12 +15,10 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.cluster import Cluster
-from evaluation.clouds.notes import OnNote
-from evaluation.localisation.settings import METHODS
-from evaluation.methods import MethodConfig, shipped_methods
-from evaluation.methods.own_files import run_module
+from cns_drake.base import Cluster, InputError
+from evaluation.clouds import OnNote
+from evaluation.localisation import METHODS
+from evaluation.methods import MethodConfig, run_module, shipped_methods
 from evaluation.real.data_sets import (
     RealScans,
     open_data_sets,
@@ -35,21 +33,27 @@ from evaluation.real.image_sequences import (
     open_sequences,
 )
 from evaluation.real.judge_task import JudgeTask
-from evaluation.recognition.describing import Role
-from evaluation.recognition.protocol import (
+from evaluation.recognition import (
     FAIR_PROTOCOL,
     RECORDED_PROTOCOL,
     RetrievalProtocol,
+    Role,
 )
-from evaluation.results.table import QueryRows, Results
-from evaluation.study.chosen_methods import MethodChoice, choose_methods
-from evaluation.study.engine import Engine
-from evaluation.study.place_measurements import DescribedSource
-from evaluation.study.tasks.jobs import Jobs
-from evaluation.study.tasks.localise import SHIPPED, LocaliseTask
-from evaluation.study.tasks.pair import NamedDrive, Pair
-from evaluation.study.tasks.place import PlaceTask, PoseTask
-from evaluation.study.tasks.task import Task
+from evaluation.results import QueryRows, Results
+from evaluation.study import (
+    SHIPPED,
+    DescribedSource,
+    Engine,
+    Jobs,
+    LocaliseTask,
+    MethodChoice,
+    NamedDrive,
+    Pair,
+    PlaceTask,
+    PoseTask,
+    Task,
+    choose_methods,
+)
 
 _SIMULATED = replace(FAIR_PROTOCOL, scans_per_place=1)
 # Every real scan is a query and a place.

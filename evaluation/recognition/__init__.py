@@ -12,3 +12,7 @@
 - Results: `place_outcome`, `place_numbers`, `result_number`, and why places are
   wrong: `faults`, `visible_change`.
 """
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.json_text import json_values
-from evaluation.drives.sampling import travelled
+from cns_drake.base import json_values
+from evaluation.drives import travelled
 from evaluation.recognition.precision_recall import (
     areas_under,
     recall_of,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from evaluation.methods.method import Method
+from evaluation.methods import Method
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 from evaluation.recognition.search import Search
 

@@ -7,13 +7,10 @@ from typing import Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.progress import track
-from cns_drake.drives.drive import Drive
-from evaluation.drives.query_sensor import QuerySensor
-from evaluation.drives.sampling import sample_frames
-from evaluation.drives.scan_clouds import cloud_at
-from evaluation.methods.method import Method, check_number
+from cns_drake.base import InputError, track
+from cns_drake.drives import Drive
+from evaluation.drives import QuerySensor, cloud_at, sample_frames
+from evaluation.methods import Method, check_number
 from evaluation.recognition.bootstrap import route_blocks
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from evaluation.methods.method import Method, check_number
+from evaluation.methods import Method, check_number
 from evaluation.recognition.pose_errors import checked_pose
 from evaluation.recognition.ranking import ranked_places
 

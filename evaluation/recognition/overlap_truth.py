@@ -17,13 +17,9 @@ from typing import Protocol
 
 import numpy as np
 
-from cns_drake.base import poses
-from cns_drake.base.csv_files import read_records, write_csv
-from cns_drake.base.errors import InputError
-from cns_drake.base.progress import track
-from cns_drake.drives.drive import Drive
-from evaluation.drives.sampling import sample_frames
-from evaluation.drives.scan_clouds import cloud_at
+from cns_drake.base import InputError, poses, read_records, track, write_csv
+from cns_drake.drives import Drive
+from evaluation.drives import cloud_at, sample_frames
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
 

@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.json_text import json_values
-from evaluation.methods.method import Method
+from cns_drake.base import InputError, json_values
+from evaluation.methods import Method
 from evaluation.recognition.bootstrap import (
     UNKNOWN,
     Interval,

@@ -7,9 +7,8 @@ import math
 
 import numpy as np
 
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError
-from evaluation.methods.method import Method
+from cns_drake.base import InputError, poses
+from evaluation.methods import Method
 from evaluation.recognition.precision_recall import pr_curve
 from evaluation.recognition.query_outcomes import QueryOutcomes
 

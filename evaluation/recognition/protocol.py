@@ -7,14 +7,14 @@ from dataclasses import asdict, dataclass, replace
 import math
 from typing import TYPE_CHECKING, Any
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from cns_drake.drives.drive import Drive
-    from evaluation.drives.query_sensor import QuerySensor
-    from evaluation.methods.method import Method, PlaceScan
+    from cns_drake.drives import Drive
+    from evaluation.drives import QuerySensor
+    from evaluation.methods import Method, PlaceScan
 
 
 # Fields that must be positive if they are given.
@@ -171,7 +171,7 @@ class RetrievalProtocol:
         """
         if not self._changes_queries:
             return None
-        from evaluation.drives.query_sensor import QuerySensor
+        from evaluation.drives import QuerySensor
 
         return QuerySensor.draw(
             self.seed,
@@ -186,7 +186,7 @@ class RetrievalProtocol:
 
         The sensor is changed as by `query_sensor`.
         """
-        from evaluation.drives.scan_clouds import cloud_at
+        from evaluation.drives import cloud_at
 
         sensor = self.query_sensor(frame)
         return cloud_at(drive, frame, 1, self.max_range, sensor=sensor)
@@ -247,7 +247,7 @@ class RetrievalProtocol:
                 as the height of the LiDAR.
         """
         # Imported here: it takes time, and options need only the fields.
-        from cns_drake.base.jobs.fingerprint import fingerprint
+        from cns_drake.base import fingerprint
 
         return fingerprint({**self._counted_fields, **further})[:_DIGEST_LENGTH]
 

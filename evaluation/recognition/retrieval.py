@@ -9,9 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.drives.drive import Drive
-from cns_drake.drives.same_world import check_same_world
-from evaluation.methods.method import Method
+from cns_drake.drives import Drive, check_same_world
+from evaluation.methods import Method
 from evaluation.recognition.describing import describe_drive
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 from evaluation.recognition.geometric_verification import (

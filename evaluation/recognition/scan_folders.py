@@ -5,16 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from cns_drake.base import InputError, completing, listed, track
 from cns_drake.base import points as point_arrays
-from cns_drake.base.complete_files import completing
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import listed
-from cns_drake.base.progress import track
-from evaluation.clouds.bin_columns import find_layout
-from evaluation.clouds.cloud_files import is_cloud, read_cloud
-from evaluation.clouds.notes import OnNote, no_note
-from evaluation.drives.scan_clouds import cropped, cropped_with_fields
-from evaluation.methods.method import Method
+from evaluation.clouds import OnNote, find_layout, is_cloud, no_note, read_cloud
+from evaluation.drives import cropped, cropped_with_fields
+from evaluation.methods import Method
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.scoring import score_places
 

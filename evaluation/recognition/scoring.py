@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.points import read_only
-from evaluation.methods.method import Method
+from cns_drake.base import InputError, read_only
+from evaluation.methods import Method
 from evaluation.recognition.geometric_verification import gated
 from evaluation.recognition.ranking import ranked_places
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.progress import track
-from evaluation.methods.method import Method
+from cns_drake.base import track
+from evaluation.methods import Method
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 from evaluation.recognition.geometric_verification import estimated_poses
 from evaluation.recognition.scoring import checked_scores, score_places

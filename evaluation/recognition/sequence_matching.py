@@ -8,7 +8,7 @@ known, so that there is only one slope.
 
 import numpy as np
 
-from evaluation.drives.sampling import travelled
+from evaluation.drives import travelled
 
 
 def sequence_scores(

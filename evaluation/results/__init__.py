@@ -10,3 +10,7 @@
 - `table_comparison` compares tables with one another, and with the shipped
   tables in `baselines`.
 """
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from evaluation.results.keys import KEYS, LAST, STAGE
 from evaluation.results.metric_tables import SHIPPED, Condition, MetricTable
 from evaluation.results.table import Row

@@ -8,8 +8,8 @@ import zlib
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from evaluation.recognition.significance import Difference, compared_by_auc
+from cns_drake.base import InputError
+from evaluation.recognition import Difference, compared_by_auc
 from evaluation.results.table import Answers
 
 

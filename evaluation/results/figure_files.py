@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import Bbox
 import numpy as np
 
-from cns_drake.base.complete_files import completing
+from cns_drake.base import completing
 from evaluation.results.ranges import check_all
 
 # The formats of pictures, the one for the page last.

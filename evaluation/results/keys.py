@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import Any
 
-from cns_drake.base.version import __version__
-from evaluation.recognition.protocol import RetrievalProtocol
+from cns_drake.base import __version__
+from evaluation.recognition import RetrievalProtocol
 
 # The beginning of a factor that is a setting of a method.
 SETTINGS = "methods."

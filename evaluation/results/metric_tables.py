@@ -6,9 +6,8 @@ import functools
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.errors import InputError
-from evaluation.recognition.metrics import main_metrics
-from evaluation.recognition.protocol import PROTOCOLS
+from cns_drake.base import InputError
+from evaluation.recognition import PROTOCOLS, main_metrics
 from evaluation.results.keys import SETTINGS
 from evaluation.results.table import (
     QUERIES,

@@ -10,11 +10,13 @@ from typing import Any
 from markupsafe import Markup
 import numpy as np
 
-from cns_drake.base.complete_files import write_text
-from cns_drake.base.csv_files import write_csv
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder
-from cns_drake.base.version import __version__
+from cns_drake.base import (
+    InputError,
+    __version__,
+    make_folder,
+    write_csv,
+    write_text,
+)
 from evaluation.results.charts.chart import NARROW, WIDE
 from evaluation.results.charts.kinds import DrawnChart, draw_chart
 from evaluation.results.charts.markers import marker_corners

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 
 
 class Range(NamedTuple):

@@ -8,8 +8,8 @@ import warnings
 import numpy as np
 from scipy.stats import kendalltau
 
-from cns_drake.base.errors import InputError
-from evaluation.recognition.bootstrap import (
+from cns_drake.base import InputError
+from evaluation.recognition import (
     Interval,
     percentile_interval,
     resampled_metrics,

@@ -10,11 +10,7 @@ import zlib
 import numpy as np
 from scipy.special import stdtrit
 
-from evaluation.recognition.bootstrap import (
-    UNKNOWN,
-    Interval,
-    resampled_weights,
-)
+from evaluation.recognition import UNKNOWN, Interval, resampled_weights
 from evaluation.results.ranges import Range, range_of
 from evaluation.results.table import Row
 

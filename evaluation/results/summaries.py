@@ -19,13 +19,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.stats import rankdata
 
-from evaluation.recognition.bootstrap import (
+from evaluation.recognition import (
     UNKNOWN,
+    kept_share,
     paired_samples,
     percentile_interval,
+    pr_curve,
 )
-from evaluation.recognition.place_metrics import kept_share
-from evaluation.recognition.precision_recall import pr_curve
 from evaluation.results.keys import CAUSE, LEVEL, NO_CAUSE, Key
 from evaluation.results.table import COSTS, Answers, QueryRows, Results, Row
 

@@ -15,11 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.complete_files import write_text
-from cns_drake.base.csv_files import csv_text
-from cns_drake.base.errors import errors_at
-from evaluation.recognition.query_outcomes import QueryOutcomes
-from evaluation.recognition.result_number import Number
+from cns_drake.base import csv_text, errors_at, write_text
+from evaluation.recognition import Number, QueryOutcomes
 from evaluation.results.keys import MEASURED, Key, key_columns
 from evaluation.results.ranges import Range, checked, range_of
 from evaluation.results.table_lines import TableLine, TableLines

@@ -8,10 +8,8 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.json_text import json_values
-from evaluation.recognition.protocol import PROTOCOL_NAMES
-from evaluation.recognition.significance import Difference
+from cns_drake.base import InputError, json_values
+from evaluation.recognition import PROTOCOL_NAMES, Difference
 from evaluation.results.common_conditions import (
     common_conditions,
     reduced_to,

@@ -11,11 +11,8 @@ from pathlib import Path
 import re
 from typing import Any
 
-from cns_drake.base.csv_files import check_separator
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
-from cns_drake.base.repetitions import repeated
-from evaluation.recognition.protocol import PROTOCOL_NAMES
+from cns_drake.base import InputError, check_separator, read_bytes, repeated
+from evaluation.recognition import PROTOCOL_NAMES
 from evaluation.results.keys import (
     NEEDED_KEYS,
     OPTIONAL_KEYS,

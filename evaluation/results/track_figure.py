@@ -5,8 +5,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 import numpy as np
 
-from evaluation.localisation.results import RIGHT_TRANSLATION
-from evaluation.localisation.tracking import LOST
+from evaluation.localisation import LOST, RIGHT_TRANSLATION
 from evaluation.results.figure_files import save_figure
 from evaluation.results.styles import INK, PALE
 

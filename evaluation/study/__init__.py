@@ -8,3 +8,7 @@ jobs, on one machine or many. No finished job runs again, because each file in
 `storage` names the inputs from which it was made. This module imports nothing,
 because the process of each job would have to wait for the imports.
 """
+
+from cns_drake.base import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

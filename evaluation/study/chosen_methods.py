@@ -7,20 +7,23 @@ from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 
-from cns_drake.base.errors import InputError, did_you_mean
-from cns_drake.base.jobs.file_digests import file_digests
-from cns_drake.base.jobs.fingerprint import script_digest
-from cns_drake.base.repetitions import repeated
+from cns_drake.base import (
+    InputError,
+    did_you_mean,
+    file_digests,
+    repeated,
+    script_digest,
+)
 from evaluation.methods import (
     Method,
     MethodConfig,
     known_methods,
+    load_method,
     make_method,
     optional_methods,
     shipped_methods,
 )
-from evaluation.methods.own_files import load_method
-from evaluation.results.keys import SETTINGS
+from evaluation.results import SETTINGS
 
 # The value of a parameter, as text.
 Setting = str | tuple[str, ...]

@@ -7,9 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evaluation.recognition.descriptors import DriveDescriptors, joined_scans
-from evaluation.recognition.place_selection import KEEP_ALL, kept_places
-from evaluation.recognition.stored_places import MOST_BYTES, StoredDrives
+from evaluation.recognition import (
+    KEEP_ALL,
+    MOST_BYTES,
+    DriveDescriptors,
+    StoredDrives,
+    joined_scans,
+    kept_places,
+)
 from evaluation.study.storage.parts import Part
 
 

@@ -11,20 +11,25 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.errors import InputError, did_you_mean
-from cns_drake.base.files import make_folder
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.forecast import Space, forecast
-from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.progress import doing
-from evaluation.results.keys import made_by
-from evaluation.results.table import (
+from cns_drake.base import (
+    Cluster,
+    InputError,
+    Job,
+    Space,
+    did_you_mean,
+    doing,
+    forecast,
+    make_folder,
+    run_jobs,
+)
+from evaluation.results import (
     QUERIES,
     RESULTS,
     Answers,
     QueryRows,
     Results,
     Row,
+    made_by,
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.removed_descriptors import (

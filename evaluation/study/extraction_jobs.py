@@ -3,9 +3,8 @@
 from collections import defaultdict
 from dataclasses import dataclass, field
 
-from cns_drake.base.jobs.running import Job
-from evaluation.recognition.describing import Role
-from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
+from cns_drake.base import Job
+from evaluation.recognition import FAIR_PROTOCOL, RetrievalProtocol, Role
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import FeatureExtraction, Further
 from evaluation.study.features import described_key

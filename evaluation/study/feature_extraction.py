@@ -8,22 +8,20 @@ from typing import TypeAlias
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.step import Reporter, Step
-from cns_drake.base.progress import doing
-from cns_drake.drives.drive import Drive
-from cns_drake.drives.same_world import DriveNames
-from evaluation.change.drive_maps import DriveMap
-from evaluation.drives.drive_views import RecentScans
-from evaluation.drives.sampling import sample_frames
-from evaluation.drives.scan_clouds import cropped
-from evaluation.maps.mapped_drive import MappedDrive
-from evaluation.maps.thumbnails import thumbnail
-from evaluation.maps.voxel_maps import CELL_SIZE, map_drive
+from cns_drake.base import InputError, Reporter, Step, doing
+from cns_drake.drives import Drive, DriveNames
+from evaluation.change import DriveMap
+from evaluation.drives import RecentScans, cropped, sample_frames
+from evaluation.maps import CELL_SIZE, MappedDrive, map_drive, thumbnail
 from evaluation.methods import MethodConfig
-from evaluation.recognition import describing
-from evaluation.recognition.descriptors import DriveDescriptors
-from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.recognition import (
+    FAIR_PROTOCOL,
+    DriveDescriptors,
+    Request,
+    RetrievalProtocol,
+    Role,
+    describe_drive,
+)
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.features import (
     DriveSummary,
@@ -38,15 +36,13 @@ from evaluation.study.storage.parts import Part
 from evaluation.study.storage.study_files import FeatureFiles
 
 # A method, and what it describes of a drive by a second protocol.
-Further: TypeAlias = (
-    "tuple[MethodChoice, frozenset[describing.Role], RetrievalProtocol]"
-)
+Further: TypeAlias = "tuple[MethodChoice, frozenset[Role], RetrievalProtocol]"
 
 
 def extract_features(
     recording: Drive,
-    roles: Set[describing.Role],
-    asked: Mapping[str, describing.Request],
+    roles: Set[Role],
+    asked: Mapping[str, Request],
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
     *,
     with_scans: bool = False,
@@ -128,8 +124,8 @@ def map_source(
 
 def describe_recording(
     recording: Drive,
-    roles: Set[describing.Role],
-    asked: Mapping[str, describing.Request],
+    roles: Set[Role],
+    asked: Mapping[str, Request],
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
 ) -> ScannedFeatures:
     """Describes the places or queries of a recording, and keeps their scans.
@@ -147,21 +143,19 @@ def describe_recording(
     return ScannedFeatures(DriveNames.of(recording), described, seen)
 
 
-def _most_scans(asked: Mapping[str, describing.Request]) -> int:
+def _most_scans(asked: Mapping[str, Request]) -> int:
     """Returns the greatest number of scans that a method merges."""
     return max((p.scans(method) for method, _, p in asked.values()), default=1)
 
 
 def _described(
     drive: Drive,
-    roles: Set[describing.Role],
-    asked: Mapping[str, describing.Request],
+    roles: Set[Role],
+    asked: Mapping[str, Request],
     protocol: RetrievalProtocol,
     visit: Callable[[int, np.ndarray], None],
 ) -> dict[str, DriveDescriptors]:
-    found = describing.describe_drive(
-        drive, (), roles, protocol, visit, asked.values()
-    )
+    found = describe_drive(drive, (), roles, protocol, visit, asked.values())
     return dict(zip(asked, found, strict=True))
 
 
@@ -188,7 +182,7 @@ class FeatureExtraction(Step):
     """
 
     source: DriveSource
-    roles: frozenset[describing.Role]
+    roles: frozenset[Role]
     methods: tuple[MethodChoice, ...]
     protocol: RetrievalProtocol
     files: FeatureFiles
@@ -263,7 +257,7 @@ class FeatureExtraction(Step):
         drive = self.source.identity()
 
         def inputs(
-            roles: Set[describing.Role], protocol: RetrievalProtocol
+            roles: Set[Role], protocol: RetrievalProtocol
         ) -> dict[str, object]:
             options = protocol.descriptor_options(queries="queries" in roles)
             return self.made_of(

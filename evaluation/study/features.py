@@ -7,14 +7,12 @@ import math
 import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
-from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.base.points import xyz
-from cns_drake.drives.same_world import DriveNames
-from evaluation.change.drive_maps import DriveMap
-from evaluation.drives.scan_clouds import within_range
-from evaluation.maps.voxel_maps import VoxelMap
-from evaluation.recognition.descriptors import DriveDescriptors
-from evaluation.recognition.protocol import RetrievalProtocol
+from cns_drake.base import fingerprint, xyz
+from cns_drake.drives import DriveNames
+from evaluation.change import DriveMap
+from evaluation.drives import within_range
+from evaluation.maps import VoxelMap
+from evaluation.recognition import DriveDescriptors, RetrievalProtocol
 
 # Fields of the points of kept scans, where a drive has them.
 _KEPT_FIELDS = ("x", "y", "z", "instance")

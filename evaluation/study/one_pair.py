@@ -9,11 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.errors import one_line
-from cns_drake.base.jobs.step import Reporter
-from cns_drake.drives.drive import Drive
-from evaluation.change.drive_maps import DriveMap
-from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
+from cns_drake.base import Reporter, one_line
+from cns_drake.drives import Drive
+from evaluation.change import DriveMap
+from evaluation.recognition import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine
 from evaluation.study.storage.parts import Part

@@ -8,21 +8,21 @@ from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
-from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.progress import track
-from cns_drake.drives.same_world import check_same_world
-from evaluation.drives.scan_clouds import cloud_at
-from evaluation.methods.method import Method
-from evaluation.recognition.costs import query_ms
-from evaluation.recognition.describing import Role
-from evaluation.recognition.descriptors import DriveDescriptors
-from evaluation.recognition.overlap_truth import overlaps_with_best_match
-from evaluation.recognition.place_outcome import PlaceOutcome, QueryDrive
-from evaluation.recognition.place_selection import KEEP_ALL
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.retrieval import (
+from cns_drake.base import Reporter, track
+from cns_drake.drives import check_same_world
+from evaluation.drives import cloud_at
+from evaluation.methods import Method
+from evaluation.recognition import (
+    KEEP_ALL,
+    DriveDescriptors,
+    PlaceOutcome,
+    QueryDrive,
+    RetrievalProtocol,
+    Role,
     compare_with_gates,
     matches_within_radius,
+    overlaps_with_best_match,
+    query_ms,
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.databases import Searched, searched_database

@@ -7,15 +7,16 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from cns_drake.base.files import make_folder
-from cns_drake.base.jobs.running import Job
-from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.progress import doing
-from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.results.keys import OWN, STAGE
-from evaluation.results.sections.camera_images import nearest_images
-from evaluation.results.sections.change_pictures import ChangePictures
-from evaluation.results.sections.routes import PageDrive, make_page_drive
+from cns_drake.base import Job, Reporter, doing, make_folder
+from evaluation.recognition import PlaceOutcome
+from evaluation.results import (
+    OWN,
+    STAGE,
+    ChangePictures,
+    PageDrive,
+    make_page_drive,
+    nearest_images,
+)
 from evaluation.study.engine import Engine
 from evaluation.study.extraction_jobs import ExtractionJobs
 from evaluation.study.recordings.map_drives import MapDrives

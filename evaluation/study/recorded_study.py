@@ -9,25 +9,32 @@ from typing import Any
 import numpy as np
 import yaml
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.forecast import Space
-from cns_drake.base.jobs.running import Job
-from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.yaml_files import read_yaml
-from evaluation.drives.drive_views import MovedDrive
-from evaluation.drives.scan_clouds import cloud_at
-from evaluation.paper.section import paper_section
-from evaluation.recognition.costs import NUM_TRIALS, Cost, measure_cost
-from evaluation.recognition.protocol import PROTOCOLS, RetrievalProtocol
-from evaluation.results.keys import LAST, OWN, PROTOCOL_BASE, STAGE
-from evaluation.results.method_names import in_table_order
-from evaluation.results.page import write_page
-from evaluation.results.page_frame import PageSection, page_section
-from evaluation.results.sections.browser import browser_section
-from evaluation.results.sections.change_pictures import change_section
-from evaluation.results.sections.routes import PageDrive, routes_section
-from evaluation.results.table import QueryRows, Results
+from cns_drake.base import Cluster, InputError, Job, Reporter, Space, read_yaml
+from evaluation.drives import MovedDrive, cloud_at
+from evaluation.paper import paper_section
+from evaluation.recognition import (
+    NUM_TRIALS,
+    PROTOCOLS,
+    Cost,
+    RetrievalProtocol,
+    measure_cost,
+)
+from evaluation.results import (
+    LAST,
+    OWN,
+    PROTOCOL_BASE,
+    STAGE,
+    PageDrive,
+    PageSection,
+    QueryRows,
+    Results,
+    browser_section,
+    change_section,
+    in_table_order,
+    page_section,
+    routes_section,
+    write_page,
+)
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine, made_tasks
 from evaluation.study.recorded_city import ShownCity, add_city

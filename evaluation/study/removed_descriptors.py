@@ -7,9 +7,7 @@ until results have been made from them.
 from collections.abc import Collection, Iterable
 from pathlib import Path
 
-from cns_drake.base.jobs.processes import nothing_left
-from cns_drake.base.jobs.running import Job
-from cns_drake.base.jobs.step import Steps
+from cns_drake.base import Job, Steps, nothing_left
 from evaluation.study.feature_extraction import FeatureExtraction
 from evaluation.study.storage.parts import MakePart, Part
 

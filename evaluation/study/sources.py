@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from cns_drake.base.jobs.file_digests import file_digests
-from cns_drake.drives.drive import Drive
-from evaluation.drives import open_drive
-from evaluation.drives.joined_drive import JoinedDrive
+from cns_drake.base import file_digests
+from cns_drake.drives import Drive
+from evaluation.drives import JoinedDrive, open_drive
 
 
 class DriveSource(Protocol):

@@ -41,7 +41,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo
 
 from cns_drake import Lidar, load_world, make_beam_pattern
-from cns_drake.sensors.lidar.adding import connect_lidar
+from cns_drake.sensors import connect_lidar
 
 WORLD = Path(__file__).parents[2] / "worlds/downtown/stage_04.sdf"
 PATTERN = make_beam_pattern("os1-128")

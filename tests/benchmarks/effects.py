@@ -30,14 +30,17 @@ import time
 import numpy as np
 from processes import in_process
 
-from cns_drake.base.jobs.processes import ALLOCATION
-from cns_drake.base.process import collect_garbage_seldom
-from cns_drake.scenarios.planning import DrivePlan, count_frames, plan_drive
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
-from cns_drake.sensors.lidar.config import WeatherConfig
-from cns_drake.simulation.loaded_drive import load_drive
-from cns_drake.simulation.simulation import simulate
+from cns_drake.base import ALLOCATION, collect_garbage_seldom
+from cns_drake.scenarios import (
+    DrivePlan,
+    Scenario,
+    count_frames,
+    load_scenario,
+    make_scenario,
+    plan_drive,
+)
+from cns_drake.sensors import WeatherConfig
+from cns_drake.simulation import load_drive, simulate
 
 # Name -> the variant that it is compared with.
 COMPARED = {

@@ -12,12 +12,10 @@ from pathlib import Path
 import resource
 import time
 
-from evaluation.drives import open_drive
-from evaluation.drives.scan_clouds import cloud_at
-from evaluation.maps.mapped_drive import MappedDrive
-from evaluation.maps.voxel_maps import map_drive
+from evaluation.drives import cloud_at, open_drive
+from evaluation.maps import MappedDrive, map_drive
 from evaluation.methods import make_method
-from evaluation.recognition.retrieval import retrieve
+from evaluation.recognition import retrieve
 
 
 def measure(label: str, work: Callable, number: int = 1):

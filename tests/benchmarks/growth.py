@@ -31,12 +31,11 @@ from stages import (
     still,
 )
 
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.scene.perception_geometry import PerceptionGeometry
-from cns_drake.scene.surfaces import TriangleSurface
-from cns_drake.sensors.lidar.patterns import SpinningPattern
-from cns_drake.simulation.simulation import simulate
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.scenarios import load_scenario
+from cns_drake.scene import PerceptionGeometry, TriangleSurface
+from cns_drake.sensors import SpinningPattern
+from cns_drake.simulation import simulate
 
 POSES = 8
 REACH = 120.0

@@ -38,13 +38,16 @@ from rosbags.highlevel import AnyReader
 import yaml
 
 from cns_drake.base import poses
-from cns_drake.recording.schedule import START_NS
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
-from cns_drake.simulation.simulation import simulate
-from evaluation.alignment.estimated_trajectories import segment_errors
-from evaluation.drives.sampling import travelled
+from cns_drake.recording import START_NS
+from cns_drake.scenarios import (
+    Scenario,
+    load_scenario,
+    make_scenario,
+    plan_drive,
+)
+from cns_drake.simulation import simulate
+from evaluation.alignment import segment_errors
+from evaluation.drives import travelled
 
 _TURNS = 10
 _ADIS16448 = {

@@ -28,7 +28,7 @@ SPEED = 20.0
 
 def print_peak(drive: str, frames: int | None) -> None:
     """Prints the peak of memory of recording a drive."""
-    from cns_drake.scenarios.scenario_files import load_scenario
+    from cns_drake.scenarios import load_scenario
 
     scenario = load_scenario(drive)
     _record(scenario.model_copy(update={"frames": frames}), lambda done: None)
@@ -39,10 +39,9 @@ def print_growth(drive: str, frames: int) -> None:
     """Prints how the memory of a long recording grows."""
     import numpy as np
 
-    from cns_drake.recording.schedule import FRAME_PERIOD
-    from cns_drake.roads.network import load_road_network
-    from cns_drake.roads.random_route import draw_route
-    from cns_drake.scenarios.scenario_files import load_scenario
+    from cns_drake.recording import FRAME_PERIOD
+    from cns_drake.roads import draw_route, load_road_network
+    from cns_drake.scenarios import load_scenario
 
     scenario = load_scenario(drive)
     route = draw_route(
@@ -78,7 +77,7 @@ def print_growth(drive: str, frames: int) -> None:
 
 
 def _record(scenario, on_frame) -> None:
-    from cns_drake.simulation.simulation import simulate
+    from cns_drake.simulation import simulate
 
     with tempfile.TemporaryDirectory() as folder:
         simulate(

@@ -46,10 +46,9 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 from stages import interleaved, read_stage, sensor_poses, still
 
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scene.perception_geometry import PerceptionGeometry
-from cns_drake.scene.surfaces import TriangleSurface
-from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.scene import PerceptionGeometry, TriangleSurface
+from cns_drake.sensors import make_beam_pattern
 
 REACH = 120.0
 # Errors beyond this are counted [m].

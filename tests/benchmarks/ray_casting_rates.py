@@ -31,16 +31,16 @@ from stages import (
     still,
 )
 
-from cns_drake.ray_casting import embree
-from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
-from cns_drake.ray_casting.embree_primitives import (
+from cns_drake.ray_casting import (
     SOLID,
+    EmbreeHierarchy,
+    RayCastingScene,
+    group_geometries,
+    load,
     merge_first,
     merge_second,
 )
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.ray_casting.ray_groups import group_geometries
-from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.sensors import make_beam_pattern
 
 DRIVES = ("metropolis_04", "downtown_04")
 POSES = 16
@@ -138,7 +138,7 @@ def _all_in_one(geometries, stands):
 
 def _limit_variant(limit, hierarchy, p_WO, poses, d_S, reach):
     tree = hierarchy._packet_scenes
-    function = embree.load().rtcIntersect16
+    function = load().rtcIntersect16
     intersect16 = ctypes.cast(function, ctypes.c_void_p)
     count = len(d_S)
     rows = np.ascontiguousarray(d_S.T, dtype=np.float32)

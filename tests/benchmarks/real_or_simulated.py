@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 from sklearn.metrics import roc_auc_score
 
-from cns_drake.base.errors import InputError
-from cns_drake.drives.drive import Drive
+from cns_drake.base import InputError
+from cns_drake.drives import Drive
 from evaluation.drives import open_drive
-from evaluation.real.judge import (
+from evaluation.real import (
     Features,
     common_names,
     judge_draws,

@@ -31,22 +31,14 @@ from processes import in_process
 from stages import Open3dStage, read_stage
 import zstandard
 
-from cns_drake.base.process import num_cores
-from cns_drake.drives.ros_types import serialize
-from cns_drake.motion.vehicle_motion import VehicleMotion
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.mcap_recorder import McapRecorder
-from cns_drake.recording.messages import make_imu
-from cns_drake.recording.schedule import FRAME_PERIOD
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.sensors.lidar.config import make_pattern
-from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.odometry.odometry import OdometrySensor
-from cns_drake.simulation.simulation import simulate
+from cns_drake.base import num_cores
+from cns_drake.drives import serialize
+from cns_drake.motion import VehicleMotion
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.recording import FRAME_PERIOD, BagWriter, McapRecorder, make_imu
+from cns_drake.scenarios import Scenario, load_scenario, plan_drive
+from cns_drake.sensors import Lidar, OdometrySensor, make_pattern, sensor_pose
+from cns_drake.simulation import simulate
 
 DRIVES = ("metropolis_04", "downtown_04")
 # Step -> what does it; of calls within calls, the innermost counts.

@@ -22,13 +22,15 @@ import sys
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cns_drake.base.points import encode_bin
-from cns_drake.motion.trajectory import Trajectory
-from cns_drake.scenarios.planning import DrivePlan
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
-from cns_drake.simulation.loaded_drive import load_drive
-from cns_drake.simulation.station import make_station
+from cns_drake.base import encode_bin
+from cns_drake.motion import Trajectory
+from cns_drake.scenarios import (
+    DrivePlan,
+    Scenario,
+    load_scenario,
+    make_scenario,
+)
+from cns_drake.simulation import load_drive, make_station
 
 DRIVES = ("riverside_02", "metropolis_04", "suburbia_02")
 # Duration of a turn of the unit [s].

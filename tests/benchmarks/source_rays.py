@@ -21,8 +21,8 @@ import shapely
 from shapely.geometry import Polygon
 import yaml
 
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.simulation.simulated_drive import SimulationSource
+from cns_drake.scenarios import load_scenario
+from cns_drake.simulation import SimulationSource
 
 _BUILDING = 50
 _EVERY = 75

@@ -11,20 +11,16 @@ import open3d
 from pydrake.geometry import FrameId, GeometryId
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.ray_casting.ray_groups import group_geometries
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.scene.perception_geometry import (
+from cns_drake.ray_casting import RayCastingScene, group_geometries
+from cns_drake.scenarios import load_scenario, plan_drive
+from cns_drake.scene import (
     PerceptionGeometry,
-    read_perception_geometry,
-)
-from cns_drake.scene.surfaces import (
     TriangleSurface,
+    load_world,
     merge_triangles,
+    read_perception_geometry,
     tessellate,
 )
-from cns_drake.scene.world import load_world
 
 
 def read_stage(drive: str) -> list[PerceptionGeometry]:

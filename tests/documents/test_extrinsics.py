@@ -4,9 +4,7 @@ from helpers import documents
 import numpy as np
 import yaml
 
-from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.sensors.imu.config import ImuSection
-from cns_drake.sensors.lidar.config import LidarSection
+from cns_drake.sensors import ImuSection, LidarSection, sensor_pose
 
 
 def test_extrinsics_are_those_of_the_default_places():

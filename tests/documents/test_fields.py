@@ -3,10 +3,9 @@
 from helpers import documents
 import pytest
 
-from cns_drake.city.buildings import ARCHETYPES
-from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
+from cns_drake.city import ARCHETYPES, OBJECTS
+from cns_drake.scenarios import Scenario
+from cns_drake.sensors import LIDAR_PRESETS
 from docs import reference_pages
 from docs.reference_pages import CITY, EXPERIMENT, METHODS, SCENARIO
 

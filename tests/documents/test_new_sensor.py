@@ -10,8 +10,7 @@ from pydantic import ValidationError
 import pytest
 from rosbags.highlevel import AnyReader
 
-from cns_drake.simulation.simulation import simulate
-from cns_drake.simulation.station import make_station
+from cns_drake.simulation import make_station, simulate
 from docs.examples.gnss import METRES_PER_DEG, GnssScenario, with_gnss
 
 FRAMES = 6

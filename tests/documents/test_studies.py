@@ -7,13 +7,13 @@ from helpers import documents
 import pytest
 import yaml
 
-from cns_drake.studies.experiments.experiment import Experiment
-from cns_drake.studies.experiments.experiment_files import (
+from cns_drake.studies import (
+    TASKS,
+    Experiment,
     load_experiment,
     shipped_experiments,
 )
-from cns_drake.studies.study import TASKS
-from evaluation.results.table import Results, Row
+from evaluation.results import Results, Row
 
 PAGE = documents.read("docs/studies.md")
 

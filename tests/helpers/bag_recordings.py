@@ -2,9 +2,12 @@
 
 import numpy as np
 
-from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.recorded_topics import recording_topics
-from cns_drake.recording.schedule import START_NS, frame_stamp_ns
+from cns_drake.recording import (
+    START_NS,
+    BagWriter,
+    frame_stamp_ns,
+    recording_topics,
+)
 
 TOPICS = recording_topics(["lidar"])
 FRAMES = 50

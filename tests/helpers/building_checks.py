@@ -9,7 +9,7 @@ import numpy as np
 from shapely.affinity import rotate
 from shapely.geometry import Polygon, box
 
-from cns_drake.city.buildings import ARCHETYPES, sample
+from cns_drake.city import ARCHETYPES, sample
 from helpers.mesh_checks import rotation_matrix
 
 

@@ -5,9 +5,7 @@ import pytest
 import shapely
 from shapely.strtree import STRtree
 
-from cns_drake.city.geometry.models import part_triangles
-from cns_drake.city.geometry.object_models import HEADROOM
-from cns_drake.city.ground.coverings import GROUND_TAG
+from cns_drake.city import GROUND_TAG, HEADROOM, part_triangles
 
 # Parts may reach this far outside a footprint: plinths, pilasters, steps.
 OVERHANG = 0.36

@@ -16,7 +16,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 import yaml
 
-from evaluation.clouds.count_images import count_image
+from evaluation.clouds import count_image
 from evaluation.drives import open_drive
 from helpers.layered_scans import town
 from helpers.small_cityjson import write_blocks

@@ -4,13 +4,9 @@ import numpy as np
 from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 import yaml
 
-from cns_drake.motion.trajectory import Trajectory
-from cns_drake.roads.lane_path import LanePath
-from cns_drake.roads.network import load_road_network
-from cns_drake.roads.route import make_lane_path
-from cns_drake.roads.speeds import Speeds
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.shipped import shipped_drives
+from cns_drake.motion import Trajectory
+from cns_drake.roads import LanePath, Speeds, load_road_network, make_lane_path
+from cns_drake.scenarios import Scenario, shipped_drives
 
 SPACING = 2.0
 NO_LIMIT = 100.0

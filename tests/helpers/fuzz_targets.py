@@ -9,36 +9,27 @@ import shutil
 import numpy as np
 import yaml
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.errors import InputError as ReadingError
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.city.generation.city_structures import make_city
-from cns_drake.city.generation.rendering import meshes_of
-from cns_drake.city.plan.city_plan import load_plan
-from cns_drake.city.plan.stages import load_stages
-from cns_drake.export.exporting import export_drive
-from cns_drake.imports.cityjson.city import import_cityjson
-from cns_drake.imports.openstreetmap.city import import_openstreetmap
-from cns_drake.pictures.camera_views import load_views
-from cns_drake.recording.schedule import FRAME_PERIOD
-from cns_drake.roads.network import load_road_network
-from cns_drake.roads.route import Route, make_lane_path
-from cns_drake.scenarios.drive_table import drive_rows
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario, write_scenarios
-from cns_drake.scene.perception_geometry import read_perception_geometry
-from cns_drake.scene.world import load_world
-from cns_drake.sensors.lidar.config import make_pattern
-from cns_drake.sensors.lidar.presets import make_beam_pattern
-from cns_drake.simulation.scan_files import save_scan
-from cns_drake.simulation.scanning import scan_world
-from cns_drake.simulation.simulation import simulate
-from cns_drake.studies.experiments.experiment_files import load_experiment
-from cns_drake.studies.maps.experiment_maps import ExperimentRun
-from cns_drake.studies.study import study_drives
+from cns_drake.base import Cluster, InputError
+from cns_drake.base import InputError as ReadingError
+from cns_drake.city import load_plan, load_stages, make_city, meshes_of
+from cns_drake.export import export_drive
+from cns_drake.imports import import_cityjson, import_openstreetmap
+from cns_drake.pictures import load_views
+from cns_drake.recording import FRAME_PERIOD
+from cns_drake.roads import Route, load_road_network, make_lane_path
+from cns_drake.scenarios import (
+    Scenario,
+    drive_rows,
+    load_scenario,
+    plan_drive,
+    write_scenarios,
+)
+from cns_drake.scene import load_world, read_perception_geometry
+from cns_drake.sensors import make_beam_pattern, make_pattern
+from cns_drake.simulation import save_scan, scan_world, simulate
+from cns_drake.studies import ExperimentRun, load_experiment, study_drives
 from evaluation import drives
-from evaluation.clouds.cloud_files import read_cloud
+from evaluation.clouds import read_cloud
 from helpers import (
     bent_drive,
     contradictions,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cns_drake.imports.openstreetmap.city import import_openstreetmap
+from cns_drake.imports import import_openstreetmap
 
 
 def import_osm(path, year_attribute=None):

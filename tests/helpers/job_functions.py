@@ -9,8 +9,7 @@ import select
 import signal
 import threading
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.step import Step
+from cns_drake.base import InputError, Step
 
 
 @dataclass(frozen=True)

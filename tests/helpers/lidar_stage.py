@@ -12,10 +12,12 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.framework import DiagramBuilder
 
-from cns_drake.sensors.lidar.adding import connect_lidar
-from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.lidar.patterns import SpinningPattern
-from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.sensors import (
+    Lidar,
+    SpinningPattern,
+    connect_lidar,
+    make_beam_pattern,
+)
 
 X_WS = RigidTransform(RollPitchYaw(0.11, -0.07, 2.3), [1.5, -0.8, 0.4])
 # Rear, left, ahead, right.

@@ -9,23 +9,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from cns_drake.drives.drive import Drive
-from evaluation.change.drive_change import (
+from cns_drake.drives import Drive
+from evaluation.change import (
+    GRIDS,
     ChangeReport,
+    DriveMap,
     change_between,
     same_stage_partner,
     spread_over_grids,
 )
-from evaluation.change.drive_maps import DriveMap
-from evaluation.change.tcr import GRIDS
-from evaluation.methods.method import Method
-from evaluation.recognition.place_outcome import (
+from evaluation.methods import Method
+from evaluation.recognition import (
+    RECORDED_PROTOCOL,
     PlaceOutcome,
     QueryDrive,
+    RetrievalProtocol,
     check_has_match,
+    retrieve,
 )
-from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
-from evaluation.recognition.retrieval import retrieve
 
 
 def place_outcome(

@@ -12,11 +12,13 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder
 
-from cns_drake.sensors.lidar.adding import connect_lidar
-from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.lidar.patterns import DirectionPattern
-from cns_drake.sensors.returns.calibrated import CalibratedReturns
-from cns_drake.sensors.returns.unit_sheets import Response
+from cns_drake.sensors import (
+    CalibratedReturns,
+    DirectionPattern,
+    Lidar,
+    Response,
+    connect_lidar,
+)
 
 
 def plate(name, reflectivity, X_WG, size=(0.1, 400.0, 400.0), shape=None):

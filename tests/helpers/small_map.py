@@ -5,7 +5,7 @@ import shutil
 import numpy as np
 import yaml
 
-from cns_drake.scenarios.shipped import shipped_drives, shipped_maps
+from cns_drake.scenarios import shipped_drives, shipped_maps
 
 _WORLD = """<?xml version="1.0"?>
 <sdf version="1.9">

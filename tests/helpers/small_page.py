@@ -4,27 +4,33 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from evaluation.maps.thumbnails import thumbnail
+from evaluation.maps import thumbnail
 from evaluation.methods import make_method
-from evaluation.recognition.place_metrics import place_numbers
-from evaluation.recognition.place_outcome import PlaceOutcome, QueryDrive
-from evaluation.recognition.pose_errors import PoseErrors
-from evaluation.recognition.protocol import PAPER_PROTOCOL
-from evaluation.recognition.result_number import Number
-from evaluation.recognition.retrieval import Retrieval
-from evaluation.results.keys import OWN, STAGE, made_by
-from evaluation.results.page import write_page
-from evaluation.results.sections.browser import browser_section
-from evaluation.results.sections.change_pictures import (
-    ChangePictures,
-    change_section,
+from evaluation.recognition import (
+    PAPER_PROTOCOL,
+    Number,
+    PlaceOutcome,
+    PoseErrors,
+    QueryDrive,
+    Retrieval,
+    place_numbers,
 )
-from evaluation.results.sections.routes import (
+from evaluation.results import (
+    OWN,
+    STAGE,
+    Answers,
+    ChangePictures,
     PageDrive,
+    QueryRows,
+    Results,
+    Row,
+    browser_section,
+    change_section,
+    made_by,
     make_page_drive,
     routes_section,
+    write_page,
 )
-from evaluation.results.table import Answers, QueryRows, Results, Row
 
 PLACES = 5.0 * np.arange(10)
 QUERIES = np.array([0.0, 10.0, 20.0, 30.0, 100.0])

@@ -3,7 +3,7 @@
 from pydrake.geometry import GeometryId
 from pydrake.math import RigidTransform
 
-from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.scene import PerceptionGeometry
 
 
 def make_geometry(surface, frame_id, X_FG=None):

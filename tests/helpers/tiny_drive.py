@@ -6,9 +6,9 @@ import sys
 
 import yaml
 
-from cns_drake.base.interrupts import INTERRUPTED, interrupt_on_termination
-from cns_drake.scenarios.scenario_files import make_scenario
-from cns_drake.simulation.simulation import simulate
+from cns_drake.base import INTERRUPTED, interrupt_on_termination
+from cns_drake.scenarios import make_scenario
+from cns_drake.simulation import simulate
 from helpers.small_map import box_visual, world_text
 
 FRAMES = 60

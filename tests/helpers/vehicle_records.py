@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cns_drake.traffic.vehicle_records import CURRENT, VEHICLE
+from cns_drake.traffic import CURRENT, VEHICLE
 
 
 def make_vehicles(*states, **fields):

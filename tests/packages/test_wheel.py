@@ -10,7 +10,7 @@ import zipfile
 
 import pytest
 
-from cns_drake.base.version import __version__
+from cns_drake.base import __version__
 
 ROOT = Path(__file__).parents[2]
 # As in a workflow of a repository.

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from shapely.geometry import Polygon
 
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base import parse_yaml
 from cns_drake.city.buildings import (
     art_deco_tower,
     balcony_flats,

@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import BaseModel
 
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base import parse_yaml
 from cns_drake.city.dice import Rgb
 from cns_drake.city.facades.building import Building
 from cns_drake.city.geometry import (

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base import parse_yaml
 from cns_drake.city.dice import Dice, Rgb
 from cns_drake.city.geometry import (
     Builder,

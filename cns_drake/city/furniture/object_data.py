@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import BaseModel, Field
 
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base import parse_yaml
 from cns_drake.city.dice import Dice, Rgb
 from cns_drake.city.geometry import Builder, Model, assemble, mesh_part
 

@@ -9,7 +9,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from cns_drake.base.errors import InputError, value_errors
+from cns_drake.base import InputError, value_errors
 from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.geometry import (
     Structure,
@@ -32,10 +32,15 @@ from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.placement.open_ground import furnish_district
 from cns_drake.city.placement.parking import park_along_streets
 from cns_drake.city.plan.city_plan import CityPlan, load_plan
-from cns_drake.roads import surface_heights
-from cns_drake.roads.carriageway import Areas
-from cns_drake.roads.network import RoadNetwork, load_road_network
-from cns_drake.scene.map_folder import MapFolder
+from cns_drake.roads import (
+    Areas,
+    KerbMap,
+    RoadNetwork,
+    RoadSurface,
+    SurfaceHeights,
+    load_road_network,
+)
+from cns_drake.scene import MapFolder
 
 
 class City(NamedTuple):
@@ -71,7 +76,7 @@ class CityStreets(NamedTuple):
     """
 
     areas: Areas
-    surface: surface_heights.SurfaceHeights
+    surface: SurfaceHeights
     kerb_height: float
     junctions: BaseGeometry
     margins: BaseGeometry
@@ -79,7 +84,7 @@ class CityStreets(NamedTuple):
     structures: Sequence[Structure]
     furnish: Callable[[Draft], None]
     park: Callable[[Draft], None]
-    kerbs: surface_heights.KerbMap | None = None
+    kerbs: KerbMap | None = None
 
 
 def make_city(world: Path) -> City:
@@ -115,7 +120,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
     """
     streets = CityStreets(
         areas=network.areas,
-        surface=surface_heights.RoadSurface(network),
+        surface=RoadSurface(network),
         kerb_height=kerb_height(network),
         junctions=unary_union(list(network.junction_areas.values())),
         margins=Polygon(),

@@ -3,14 +3,11 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from cns_drake.base.complete_files import write_text
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import user_errors
-from cns_drake.base.progress import doing
+from cns_drake.base import InputError, doing, user_errors, write_text
 from cns_drake.city.generation.city_structures import City, make_city
 from cns_drake.city.generation.renaming import find_renaming, renamed_text
 from cns_drake.city.generation.rendering import render_city
-from cns_drake.scene.map_folder import (
+from cns_drake.scene import (
     MESH_FOLDER,
     STAGES_NAME,
     STRUCTURES_NAME,

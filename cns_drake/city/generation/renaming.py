@@ -10,11 +10,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 import yaml
 
-from cns_drake.base.csv_files import read_records
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
-from cns_drake.base.number_format import to_number
-from cns_drake.base.yaml_files import MarkedYamlLoader, read_yaml
+from cns_drake.base import (
+    InputError,
+    MarkedYamlLoader,
+    read_bytes,
+    read_records,
+    read_yaml,
+    to_number,
+)
 from cns_drake.city.geometry.structures import Structure
 
 # A structure that has moved farther than this counts as a new one [m].

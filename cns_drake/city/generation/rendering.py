@@ -4,9 +4,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from cns_drake.base.csv_files import csv_text
-from cns_drake.base.errors import InputError
-from cns_drake.base.progress import doing
+from cns_drake.base import InputError, csv_text, doing
 from cns_drake.city.generation.city_structures import City
 from cns_drake.city.generation.stage_sizes import stage_size, triangles_in
 from cns_drake.city.generation.world_sdf import world_sdf
@@ -15,8 +13,8 @@ from cns_drake.city.geometry.models import MeshShape
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.city.plan.stages import Stages, load_stages
-from cns_drake.scene.labels import MAX_INSTANCE
-from cns_drake.scene.map_folder import (
+from cns_drake.scene import (
+    MAX_INSTANCE,
     MESH_FOLDER,
     STAGES_NAME,
     STRUCTURES_NAME,

@@ -16,15 +16,12 @@ from shapely.geometry import box
 from shapely.ops import unary_union
 import yaml
 
-from cns_drake.base.complete_files import complete_part, write_part
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base import complete_part, parse_yaml, write_part
 from cns_drake.city.generation.city_structures import City, lay_out
 from cns_drake.city.geometry.polygons import polygons_of, snap
 from cns_drake.city.plan.city_plan import CityPlan, load_plan
-from cns_drake.roads.carriageway import Areas
-from cns_drake.roads.network import RoadNetwork, load_road_network
-from cns_drake.roads.random_route import draw_route
-from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
+from cns_drake.roads import Areas, RoadNetwork, draw_route, load_road_network
+from cns_drake.scene import STAGES_NAME, MapFolder
 
 # The generated world extends this far beyond the roads [m].
 _MARGIN = 45.0

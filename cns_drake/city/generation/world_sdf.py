@@ -7,8 +7,7 @@ import numpy as np
 
 from cns_drake.city.geometry.models import MeshShape, Part, Shape
 from cns_drake.city.geometry.structures import Structure
-from cns_drake.scene.map_folder import MESH_FOLDER
-from cns_drake.scene.semantics import CLASS_RGB
+from cns_drake.scene import CLASS_RGB, MESH_FOLDER
 
 
 # Paths of meshes are relative to the SDF file. A stage therefore needs no

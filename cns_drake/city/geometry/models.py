@@ -10,7 +10,7 @@ import numpy as np
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.mesh import Mesh, box_mesh
-from cns_drake.scene.materials import MATERIALS
+from cns_drake.scene import MATERIALS
 
 # Number of sides of the prisms that stand for round shapes.
 _ROUND_SIDES = 12

@@ -12,10 +12,12 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.models import Model, part_mesh, rotation, triple
 from cns_drake.city.geometry.polygons import placed
-from cns_drake.scene.material_cells import shortened
-from cns_drake.scene.materials import USUAL_MATERIALS
-from cns_drake.scene.structure_names import kind_in_name
-from cns_drake.scene.structure_table import StructureEntry
+from cns_drake.scene import (
+    USUAL_MATERIALS,
+    StructureEntry,
+    kind_in_name,
+    shortened,
+)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry import Structure, snap
-from cns_drake.roads import surface_heights
+from cns_drake.roads import KerbMap, SurfaceHeights
 
 # Distance of the nodes between which the field is interpolated [m].
 _NODES = 2.0
@@ -80,8 +80,8 @@ class SlopingGround:
 
     def __init__(
         self,
-        surface: surface_heights.SurfaceHeights,
-        kerb_height: float | surface_heights.KerbMap,
+        surface: SurfaceHeights,
+        kerb_height: float | KerbMap,
         streets: BaseGeometry,
         bounds: tuple[float, float, float, float],
         pads: Sequence[Pad] = (),
@@ -195,8 +195,8 @@ Ground = LevelGround | SlopingGround
 
 
 def make_ground(
-    surface: surface_heights.SurfaceHeights,
-    kerb_height: float | surface_heights.KerbMap,
+    surface: SurfaceHeights,
+    kerb_height: float | KerbMap,
     streets: BaseGeometry,
     bounds: tuple[float, float, float, float],
     pads: Sequence[Pad] = (),

@@ -11,9 +11,14 @@ from cns_drake.city.geometry import (
     merge_meshes,
 )
 from cns_drake.city.ground.coverings import Covering
-from cns_drake.roads.centreline import sample_stations
-from cns_drake.roads.network import RoadNetwork
-from cns_drake.roads.road import ENDS, Direction, End, Road
+from cns_drake.roads import (
+    ENDS,
+    Direction,
+    End,
+    Road,
+    RoadNetwork,
+    sample_stations,
+)
 
 _RGB = (0.80, 0.79, 0.74)
 # Paint lies this high above the road, so that they are not in one plane [m].

@@ -19,9 +19,13 @@ from cns_drake.city.geometry import (
     wall_mesh,
 )
 from cns_drake.city.ground.coverings import Covering
-from cns_drake.roads import surface_heights
-from cns_drake.roads.carriageway import Areas
-from cns_drake.roads.network import RoadNetwork
+from cns_drake.roads import (
+    Areas,
+    KerbMap,
+    RoadNetwork,
+    RoadSurface,
+    SurfaceHeights,
+)
 
 # Width of the kerb stones [m].
 _KERB_WIDTH = 0.15
@@ -63,7 +67,7 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
     bays = unary_union(list(network.areas.parking_bays.values()))
     return street_surfaces(
         network.areas,
-        surface_heights.RoadSurface(network),
+        RoadSurface(network),
         kerb_height(network),
         [parking_bays(bays)],
     )
@@ -71,8 +75,8 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
 
 def street_surfaces(
     areas: Areas,
-    surface: surface_heights.SurfaceHeights,
-    kerb: float | surface_heights.KerbMap,
+    surface: SurfaceHeights,
+    kerb: float | KerbMap,
     coverings: Sequence[Covering],
     kerbless: BaseGeometry | None = None,
 ) -> list[Structure]:
@@ -127,8 +131,8 @@ def kerb_area(paved: BaseGeometry) -> MultiPolygon:
 
 
 def _street_heights(
-    surface: surface_heights.SurfaceHeights,
-    kerb: float | surface_heights.KerbMap,
+    surface: SurfaceHeights,
+    kerb: float | KerbMap,
 ) -> tuple[HeightMap | float, HeightMap | float]:
     """Returns the heights of the roads and of the sidewalks beside them."""
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base import parse_yaml
 from cns_drake.city.geometry import Occupancy, Structure
 from cns_drake.city.geometry.rectangles import largest_rectangle
 from cns_drake.city.placement.objects import OBJECTS, pick_key

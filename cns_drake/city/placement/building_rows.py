@@ -8,7 +8,7 @@ from numpy.random import Generator
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.errors import InputError, value_errors
+from cns_drake.base import InputError, value_errors
 from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.facades.site import Site
 from cns_drake.city.geometry import Structure, placed

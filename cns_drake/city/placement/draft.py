@@ -22,7 +22,7 @@ from cns_drake.city.ground.elevation import Ground, LevelGround
 from cns_drake.city.placement.naming import NameCounter, name_stem
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plan.city_plan import CityPlan
-from cns_drake.roads.carriageway import Areas
+from cns_drake.roads import Areas
 
 # An object stands upright if the ground below it falls by at most this much;
 # half of the fall is how deep it stands in the ground on the upper side [m].

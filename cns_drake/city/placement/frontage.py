@@ -10,7 +10,7 @@ from shapely.geometry import LineString, Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import linemerge
 
-from cns_drake.base.units import wrapped
+from cns_drake.base import wrapped
 from cns_drake.city.geometry.polygons import placed
 
 # A vertex at which a line turns by more than this is a corner [rad].

@@ -7,8 +7,7 @@ import shapely
 
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.roads.network import RoadNetwork
-from cns_drake.roads.road import Arm, Direction, Junction, Road
+from cns_drake.roads import Arm, Direction, Junction, Road, RoadNetwork
 
 # Distance of posts from the kerb [m].
 _FROM_KERB = 0.7

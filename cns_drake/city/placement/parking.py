@@ -10,7 +10,7 @@ import shapely
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.objects import OBJECTS, pick_key
 from cns_drake.city.plan.city_plan import ParkingPlan
-from cns_drake.roads.network import RoadNetwork
+from cns_drake.roads import RoadNetwork
 
 # Length of a parking bay along the street, least and greatest [m].
 _BAY_LENGTH = (5.6, 7.0)

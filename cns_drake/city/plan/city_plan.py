@@ -13,11 +13,8 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base.errors import validated
-from cns_drake.base.input_models import InputModel
-from cns_drake.base.repetitions import repeated
-from cns_drake.base.yaml_files import read_yaml
-from cns_drake.roads.roads_file import MeshStem
+from cns_drake.base import InputModel, read_yaml, repeated, validated
+from cns_drake.roads import MeshStem
 
 # Greatest extent of a city [m]; the size of the generated files grows with its
 # area.

@@ -7,9 +7,13 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
-from cns_drake.base.errors import InputError, validated
-from cns_drake.base.input_models import InputModel
-from cns_drake.base.yaml_files import parse_yaml, read_yaml
+from cns_drake.base import (
+    InputError,
+    InputModel,
+    parse_yaml,
+    read_yaml,
+    validated,
+)
 
 LotUse = Literal["car_park", "market", "garden", "yard", "empty"]
 StageName = Annotated[str, Field(pattern=r"^\d\d$")]

@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry import Finish
+from cns_drake.city import Finish
 from cns_drake.imports import colours
 from cns_drake.imports.building_years import construction_year
 from cns_drake.imports.cityjson.city_file import (

@@ -14,9 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular, user_errors
-from cns_drake.base.json_text import parse_json
+from cns_drake.base import InputError, check_regular, parse_json, user_errors
 from cns_drake.imports.cityjson.city_file import (
     CityFile,
     CityGeometry,

@@ -9,7 +9,7 @@ import numpy as np
 import pyproj
 from pyproj.exceptions import CRSError, ProjError
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 
 # Direction of an axis -> its row among east, north and up, and its sign.
 _ROWS = {

@@ -12,11 +12,11 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.facades.assembly import Assembly
-from cns_drake.city.facades.site import Site
-from cns_drake.city.geometry import (
+from cns_drake.city import (
+    Assembly,
     MeshShape,
     Model,
+    Site,
     UpperSides,
     looks_up,
     turned_up,

@@ -11,10 +11,17 @@ from shapely import STRtree
 from shapely.geometry import LineString, MultiLineString
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.errors import InputError
-from cns_drake.city.geometry import Mesh, MeshShape, Part, Structure, turned_up
-from cns_drake.city.geometry.polygons import GRID
-from cns_drake.city.ground.markings import DASH, DASH_GAP
+from cns_drake.base import InputError
+from cns_drake.city import (
+    DASH,
+    DASH_GAP,
+    GRID,
+    Mesh,
+    MeshShape,
+    Part,
+    Structure,
+    turned_up,
+)
 from cns_drake.imports.colours import WHITE_PAINT, Rgb
 from cns_drake.imports.dressing.dressed_buildings import (
     DressedBuildings,
@@ -44,7 +51,7 @@ from cns_drake.imports.streets import (
     Street,
     ends_at_nodes,
 )
-from cns_drake.scene.labels import MAX_INSTANCE
+from cns_drake.scene import MAX_INSTANCE
 
 # Colour of paving stones.
 _PAVED: Rgb = (0.57, 0.56, 0.53)

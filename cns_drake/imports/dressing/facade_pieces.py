@@ -13,19 +13,23 @@ import numpy as np
 import shapely
 from shapely.geometry import box
 
-from cns_drake.city.facades import (
+from cns_drake.city import (
+    GRID,
     Assembly,
+    AwningShape,
+    Mesh,
     Relief,
-    balconies,
-    bays,
+    balcony,
+    gate,
+    house_door,
     lifted,
+    shop_front,
     single_wall,
+    triangulate,
+    window,
 )
-from cns_drake.city.facades.boards import board as make_board
-from cns_drake.city.facades.canopies import AwningShape
-from cns_drake.city.facades.canopies import awnings as make_awnings
-from cns_drake.city.geometry import Mesh, triangulate
-from cns_drake.city.geometry.polygons import GRID
+from cns_drake.city import awnings as make_awnings
+from cns_drake.city import board as make_board
 from cns_drake.imports.dressing.facade_plan import (
     DOOR_DEEPER,
     DOOR_WIDTH,
@@ -226,16 +230,16 @@ def _reliefs(opening: Opening, plan: FacadePlan) -> list[tuple[Relief, str]]:
     height = opening.z1 - z0
     if kind == "shop":
         is_even = opening.nth % 2 == 0
-        bay = bays.shop_front(height, SHOP_DEPTH, door=is_even)
+        bay = shop_front(height, SHOP_DEPTH, door=is_even)
     elif kind == "gate":
-        bay = bays.gate(GATE_WIDTH, height, GATE_DEPTH)
+        bay = gate(GATE_WIDTH, height, GATE_DEPTH)
     elif kind == "door":
         depth = style.recess + DOOR_DEEPER
-        bay = bays.house_door(DOOR_WIDTH, 0.0, height, depth)
+        bay = house_door(DOOR_WIDTH, 0.0, height, depth)
     else:
         has_bars = plan.to_drive < _BARS_WITHIN
         has_sill = plan.to_drive < _SILLS_WITHIN and z0 > _LEAST_SILL
-        bay = bays.window(
+        bay = window(
             style.window_width,
             0.0,
             height,
@@ -340,7 +344,7 @@ def _add_balconies(out: Assembly, plan: FacadePlan) -> int:
         x0 = max(_BALCONY_FROM_END, middle - half)
         x1 = min(plan.panel.length - _BALCONY_FROM_END, middle + half)
         if not plan.is_in_the_way(z, _BALCONY_REACH):
-            mesh = balconies.balcony(x0, x1, _BALCONY_REACH, z)
+            mesh = balcony(x0, x1, _BALCONY_REACH, z)
             _add_in_wall(out, "trim", plan.panel, mesh)
             count += 1
     return count

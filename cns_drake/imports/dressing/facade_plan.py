@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.city.facades import bays
-from cns_drake.city.geometry import upper_sides
+from cns_drake.city import UpperSides, stretches
 from cns_drake.imports.dressing.styles import Style
 from cns_drake.imports.dressing.wall_panels import Panel
 
@@ -139,7 +138,7 @@ class FacadePlan:
         x, z = np.transpose(at)
         return panel.place(x, z, _PROBE_BEFORE)
 
-    def threshold(self, door: Opening, paving: upper_sides.UpperSides) -> float:
+    def threshold(self, door: Opening, paving: UpperSides) -> float:
         """Returns the height of a door's threshold in panel coordinates [m].
 
         The threshold is one step above the highest paving in front of the door
@@ -188,7 +187,7 @@ def plan_facade(
         to_drive: distance from the wall to the nearest drive [m].
     """
     floor, ground = base - panel.origin[2], ground - panel.origin[2]
-    cells = bays.stretches(panel.length, style.window_pitch, _END_MARGIN)
+    cells = stretches(panel.length, style.window_pitch, _END_MARGIN)
     first = max(0, math.floor(-floor / style.storey))
     last = math.ceil((panel.height - floor) / style.storey)
     if style.use == "church":
@@ -209,7 +208,7 @@ def plan_facade(
     return FacadePlan(panel, style, openings, floor, ground, to_drive)
 
 
-def with_shops(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
+def with_shops(plan: FacadePlan, paving: UpperSides) -> FacadePlan:
     """Returns the plan with shop windows on the ground floor, where possible.
 
     Only wide openings towards the street become shop windows.
@@ -232,7 +231,7 @@ def with_shops(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
     return replace(plan, openings=openings)
 
 
-def with_doors(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
+def with_doors(plan: FacadePlan, paving: UpperSides) -> FacadePlan:
     """Returns a wall's plan with doors in place of some ground-floor windows.
 
     `paving` is the paving in front of the wall.

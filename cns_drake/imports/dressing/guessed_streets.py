@@ -7,8 +7,7 @@ import shapely
 from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry import looks_up, turned_up
-from cns_drake.city.geometry.polygons import GRID
+from cns_drake.city import GRID, looks_up, turned_up
 from cns_drake.imports.dressing.paving import (
     area_outside,
     near_drives,

@@ -7,8 +7,7 @@ import shapely
 from shapely.geometry import MultiLineString, MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry import looks_up, turned_up
-from cns_drake.city.geometry.polygons import GRID
+from cns_drake.city import GRID, looks_up, turned_up
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles, parts_of
 from cns_drake.imports.imported_objects import ImportedObject, make_object

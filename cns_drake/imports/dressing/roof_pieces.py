@@ -8,14 +8,16 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon, box
 
-from cns_drake.city.facades import Assembly, add_chimney, equip_roof
-from cns_drake.city.geometry import (
+from cns_drake.city import (
+    GRID,
+    Assembly,
     Finish,
     UpperSides,
+    add_chimney,
+    equip_roof,
     long_normals,
     unit_normals,
 )
-from cns_drake.city.geometry.polygons import GRID
 from cns_drake.imports.dressing.styles import Style
 
 # A roof is level if the z of its unit normal is greater than this.

@@ -10,10 +10,8 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, MultiPoint, Point
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.yaml_files import parse_yaml
-from cns_drake.city.geometry import Structure
-from cns_drake.city.placement.frontage import station_at
-from cns_drake.city.placement.objects import pick_key
+from cns_drake.base import parse_yaml
+from cns_drake.city import Structure, pick_key, station_at
 from cns_drake.imports.dressing.guessed_streets import HALF_STREET
 from cns_drake.imports.dressing.street_room import (
     PlacedObjects,

@@ -9,9 +9,10 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, Point
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.round_shapes import revolved
-from cns_drake.city.furniture.parked_cars import PARKED_CARS
-from cns_drake.city.geometry import (
+from cns_drake.base import revolved
+from cns_drake.city import (
+    OBJECTS,
+    PARKED_CARS,
     CylinderShape,
     Mesh,
     MeshShape,
@@ -21,11 +22,10 @@ from cns_drake.city.geometry import (
     Structure,
     UpperSides,
     ground_triangles,
+    name_stem,
     placed,
     turned_up,
 )
-from cns_drake.city.placement.naming import name_stem
-from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.ground import Ground

@@ -8,9 +8,8 @@ import re
 from matplotlib.colors import to_rgb
 import numpy as np
 
-from cns_drake.base.yaml_files import parse_yaml
-from cns_drake.city.dice import Dice
-from cns_drake.city.geometry import Finish, triple
+from cns_drake.base import parse_yaml
+from cns_drake.city import Dice, Finish, triple
 from cns_drake.imports.openstreetmap.tags import count
 
 _USE_KEYS = (

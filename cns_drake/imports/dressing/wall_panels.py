@@ -11,8 +11,7 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.facades.wall_frames import WallFrame
-from cns_drake.city.geometry.triangles import long_normals, unit_normals
+from cns_drake.city import WallFrame, long_normals, unit_normals
 from cns_drake.imports.faces import joined_triangles
 
 # A face is vertical if the absolute z of its unit normal is below this.

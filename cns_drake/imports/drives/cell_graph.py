@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base.polylines import distances_along
+from cns_drake.base import distances_along
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.steerable_drives import (
     Obstacle,

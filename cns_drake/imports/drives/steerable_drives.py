@@ -8,13 +8,10 @@ import numpy as np
 from scipy.interpolate import BSpline
 from shapely.geometry import LineString
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.polylines import distances_along, length_of
+from cns_drake.base import InputError, distances_along, length_of
 from cns_drake.imports.drives.free_space import FreeSpace
 from cns_drake.imports.faults import ImportFaults
-from cns_drake.roads.lane_path import POINT_SPACING
-from cns_drake.roads.u_turn import TIGHTEST_RADIUS
-from cns_drake.roads.waypoints import make_waypoint_path
+from cns_drake.roads import POINT_SPACING, TIGHTEST_RADIUS, make_waypoint_path
 
 # Paths of vehicles are quintic splines (`cns_drake.motion`). The points of a
 # path are their control points.

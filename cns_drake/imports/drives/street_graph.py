@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from cns_drake.base.polylines import length_of, step_lengths
+from cns_drake.base import length_of, step_lengths
 from cns_drake.imports.drives.free_space import FreeSpace
 from cns_drake.imports.drives.search import LONGEST
 from cns_drake.imports.drives.steerable_drives import (

@@ -6,12 +6,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base.polylines import length_of, step_lengths
-from cns_drake.base.units import wrapped
+from cns_drake.base import length_of, step_lengths, wrapped
 from cns_drake.imports.drives import search, steerable_drives, way_graph
 from cns_drake.imports.drives.steerable_drives import Obstacle, WaypointRoute
 from cns_drake.imports.opendrive.lanes import DRIVEN, LaneBand
-from cns_drake.traffic.lane_joining import usual_limit
+from cns_drake.traffic import usual_limit
 
 # A lane follows another one if its start is within this distance of the other's
 # end [m].

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from cns_drake.base.xml_elements import Element
+from cns_drake.base import Element
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive import curves, road_model
 

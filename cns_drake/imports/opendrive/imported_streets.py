@@ -9,9 +9,14 @@ import shapely
 from shapely.geometry import LinearRing, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry import polygons_of, snap
-from cns_drake.city.ground.coverings import TILE, Covering
-from cns_drake.city.ground.streets import kerb_area, parking_bays
+from cns_drake.city import (
+    TILE,
+    Covering,
+    kerb_area,
+    parking_bays,
+    polygons_of,
+    snap,
+)
 from cns_drake.imports.opendrive.kerb_tapers import kerb_tapers
 from cns_drake.imports.opendrive.lanes import (
     LaneBand,
@@ -19,7 +24,7 @@ from cns_drake.imports.opendrive.lanes import (
     lane_class,
     lane_polygon,
 )
-from cns_drake.roads.carriageway import Areas, union_without_slits
+from cns_drake.roads import Areas, union_without_slits
 
 # Slits between lanes are closed up to twice this width [m].
 _SEAM = 0.05

@@ -12,9 +12,8 @@ import shapely
 from shapely.geometry import LinearRing, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.polylines import length_of
-from cns_drake.base.units import wrapped
-from cns_drake.city.geometry import polygons_of
+from cns_drake.base import length_of, wrapped
+from cns_drake.city import polygons_of
 
 # Least and greatest width of a step [m].
 _STEP = (0.02, 2.0)

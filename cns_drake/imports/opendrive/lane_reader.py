@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from cns_drake.base.xml_elements import Element
+from cns_drake.base import Element
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive import road_model
 from cns_drake.imports.opendrive.course_reader import SHORTEST_PIECE

@@ -15,9 +15,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry import Finish, Structure, triangulate
-from cns_drake.city.geometry.polygons import GRID
-from cns_drake.city.ground.markings import DASH, DASH_GAP
+from cns_drake.city import DASH, DASH_GAP, GRID, Finish, Structure, triangulate
 from cns_drake.imports.colours import WHITE, Rgb
 from cns_drake.imports.faces import parts_of
 from cns_drake.imports.imported_objects import make_object

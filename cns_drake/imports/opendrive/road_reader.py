@@ -15,9 +15,13 @@ import re
 
 import numpy as np
 
-from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.xml_elements import Element, read_elements
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base import (
+    Element,
+    InputError,
+    parse_yaml,
+    read_elements,
+    value_errors,
+)
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive import road_model
 from cns_drake.imports.opendrive.course_reader import (

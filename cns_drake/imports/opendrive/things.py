@@ -12,12 +12,8 @@ import shapely
 from shapely.geometry import LineString, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.polylines import step_lengths
-from cns_drake.city.geometry import Structure, placed
-from cns_drake.city.geometry.polygons import GRID
-from cns_drake.city.placement.naming import name_stem
-from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.city.plants.trees import tree
+from cns_drake.base import step_lengths
+from cns_drake.city import GRID, OBJECTS, Structure, name_stem, placed, tree
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.imported_objects import make_object
 from cns_drake.imports.opendrive.lanes import TYPES, stations

@@ -13,21 +13,26 @@ from shapely import GEOSException
 from shapely.geometry import LineString, MultiLineString
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.polylines import distances_along, length_of
-from cns_drake.base.progress import doing
-from cns_drake.city.generation.city_structures import (
-    City,
-    CityStreets,
-    build_along,
+from cns_drake.base import (
+    InputError,
+    distances_along,
+    doing,
+    length_of,
+    value_errors,
 )
-from cns_drake.city.generation.starter import starter_plan, starter_stages
-from cns_drake.city.geometry import Structure
-from cns_drake.city.ground.streets import street_surfaces
-from cns_drake.city.placement.draft import Draft
-from cns_drake.city.placement.parking import place_car
-from cns_drake.city.plan.city_plan import CityPlan
-from cns_drake.city.plan.stages import Stages
+from cns_drake.city import (
+    City,
+    CityPlan,
+    CityStreets,
+    Draft,
+    Stages,
+    Structure,
+    build_along,
+    place_car,
+    starter_plan,
+    starter_stages,
+    street_surfaces,
+)
 from cns_drake.imports.drives import search, steerable_drives
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faults import ImportFaults
@@ -48,11 +53,14 @@ from cns_drake.imports.opendrive.road_model import RoadMap
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
 from cns_drake.imports.options import ImportOptions
-from cns_drake.scene.semantics import GROUND_CLASSES
-from cns_drake.traffic.lane_file import lane_text
-from cns_drake.traffic.lane_graph import Walkway
-from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
-from cns_drake.traffic.polylines import resampled
+from cns_drake.scene import GROUND_CLASSES
+from cns_drake.traffic import (
+    DirectedLane,
+    Walkway,
+    join_lanes,
+    lane_text,
+    resampled,
+)
 
 # Height of sidewalks above the road if the file states none [m].
 _KERB_HEIGHT = 0.1

@@ -5,13 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.city.generation.rendering import render_stages
-from cns_drake.city.geometry import Structure, surface_mesh
+from cns_drake.city import Structure, render_stages, surface_mesh
 from cns_drake.imports import map_files, overview
 from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.opendrive.town import Town
 from cns_drake.imports.report import ImportReport
-from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER
+from cns_drake.scene import LANES_NAME, MESH_FOLDER
 
 # About the radius of a tree's crown, in pictures [m].
 _CROWN_RADIUS = 1.5

@@ -7,7 +7,7 @@ import numpy as np
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry import Finish
+from cns_drake.city import Finish
 from cns_drake.imports import faces
 from cns_drake.imports.colours import Rgb
 from cns_drake.imports.faults import ImportFaults

@@ -16,9 +16,8 @@ import shapely
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.errors import InputError
-from cns_drake.city.geometry.structures import Structure
-from cns_drake.city.plants.trees import tree
+from cns_drake.base import InputError
+from cns_drake.city import Structure, tree
 from cns_drake.imports import faces
 from cns_drake.imports.colours import WHITE_PAINT
 from cns_drake.imports.faults import ImportFaults

@@ -12,9 +12,8 @@ import numpy as np
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular
-from cns_drake.city.geometry.polygons import hull_of
+from cns_drake.base import InputError, check_regular
+from cns_drake.city import hull_of
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.element_kinds import (
     element_kind,

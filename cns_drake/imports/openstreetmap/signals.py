@@ -8,10 +8,10 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.units import wrapped
+from cns_drake.base import wrapped
 from cns_drake.imports.openstreetmap.street_lanes import StreetTraffic
 from cns_drake.imports.streets import Street
-from cns_drake.traffic import lane_graph
+from cns_drake.traffic import LaneGraph, Piece
 
 # A signal belongs to a junction within this distance [m].
 _JUNCTION_WITHIN = 25.0
@@ -49,8 +49,8 @@ def junctions_with_signals(
 
 
 def with_signals(
-    graph: lane_graph.LaneGraph, signals: Sequence[BaseGeometry]
-) -> lane_graph.LaneGraph:
+    graph: LaneGraph, signals: Sequence[BaseGeometry]
+) -> LaneGraph:
     """Returns the lanes, with signals of two phases at some junctions.
 
     The first phase is for the direction in which the first way of a junction
@@ -71,7 +71,7 @@ def with_signals(
 
 
 def _junctions_of_signals(
-    graph: lane_graph.LaneGraph, signals: Sequence[BaseGeometry]
+    graph: LaneGraph, signals: Sequence[BaseGeometry]
 ) -> Iterator[tuple[int, int]]:
     """Yields pairs of junctions that have a common signal.
 
@@ -108,8 +108,8 @@ def _joined_junctions(pairs: Iterable[tuple[int, int]]) -> dict[int, int]:
 
 
 def _with_phases(
-    pieces: Iterable[lane_graph.Piece], switched: AbstractSet[int]
-) -> Iterator[lane_graph.Piece]:
+    pieces: Iterable[Piece], switched: AbstractSet[int]
+) -> Iterator[Piece]:
     """Yields pieces; ways through the junctions in `switched` have a phase."""
     first_headings: dict[int, float] = {}
     for piece in pieces:

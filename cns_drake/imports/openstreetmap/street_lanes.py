@@ -13,14 +13,11 @@ from scipy.ndimage import uniform_filter1d
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.polylines import length_of
-from cns_drake.base.units import wrapped
+from cns_drake.base import length_of, wrapped
 from cns_drake.imports.openstreetmap import lane_tags, speed_tags
 from cns_drake.imports.streets import SHARPEST_TURN_DEG, Street, cut_at_nodes
-from cns_drake.roads.centreline import blend
-from cns_drake.roads.network import STRAIGHT_LIMIT_DEG
-from cns_drake.traffic.lane_joining import DirectedLane
-from cns_drake.traffic.polylines import SPACING
+from cns_drake.roads import STRAIGHT_LIMIT_DEG, blend
+from cns_drake.traffic import SPACING, DirectedLane
 
 # Length of the running mean that rounds the corners of a street [m].
 _ROUNDED_OVER = 7.0

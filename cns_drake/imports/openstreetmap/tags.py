@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 import re
 
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base import parse_yaml
 from cns_drake.imports.faults import ImportFaults
 
 TABLES = parse_yaml(Path(__file__).with_name("tags.yaml").read_bytes())

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry.polygons import GRID
+from cns_drake.city import GRID
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.foreign_city import StreetPlaces
 from cns_drake.imports.imported_objects import ImportedObject
@@ -22,9 +22,7 @@ from cns_drake.imports.openstreetmap.street_lanes import (
 from cns_drake.imports.openstreetmap.walkways import find_walkways
 from cns_drake.imports.options import DriveOn
 from cns_drake.imports.streets import Street
-from cns_drake.traffic import lane_graph
-from cns_drake.traffic.lane_file import lane_text
-from cns_drake.traffic.lane_joining import join_lanes
+from cns_drake.traffic import LaneGraph, join_lanes, lane_text
 
 # Traffic stays within this distance of drives [m].
 _TRAFFIC_WITHIN = 300.0
@@ -156,9 +154,7 @@ def _driven_area(points: np.ndarray) -> BaseGeometry:
     )
 
 
-def _in_the_way(
-    graph: lane_graph.LaneGraph, added: Sequence[ImportedObject]
-) -> list[str]:
+def _in_the_way(graph: LaneGraph, added: Sequence[ImportedObject]) -> list[str]:
     """Returns the names of objects that stand where vehicles drive."""
     if not added:
         return []

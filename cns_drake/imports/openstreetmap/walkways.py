@@ -13,8 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
 from cns_drake.imports.streets import KERB_HEIGHT, Street, ends_at_nodes
-from cns_drake.traffic import lane_graph
-from cns_drake.traffic.polylines import resampled
+from cns_drake.traffic import Crossing, Walkway, make_crossing, resampled
 
 # Distance from the kerb to the middle of a walked strip [m].
 _FROM_KERB = 1.3
@@ -49,8 +48,8 @@ class StreetWalkways(NamedTuple):
         crossings: node of a street -> the crossing at this node.
     """
 
-    walkways: Sequence[lane_graph.Walkway]
-    crossings: Mapping[int, lane_graph.Crossing]
+    walkways: Sequence[Walkway]
+    crossings: Mapping[int, Crossing]
 
 
 def find_walkways(
@@ -78,7 +77,7 @@ def find_walkways(
             if strip.geom_type == "LineString" and strip.length >= _LEAST_STRIP
         ]
     )
-    crossings: dict[int, lane_graph.Crossing] = {}
+    crossings: dict[int, Crossing] = {}
     ends_of_crossings = []
     num_ends = ends_at_nodes(streets)
     # At a junction, a crossing would lead over several streets.
@@ -122,7 +121,7 @@ class _Strips:
 
     def crossing(
         self, street: Street, k: int
-    ) -> tuple[lane_graph.Crossing, tuple[_Place, _Place]] | None:
+    ) -> tuple[Crossing, tuple[_Place, _Place]] | None:
         """Returns a crossing of a street, and its two ends on strips.
 
         The crossing is at the k-th point of the street. The result is None if
@@ -144,7 +143,7 @@ class _Strips:
         self._node_at(last)
         kerbs = np.array([line[k] + side * half * left for side in (1.0, -1.0)])
         course = np.column_stack([kerbs, np.zeros(2)])
-        return lane_graph.make_crossing(course, _CROSSING_WIDTH), (first, last)
+        return make_crossing(course, _CROSSING_WIDTH), (first, last)
 
     def _nearest_place(self, place: np.ndarray) -> _Place | None:
         """Returns the place on a strip nearest to a place (2,) in W [m].
@@ -189,7 +188,7 @@ class _Strips:
                 self._node_at(ends[b])
                 yield ends[a], ends[b]
 
-    def walkways(self) -> Iterator[lane_graph.Walkway]:
+    def walkways(self) -> Iterator[Walkway]:
         """Yields the strips as walkways, divided where other walkways begin."""
         cuts: defaultdict[int, set[float]] = defaultdict(set)
         for k, s in self.nodes:
@@ -206,9 +205,7 @@ class _Strips:
                     shapely.get_coordinates(part), (k, a), (k, b)
                 )
 
-    def way(
-        self, a: _Place, b: _Place, crossing: int = -1
-    ) -> lane_graph.Walkway:
+    def way(self, a: _Place, b: _Place, crossing: int = -1) -> Walkway:
         """Returns the straight walkway between two places on strips.
 
         `crossing` is the number of the crossing that it leads over; -1 for
@@ -219,10 +216,10 @@ class _Strips:
 
     def _walkway(
         self, line: np.ndarray, a: _Place, b: _Place, crossing: int = -1
-    ) -> lane_graph.Walkway:
+    ) -> Walkway:
         """Returns the walkway along a line (N, 2) from place a to place b."""
         height = np.full(len(line), KERB_HEIGHT)
-        return lane_graph.Walkway(
+        return Walkway(
             resampled(np.column_stack([line, height])),
             _HALF_STRIP if crossing < 0 else _CROSSING_HALF_PATH,
             self._node_at(a),

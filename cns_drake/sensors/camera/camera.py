@@ -27,9 +27,14 @@ from pydrake.systems.sensors import (
     RgbdSensor,
 )
 
-from cns_drake.recording import messages
-from cns_drake.recording.mcap_recorder import RecordedSensor
-from cns_drake.recording.recorded_topics import camera_topic
+from cns_drake.recording import (
+    ENCODINGS,
+    RecordedSensor,
+    camera_topic,
+    make_camera_info,
+    make_compressed_image,
+    make_image,
+)
 from cns_drake.sensors.camera.camera_scene import CameraScene
 from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.camera.renderer import RENDERER
@@ -170,19 +175,17 @@ def _message_makers(info: CameraInfo) -> dict[str, Callable[..., Any]]:
     def label(image: Any, frame_id: str, stamp_ns: int) -> Any:
         classes = image.data.astype(np.uint16)
         classes[classes >= _RESERVED] = 0
-        return messages.make_image(classes, "16UC1", frame_id, stamp_ns)
+        return make_image(classes, "16UC1", frame_id, stamp_ns)
 
     return {
-        "image": lambda image, frame_id, stamp_ns: (
-            messages.make_compressed_image(
-                image.data[:, :, :3], frame_id, stamp_ns
-            )
+        "image": lambda image, frame_id, stamp_ns: make_compressed_image(
+            image.data[:, :, :3], frame_id, stamp_ns
         ),
-        "depth": lambda image, frame_id, stamp_ns: messages.make_image(
-            image.data, messages.ENCODINGS["depth"], frame_id, stamp_ns
+        "depth": lambda image, frame_id, stamp_ns: make_image(
+            image.data, ENCODINGS["depth"], frame_id, stamp_ns
         ),
         "label": label,
-        "camera_info": lambda image, frame_id, stamp_ns: (
-            messages.make_camera_info(info, frame_id, stamp_ns)
+        "camera_info": lambda image, frame_id, stamp_ns: make_camera_info(
+            info, frame_id, stamp_ns
         ),
     }

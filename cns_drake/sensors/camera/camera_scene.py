@@ -23,15 +23,13 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 
-from cns_drake.scene.perception_geometry import (
+from cns_drake.scene import (
     GREY,
     PerceptionGeometry,
-    read_perception_geometry,
-)
-from cns_drake.scene.structure_table import StructureTable
-from cns_drake.scene.surfaces import (
+    StructureTable,
     TriangleSurface,
     merge_triangles,
+    read_perception_geometry,
     tessellate,
 )
 from cns_drake.sensors.camera.gltf_mesh import make_mesh

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.common import MemoryFile
 from pydrake.geometry import InMemoryMesh, Mesh
 
-from cns_drake.scene.drake_releases import reads_vertex_colours_as_srgb
+from cns_drake.scene import reads_vertex_colours_as_srgb
 from cns_drake.sensors.camera.looks import GAMMA, LOOKS, texture
 
 # Component types of glTF 2.0.

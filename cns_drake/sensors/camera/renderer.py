@@ -18,7 +18,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from cns_drake.sensors.camera.sky import HORIZON_RGB, SUN_W
 
 # Name of the renderers in the SceneGraphs of cameras.

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from cns_drake.base.errors import InputError, validated, value_errors
-from cns_drake.base.yaml_files import read_yaml
+from cns_drake.base import InputError, read_yaml, validated, value_errors
 from cns_drake.sensors.imu.noise import ImuNoise
 from cns_drake.sensors.sensor_config import (
     Mount,

@@ -17,7 +17,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.sensors import Accelerometer, Gyroscope
 
-from cns_drake.drives.sensor_names import IMU_FRAME
+from cns_drake.drives import IMU_FRAME
 from cns_drake.sensors import carriers, system_names
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
 from cns_drake.sensors.imu.sampling import MEASUREMENTS, last_sample

@@ -19,9 +19,9 @@ from pydrake.systems.framework import (
 )
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base.elementary import product, rotated
-from cns_drake.drives.drive import ImuSamples
-from cns_drake.motion.trajectory import Trajectory
+from cns_drake.base import product, rotated
+from cns_drake.drives import ImuSamples
+from cns_drake.motion import Trajectory
 from cns_drake.sensors import carriers
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.imu.imu import add_imu

@@ -14,10 +14,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder, System
 
-from cns_drake.scene.geometry_list import geometry_port
-from cns_drake.scene.perception_geometry import (
-    anchored_frames as find_anchored_frames,
-)
+from cns_drake.scene import anchored_frames as find_anchored_frames
+from cns_drake.scene import geometry_port
 from cns_drake.sensors.carriers import body_and_pose, connect_motion
 from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.config import (

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, PlainSerializer, field_validator, model_validator
 
-from cns_drake.base.errors import validated
-from cns_drake.drives.point_layouts import LayoutName
+from cns_drake.base import validated
+from cns_drake.drives import LayoutName
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.presets import (
     LIDAR_PRESETS,

@@ -20,12 +20,16 @@ from pydrake.systems.framework import (
     ValueProducer,
 )
 
-from cns_drake.base.elementary import product, rotated
-from cns_drake.ray_casting import moving_groups
-from cns_drake.ray_casting.known_poses import NOTHING_KNOWN, KnownPoses
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.ray_casting.ray_groups import Motion
-from cns_drake.scene.drake_ports import optional_value
+from cns_drake.base import product, rotated
+from cns_drake.ray_casting import (
+    EVERYWHERE,
+    NOTHING_KNOWN,
+    Ball,
+    KnownPoses,
+    Motion,
+    RayCastingScene,
+)
+from cns_drake.scene import optional_value
 from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.ray_queries import (
@@ -242,7 +246,7 @@ class Lidar(LeafSystem):
             )
             for what, calc_ball in (
                 ("within reach of the beams", self._calc_ball),
-                ("complete", lambda context: moving_groups.EVERYWHERE),
+                ("complete", lambda context: EVERYWHERE),
             )
         )
         if self._scanner.varies:
@@ -431,7 +435,7 @@ class Lidar(LeafSystem):
         )
 
     def _update_seen(
-        self, context: Context, seen: SeenGeometry, ball: moving_groups.Ball
+        self, context: Context, seen: SeenGeometry, ball: Ball
     ) -> None:
         """Updates the geometry that the LiDAR sees in a ball."""
         seen.update(
@@ -447,13 +451,13 @@ class Lidar(LeafSystem):
         known = optional_value(self._frame_poses, context)
         return NOTHING_KNOWN if known is None else known
 
-    def _calc_ball(self, context: Context) -> moving_groups.Ball:
+    def _calc_ball(self, context: Context) -> Ball:
         """Returns the ball in which beams can meet geometry.
 
         The ball is infinite if no poses are known without the SceneGraph.
         """
         if not self._frame_poses.HasValue(context):
-            return moving_groups.EVERYWHERE
+            return EVERYWHERE
         p_WSset, _ = self._calc_poses(context)
         middle = p_WSset[0]
         way = 0.0
@@ -461,9 +465,7 @@ class Lidar(LeafSystem):
             middle = p_WSset.mean(axis=0)
             way = np.linalg.norm(p_WSset - middle, axis=1).max()
         # A metre of margin for rounding and merged beams.
-        return moving_groups.Ball(
-            middle, float(self._scanner.reach() + way) + 1.0
-        )
+        return Ball(middle, float(self._scanner.reach() + way) + 1.0)
 
     def _calc_motions(self, context: Context) -> dict[FrameId, Motion]:
         """Returns moving frame -> its motion during the revolution."""

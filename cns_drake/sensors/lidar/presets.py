@@ -11,8 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from cns_drake.base.errors import did_you_mean
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base import did_you_mean, parse_yaml
 from cns_drake.sensors.lidar.nonrepeating_patterns import (
     NoddingPattern,
     RosettePattern,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from pydrake.geometry import GeometryId
 
-from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.scene import PerceptionGeometry
 from cns_drake.sensors.lidar.seen_geometry import SeenGeometry
 
 

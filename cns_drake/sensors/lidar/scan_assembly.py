@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from pydrake.perception import PointCloud
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 from cns_drake.sensors.lidar.beams import Beams
 from cns_drake.sensors.lidar.measurement import Returns
 

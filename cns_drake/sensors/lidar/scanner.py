@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.scene import PerceptionGeometry
 from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.measurement import MeasurementModel, Returns
 from cns_drake.sensors.lidar.scan_assembly import (

@@ -14,18 +14,18 @@ import numpy as np
 from pydrake.geometry import FrameId, GeometryId, QueryObject, Role
 from pydrake.math import RigidTransform
 
-from cns_drake.base.progress import doing
-from cns_drake.ray_casting import moving_groups
-from cns_drake.ray_casting.known_poses import KnownPoses
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.ray_casting.ray_groups import Motion
-from cns_drake.scene.geometry_list import GeometryList, list_geometry
-from cns_drake.scene.labels import MAX_INSTANCE, Labels, number_structures
-from cns_drake.scene.perception_geometry import (
+from cns_drake.base import doing
+from cns_drake.ray_casting import Ball, KnownPoses, Motion, RayCastingScene
+from cns_drake.scene import (
+    MAX_INSTANCE,
+    GeometryList,
     GeometryReader,
+    Labels,
     PerceptionGeometry,
+    list_geometry,
+    number_structures,
+    structure_name,
 )
-from cns_drake.scene.structure_names import structure_name
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.
@@ -120,7 +120,7 @@ class SeenGeometry:
         records: GeometryList | None,
         motions: Mapping[FrameId, Motion],
         known: KnownPoses,
-        seen: moving_groups.Ball,
+        seen: Ball,
         p_WS: np.ndarray,
     ) -> None:
         """Moves geometry whose frame has moved, and rebuilds changed geometry.

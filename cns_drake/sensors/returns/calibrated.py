@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene, SceneHits
-from cns_drake.ray_casting.rays import rotate
-from cns_drake.scene.perception_geometry import PerceptionGeometry
-from cns_drake.scene.structure_table import StructureTable
+from cns_drake.ray_casting import RayCastingScene, SceneHits, rotate
+from cns_drake.scene import PerceptionGeometry, StructureTable
 from cns_drake.sensors.lidar.beams import BeamPattern, Beams
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.presets import check_preset

@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
-from cns_drake.base.elementary import log
+from cns_drake.base import compiled, log
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.link_budget import (

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 from cns_drake.sensors.returns.light import BeamHits, Shots
 from cns_drake.sensors.returns.random_numbers import uniform
 

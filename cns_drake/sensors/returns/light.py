@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
-from cns_drake.ray_casting.ray_casting_scene import SceneHits
+from cns_drake.base import compiled
+from cns_drake.ray_casting import SceneHits
 from cns_drake.sensors.returns.materials import BEADS, RETRO, Materials
 
 # The retro-reflective sheeting of signs and plates works up to this angle.

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import erf
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 
 _Value = TypeVar("_Value", float, np.ndarray)
 

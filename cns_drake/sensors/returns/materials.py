@@ -5,10 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.scene.materials import Material
-from cns_drake.scene.perception_geometry import PerceptionGeometry
-from cns_drake.scene.structure_table import StructureEntry, StructureTable
-from cns_drake.scene.surfaces import Surface, is_closed
+from cns_drake.scene import (
+    Material,
+    PerceptionGeometry,
+    StructureEntry,
+    StructureTable,
+    Surface,
+    is_closed,
+)
 
 # Kinds of materials.
 LAMBERT, RETRO, GLASS, LEAVES, BEADS, SPRAYS = range(6)

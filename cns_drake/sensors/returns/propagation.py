@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
+from cns_drake.base import compiled
 from cns_drake.sensors.returns.footprint import Sides
 from cns_drake.sensors.returns.light import (
     BeamHits,

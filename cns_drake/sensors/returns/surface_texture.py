@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.base.compilation import compiled
-from cns_drake.ray_casting.ray_casting_scene import SurfaceFrames
+from cns_drake.base import compiled
+from cns_drake.ray_casting import SurfaceFrames
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.materials import Materials
 from cns_drake.sensors.returns.random_numbers import cell_number

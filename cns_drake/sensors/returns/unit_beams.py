@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.elementary import cos, sin
+from cns_drake.base import cos, sin
 from cns_drake.sensors.lidar.beams import Beams
 from cns_drake.sensors.returns.random_numbers import normal, uniform
 from cns_drake.sensors.returns.unit_sheets import UnitSheet

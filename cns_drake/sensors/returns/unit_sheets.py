@@ -8,8 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cns_drake.base.elementary import log
-from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.base import log, parse_yaml
 from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.patterns import SpinningPattern
 from cns_drake.sensors.returns import link_budget

@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.elementary import exp
+from cns_drake.base import exp
 from cns_drake.sensors.returns import link_budget
 
 

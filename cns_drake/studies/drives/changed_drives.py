@@ -6,17 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base.errors import InputError, errors_at, validated
-from cns_drake.roads.network import RoadNetwork, load_road_network
-from cns_drake.roads.random_route import draw_route
-from cns_drake.roads.route import Route
-from cns_drake.scenarios.planning import count_frames, plan_drive
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import check_files
-from cns_drake.scene.map_folder import MapFolder
-from cns_drake.scene.world import load_world
-from cns_drake.sensors.lidar.config import WeatherConfig
-from cns_drake.simulation.scenario_traffic import load_ways
+from cns_drake.base import InputError, errors_at, validated
+from cns_drake.roads import RoadNetwork, Route, draw_route, load_road_network
+from cns_drake.scenarios import Scenario, check_files, count_frames, plan_drive
+from cns_drake.scene import MapFolder, load_world
+from cns_drake.sensors import WeatherConfig
+from cns_drake.simulation import load_ways
 from cns_drake.studies.drives.lost_structures import Losses, lost_structures
 from cns_drake.studies.drives.named_stages import find_stage
 from cns_drake.studies.drives.sampled_drives import DrawnRoute
@@ -27,8 +22,8 @@ from cns_drake.studies.drives.viewpoints import (
     with_lidars_moved,
 )
 from cns_drake.studies.experiments.nested_fields import Changes
-from cns_drake.traffic.vehicle_placement import room_for_vehicles
-from evaluation.results.keys import LAST, OWN
+from cns_drake.traffic import room_for_vehicles
+from evaluation.results import LAST, OWN
 
 # Fields of a drive that do not change the drive itself.
 _UNUSED_FIELDS = (*QUERY_FIELDS, "distractors", "years", "rates")

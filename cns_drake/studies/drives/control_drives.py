@@ -1,6 +1,6 @@
 """Control drives, which show what another route costs without any change."""
 
-from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios import Scenario
 
 
 def control_drive(drive: Scenario, stage: str) -> Scenario:

@@ -15,12 +15,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from cns_drake.base.csv_files import read_records
-from cns_drake.base.errors import InputError
-from cns_drake.scenarios import scenario_files
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scene.world import load_world, structures_in
-from cns_drake.sensors.sensor_config import Section
+from cns_drake.base import InputError, read_records
+from cns_drake.scenarios import Scenario, check_files
+from cns_drake.scene import load_world, structures_in
+from cns_drake.sensors import Section
 
 # Classes of structures that can be missing; streets, ground and street
 # furniture always stay.
@@ -135,7 +133,7 @@ def _structures_of(base: Scenario, stage: str, source: str) -> set[str]:
         InputError: the stage does not exist.
     """
     scenario = base.replaced(stage=stage)
-    scenario_files.check_files(scenario, source)
+    check_files(scenario, source)
     return structures_in(load_world(scenario.world_file))
 
 

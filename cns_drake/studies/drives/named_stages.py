@@ -2,10 +2,9 @@
 
 from typing import Any
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import natural_key
-from cns_drake.scenarios.scenario import Scenario
-from evaluation.results.keys import LAST, OWN
+from cns_drake.base import InputError, natural_key
+from cns_drake.scenarios import Scenario
+from evaluation.results import LAST, OWN
 
 # The first stage of a map.
 _FIRST = "first"

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from cns_drake.base.errors import InputError, validated
+from cns_drake.base import InputError, validated
 from cns_drake.studies.drives.sampled_drives import Fleet
 from cns_drake.studies.drives.side_fields import DATABASE_FIELDS
 from cns_drake.studies.experiments.nested_fields import (

@@ -4,14 +4,14 @@ from collections.abc import Mapping
 from importlib.util import find_spec
 from typing import Any
 
-from cns_drake.ageing.years import LAST_YEAR
-from cns_drake.base.errors import InputError
+from cns_drake.ageing import LAST_YEAR
+from cns_drake.base import InputError
 from cns_drake.studies.experiments.nested_fields import (
     FLEET,
     SESSIONS,
     Changes,
 )
-from evaluation.map_update.upkeep import MAINTAINERS, NOT_MAINTAINED
+from evaluation.map_update import MAINTAINERS, NOT_MAINTAINED
 
 # Fields that only the query can have: they change its scans.
 QUERY_FIELDS = ("turn_queries", "tilt_queries", "hide_sector")

@@ -2,11 +2,11 @@
 
 import re
 
-from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.scenarios.scenario import Scenario
+from cns_drake.base import fingerprint
+from cns_drake.scenarios import Scenario
 from cns_drake.studies.drives.control_drives import control_drive
 from cns_drake.studies.experiments.nested_fields import Changes
-from evaluation.results.keys import CAUSE, LEVEL, NO_CAUSE
+from evaluation.results import CAUSE, LEVEL, NO_CAUSE
 
 
 class UniqueNames:

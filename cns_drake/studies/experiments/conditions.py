@@ -22,7 +22,7 @@ from cns_drake.studies.experiments.nested_fields import (
     nested,
     set_field,
 )
-from evaluation.results.keys import CAUSE, FROZEN_REDRAW, LEVEL, NO_CAUSE
+from evaluation.results import CAUSE, FROZEN_REDRAW, LEVEL, NO_CAUSE
 
 if TYPE_CHECKING:
     from cns_drake.studies.experiments.experiment import Experiment

@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, PlainValidator, model_validator
 import yaml
 
-from cns_drake.base.errors import InputError, validated
-from cns_drake.base.repetitions import check_once
-from cns_drake.scenarios.scenario import Name
-from cns_drake.sensors.sensor_config import Section
+from cns_drake.base import InputError, check_once, validated
+from cns_drake.scenarios import Name
+from cns_drake.sensors import Section
 from cns_drake.studies.experiments.conditions import Condition, conditions
 from cns_drake.studies.experiments.method_variants import (
     MethodVariant,

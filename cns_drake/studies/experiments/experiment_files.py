@@ -4,17 +4,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.errors import (
+from cns_drake.base import (
     InputError,
     did_you_mean,
     errors_at,
+    parse_yaml,
+    read_yaml,
     validated,
     value_errors,
 )
-from cns_drake.base.yaml_files import parse_yaml, read_yaml
 from cns_drake.studies.experiments.experiment import Experiment, in_long_form
 from cns_drake.studies.experiments.nested_fields import Changes, merged, nested
-from evaluation.study.recordings import STAGES_FILE
+from evaluation.study import STAGES_FILE
 
 _FOLDER = Path(__file__).parent
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 import json
 from typing import Any
 
-from cns_drake.base.repetitions import check_once
+from cns_drake.base import check_once
 from cns_drake.studies.experiments.nested_fields import SESSIONS, Changes
 from cns_drake.studies.experiments.spread_values import expand_spread, is_spread
 

@@ -5,10 +5,10 @@ from typing import Literal, get_type_hints
 
 from pydantic import ConfigDict, create_model
 
-from cns_drake.base.errors import InputError, validated
+from cns_drake.base import InputError, validated
 from cns_drake.studies.experiments.conditions import Condition
 from cns_drake.studies.experiments.nested_fields import Changes
-from evaluation.recognition.protocol import (
+from evaluation.recognition import (
     PROTOCOLS,
     ProtocolFieldError,
     RetrievalProtocol,

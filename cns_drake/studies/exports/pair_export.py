@@ -13,29 +13,35 @@ from typing import Literal
 
 import numpy as np
 
-from cns_drake.base.complete_files import completing
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder, user_errors
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.points import encode_bin
-from cns_drake.base.progress import track
-from cns_drake.base.repetitions import repeated
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scene.semantics import CLASS_IDS, GROUND_CLASSES
-from cns_drake.simulation.simulated_drive import SimulationSource
+from cns_drake.base import (
+    Cluster,
+    InputError,
+    Job,
+    Reporter,
+    completing,
+    encode_bin,
+    make_folder,
+    repeated,
+    run_jobs,
+    track,
+    user_errors,
+)
+from cns_drake.scenarios import Scenario
+from cns_drake.scene import CLASS_IDS, GROUND_CLASSES
+from cns_drake.simulation import SimulationSource
 from cns_drake.studies.exports.pointnetvlad_files import (
     ExportedDrive,
     write_pickles,
 )
 from cns_drake.studies.ground_truth.exact_overlap import exact_overlaps
-from evaluation.drives.sampling import sample_frames
-from evaluation.drives.scan_clouds import cloud_at
-from evaluation.maps.voxel_maps import downsample
-from evaluation.recognition.overlap_truth import compared_frames, write_overlaps
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.study.storage.parts import MakePart, Part
+from evaluation.drives import cloud_at, sample_frames
+from evaluation.maps import downsample
+from evaluation.recognition import (
+    RetrievalProtocol,
+    compared_frames,
+    write_overlaps,
+)
+from evaluation.study import MakePart, Part
 
 Format = Literal["pointnetvlad", "overlap"]
 

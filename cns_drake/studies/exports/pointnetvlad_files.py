@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base.complete_files import completing
+from cns_drake.base import completing
 
 # Added to the northing of each further city [m].
 CITY_DISTANCE = 100_000.0

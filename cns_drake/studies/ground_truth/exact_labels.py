@@ -27,15 +27,13 @@ import itertools
 
 import numpy as np
 
-from cns_drake.base.process import num_cores
-from cns_drake.base.progress import track
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.base import num_cores, track
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.simulation import SimulatedDrive
 from cns_drake.studies.ground_truth.exact_overlap import Sight, sights_of
 from cns_drake.studies.ground_truth.labelled_drive import LabelledDrive
-from evaluation.drives.sampling import sample_frames
-from evaluation.map_update.labels import SIDES
-from evaluation.map_update.sessions import Session
+from evaluation.drives import sample_frames
+from evaluation.map_update import SIDES, Session
 
 # A surface this near to a point is its own [m].
 NEAR = 0.1

@@ -21,16 +21,12 @@ import math
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cns_drake.drives.drive import Drive
-from cns_drake.drives.same_world import check_same_world
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.sensors.lidar.beam_coverage import BeamCoverage
-from cns_drake.sensors.lidar.beams import BeamPattern
-from cns_drake.simulation.simulated_drive import SimulatedDrive
-from evaluation.drives.scan_clouds import within_range
-from evaluation.recognition.overlap_truth import overlap_matrix
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.seen_surfaces import TOLERANCE
+from cns_drake.drives import Drive, check_same_world
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.sensors import BeamCoverage, BeamPattern
+from cns_drake.simulation import SimulatedDrive
+from evaluation.drives import within_range
+from evaluation.recognition import TOLERANCE, RetrievalProtocol, overlap_matrix
 
 
 @dataclass(frozen=True)

@@ -5,21 +5,23 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.errors import InputError, validated
-from cns_drake.drives.drive import Drive
-from cns_drake.drives.mcap_drive import McapDrive, holds_mcap
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scenarios.planning import DrivePlan
-from cns_drake.scenarios.provenance import digest_inputs
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import describe_scenario, load_scenario
-from cns_drake.simulation.scanning import still_scene
-from cns_drake.simulation.simulated_drive import (
+from cns_drake.base import InputError, validated
+from cns_drake.drives import Drive, McapDrive, holds_mcap
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.scenarios import (
+    DrivePlan,
+    Scenario,
+    describe_scenario,
+    digest_inputs,
+    load_scenario,
+)
+from cns_drake.simulation import (
     SimulatedDrive,
     SimulationSource,
+    load_stage,
+    still_scene,
 )
-from cns_drake.simulation.stage_loading import load_stage
-from evaluation.study.sources import DriveSource, RecordingSource
+from evaluation.study import DriveSource, RecordingSource
 
 # Recorded poses are those of the scenario up to this [m, or without a unit].
 _SAME_POSE = 1e-6

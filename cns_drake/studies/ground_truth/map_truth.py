@@ -4,23 +4,19 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from cns_drake.base.complete_files import draft_folder
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import user_errors
-from cns_drake.drives.same_world import check_same_world
+from cns_drake.base import InputError, draft_folder, user_errors
+from cns_drake.drives import check_same_world
 from cns_drake.studies.ground_truth.exact_labels import label_points
 from cns_drake.studies.ground_truth.labelled_drive import LabelledDrive
 from cns_drake.studies.ground_truth.map_truth_page import write_page
-from evaluation.map_update.labels import SIDES
-from evaluation.map_update.sessions import (
+from evaluation.map_update import (
+    SIDES,
     SPACING,
     SessionPair,
-    write_labels,
-    write_session,
-)
-from evaluation.map_update.structures import (
     StructureChange,
     structure_changes,
+    write_labels,
+    write_session,
     write_structures,
 )
 

@@ -8,11 +8,9 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
-from cns_drake.base.complete_files import write_text
-from evaluation.map_update.labels import Label
-from evaluation.map_update.sessions import SessionPair
-from evaluation.map_update.structures import StructureChange
-from evaluation.results.styles import GONE, NEW
+from cns_drake.base import write_text
+from evaluation.map_update import Label, SessionPair, StructureChange
+from evaluation.results import GONE, NEW
 
 # Drawing order of the labels: changes are on top.
 _RGB = {

@@ -5,24 +5,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import natural_key
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.scenarios.shipped import (
+from cns_drake.base import Cluster, InputError, natural_key
+from cns_drake.scenarios import (
+    Scenario,
+    load_scenario,
     recordable_map,
     recordable_maps,
     shipped_maps,
 )
-from cns_drake.scene.map_folder import MapFolder
+from cns_drake.scene import MapFolder
 from cns_drake.studies.experiments.experiment import Experiment, MadeMap
 from cns_drake.studies.maps.frozen_redraws import redraw_frozen
 from cns_drake.studies.maps.made_maps import made_map_step
 from cns_drake.studies.maps.map_step import make_maps
-from evaluation.results.keys import FROZEN_REDRAW
-from evaluation.study.recordings.map_drives import MapDrives, drives_by_map
-from evaluation.study.recordings.recording_search import find_recordings
+from evaluation.results import FROZEN_REDRAW
+from evaluation.study import MapDrives, drives_by_map, find_recordings
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,10 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.csv_files import read_records
-from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.yaml_files import read_yaml
-from cns_drake.city.generation.city_structures import make_city
-from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
-from cns_drake.scene.map_folder import MapFolder
+from cns_drake.base import Cluster, InputError, read_records, read_yaml
+from cns_drake.city import make_city
+from cns_drake.scenarios import shipped_maps, worlds_folder
+from cns_drake.scene import MapFolder
 from cns_drake.studies.maps.map_step import make_maps
 from cns_drake.studies.maps.redrawing import (
     RedrawCity,
@@ -28,7 +25,7 @@ from cns_drake.studies.maps.redrawing import (
     redrawn_inputs,
 )
 from cns_drake.studies.maps.turned_inputs import turned_bounds, turned_content
-from evaluation.results.keys import FROZEN_REDRAW
+from evaluation.results import FROZEN_REDRAW
 
 _COLUMNS = ("map", "number", "seed", "turn_deg")
 # The driver, frozen with the seeds.

@@ -6,19 +6,25 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from cns_drake.ageing.aged_map import age_map
-from cns_drake.ageing.rates import DEFAULT_RATES, check_rates, read_rates
-from cns_drake.ageing.years import LAST_YEAR
-from cns_drake.base.errors import InputError, errors_at
-from cns_drake.base.files import read_bytes
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
-from cns_drake.base.jobs.step import Reporter
-from cns_drake.imports.import_map import import_city
-from cns_drake.imports.options import ImportOptions
-from cns_drake.scenarios.provenance import digest_file
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scene.map_folder import MapFolder
+from cns_drake.ageing import (
+    DEFAULT_RATES,
+    LAST_YEAR,
+    age_map,
+    check_rates,
+    read_rates,
+)
+from cns_drake.base import (
+    Cluster,
+    InputError,
+    Reporter,
+    code_digest,
+    errors_at,
+    fingerprint,
+    read_bytes,
+)
+from cns_drake.imports import ImportOptions, import_city
+from cns_drake.scenarios import Scenario, digest_file
+from cns_drake.scene import MapFolder
 from cns_drake.studies.experiments.experiment import Experiment, MadeMap
 from cns_drake.studies.maps.map_step import MakeMap, make_maps
 from cns_drake.studies.maps.redrawing import RedrawCity

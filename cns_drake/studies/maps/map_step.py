@@ -6,12 +6,18 @@ from dataclasses import dataclass
 import os
 from pathlib import Path
 
-from cns_drake.base import complete_files, files
-from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.jobs.step import Reporter, Step
-from evaluation.study.storage.parts import Part
+from cns_drake.base import (
+    Cluster,
+    InputError,
+    Job,
+    Reporter,
+    Step,
+    make_folder,
+    remove_folder,
+    run_jobs,
+    user_errors,
+)
+from evaluation.study import Part
 
 # The file in its folder with the fingerprint of a map.
 _PART = "drawn.data"
@@ -43,7 +49,7 @@ class MakeMap(Step):
     def run(self, reporter: Reporter) -> None:
         made_of = self.sources()
         if is_older := self.check():
-            complete_files.remove_folder(self.folder)
+            remove_folder(self.folder)
         self.make(
             lambda draft: Part(draft / _PART).write(made_of, None), reporter
         )
@@ -59,7 +65,7 @@ class MakeMap(Step):
             InputError: the folder, or a file of its name, exists but is not a
                 map that a job step made.
         """
-        with files.user_errors(self.folder):
+        with user_errors(self.folder):
             is_there = os.path.lexists(self.folder)
             if is_there and not (self.folder / _PART).is_file():
                 raise InputError(
@@ -99,6 +105,6 @@ def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
     for step in steps:
         step.check()
     if steps:
-        files.make_folder(output)
+        make_folder(output)
     jobs = [Job(f"city {one.folder.name}", one, cost=_COST) for one in steps]
     run_jobs(jobs, cluster, "cities")

@@ -12,16 +12,18 @@ from pathlib import Path
 
 import yaml
 
-from cns_drake.base import complete_files, files
-from cns_drake.base.errors import errors_at
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.fingerprint import code_digest
-from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.version import __version__
-from cns_drake.base.yaml_files import read_yaml
-from cns_drake.city.generation.generate import generate_city
-from cns_drake.city.plan.city_plan import load_plan
-from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
+from cns_drake.base import (
+    Cluster,
+    Reporter,
+    __version__,
+    code_digest,
+    draft_folder,
+    errors_at,
+    read_yaml,
+    user_errors,
+)
+from cns_drake.city import generate_city, load_plan
+from cns_drake.scene import STAGES_NAME, MapFolder
 from cns_drake.studies.maps.map_step import MakeMap, make_maps
 
 # Start of the first line of each input that is written here.
@@ -80,7 +82,7 @@ class RedrawCity(MakeMap):
     seed: int
 
     def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
-        with complete_files.draft_folder(self.folder) as draft:
+        with draft_folder(self.folder) as draft:
             for name, content in self.inputs().items():
                 (draft / name).write_bytes(content)
             place = f"{self.map_folder}: seed {self.seed}"
@@ -135,7 +137,7 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
     source = MapFolder(map_folder)
     roads, plan = source.roads, source.plan
     load_plan(plan)
-    with files.user_errors(roads):
+    with user_errors(roads):
         network = roads.read_bytes()
     stages = {stage: {"story": f"The whole city, as seed {seed} draws it."}}
     return {

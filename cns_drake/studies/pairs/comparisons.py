@@ -5,10 +5,8 @@ from dataclasses import dataclass, field, replace
 import math
 from typing import Any, NamedTuple
 
-from cns_drake.base.errors import InputError, errors_at
-from cns_drake.base.files import natural_key
-from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.scenarios.scenario import Scenario
+from cns_drake.base import InputError, errors_at, fingerprint, natural_key
+from cns_drake.scenarios import Scenario
 from cns_drake.studies.drives.changed_drives import (
     Age,
     Ageing,
@@ -36,11 +34,10 @@ from cns_drake.studies.experiments.nested_fields import (
     merged,
 )
 from cns_drake.studies.experiments.protocol_fields import protocol_from_fields
-from evaluation.map_update.upkeep import NOT_MAINTAINED
-from evaluation.recognition.place_selection import KEEP_ALL, checked_keep
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.keys import CAUSE, OWN
-from evaluation.study.tasks.pair import USUAL_LENGTH
+from evaluation.map_update import NOT_MAINTAINED
+from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
+from evaluation.results import CAUSE, OWN
+from evaluation.study import USUAL_LENGTH
 
 
 @dataclass(frozen=True)

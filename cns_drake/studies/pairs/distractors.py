@@ -6,15 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.scenarios.planning import count_frames, plan_drive
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.scene.map_folder import MapFolder
+from cns_drake.base import Cluster
+from cns_drake.scenarios import (
+    Scenario,
+    count_frames,
+    load_scenario,
+    plan_drive,
+    shipped_maps,
+)
+from cns_drake.scene import MapFolder
 from cns_drake.studies.maps.made_maps import ONLY_STAGE
 from cns_drake.studies.maps.redrawing import redraw_cities
-from evaluation.drives.sampling import sample_frames
+from evaluation.drives import sample_frames
 
 # Number of drives after which a note reports the search for places elsewhere.
 _NOTED_DRIVES = 20

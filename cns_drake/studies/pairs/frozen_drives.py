@@ -3,12 +3,8 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from cns_drake.base.csv_files import read_records
-from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.base.number_format import whole_number
-from cns_drake.scenarios.provenance import combined_digest, digest_inputs
-from cns_drake.scenarios.shipped import worlds_folder
+from cns_drake.base import InputError, fingerprint, read_records, whole_number
+from cns_drake.scenarios import combined_digest, digest_inputs, worlds_folder
 from cns_drake.studies.pairs.comparisons import ComparedDrives
 
 # Columns of a table of frozen drives.

@@ -8,21 +8,25 @@ import tempfile
 
 import numpy as np
 
-from cns_drake.base.jobs.fingerprint import code_digest
-from cns_drake.base.jobs.step import Reporter
+from cns_drake.base import Reporter, code_digest
 from cns_drake.studies.ground_truth.exact_labels import is_there, label_points
 from cns_drake.studies.ground_truth.labelled_drive import (
     LabelledDrive,
     labelled_drive,
 )
-from evaluation.map_update.baselines import run_baseline
-from evaluation.map_update.labels import Label, PairLabels
-from evaluation.map_update.nearest_points import nearest_distances
-from evaluation.map_update.sessions import SessionPair, write_session
-from evaluation.map_update.upkeep import TRUTH, Updates, UpkeptMap
-from evaluation.map_update.upkept_drive import UpkeptDrive
-from evaluation.study.sources import DriveSource
-from evaluation.study.storage.parts import Part
+from evaluation.map_update import (
+    TRUTH,
+    Label,
+    PairLabels,
+    SessionPair,
+    Updates,
+    UpkeptDrive,
+    UpkeptMap,
+    nearest_distances,
+    run_baseline,
+    write_session,
+)
+from evaluation.study import DriveSource, Part
 
 # Distance driven between two scans of a map, as in the task `map` [m].
 _SPACING = 5.0

@@ -2,15 +2,16 @@
 
 from collections.abc import Sequence
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from cns_drake.studies.experiments.conditions import Condition
 from cns_drake.studies.experiments.nested_fields import SESSIONS, SIDES
 from cns_drake.studies.experiments.protocol_fields import condition_protocol
-from evaluation.recognition.place_selection import KEEP_ALL, checked_keep
-from evaluation.results.keys import CAUSE, LAST, OWN, STAGE
-from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
-from evaluation.study.recordings.recorded_pairs import (
+from evaluation.recognition import KEEP_ALL, checked_keep
+from evaluation.results import CAUSE, LAST, OWN, STAGE
+from evaluation.study import (
+    MapDrives,
     RecordedCondition,
+    RecordingInfo,
     chosen_recordings,
 )
 

@@ -4,10 +4,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.base.jobs.running import Job
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.simulation.simulated_drive import SimulationSource
+from cns_drake.base import Job, fingerprint
+from cns_drake.scenarios import Scenario
+from cns_drake.simulation import SimulationSource
 from cns_drake.studies.drives.named_stages import MissingError
 from cns_drake.studies.experiments.conditions import Condition
 from cns_drake.studies.experiments.protocol_fields import condition_protocol
@@ -16,14 +15,18 @@ from cns_drake.studies.maps.made_maps import MadeMaps
 from cns_drake.studies.pairs.comparisons import ComparedDrives, PairMaker
 from cns_drake.studies.pairs.map_upkeep import UpkeptSource, update_maps
 from cns_drake.studies.recordings.recording import is_recorded
-from evaluation.map_update.upkeep import NOT_MAINTAINED
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.keys import CAUSE
-from evaluation.study.sources import RecordingSource
-from evaluation.study.storage.parts import MakePart
-from evaluation.study.storage.study_files import StudyFiles
-from evaluation.study.tasks.jobs import OPENING_COST, job_name
-from evaluation.study.tasks.pair import NamedDrive, Pair
+from evaluation.map_update import NOT_MAINTAINED
+from evaluation.recognition import RetrievalProtocol
+from evaluation.results import CAUSE
+from evaluation.study import (
+    OPENING_COST,
+    MakePart,
+    NamedDrive,
+    Pair,
+    RecordingSource,
+    StudyFiles,
+    job_name,
+)
 
 # Expected time to update a map by a usual drive, once it is open [s].
 _UPKEEP_COST = 60.0

@@ -3,16 +3,16 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from cns_drake.base.jobs.running import Job
-from cns_drake.base.jobs.step import Reporter
-from cns_drake.pictures.aerial_pictures import draw_drives
-from cns_drake.pictures.camera_views import load_views
-from cns_drake.pictures.stage_pictures import draw_stages
-from cns_drake.scenarios.provenance import digest_file, digest_inputs
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.scene.map_folder import MapFolder
-from evaluation.study.storage.parts import MakePart, Part
+from cns_drake.base import Job, Reporter
+from cns_drake.pictures import draw_drives, draw_stages, load_views
+from cns_drake.scenarios import (
+    Scenario,
+    digest_file,
+    digest_inputs,
+    load_scenario,
+)
+from cns_drake.scene import MapFolder
+from evaluation.study import MakePart, Part
 
 # Expected time to draw a stage [s].
 _STAGE_COST = 10.0

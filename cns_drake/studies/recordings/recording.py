@@ -8,22 +8,28 @@ from pathlib import Path
 import shutil
 import sys
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder, read_bytes, user_errors
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.jobs.step import Reporter, Step
-from cns_drake.base.yaml_files import read_yaml
-from cns_drake.pictures.stage_comparison import other_stage
-from cns_drake.recording.recording_folder import RecordingFolder
-from cns_drake.scenarios.provenance import (
+from cns_drake.base import (
+    Cluster,
+    InputError,
+    Job,
+    Reporter,
+    Step,
+    make_folder,
+    read_bytes,
+    read_yaml,
+    run_jobs,
+    user_errors,
+)
+from cns_drake.pictures import other_stage
+from cns_drake.recording import RecordingFolder
+from cns_drake.scenarios import (
+    Scenario,
     digest_file,
     digest_inputs,
     recording_fingerprint,
 )
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.simulation.simulation import simulate
-from evaluation.study.storage.parts import Part
+from cns_drake.simulation import simulate
+from evaluation.study import Part
 
 # Expected time to load a stage [s].
 _LOADING = 8.0

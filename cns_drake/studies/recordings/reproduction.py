@@ -4,16 +4,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder, natural_key
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.forecast import Space
-from cns_drake.drives.drive_scenario import driven_way
-from cns_drake.scenarios import scenario_files
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.shipped import recordable_map, recordable_maps
-from cns_drake.scene.map_folder import MapFolder
-from cns_drake.simulation.simulated_drive import SimulationSource
+from cns_drake.base import Cluster, InputError, Space, make_folder, natural_key
+from cns_drake.drives import driven_way
+from cns_drake.scenarios import (
+    Scenario,
+    describe_scenario,
+    load_scenario,
+    recordable_map,
+    recordable_maps,
+)
+from cns_drake.scene import MapFolder
+from cns_drake.simulation import SimulationSource
 from cns_drake.studies.drives.control_drives import control_drive
 from cns_drake.studies.recordings.map_pictures import plan_pictures
 from cns_drake.studies.recordings.recording import (
@@ -21,10 +22,8 @@ from cns_drake.studies.recordings.recording import (
     plan_recordings,
     usual_frames,
 )
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.recorded_study import study_recordings
-from evaluation.study.recordings.map_drives import RecordingInfo
+from evaluation.recognition import RetrievalProtocol
+from evaluation.study import RecordingInfo, choose_methods, study_recordings
 
 # Mean size of a page.
 _PAGE_BYTES = 18e6
@@ -142,8 +141,7 @@ def _expected_space(
 
 def _recordable_drives(folder: Path) -> list[Scenario]:
     drives = [
-        scenario_files.load_scenario(path)
-        for path in MapFolder(folder).recordable_drives()
+        load_scenario(path) for path in MapFolder(folder).recordable_drives()
     ]
     for drive in drives:
         if drive.map is None:
@@ -186,6 +184,6 @@ def recording_info(
         path=output.absolute() / scenario.name,
         map_name=scenario.folder.name,
         stage=scenario.stage,
-        way=driven_way(scenario_files.describe_scenario(scenario)),
+        way=driven_way(describe_scenario(scenario)),
         needs=(scenario.name,) if is_waiting else (),
     )

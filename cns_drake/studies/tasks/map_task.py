@@ -4,20 +4,21 @@ from importlib.util import find_spec
 from pathlib import Path
 import tempfile
 
-from cns_drake.base.jobs.step import Reporter
-from cns_drake.simulation.simulated_drive import SimulationSource
+from cns_drake.base import Reporter
+from cns_drake.simulation import SimulationSource
 from cns_drake.studies.ground_truth.labelled_drive import labelled_drive
 from cns_drake.studies.ground_truth.map_truth import write_truth
-from evaluation.map_update.baselines import BASELINES
-from evaluation.study.sources import RecordingSource
-from evaluation.study.tasks.jobs import Jobs
-from evaluation.study.tasks.map_scores import (
+from evaluation.map_update import BASELINES
+from evaluation.study import (
     TRUTH,
+    Jobs,
     MapScores,
     MapTask,
+    Pair,
+    RecordingSource,
+    Result,
     score_methods,
 )
-from evaluation.study.tasks.pair import Pair, Result
 
 _COST = 60.0
 

@@ -7,25 +7,29 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cns_drake.ageing.aged_map import HISTORY_NAME
-from cns_drake.ageing.events import PUT_UP, TAKEN_DOWN
-from cns_drake.base.csv_files import read_records
-from cns_drake.base.files import is_there
-from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.number_format import whole_number
-from cns_drake.base.progress import track
-from cns_drake.simulation.simulated_drive import (
-    SimulatedDrive,
-    SimulationSource,
+from cns_drake.ageing import HISTORY_NAME, PUT_UP, TAKEN_DOWN
+from cns_drake.base import (
+    Reporter,
+    fingerprint,
+    is_there,
+    read_records,
+    track,
+    whole_number,
 )
+from cns_drake.simulation import SimulatedDrive, SimulationSource
 from cns_drake.studies.pairs.map_upkeep import UpkeptSource
-from evaluation.drives.sampling import sample_frames
-from evaluation.recognition.result_number import Number
-from evaluation.study.sources import DriveSource
-from evaluation.study.tasks.jobs import OPENING_COST, SCAN_COST, Jobs
-from evaluation.study.tasks.pair import Pair, Result
-from evaluation.study.tasks.task import Task, check_positive
+from evaluation.drives import sample_frames
+from evaluation.recognition import Number
+from evaluation.study import (
+    OPENING_COST,
+    SCAN_COST,
+    DriveSource,
+    Jobs,
+    Pair,
+    Result,
+    Task,
+    check_positive,
+)
 
 # Events in which a structure appears under its own name; in all others, the
 # successor appears.

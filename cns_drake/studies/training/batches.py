@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from cns_drake.base.errors import InputError
-from evaluation.methods.polar_images import SECTORS
+from cns_drake.base import InputError
+from evaluation.methods import SECTORS
 
 # Number of cities in a batch.
 _CITIES = 2

@@ -7,19 +7,15 @@ import shutil
 
 import numpy as np
 
-from cns_drake.base import poses
-from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.progress import track
-from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.base import InputError, Reporter, poses, track
+from cns_drake.simulation import SimulatedDrive
 from cns_drake.studies.ground_truth.exact_overlap import (
     VisibleSurfaces,
     sights_of,
 )
 from cns_drake.studies.training.sampled_city import SampledCity
-from evaluation.drives.sampling import sample_frames
-from evaluation.drives.scan_clouds import cloud_at
-from evaluation.methods.polar_images import polar_image
+from evaluation.drives import cloud_at, sample_frames
+from evaluation.methods import polar_image
 
 # Distance between two scans [m].
 _SCAN_SPACING = 6.0

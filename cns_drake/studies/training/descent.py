@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.progress import track
+from cns_drake.base import InputError, track
 from cns_drake.studies.training.batches import BatchSampler, TrainingScans
 from cns_drake.studies.training.network import (
     Parameters,
@@ -16,8 +15,8 @@ from cns_drake.studies.training.network import (
     scores,
     start_parameters,
 )
-from evaluation.methods.learned import WEIGHTS_VERSION
-from evaluation.study.storage.parts import Part
+from evaluation.methods import WEIGHTS_VERSION
+from evaluation.study import Part
 
 # Divides the similarities before the softmax of the loss.
 _TEMPERATURE = 0.05

@@ -4,14 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from evaluation.methods.learned import (
-    FEATURES,
-    FREQUENCIES,
-    HEADINGS,
-    LAYERS,
-    TURNS,
-)
+from cns_drake.base import InputError
+from evaluation.methods import FEATURES, FREQUENCIES, HEADINGS, LAYERS, TURNS
 
 # Name -> weights of the network.
 Parameters = dict[str, Any]

@@ -12,16 +12,11 @@ from typing import Any
 import numpy as np
 import yaml
 
-from cns_drake.base.complete_files import draft_folder
-from cns_drake.city.generation.city_structures import make_city
-from cns_drake.city.generation.generate import generate_city
-from cns_drake.city.generation.starter import start_city
-from cns_drake.roads.network import load_road_network
-from cns_drake.roads.random_route import draw_route
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
+from cns_drake.base import draft_folder
+from cns_drake.city import generate_city, make_city, start_city
+from cns_drake.roads import draw_route, load_road_network
+from cns_drake.scenarios import Scenario, load_scenario, shipped_maps
+from cns_drake.scene import STAGES_NAME, MapFolder
 from cns_drake.studies.drives.viewpoints import with_lidars_moved
 from cns_drake.studies.maps.redrawing import marked_yaml, redrawn_inputs
 from cns_drake.studies.training.sampled_stages import STAGES, draw_stages

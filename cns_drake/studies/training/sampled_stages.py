@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.city.generation.city_structures import City
+from cns_drake.city import City
 
 # Names of all stages, from older to newer.
 STAGES = ("01", "02", "03")

@@ -10,20 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.complete_files import check_writable, completing
-from cns_drake.base.files import make_folder
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.terminal import resumable
-from cns_drake.base.version import __version__
+from cns_drake.base import (
+    Cluster,
+    Job,
+    __version__,
+    check_writable,
+    completing,
+    fingerprint,
+    make_folder,
+    resumable,
+    run_jobs,
+)
 from cns_drake.studies.training.batches import HIDDEN_DEG, TrainingScans
 from cns_drake.studies.training.city_scans import scan_city
 from cns_drake.studies.training.descent import train
 from cns_drake.studies.training.network import import_jax
 from cns_drake.studies.training.sampled_city import DRAWN_STREETS, SampledCity
-from evaluation.methods.learned import SEEN_SHARES, WEIGHTS_VERSION
-from evaluation.study.storage.parts import MakePart, Part
+from evaluation.methods import SEEN_SHARES, WEIGHTS_VERSION
+from evaluation.study import MakePart, Part
 
 # The streets of the cities, in turn. Metropolis is kept for tests.
 MAPS = ("riverside", "suburbia", "downtown")
@@ -183,7 +187,7 @@ def _draw_curve(curve: np.ndarray, stem: Path) -> None:
     """Draws the loss, and the share of right answers, over the steps."""
     from matplotlib.figure import Figure
 
-    from evaluation.results.figure_files import save_figure
+    from evaluation.results import save_figure
 
     size = max(1, len(curve) // 40)
     kept = curve[: len(curve) // size * size].reshape(-1, size, 2).mean(axis=1)

@@ -3,9 +3,8 @@
 from matplotlib.figure import Figure
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.repetitions import repeated
-from evaluation.recognition.precision_recall import pr_curve
+from cns_drake.base import InputError, repeated
+from evaluation.recognition import pr_curve
 from evaluation.results.charts.chart import FONT, Chart
 from evaluation.results.method_names import title
 from evaluation.results.table import Row

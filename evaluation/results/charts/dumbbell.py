@@ -9,8 +9,8 @@ from typing import TypeAlias
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cns_drake.base.errors import InputError
-from evaluation.recognition.place_metrics import kept_share
+from cns_drake.base import InputError
+from evaluation.recognition import kept_share
 from evaluation.results.charts.chart import (
     FONT,
     ROW,

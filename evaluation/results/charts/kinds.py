@@ -11,7 +11,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from evaluation.results.charts.chart import FONT, PX, ROW, WIDE, Chart
 from evaluation.results.charts.curves import draw_curves
 from evaluation.results.charts.dumbbell import draw_dumbbell

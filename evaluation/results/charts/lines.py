@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from evaluation.results.charts.chart import (
     FONT,
     Chart,

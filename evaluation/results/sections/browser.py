@@ -6,9 +6,8 @@ import zlib
 
 import numpy as np
 
-from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
-from evaluation.recognition.faults import FAULTS
-from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.maps import CELL, HEIGHT_STEP, MAX_POINTS
+from evaluation.recognition import FAULTS, PlaceOutcome
 from evaluation.results.method_names import in_table_order, title
 from evaluation.results.page_frame import PageSection, page_section
 from evaluation.results.sections.routes import PageDrive

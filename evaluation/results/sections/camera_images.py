@@ -8,8 +8,8 @@ import io
 import numpy as np
 from PIL import Image
 
-from cns_drake.base.jpeg_images import to_jpeg
-from cns_drake.drives.drive import Drive
+from cns_drake.base import to_jpeg
+from cns_drake.drives import Drive
 
 # Longer side of a shown image [pixels].
 _IMAGE_SIDE = 320

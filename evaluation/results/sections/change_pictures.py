@@ -15,9 +15,9 @@ from matplotlib.patheffects import withStroke
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base.files import file_name
-from evaluation.change.tcr import TemporalChange, judge_points
-from evaluation.maps.voxel_maps import VoxelMap
+from cns_drake.base import file_name
+from evaluation.change import TemporalChange, judge_points
+from evaluation.maps import VoxelMap
 from evaluation.results.figure_files import PIXELS, save_figure
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import LAST, STAGE

@@ -11,7 +11,7 @@ from matplotlib import colormaps, image
 from matplotlib.colors import to_hex
 import numpy as np
 
-from evaluation.drives.sampling import sample_frames
+from evaluation.drives import sample_frames
 from evaluation.results.page_frame import PageSection, page_section, rendered
 from evaluation.results.sections.camera_images import CameraImages
 from evaluation.results.sections.point_rendering import (

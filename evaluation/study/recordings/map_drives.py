@@ -6,9 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import natural_key
-from cns_drake.drives.lidar_fields import LidarField
+from cns_drake.base import InputError, natural_key
+from cns_drake.drives import LidarField
 from evaluation.study.sources import DriveSource, RecordingSource
 from evaluation.study.tasks.pair import NamedDrive
 

@@ -3,14 +3,17 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from cns_drake.base.errors import InputError, did_you_mean, errors_at
-from cns_drake.base.files import natural_key
-from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.base.repetitions import repeated
-from cns_drake.drives.same_world import check_same_world
-from evaluation.recognition.place_selection import KEEP_ALL
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.keys import OWN
+from cns_drake.base import (
+    InputError,
+    did_you_mean,
+    errors_at,
+    fingerprint,
+    natural_key,
+    repeated,
+)
+from cns_drake.drives import check_same_world
+from evaluation.recognition import KEEP_ALL, RetrievalProtocol
+from evaluation.results import OWN
 from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
 from evaluation.study.tasks.pair import Pair
 

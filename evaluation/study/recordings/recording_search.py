@@ -7,12 +7,9 @@ import os
 from pathlib import Path
 import re
 
-from cns_drake.base.errors import InputError, one_line
-from cns_drake.base.files import listed, natural_key
-from cns_drake.drives.drive_scenario import SCENARIO, driven_way
-from evaluation.drives import find_readers, open_drive
-from evaluation.drives.cns_folder import holds_cns
-from evaluation.drives.kitti import holds_kitti
+from cns_drake.base import InputError, listed, natural_key, one_line
+from cns_drake.drives import SCENARIO, driven_way
+from evaluation.drives import find_readers, holds_cns, holds_kitti, open_drive
 from evaluation.study.recordings.map_drives import RecordingInfo
 from evaluation.study.sources import RecordingSource
 

@@ -16,11 +16,17 @@ from typing import Any, BinaryIO
 
 import zstandard
 
-from cns_drake.base.complete_files import completing
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular, make_folder, user_errors
-from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
-from cns_drake.base.jobs.step import Reporter, Step
+from cns_drake.base import (
+    InputError,
+    Reporter,
+    Step,
+    check_regular,
+    code_digest,
+    completing,
+    fingerprint,
+    make_folder,
+    user_errors,
+)
 from evaluation.study.storage.value_encoding import (
     DECODING_ERRORS,
     annotations,

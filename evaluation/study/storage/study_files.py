@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from cns_drake.base.files import file_name
+from cns_drake.base import file_name
 from evaluation.study.storage.parts import Part
 
 

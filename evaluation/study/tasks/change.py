@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping
 import math
 from typing import Any, ClassVar
 
-from cns_drake.base.jobs.step import Reporter
-from evaluation.change.drive_change import ChangeReport, change_between
-from evaluation.recognition.result_number import Number
+from cns_drake.base import Reporter
+from evaluation.change import ChangeReport, change_between
+from evaluation.recognition import Number
 from evaluation.study.features import DriveSummary
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import Pair, Result

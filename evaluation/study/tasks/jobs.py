@@ -4,10 +4,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.base.jobs.running import Job
-from evaluation.recognition.describing import Role
-from evaluation.recognition.protocol import RetrievalProtocol
+from cns_drake.base import Job, fingerprint
+from evaluation.recognition import RetrievalProtocol, Role
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import FeatureExtraction, map_source
 from evaluation.study.place_measurements import DescribedSource

@@ -8,48 +8,45 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.progress import track
-from cns_drake.drives.drive import Drive
-from evaluation.localisation.estimators import make_estimator
-from evaluation.localisation.initial_poses import InitialPose, Starts
-from evaluation.localisation.localisation_map import (
-    LocalisationMap,
-    make_map,
-    map_of,
+from cns_drake.base import (
+    Cluster,
+    InputError,
+    Job,
+    Reporter,
+    read_bytes,
+    run_jobs,
+    track,
 )
-from evaluation.localisation.localiser import (
+from cns_drake.drives import Drive
+from evaluation.localisation import (
+    KISS_MATCHER,
+    METHODS,
     NEAR,
+    QUERY,
+    InitialPose,
+    LocalisationMap,
     Localiser,
     Query,
-    localise,
-    mapped_frames,
-    path_axes,
-    query_frames,
-    read_queries,
-)
-from evaluation.localisation.results import (
-    QUERY,
+    Settings,
+    Starts,
+    default_settings,
     is_right,
     localisation_columns,
     localisation_numbers,
+    localise,
+    make_estimator,
+    make_map,
+    map_of,
+    mapped_frames,
     note_sparse,
+    path_axes,
+    query_frames,
+    read_queries,
+    track_drive,
+    tracking_numbers,
 )
-from evaluation.localisation.settings import (
-    KISS_MATCHER,
-    METHODS,
-    Settings,
-    default_settings,
-)
-from evaluation.localisation.tracking import track_drive, tracking_numbers
-from evaluation.maps.voxel_maps import map_drive
-from evaluation.recognition.place_metrics import kept_share
-from evaluation.recognition.place_selection import KEEP_ALL
-from evaluation.recognition.result_number import Number
+from evaluation.maps import map_drive
+from evaluation.recognition import KEEP_ALL, Number, kept_share
 from evaluation.study.sources import (
     DriveSource,
     JoinedSource,

@@ -4,19 +4,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.step import Reporter
-from evaluation.map_update.baselines import BASELINES, run_baseline
-from evaluation.map_update.labels import Label, PairLabels
-from evaluation.map_update.scores import score
-from evaluation.map_update.sessions import (
+from cns_drake.base import InputError, Reporter
+from evaluation.map_update import (
+    BASELINES,
+    Label,
+    PairLabels,
     SessionPair,
+    class_names,
     read_labels,
     read_pair,
     read_truth,
+    run_baseline,
+    score,
 )
-from evaluation.map_update.structures import class_names
-from evaluation.recognition.result_number import Number
+from evaluation.recognition import Number
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Task, check_positive

@@ -7,10 +7,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from evaluation.recognition.describing import Role
-from evaluation.recognition.place_selection import KEEP_ALL
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.keys import FROZEN_REDRAW
+from evaluation.recognition import KEEP_ALL, RetrievalProtocol, Role
+from evaluation.results import FROZEN_REDRAW
 from evaluation.study.sources import DriveSource
 
 # Length of a drive through a shipped city, about [m].

@@ -4,13 +4,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from cns_drake.base.jobs.running import Job
-from cns_drake.base.jobs.step import Reporter, Steps
-from cns_drake.base.progress import track
-from evaluation.recognition.costs import NUM_TRIALS, QueryCost, measure_search
-from evaluation.recognition.place_metrics import place_numbers, pose_numbers
-from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.recognition.result_number import Number
+from cns_drake.base import Job, Reporter, Steps, track
+from evaluation.recognition import (
+    NUM_TRIALS,
+    Number,
+    PlaceOutcome,
+    QueryCost,
+    measure_search,
+    place_numbers,
+    pose_numbers,
+)
 from evaluation.study.place_measurements import (
     PlaceComparison,
     measure_places,

@@ -7,9 +7,8 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from cns_drake.base.errors import InputError, did_you_mean
-from cns_drake.base.repetitions import repeated
-from evaluation.recognition.result_number import Number
+from cns_drake.base import InputError, did_you_mean, repeated
+from evaluation.recognition import Number
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import Pair, Result
 

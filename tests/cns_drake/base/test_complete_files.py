@@ -9,7 +9,8 @@ from threading import Thread
 
 import pytest
 
-from cns_drake.base.complete_files import (
+from cns_drake.base import (
+    InputError,
     check_folder_writable,
     check_writable,
     complete_part,
@@ -19,7 +20,6 @@ from cns_drake.base.complete_files import (
     write_part,
     write_text,
 )
-from cns_drake.base.errors import InputError
 
 
 def test_part_lies_beside_the_file(tmp_path):

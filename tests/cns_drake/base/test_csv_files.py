@@ -2,9 +2,13 @@
 
 import pytest
 
-from cns_drake.base.csv_files import read_records, read_rows
-from cns_drake.base.errors import InputError
-from cns_drake.base.number_format import number_within, whole_number
+from cns_drake.base import (
+    InputError,
+    number_within,
+    read_records,
+    read_rows,
+    whole_number,
+)
 
 
 def write(tmp_path, content):

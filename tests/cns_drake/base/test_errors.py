@@ -2,7 +2,7 @@
 
 import pytest
 
-from cns_drake.base.errors import InputError, errors_at_option
+from cns_drake.base import InputError, errors_at_option
 
 
 @pytest.mark.parametrize(

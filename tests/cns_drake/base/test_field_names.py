@@ -3,7 +3,7 @@
 from pydantic import BaseModel, ConfigDict, ValidationError
 import pytest
 
-from cns_drake.base.errors import describe_validation_error
+from cns_drake.base import describe_validation_error
 
 
 class Corner(BaseModel):

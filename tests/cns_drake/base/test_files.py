@@ -4,8 +4,13 @@ import os
 
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import is_there, make_folder, read_bytes, user_errors
+from cns_drake.base import (
+    InputError,
+    is_there,
+    make_folder,
+    read_bytes,
+    user_errors,
+)
 
 
 def test_only_errors_of_the_file_system_are_turned(tmp_path):

@@ -5,10 +5,10 @@ from typing import Annotated
 from pydantic import Field, ValidationError
 import pytest
 
-from cns_drake.base.input_models import InputModel
-from cns_drake.city.plan.city_plan import BuildingPlan
-from cns_drake.sensors.lidar.config import LidarSection
-from evaluation.methods.method import MethodConfig
+from cns_drake.base import InputModel
+from cns_drake.city import BuildingPlan
+from cns_drake.sensors import LidarSection
+from evaluation.methods import MethodConfig
 
 
 class _Switches(InputModel):

@@ -6,7 +6,7 @@ import numpy as np
 from PIL import Image
 import pytest
 
-from cns_drake.base.jpeg_images import to_jpeg
+from cns_drake.base import to_jpeg
 
 
 def seen(values, kind="PNG"):

@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from cns_drake.base.json_text import parse_json
+from cns_drake.base import parse_json
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from cns_drake.base.files import listed, natural_key
+from cns_drake.base import listed, natural_key
 
 
 @pytest.mark.parametrize(

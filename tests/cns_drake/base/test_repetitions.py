@@ -2,7 +2,7 @@
 
 import pytest
 
-from cns_drake.base.repetitions import check_once, repeated
+from cns_drake.base import check_once, repeated
 
 
 def test_what_is_there_twice():

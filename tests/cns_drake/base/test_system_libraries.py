@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from cns_drake.base.system_libraries import missing_library
+from cns_drake.base import missing_library
 
 
 @pytest.mark.parametrize(

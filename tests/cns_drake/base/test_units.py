@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 
-from cns_drake.base.units import wrapped
+from cns_drake.base import wrapped
 
 
 def test_angles_are_wrapped_to_a_half_open_turn():

@@ -6,8 +6,7 @@ import re
 import pytest
 import yaml
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.yaml_files import parse_yaml, read_yaml
+from cns_drake.base import InputError, parse_yaml, read_yaml
 
 # Nine lines that stand for 9 ** 9 values.
 _LAUGHS = "a0: &a0 [x]\n" + "".join(

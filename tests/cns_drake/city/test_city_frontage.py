@@ -9,7 +9,7 @@ from shapely.affinity import rotate
 from shapely.geometry import LineString, Point, box
 from shapely.ops import unary_union
 
-from cns_drake.city.placement.frontage import lines_along, lot_at, station_at
+from cns_drake.city import lines_along, lot_at, station_at
 
 YAW = math.radians(23.0)
 

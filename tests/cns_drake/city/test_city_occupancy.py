@@ -3,7 +3,7 @@
 import numpy as np
 from shapely.geometry import box
 
-from cns_drake.city.geometry.occupancy import Occupancy
+from cns_drake.city import Occupancy
 
 
 def test_polygons_may_touch_but_not_overlap():

@@ -18,12 +18,10 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.scene.perception_geometry import read_perception_geometry
-from cns_drake.scene.world import load_world
-from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.scenarios import load_scenario, plan_drive
+from cns_drake.scene import load_world, read_perception_geometry
+from cns_drake.sensors import make_beam_pattern
 
 pytestmark = [pytest.mark.slow, pytest.mark.night]
 

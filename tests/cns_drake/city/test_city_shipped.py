@@ -21,7 +21,7 @@ import pytest
 import shapely
 from shapely.affinity import affine_transform
 
-from cns_drake.scene.semantics import CLASS_IDS
+from cns_drake.scene import CLASS_IDS
 
 pytestmark = pytest.mark.slow
 

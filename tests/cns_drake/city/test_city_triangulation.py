@@ -9,7 +9,7 @@ from shapely.affinity import rotate, translate
 from shapely.geometry import MultiPoint, Point, Polygon, box
 from shapely.ops import unary_union
 
-from cns_drake.city.geometry.triangulation import triangulate
+from cns_drake.city import triangulate
 
 
 def star(seed: int, corners: int) -> Polygon:

@@ -7,9 +7,9 @@ from helpers.small_city import write_small_city
 import pytest
 import typer
 
-from cns_drake.base.errors import InputError
-from cns_drake.city.generation.generate import generate_city
-from cns_drake.command_line.maps import city
+from cns_drake.base import InputError
+from cns_drake.city import generate_city
+from cns_drake.command_line import city
 
 pytestmark = pytest.mark.slow
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city import Mesh
 
 
 def decimal(thousandths):

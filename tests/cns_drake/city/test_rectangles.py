@@ -3,7 +3,7 @@
 import pytest
 from shapely.geometry import box
 
-from cns_drake.city.geometry.rectangles import largest_rectangle
+from cns_drake.city import largest_rectangle
 
 
 def test_the_rectangle_lies_within_the_lot():

@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner
 import yaml
 
-from cns_drake.base.errors import InputError
-from cns_drake.city.generation.generate import generate_city
-from cns_drake.command_line.cli import app
+from cns_drake.base import InputError
+from cns_drake.city import generate_city
+from cns_drake.command_line import app
 
 pytestmark = pytest.mark.slow
 

@@ -12,8 +12,8 @@ import pytest
 import yaml
 
 from cns_drake.__main__ import main
-from cns_drake.command_line.drive_script import run_script
-from cns_drake.scenarios.shipped import recordable_drives
+from cns_drake.command_line import run_script
+from cns_drake.scenarios import recordable_drives
 
 pytestmark = pytest.mark.slow
 

@@ -8,8 +8,8 @@ import typer
 
 import cns_drake
 from cns_drake import command_line as cli
-from cns_drake.base.commands import Command
-from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
+from cns_drake.base import Command
+from cns_drake.sensors import LIDAR_PRESETS
 from evaluation import command_line as evaluation_cli
 
 PROGRAMS = {

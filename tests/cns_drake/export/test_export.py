@@ -16,13 +16,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 import yaml
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.errors import InputError as ReadingError
-from cns_drake.base.progress import Listener, heard_by
-from cns_drake.export.exporting import export_drive
+from cns_drake.base import InputError, Listener, heard_by
+from cns_drake.base import InputError as ReadingError
+from cns_drake.export import export_drive
 from evaluation import open_drive
-from evaluation.study.recordings.map_drives import drives_by_map
-from evaluation.study.recordings.recording_search import find_recordings
+from evaluation.study import drives_by_map, find_recordings
 
 
 @pytest.fixture(scope="module")

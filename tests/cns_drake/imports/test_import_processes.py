@@ -10,7 +10,7 @@ from helpers.small_osm import write_corner
 import pytest
 from typer.testing import CliRunner
 
-from cns_drake.command_line.cli import app
+from cns_drake.command_line import app
 
 # The program, which says at once what it does, however short it takes.
 PROGRAM = """

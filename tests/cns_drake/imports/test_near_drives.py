@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, box
 
-from cns_drake.base.errors import InputError
-from cns_drake.imports.import_map import import_city
-from cns_drake.imports.options import ImportOptions
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.base import InputError
+from cns_drake.imports import ImportOptions, import_city
+from cns_drake.scenarios import load_scenario, plan_drive
 
 # The map's origin is the middle of the town of blocks.
 MIDDLE = 72.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from cns_drake.motion.road_profile import RoadProfile
+from cns_drake.motion import RoadProfile
 
 
 def line(start, angle, length, step):

@@ -14,10 +14,8 @@ from helpers.drives import (
 import numpy as np
 import pytest
 
-from cns_drake.motion.path_geometry import SmoothPath
-from cns_drake.motion.trajectory import Trajectory
-from cns_drake.roads.lane_path import LanePath
-from cns_drake.roads.speeds import Speeds
+from cns_drake.motion import SmoothPath, Trajectory
+from cns_drake.roads import LanePath, Speeds
 
 
 def motion(trajectory, t):

@@ -14,9 +14,8 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
-from cns_drake.motion.trajectory import Trajectory
-from cns_drake.motion.vehicle_motion import VehicleMotion
-from cns_drake.scenarios.shipped import vehicle_file
+from cns_drake.motion import Trajectory, VehicleMotion
+from cns_drake.scenarios import vehicle_file
 
 WHEELS = {
     f"{end}_{side}_wheel": (x, y)

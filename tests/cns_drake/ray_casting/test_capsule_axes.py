@@ -6,11 +6,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.ray_casting.known_poses import KnownPoses
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.ray_casting.ray_groups import Motion
-from cns_drake.scene.perception_geometry import PerceptionGeometry
-from cns_drake.scene.surfaces import CapsuleSurface, EllipsoidSurface
+from cns_drake.ray_casting import KnownPoses, Motion, RayCastingScene
+from cns_drake.scene import CapsuleSurface, EllipsoidSurface, PerceptionGeometry
 
 WORLD = FrameId.get_new_id()
 MOVING = FrameId.get_new_id()

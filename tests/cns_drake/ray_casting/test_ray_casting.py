@@ -7,8 +7,8 @@ from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scene.surfaces import (
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.scene import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,

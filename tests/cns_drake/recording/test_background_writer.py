@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from cns_drake.recording.background_writer import BackgroundWriter
+from cns_drake.recording import BackgroundWriter
 
 
 def feed(write, count):

@@ -23,7 +23,7 @@ from pydrake.systems.sensors import CameraInfo, RgbdSensor
 import pytest
 from scipy.optimize import least_squares
 
-from cns_drake.recording.messages import make_camera_info
+from cns_drake.recording import make_camera_info
 
 INFOS = (
     CameraInfo(64, 48, 1.0),

@@ -1,9 +1,9 @@
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from cns_drake.drives import ros_types
-from cns_drake.recording.cloud_messages import encode_point_cloud
-from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
+from cns_drake.drives import POINT_CLOUD
+from cns_drake.recording import encode_point_cloud
+from cns_drake.sensors import POINT_DTYPE
 
 STAMP_NS = 1_700_000_000_150_000_001
 
@@ -11,8 +11,8 @@ STAMP_NS = 1_700_000_000_150_000_001
 def decode_cloud(data):
     """Reads a point cloud back; its bytes are those of the typestore."""
     store = get_typestore(Stores.ROS2_HUMBLE)
-    cloud = store.deserialize_cdr(data, ros_types.POINT_CLOUD)
-    assert bytes(store.serialize_cdr(cloud, ros_types.POINT_CLOUD)) == data
+    cloud = store.deserialize_cdr(data, POINT_CLOUD)
+    assert bytes(store.serialize_cdr(cloud, POINT_CLOUD)) == data
     return cloud
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from cns_drake.base import poses
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.simulation.simulation import simulate
+from cns_drake.scenarios import load_scenario
+from cns_drake.simulation import simulate
 from evaluation import drives
 
 pytestmark = [pytest.mark.slow, pytest.mark.night]

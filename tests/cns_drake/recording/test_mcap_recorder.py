@@ -13,14 +13,14 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base.errors import InputError
-from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.mcap_recorder import McapRecorder
-from cns_drake.recording.recorded_topics import (
+from cns_drake.base import InputError
+from cns_drake.recording import (
+    BagWriter,
+    McapRecorder,
     make_calibration,
     recording_topics,
 )
-from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
+from cns_drake.sensors import POINT_DTYPE
 
 START_NS = 1_700_000_000_000_000_000
 PERIOD = 0.05

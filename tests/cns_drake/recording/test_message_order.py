@@ -1,15 +1,14 @@
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.drives import ros_types
-from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.rosbag2_metadata import Topic
+from cns_drake.base import InputError
+from cns_drake.drives import TF
+from cns_drake.recording import BagWriter, Topic
 
 
 def test_stamps_are_not_before_the_epoch(tmp_path):
     with BagWriter(
         tmp_path / "drive",
-        [Topic("/tf", ros_types.TF)],
+        [Topic("/tf", TF)],
         start_ns=0,
         attachments={},
         scenario={},

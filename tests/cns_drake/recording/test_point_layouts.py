@@ -3,15 +3,17 @@
 import numpy as np
 import pytest
 
-from cns_drake.drives.point_cloud2 import to_points, to_records
-from cns_drake.drives.point_layouts import (
+from cns_drake.drives import (
+    POINT_CLOUD,
+    deserialize,
     from_layout,
     to_labels,
     to_layout,
+    to_points,
+    to_records,
 )
-from cns_drake.drives.ros_types import POINT_CLOUD, deserialize
-from cns_drake.recording.cloud_messages import encode_point_cloud
-from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
+from cns_drake.recording import encode_point_cloud
+from cns_drake.sensors import POINT_DTYPE
 
 # sensor_msgs/PointField: UINT8 2, UINT16 4, UINT32 6, FLOAT32 7.
 XYZ = [("x", 0, 7), ("y", 4, 7), ("z", 8, 7)]

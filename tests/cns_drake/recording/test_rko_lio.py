@@ -12,11 +12,9 @@ import numpy as np
 import pytest
 
 from cns_drake.base import poses
-from cns_drake.recording.schedule import START_NS
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.scenarios.sections import RideConfig
-from cns_drake.simulation.simulation import simulate
+from cns_drake.recording import START_NS
+from cns_drake.scenarios import RideConfig, load_scenario, plan_drive
+from cns_drake.simulation import simulate
 
 pytestmark = [pytest.mark.slow, pytest.mark.night]
 

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import pytest
 
-from cns_drake.recording.schedule import make_schedule
+from cns_drake.recording import make_schedule
 
 RATES = {"scan": 10, "rear": 20, "imu": 400, "pose": 100}
 

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from cns_drake.base.errors import InputError
-from cns_drake.drives.mcap_messages import STAMPED_RECORD
-from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.rosbag2_metadata import Topic
+from cns_drake.base import InputError
+from cns_drake.drives import STAMPED_RECORD
+from cns_drake.recording import BagWriter, Topic
 from evaluation.drives import open_drive
 
 FRAMES = 40

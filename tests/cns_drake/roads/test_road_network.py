@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from shapely.geometry import Point
 
-from cns_drake.roads.road import LaneRef
+from cns_drake.roads import LaneRef
 
 
 @pytest.fixture

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point
 
-from cns_drake.roads.network import load_road_network
-from cns_drake.scenarios.shipped import worlds_folder
+from cns_drake.roads import load_road_network
+from cns_drake.scenarios import worlds_folder
 
 
 @pytest.fixture(scope="module")

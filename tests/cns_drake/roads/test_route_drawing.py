@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.roads.network import load_road_network
-from cns_drake.roads.random_route import draw_route
-from cns_drake.roads.route import make_lane_path
-from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.base import InputError
+from cns_drake.roads import draw_route, load_road_network, make_lane_path
+from cns_drake.scenarios import shipped_maps
 
 
 @pytest.fixture(scope="module", params=sorted(shipped_maps()))

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point, Polygon
 
-from cns_drake.roads.network import load_road_network
-from cns_drake.roads.surface_heights import RoadSurface
-from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.roads import RoadSurface, load_road_network
+from cns_drake.scenarios import shipped_maps
 
 # Figures of CARLA's towns: extents of the centrelines in x and y [m], length
 # between junctions and lanes on it [m], junctions by number of arms, lane

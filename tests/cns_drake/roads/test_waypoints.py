@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point
 
-from cns_drake.base.errors import InputError
-from cns_drake.roads.waypoints import load_waypoint_path, make_waypoint_path
+from cns_drake.base import InputError
+from cns_drake.roads import load_waypoint_path, make_waypoint_path
 
 
 @pytest.fixture

@@ -8,12 +8,17 @@ from helpers.small_map import write_small_map
 import pytest
 import yaml
 
-from cns_drake.base.errors import InputError
-from cns_drake.scenarios.drive_table import drive_rows, write_table
-from cns_drake.scenarios.planning import count_frames, plan_drive
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.scenarios.shipped import shipped_drives, shipped_maps
-from cns_drake.scene.map_folder import MapFolder
+from cns_drake.base import InputError
+from cns_drake.scenarios import (
+    count_frames,
+    drive_rows,
+    load_scenario,
+    plan_drive,
+    shipped_drives,
+    shipped_maps,
+    write_table,
+)
+from cns_drake.scene import MapFolder
 
 # A box has twelve triangles.
 BOX = 12

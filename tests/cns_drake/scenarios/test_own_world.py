@@ -9,10 +9,9 @@ import pytest
 from rosbags.highlevel import AnyReader
 import yaml
 
-from cns_drake.base.errors import InputError
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.simulation.simulation import simulate
+from cns_drake.base import InputError
+from cns_drake.scenarios import load_scenario, plan_drive
+from cns_drake.simulation import simulate
 
 SPEEDS = {
     "cruise": 6.0,

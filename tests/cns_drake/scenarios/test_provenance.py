@@ -8,8 +8,8 @@ import tracemalloc
 from helpers.tiny_drive import tiny_scenario
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.scenarios.provenance import (
+from cns_drake.base import InputError
+from cns_drake.scenarios import (
     combined_digest,
     dependency_versions,
     digest_file,

@@ -6,23 +6,23 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 import yaml
 
-from cns_drake.base.errors import InputError
-from cns_drake.command_line.drive_script import run_drive
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.provenance import digest_inputs
-from cns_drake.scenarios.scenario_files import (
+from cns_drake.base import InputError
+from cns_drake.command_line import run_drive
+from cns_drake.scenarios import (
     describe_scenario,
+    digest_inputs,
     load_scenario,
     make_scenario,
+    plan_drive,
+    recordable_drives,
 )
-from cns_drake.scenarios.shipped import recordable_drives
-from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.sensors.lidar.config import (
+from cns_drake.sensors import (
     LidarSection,
+    Mount,
     WeatherConfig,
     make_pattern,
+    sensor_pose,
 )
-from cns_drake.sensors.sensor_config import Mount
 
 
 def test_shipped_drives_load():

@@ -3,7 +3,7 @@
 from helpers.small_map import scenario_values, write_small_map
 import yaml
 
-from cns_drake.scenarios.scenario_files import load_scenario, write_scenarios
+from cns_drake.scenarios import load_scenario, write_scenarios
 
 
 def test_written_scenarios_are_the_same(tmp_path):

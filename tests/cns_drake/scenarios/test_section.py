@@ -2,8 +2,8 @@
 
 import pytest
 
-from cns_drake.base.errors import InputError, validated
-from cns_drake.sensors.sensor_config import Section, field_off_by_default
+from cns_drake.base import InputError, validated
+from cns_drake.sensors import Section, field_off_by_default
 
 
 class Weather(Section):

@@ -11,14 +11,16 @@ import pytest
 from scipy.spatial import cKDTree
 from shapely import contains, distance, linestrings, points, polygons, prepare
 
-from cns_drake.recording.schedule import FRAME_PERIOD, frames_within
-from cns_drake.roads.network import load_road_network
-from cns_drake.roads.surface_heights import RoadSurface
-from cns_drake.scenarios.planning import count_frames, plan_drive
-from cns_drake.scenarios.scenario_files import make_scenario
-from cns_drake.scenarios.shipped import shipped_drives
-from evaluation.drives.sampling import sample_frames
-from evaluation.recognition.protocol import PAPER_PROTOCOL
+from cns_drake.recording import FRAME_PERIOD, frames_within
+from cns_drake.roads import RoadSurface, load_road_network
+from cns_drake.scenarios import (
+    count_frames,
+    make_scenario,
+    plan_drive,
+    shipped_drives,
+)
+from evaluation.drives import sample_frames
+from evaluation.recognition import PAPER_PROTOCOL
 
 pytestmark = pytest.mark.slow
 

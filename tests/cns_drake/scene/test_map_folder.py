@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.scene.map_folder import MapFolder, drive_name
+from cns_drake.base import InputError
+from cns_drake.scene import MapFolder, drive_name
 
 
 def test_existing_files(tmp_path):

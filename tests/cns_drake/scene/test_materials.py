@@ -2,13 +2,22 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from cns_drake.city.buildings import ARCHETYPES, sample
-from cns_drake.city.geometry.models import Finish, Model, Part, SphereShape
-from cns_drake.city.geometry.structures import Structure
-from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.scene.materials import MATERIALS, USUAL_MATERIALS
-from cns_drake.scene.semantics import CLASS_IDS
-from cns_drake.scene.structure_table import StructureEntry
+from cns_drake.city import (
+    ARCHETYPES,
+    OBJECTS,
+    Finish,
+    Model,
+    Part,
+    SphereShape,
+    Structure,
+    sample,
+)
+from cns_drake.scene import (
+    CLASS_IDS,
+    MATERIALS,
+    USUAL_MATERIALS,
+    StructureEntry,
+)
 
 
 def built(name, seed=0):

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from cns_drake.scene.file_references import referenced_files
-from cns_drake.scene.file_watch import FileWatch
+from cns_drake.scene import FileWatch, referenced_files
 
 _MODEL = """<sdf version="1.9"><model name="m"><link name="l">
 <visual name="v"><geometry><mesh><uri>a.obj</uri></mesh></geometry></visual>

@@ -8,13 +8,15 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.scene.geometry_list import list_geometry
-from cns_drake.scene.perception_geometry import read_perception_geometry
-from cns_drake.scene.surfaces import tessellate
-from cns_drake.scene.world import load_world
-from cns_drake.sensors.lidar.patterns import SpinningPattern
-from cns_drake.simulation.scanning import scan_world
+from cns_drake.base import InputError
+from cns_drake.scene import (
+    list_geometry,
+    load_world,
+    read_perception_geometry,
+    tessellate,
+)
+from cns_drake.sensors import SpinningPattern
+from cns_drake.simulation import scan_world
 
 AROUND = SpinningPattern((0.0, -0.5), 4, 0.05, 90.0, 0.1)
 BOX = "<geometry><box><size>1 1 2</size></box></geometry>"

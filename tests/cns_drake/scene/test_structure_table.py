@@ -2,12 +2,8 @@
 
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.scene.structure_table import (
-    StructureEntry,
-    StructureTable,
-    load_structure_table,
-)
+from cns_drake.base import InputError
+from cns_drake.scene import StructureEntry, StructureTable, load_structure_table
 
 
 def write(tmp_path, text):

@@ -3,15 +3,13 @@ from pydrake.geometry import FrameId, GeometryId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.scene.perception_geometry import (
-    PerceptionGeometry,
-    merge_surfaces,
-)
-from cns_drake.scene.surfaces import (
+from cns_drake.scene import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
+    PerceptionGeometry,
     TriangleSurface,
+    merge_surfaces,
     tessellate,
 )
 

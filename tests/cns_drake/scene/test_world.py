@@ -7,13 +7,11 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.scenarios.shipped import vehicle_file
-from cns_drake.scene.perception_geometry import read_perception_geometry
-from cns_drake.scene.structure_table import StructureEntry
-from cns_drake.scene.world import load_world
-from cns_drake.sensors.lidar.presets import make_beam_pattern
-from cns_drake.simulation.scanning import scan_world
+from cns_drake.base import InputError
+from cns_drake.scenarios import vehicle_file
+from cns_drake.scene import StructureEntry, load_world, read_perception_geometry
+from cns_drake.sensors import make_beam_pattern
+from cns_drake.simulation import scan_world
 
 MESH = "<mesh><uri>{}</uri></mesh>"
 

@@ -40,12 +40,10 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scene.perception_geometry import read_perception_geometry
-from cns_drake.sensors.lidar.adding import connect_lidar
-from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.lidar.patterns import SpinningPattern
+from cns_drake.base import InputError
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.scene import read_perception_geometry
+from cns_drake.sensors import Lidar, SpinningPattern, connect_lidar
 
 X_WG = RigidTransform(RollPitchYaw(0.4, -0.3, 1.9), [-4.0, 2.5, 0.8])
 PATTERN = SpinningPattern(

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from cns_drake.drives.lidar_fields import lidar_field
-from cns_drake.sensors.lidar.beam_coverage import BeamCoverage
-from cns_drake.sensors.lidar.patterns import SpinningPattern
-from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
+from cns_drake.drives import lidar_field
+from cns_drake.sensors import LIDAR_PRESETS, BeamCoverage, SpinningPattern
 
 
 def direction(azimuth_deg, elevation_deg):

@@ -7,17 +7,16 @@ from pydrake.geometry import Box
 from pydrake.math import RigidTransform
 import pytest
 
-from cns_drake.sensors.lidar.beams import BeamPattern
-from cns_drake.sensors.lidar.nonrepeating_patterns import (
+from cns_drake.sensors import (
+    LIDAR_PRESETS,
+    BeamPattern,
+    DirectionPattern,
     NoddingPattern,
     RosettePattern,
-)
-from cns_drake.sensors.lidar.patterns import (
-    DirectionPattern,
     SpinningPattern,
+    make_beam_pattern,
     make_flash_pattern,
 )
-from cns_drake.sensors.lidar.presets import LIDAR_PRESETS, make_beam_pattern
 
 LIVOX = ("mid-70", "avia", "mid-360")
 

@@ -22,10 +22,9 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.ray_casting import embree_hierarchy
-from cns_drake.scene.geometry_list import geometry_port
-from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.ray_casting import EmbreeHierarchy
+from cns_drake.scene import geometry_port
+from cns_drake.sensors import Lidar, make_beam_pattern
 
 PATTERN = make_beam_pattern("vlp-16", 0.05, num_columns=60, min_range=0.0)
 
@@ -372,9 +371,9 @@ def test_what_did_not_change_is_not_built_anew(monkeypatch):
     stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
     stage.eval()
     built = []
-    build = embree_hierarchy.EmbreeHierarchy._build_scene
+    build = EmbreeHierarchy._build_scene
     monkeypatch.setattr(
-        embree_hierarchy.EmbreeHierarchy,
+        EmbreeHierarchy,
         "_build_scene",
         lambda self, parts: built.append(parts) or build(self, parts),
     )

@@ -23,8 +23,7 @@ from pydrake.systems.framework import DiagramBuilder
 import pytest
 from scipy.spatial import ConvexHull
 
-from cns_drake.sensors.lidar.adding import add_lidar
-from cns_drake.sensors.lidar.patterns import DirectionPattern
+from cns_drake.sensors import DirectionPattern, add_lidar
 
 SLOPE = RollPitchYaw(0.3, 0.4, 0.5)
 # What docs/drake.md promises: error of a range, distance of a point from its

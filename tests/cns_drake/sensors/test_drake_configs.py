@@ -33,8 +33,8 @@ from cns_drake import (
     add_lidar,
     load_scenario,
 )
-from cns_drake.scene.drake_releases import find_bus
-from cns_drake.sensors.imu.noise import ImuErrors
+from cns_drake.scene import find_bus
+from cns_drake.sensors import ImuErrors
 
 X_WR = RigidTransform(RollPitchYaw(0.0, 0.0, 0.6), [1.0, -2.0, 0.5])
 X_RS = RigidTransform(RollPitchYaw(0.1, -0.2, 2.0), [0.3, 0.1, 0.9])

@@ -14,10 +14,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
-from cns_drake.ray_casting.known_poses import KnownPoses
-from cns_drake.sensors.lidar.adding import connect_lidar
-from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.ray_casting import KnownPoses
+from cns_drake.sensors import Lidar, connect_lidar, make_beam_pattern
 
 INERTIA = SpatialInertia.SolidSphereWithMass(1.0, 1.0)
 X_PS = RigidTransform(RollPitchYaw(0.1, -0.2, 0.4), [0.3, 0.1, 0.2])

@@ -16,11 +16,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from cns_drake.motion.trajectory import Trajectory
-from cns_drake.motion.vehicle_motion import VehicleMotion
-from cns_drake.scenarios.shipped import vehicle_file
-from cns_drake.sensors.imu.imu import add_imu
-from cns_drake.sensors.odometry.odometry import add_odometry
+from cns_drake.motion import Trajectory, VehicleMotion
+from cns_drake.scenarios import vehicle_file
+from cns_drake.sensors import add_imu, add_odometry
 
 GRAVITY = 9.81
 

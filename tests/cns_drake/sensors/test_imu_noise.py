@@ -6,7 +6,7 @@ from helpers.allan import allan_deviation, tolerance
 import numpy as np
 import pytest
 
-from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
+from cns_drake.sensors import ImuErrors, ImuNoise
 
 RATE = 100
 HOURS = 1.5 * 3600.0

@@ -15,10 +15,9 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.perception import PointCloud
 import pytest
 
-from cns_drake.motion.vehicle_sweep import Sweep
-from cns_drake.scene.structure_table import StructureEntry, StructureTable
-from cns_drake.sensors.lidar.measurement import MeasurementModel
-from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
+from cns_drake.motion import Sweep
+from cns_drake.scene import StructureEntry, StructureTable
+from cns_drake.sensors import POINT_DTYPE, MeasurementModel
 
 
 def test_box_room():

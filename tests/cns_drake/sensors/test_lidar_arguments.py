@@ -12,10 +12,7 @@ from pydrake.multibody.plant import (
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from cns_drake.sensors.imu.imu import add_imu
-from cns_drake.sensors.lidar.adding import add_lidar
-from cns_drake.sensors.lidar.measurement import MeasurementModel
-from cns_drake.sensors.odometry.odometry import add_odometry
+from cns_drake.sensors import MeasurementModel, add_imu, add_lidar, add_odometry
 
 X_PS = RigidTransform([0.0, 0.0, 1.0])
 

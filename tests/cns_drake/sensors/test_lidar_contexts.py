@@ -14,9 +14,8 @@ from pydrake.systems.framework import LeafSystem
 import pytest
 
 import cns_drake
-from cns_drake.ray_casting.known_poses import KnownPoses
-from cns_drake.sensors.lidar.adding import add_lidar
-from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.ray_casting import KnownPoses
+from cns_drake.sensors import Lidar, add_lidar
 
 AHEAD = np.eye(3)[:1]
 METHODS = {

@@ -22,9 +22,7 @@ from pydrake.systems.framework import DiagramBuilder
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.sensors.lidar.adding import add_lidar
-from cns_drake.sensors.lidar.patterns import SpinningPattern
-from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.sensors import SpinningPattern, add_lidar, make_beam_pattern
 
 PATTERN = SpinningPattern(
     tuple(np.linspace(0.4, -0.4, 12)), 240, 0.05, 60.0, 0.1

@@ -8,22 +8,27 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from cns_drake.drives.sensor_names import RESERVED_NAMES
-from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.mcap_recorder import McapRecorder, RecordedSensor
-from cns_drake.recording.recorded_topics import points_topic, recording_topics
-from cns_drake.sensors.drake_configs import (
+from cns_drake.drives import RESERVED_NAMES
+from cns_drake.recording import (
+    BagWriter,
+    McapRecorder,
+    RecordedSensor,
+    points_topic,
+    recording_topics,
+)
+from cns_drake.sensors import (
     ApplyImuConfig,
     ApplyLidarConfig,
     ApplyOdometryConfig,
     ImuConfig,
+    ImuNoise,
     LidarConfig,
     OdometryConfig,
+    add_imu,
+    add_lidar,
+    add_lidar_view,
+    add_odometry,
 )
-from cns_drake.sensors.imu.imu import add_imu
-from cns_drake.sensors.imu.noise import ImuNoise
-from cns_drake.sensors.lidar.adding import add_lidar, add_lidar_view
-from cns_drake.sensors.odometry.odometry import add_odometry
 
 X_PS = RigidTransform([0.0, 0.0, 1.0])
 BAD = (

@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 import numpy as np
 import pytest
 
-from cns_drake.simulation.simulation import simulate
+from cns_drake.simulation import simulate
 
 pytestmark = pytest.mark.slow
 

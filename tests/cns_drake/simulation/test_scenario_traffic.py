@@ -7,12 +7,14 @@ from helpers.small_map import write_small_map
 from helpers.tiny_drive import tiny_scenario, write_scenario
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.scenarios.planning import DrivePlan, plan_drive
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.scenarios.sections import TrafficConfig
-from cns_drake.simulation.loaded_drive import load_drive
-from cns_drake.simulation.scenario_traffic import plan_scenario_traffic
+from cns_drake.base import InputError
+from cns_drake.scenarios import (
+    DrivePlan,
+    TrafficConfig,
+    load_scenario,
+    plan_drive,
+)
+from cns_drake.simulation import load_drive, plan_scenario_traffic
 
 
 @pytest.fixture

@@ -7,18 +7,18 @@ from pydrake.math import RigidTransform
 import pytest
 from scipy.special import lambertw
 
-from cns_drake.drives.deskewing import deskew
-from cns_drake.recording.schedule import FRAME_PERIOD
-from cns_drake.scenarios.planning import DrivePlan, plan_drive
-from cns_drake.scenarios.scenario_files import make_scenario
-from cns_drake.scene.semantics import CLASS_IDS
-from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.sensors.lidar.config import WeatherConfig, make_pattern
-from cns_drake.sensors.returns.link_budget import HOPELESS_SNR
-from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
-from cns_drake.simulation.loaded_drive import load_drive
-from cns_drake.simulation.simulation import simulate
-from cns_drake.simulation.station import make_station
+from cns_drake.drives import deskew
+from cns_drake.recording import FRAME_PERIOD
+from cns_drake.scenarios import DrivePlan, make_scenario, plan_drive
+from cns_drake.scene import CLASS_IDS
+from cns_drake.sensors import (
+    HOPELESS_SNR,
+    UNIT_SHEETS,
+    WeatherConfig,
+    make_pattern,
+    sensor_pose,
+)
+from cns_drake.simulation import load_drive, make_station, simulate
 from evaluation.drives import open_drive
 
 # A tilted sensor off the vehicle's middle, so that no transform is trivial.

@@ -26,12 +26,15 @@ import pytest
 from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
-from cns_drake.sensors.imu.imu import add_imu
-from cns_drake.sensors.lidar.adding import add_lidar, add_lidar_view
-from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.lidar.presets import make_beam_pattern
-from cns_drake.sensors.odometry.odometry import add_odometry
-from cns_drake.simulation.sensor_recording import add_mcap_recorder
+from cns_drake.sensors import (
+    Lidar,
+    add_imu,
+    add_lidar,
+    add_lidar_view,
+    add_odometry,
+    make_beam_pattern,
+)
+from cns_drake.simulation import add_mcap_recorder
 from evaluation.drives import open_drive
 
 # Angular velocity of the arm [rad/s].

@@ -12,13 +12,17 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from cns_drake.drives.mcap_drive import McapDrive
-from cns_drake.sensors.imu.imu import NoisyImu, add_imu
-from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
-from cns_drake.sensors.lidar.adding import add_lidar
-from cns_drake.sensors.lidar.presets import make_beam_pattern
-from cns_drake.sensors.odometry.odometry import add_odometry
-from cns_drake.simulation.sensor_recording import add_mcap_recorder
+from cns_drake.drives import McapDrive
+from cns_drake.sensors import (
+    ImuErrors,
+    ImuNoise,
+    NoisyImu,
+    add_imu,
+    add_lidar,
+    add_odometry,
+    make_beam_pattern,
+)
+from cns_drake.simulation import add_mcap_recorder
 
 NOISE = ImuNoise(
     accelerometer_noise_density=0.02, gyroscope_random_walk=1e-3, seed=5

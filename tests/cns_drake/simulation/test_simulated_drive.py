@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 import yaml
 
-from cns_drake.base.errors import InputError
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.simulation.simulated_drive import SimulationSource
-from cns_drake.simulation.simulation import simulate
+from cns_drake.base import InputError
+from cns_drake.scenarios import load_scenario
+from cns_drake.simulation import SimulationSource, simulate
 from evaluation.drives import open_drive
-from evaluation.study.feature_extraction import extract_features
+from evaluation.study import extract_features
 
 
 def check_same(simulated, recorded, frames):

@@ -10,16 +10,17 @@ from mcap.reader import make_reader
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.drives.mcap_drive import McapDrive
-from cns_drake.export.marked_drive import MarkedDrive
-from cns_drake.scenarios.planning import DrivePlan
-from cns_drake.scenarios.provenance import digest_inputs
-from cns_drake.scenarios.scenario_files import describe_scenario, make_scenario
-from cns_drake.simulation.loaded_drive import load_drive
-from cns_drake.simulation.simulated_drive import SimulatedDrive
-from cns_drake.simulation.simulation import simulate
-from evaluation.change.tcr import temporal_change
+from cns_drake.base import InputError
+from cns_drake.drives import McapDrive
+from cns_drake.export import MarkedDrive
+from cns_drake.scenarios import (
+    DrivePlan,
+    describe_scenario,
+    digest_inputs,
+    make_scenario,
+)
+from cns_drake.simulation import SimulatedDrive, load_drive, simulate
+from evaluation.change import temporal_change
 
 
 @pytest.fixture(scope="module")

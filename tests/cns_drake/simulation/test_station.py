@@ -8,13 +8,11 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
-from cns_drake.recording.schedule import FRAME_PERIOD
-from cns_drake.scenarios.planning import DrivePlan
-from cns_drake.scenarios.scenario_files import make_scenario
-from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.simulation.loaded_drive import load_drive
-from cns_drake.simulation.station import make_station
+from cns_drake.pictures import MeshcatRecorder
+from cns_drake.recording import FRAME_PERIOD
+from cns_drake.scenarios import DrivePlan, make_scenario
+from cns_drake.sensors import sensor_pose
+from cns_drake.simulation import load_drive, make_station
 
 GRAVITY_W = np.array([0.0, 0.0, -9.81])
 

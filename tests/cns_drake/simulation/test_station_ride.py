@@ -5,10 +5,9 @@ from helpers.small_map import scenario_values
 import numpy as np
 import pytest
 
-from cns_drake.scenarios.scenario_files import make_scenario
-from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.simulation.simulated_drive import SimulationSource
-from cns_drake.simulation.station import make_station
+from cns_drake.scenarios import make_scenario
+from cns_drake.sensors import sensor_pose
+from cns_drake.simulation import SimulationSource, make_station
 
 
 def rough(small_map, **lidar):

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.drives.mcap_drive import McapDrive
-from cns_drake.export.exporting import export_drive
-from cns_drake.scene.semantics import MOVING_IDS
-from cns_drake.simulation.simulation import simulate
+from cns_drake.drives import McapDrive
+from cns_drake.export import export_drive
+from cns_drake.scene import MOVING_IDS
+from cns_drake.simulation import simulate
 
 pytestmark = pytest.mark.slow
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cns_drake.studies.experiments.experiment_files import load_experiment
+from cns_drake.studies import load_experiment
 
 
 @pytest.fixture(autouse=True)

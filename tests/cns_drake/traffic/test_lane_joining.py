@@ -7,10 +7,16 @@ import json
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.traffic.lane_file import lane_text, read_lanes
-from cns_drake.traffic.lane_graph import LaneGraph, Walkway, make_crossing
-from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
+from cns_drake.base import InputError
+from cns_drake.traffic import (
+    DirectedLane,
+    LaneGraph,
+    Walkway,
+    join_lanes,
+    lane_text,
+    make_crossing,
+    read_lanes,
+)
 
 
 def straight(start, end, limit=10.0, connects=False):

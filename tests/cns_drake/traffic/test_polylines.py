@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cns_drake.base.polylines import distances_along, length_of
-from cns_drake.traffic.polylines import resampled
+from cns_drake.base import distances_along, length_of
+from cns_drake.traffic import resampled
 
 # A 3-4-5 triangle's two short sides, and a vertical one of 2 m.
 CORNERS = np.array([[0, 0, 1], [3, 0, 1], [3, 4, 1], [3, 4, 3]], float)

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.traffic.road_lanes import make_lane_graph
-from cns_drake.traffic.road_walkways import make_walkways
+from cns_drake.traffic import make_lane_graph, make_walkways
 
 
 @pytest.fixture(scope="module")

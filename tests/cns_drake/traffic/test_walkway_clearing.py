@@ -7,8 +7,7 @@ import pytest
 import shapely
 import shapely.affinity
 
-from cns_drake.traffic.lane_graph import Walkway
-from cns_drake.traffic.walkway_clearing import kept_clear
+from cns_drake.traffic import Walkway, kept_clear
 
 
 def straight(length=20.0, half_width=1.0):

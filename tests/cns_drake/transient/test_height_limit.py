@@ -19,9 +19,8 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.city.geometry.models import part_mesh
-from cns_drake.city.growth.lowering import lowered
-from cns_drake.transient.structure_geometry import triangle_corners
+from cns_drake.city import lowered, part_mesh
+from cns_drake.transient import triangle_corners
 
 DRIVE = shapely.LineString([(X_WT @ [x, -1, 0])[:2] for x in (-60, 60)])
 # The parapet of a new roof, and the highest equipment on it [m].

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.city.geometry.object_models import ROOT_DEPTH
+from cns_drake.city import ROOT_DEPTH
 
 
 def kind_of(name):

@@ -4,11 +4,13 @@ from helpers.transient_town import DRIVE, LANES, in_town, new_things
 import numpy as np
 import pytest
 
-from cns_drake.scenarios.sections import TransientConfig
-from cns_drake.scene.world import load_world
-from cns_drake.transient.changing import change_world
-from cns_drake.transient.ground_surface import GroundSurface
-from cns_drake.transient.structure_geometry import geometry_by_structure
+from cns_drake.scenarios import TransientConfig
+from cns_drake.scene import load_world
+from cns_drake.transient import (
+    GroundSurface,
+    change_world,
+    geometry_by_structure,
+)
 
 
 def test_roadworks_leave_the_lanes_free(changed):

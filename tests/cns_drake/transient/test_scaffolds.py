@@ -12,7 +12,7 @@ from helpers.transient_town import (
 import numpy as np
 import pytest
 
-from cns_drake.city.geometry.object_models import ROOT_DEPTH
+from cns_drake.city import ROOT_DEPTH
 
 
 def test_every_front_along_the_drive_has_a_scaffold_at_one(changed):

@@ -3,9 +3,9 @@ import math
 import numpy as np
 import pytest
 
-from cns_drake.base.points import from_xyz
-from evaluation.change.tcr import covered, judge_points, temporal_change
-from evaluation.maps.voxel_maps import voxelise
+from cns_drake.base import from_xyz
+from evaluation.change import covered, judge_points, temporal_change
+from evaluation.maps import voxelise
 
 NO_POINTS = np.empty((0, 3))
 

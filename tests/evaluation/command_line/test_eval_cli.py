@@ -8,7 +8,7 @@ from helpers.internal.eval_program import assert_refused, run
 import numpy as np
 import pytest
 
-from evaluation.results.table import QueryRows, Results
+from evaluation.results import QueryRows, Results
 
 
 def test_the_protocol_is_the_users(capsys, towns):

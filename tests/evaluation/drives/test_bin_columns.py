@@ -4,9 +4,8 @@ from helpers.internal.eval_program import run
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
-from evaluation.clouds.bin_columns import find_layout
-from evaluation.clouds.cloud_files import read_cloud
+from cns_drake.base import InputError
+from evaluation.clouds import find_layout, read_cloud
 
 RNG = np.random.default_rng(5)
 NUM = 4000

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.poses import make_pose
+from cns_drake.base import InputError, make_pose
 from evaluation import Drive, compare_drives
-from evaluation.drives.comparison import DriveComparison
+from evaluation.drives import DriveComparison
 
 RNG_SEED = 20260
 

@@ -9,7 +9,7 @@ from helpers.mcap_bytes import edit_summary
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from evaluation.drives import open_drive
 
 

@@ -2,8 +2,8 @@ from helpers.drive_files import make_scan, yaw_pose
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
-from evaluation.drives.scan_clouds import cropped, cropped_with_fields
+from cns_drake.base import InputError
+from evaluation.drives import cropped, cropped_with_fields
 
 
 def random_scan(number, seed=3):

@@ -4,8 +4,8 @@ from helpers.drive_files import T0_NS, write_recording, yaw_pose
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.drives.deskewing import deskew
+from cns_drake.base import InputError
+from cns_drake.drives import deskew
 from evaluation.drives import open_drive
 
 NUM = 200

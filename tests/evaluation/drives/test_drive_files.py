@@ -19,10 +19,9 @@ from helpers.drive_files import make_scan, write_recording
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.file_digests import file_digests
+from cns_drake.base import InputError, file_digests
 from evaluation.drives import open_drive
-from evaluation.study.sources import RecordingSource
+from evaluation.study import RecordingSource
 
 MATRIX = "matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1.6, 0, 0, 0, 1]\n"
 _opened: list[str] | None = None

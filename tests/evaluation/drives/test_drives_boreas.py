@@ -6,9 +6,9 @@ from helpers.dataset_folders import stored, write_bytes
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from evaluation.drives import open_drive
-from evaluation.study.recordings.recording_search import find_recordings
+from evaluation.study import find_recordings
 
 T0_US = 1_628_184_886_518_266
 HEADER = (

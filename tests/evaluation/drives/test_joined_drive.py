@@ -5,13 +5,11 @@ from functools import partial
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.points import from_xyz
-from cns_drake.drives.drive import Drive
-from evaluation.drives.joined_drive import JoinedDrive
-from evaluation.localisation.localisation_map import make_map, map_frames
-from evaluation.localisation.settings import Settings
-from evaluation.recognition.descriptors import DescribedScans, joined_scans
+from cns_drake.base import InputError, from_xyz
+from cns_drake.drives import Drive
+from evaluation.drives import JoinedDrive
+from evaluation.localisation import Settings, make_map, map_frames
+from evaluation.recognition import DescribedScans, joined_scans
 
 
 class Straight(Drive):

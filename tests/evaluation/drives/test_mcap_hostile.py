@@ -11,8 +11,8 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, IndexType
 import pytest
 import zstandard
 
-from cns_drake.base.errors import InputError
-from cns_drake.drives.mcap_file import CHUNK_LIMIT_BYTES, McapFile
+from cns_drake.base import InputError
+from cns_drake.drives import CHUNK_LIMIT_BYTES, McapFile
 
 # Behind the magic bytes and the header.
 START = len(MCAP0_MAGIC) + 9 + 4 + 4 + len("test")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cns_drake.base.points import from_xyz
-from evaluation.maps.voxel_maps import downsample, voxelise
+from cns_drake.base import from_xyz
+from evaluation.maps import downsample, voxelise
 
 
 def test_thin():

@@ -3,8 +3,7 @@ import numpy as np
 import pytest
 
 from evaluation.drives import open_drive
-from evaluation.maps.mapped_drive import MappedDrive
-from evaluation.maps.voxel_maps import CELL_SIZE, map_drive
+from evaluation.maps import CELL_SIZE, MappedDrive, map_drive
 
 
 @pytest.fixture

@@ -3,9 +3,9 @@ from helpers.listening import listening
 import numpy as np
 import pytest
 
-from cns_drake.base.points import from_xyz
+from cns_drake.base import from_xyz
 from evaluation.drives import open_drive
-from evaluation.maps.voxel_maps import VoxelAccumulator, map_drive, voxelise
+from evaluation.maps import VoxelAccumulator, map_drive, voxelise
 
 
 def reference_map(points, voxel_size):

@@ -1,6 +1,6 @@
 import numpy as np
 
-from evaluation.maps.thumbnails import MAX_POINTS, thumbnail
+from evaluation.maps import MAX_POINTS, thumbnail
 
 
 def test_cells_and_heights():

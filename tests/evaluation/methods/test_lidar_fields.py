@@ -6,12 +6,11 @@ from helpers.internal.eval_program import make_block_scene, run
 import numpy as np
 import pytest
 
-from cns_drake.drives.lidar_fields import LidarField, lidar_field
-from cns_drake.sensors.lidar.patterns import SpinningPattern
-from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
+from cns_drake.drives import LidarField, lidar_field
+from cns_drake.sensors import LIDAR_PRESETS, SpinningPattern
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
-from evaluation.recognition.describing import describe_drive
+from evaluation.recognition import describe_drive
 
 POINTS = np.random.default_rng(2).uniform(-40.0, 40.0, (3000, 3))
 

@@ -5,12 +5,10 @@ from helpers.measured_pairs import place_outcome
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
-from evaluation.recognition.retrieval import retrieve
-from evaluation.recognition.scan_folders import write_scores
-from evaluation.recognition.scoring import score_places
+from evaluation.recognition import retrieve, score_places, write_scores
 
 
 def record(folder, heights, y=0.0):

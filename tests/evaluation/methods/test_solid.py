@@ -3,9 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
-from evaluation.methods import make_method
-from evaluation.methods.solid import SolidMethod
+from cns_drake.base import InputError
+from evaluation.methods import SolidMethod, make_method
 
 
 def solid(**parameters) -> SolidMethod:

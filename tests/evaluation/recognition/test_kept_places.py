@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
-from evaluation.recognition.place_selection import checked_keep, kept_places
+from cns_drake.base import InputError
+from evaluation.recognition import checked_keep, kept_places
 
 CELL = 5.0
 

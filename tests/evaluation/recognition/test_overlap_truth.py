@@ -10,13 +10,16 @@ from helpers.measured_pairs import place_outcome
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
-from evaluation.recognition.overlap_truth import overlap_matrix
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.retrieval import retrieve
-from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
+from evaluation.recognition import (
+    TOLERANCE,
+    RetrievalProtocol,
+    SeenSurfaces,
+    overlap_matrix,
+    retrieve,
+)
 
 # Beams are a degree apart and miss the borders of cells.
 AZIMUTH, ELEVATION = np.radians(

@@ -8,15 +8,15 @@ from helpers.measured_pairs import place_outcome
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
+from cns_drake.base import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
-from evaluation.recognition.protocol import (
+from evaluation.recognition import (
     PAPER_PROTOCOL,
     ProtocolFieldError,
     RetrievalProtocol,
+    retrieve,
 )
-from evaluation.recognition.retrieval import retrieve
 
 
 class Means(Method):

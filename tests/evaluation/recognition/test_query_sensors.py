@@ -8,24 +8,21 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.poses import make_pose, transform
-from evaluation.drives import open_drive
-from evaluation.drives.query_sensor import QuerySensor
-from evaluation.drives.scan_clouds import cloud_at
+from cns_drake.base import InputError, make_pose, transform
+from evaluation.drives import QuerySensor, cloud_at, open_drive
 from evaluation.methods import (
     Method,
     MethodConfig,
+    align,
     make_method,
 )
-from evaluation.methods.btc_verification import align
-from evaluation.recognition.describing import describe_drive
-from evaluation.recognition.protocol import (
+from evaluation.recognition import (
     FAIR_PROTOCOL,
     PAPER_PROTOCOL,
     RetrievalProtocol,
+    describe_drive,
+    retrieve,
 )
-from evaluation.recognition.retrieval import retrieve
 
 P_WL = np.random.default_rng(5).uniform(-30.0, 30.0, (200, 3))
 TURNED = RetrievalProtocol(turn_queries=True, tilt_queries=20.0)

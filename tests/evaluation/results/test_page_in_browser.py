@@ -3,8 +3,7 @@
 from helpers.browser import chromium, has_chromium
 import pytest
 
-from evaluation.results.page import write_page
-from evaluation.results.table import Results, Row
+from evaluation.results import Results, Row, write_page
 
 pytestmark = [
     pytest.mark.slow,

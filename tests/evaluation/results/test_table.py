@@ -6,9 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from cns_drake.base.errors import InputError
-from evaluation.results.keys import Key
-from evaluation.results.table import Answers, QueryRows, Results, Row
+from cns_drake.base import InputError
+from evaluation.results import Answers, Key, QueryRows, Results, Row
 
 FACTOR = "query.transient.snow"
 HEADER = (

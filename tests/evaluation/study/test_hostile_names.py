@@ -6,8 +6,8 @@ from helpers.internal import studies
 from helpers.small_towns import drive
 import pytest
 
-from cns_drake.base.files import file_name
-from evaluation.study.chosen_methods import MethodChoice
+from cns_drake.base import file_name
+from evaluation.study import MethodChoice
 
 STAGE = r"../../../../evil|$\frac{_%# <b>&"
 MAP = "..|[x](y)_$"

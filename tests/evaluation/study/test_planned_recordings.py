@@ -6,10 +6,9 @@ import pickle
 from helpers.internal import studies
 import pytest
 
-from cns_drake.base.errors import InputError
-from evaluation.recognition.protocol import PROTOCOLS
-from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.recordings.map_drives import RecordingInfo, drives_by_map
+from cns_drake.base import InputError
+from evaluation.recognition import PROTOCOLS
+from evaluation.study import RecordingInfo, choose_methods, drives_by_map
 
 
 def info(name, stage, route="a", city="metropolis", needs=()):

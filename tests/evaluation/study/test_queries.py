@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from evaluation import QueryRows, Results
-from evaluation.recognition.bootstrap import route_blocks
-from evaluation.recognition.precision_recall import pr_curve
-from evaluation.results.keys import OWN, STAGE
-from evaluation.study.chosen_methods import choose_methods
+from evaluation.recognition import pr_curve, route_blocks
+from evaluation.results import OWN, STAGE
+from evaluation.study import choose_methods
 
 pytestmark = pytest.mark.slow
 

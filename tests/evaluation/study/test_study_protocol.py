@@ -4,9 +4,9 @@ from helpers.internal import studies
 from helpers.small_towns import drive
 import pytest
 
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.table import Results
-from evaluation.study.chosen_methods import MethodChoice
+from evaluation.recognition import RetrievalProtocol
+from evaluation.results import Results
+from evaluation.study import MethodChoice
 
 pytestmark = [
     pytest.mark.slow,

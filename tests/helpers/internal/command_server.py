@@ -28,12 +28,10 @@ import tempfile
 from _pytest.monkeypatch import MonkeyPatch
 
 import cns_drake
+from cns_drake.base import ALLOCATION, code_digest, collect_garbage_seldom
 from cns_drake.base.compilation import start_compiler
 from cns_drake.base.jobs import processes
-from cns_drake.base.jobs.fingerprint import code_digest
-from cns_drake.base.jobs.processes import ALLOCATION
-from cns_drake.base.process import collect_garbage_seldom
-from cns_drake.simulation.simulation import simulate
+from cns_drake.simulation import simulate
 from evaluation.study import chosen_methods
 from helpers.internal.studies import leave_figures_unrendered
 from helpers.tiny_drive import tiny_scenario

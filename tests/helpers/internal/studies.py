@@ -10,15 +10,16 @@ from matplotlib.figure import Figure
 import numpy as np
 import pytest
 
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.processes import nothing_left
-from cns_drake.base.jobs.step import Reporter
-from cns_drake.pictures.stage_scene import StageScene
-from evaluation.recognition.protocol import FAIR_PROTOCOL
-from evaluation.study import chosen_methods, engine
-from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.recorded_study import study_recordings
-from evaluation.study.recordings.recording_search import find_recordings
+from cns_drake.base import Cluster, Reporter, nothing_left
+from cns_drake.pictures import StageScene
+from evaluation.recognition import FAIR_PROTOCOL
+from evaluation.study import (
+    choose_methods,
+    chosen_methods,
+    engine,
+    find_recordings,
+    study_recordings,
+)
 
 
 def do(jobs):

@@ -1,6 +1,6 @@
 """Fields of experiments."""
 
-from cns_drake.studies.experiments.experiment import named_programs
+from cns_drake.studies import named_programs
 
 
 def test_lists_of_whole_numbers_can_be_spread(read):

@@ -3,16 +3,19 @@
 import numpy as np
 import pytest
 
-from cns_drake.base.jobs.step import Reporter
+from cns_drake.base import Reporter
 from evaluation.drives import open_drive
-from evaluation.localisation.estimators import make_estimator
-from evaluation.localisation.initial_poses import Starts
-from evaluation.localisation.localisation_map import make_map
-from evaluation.localisation.localiser import Localiser, localise
-from evaluation.localisation.results import COLUMNS, localisation_summary
-from evaluation.localisation.settings import default_settings
-from evaluation.study.sources import RecordingSource
-from evaluation.study.tasks.localise import LocaliseTask, measure_localisation
+from evaluation.localisation import (
+    COLUMNS,
+    Localiser,
+    Starts,
+    default_settings,
+    localisation_summary,
+    localise,
+    make_estimator,
+    make_map,
+)
+from evaluation.study import LocaliseTask, RecordingSource, measure_localisation
 
 STARTS = (Starts(0.5, 5.0), Starts(2.0, 10.0))
 

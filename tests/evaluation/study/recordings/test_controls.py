@@ -3,9 +3,8 @@
 from helpers.small_towns import ROUTES, drive
 import pytest
 
-from cns_drake.drives.drive_scenario import driven_way
-from evaluation.study.recordings.map_drives import drives_by_map
-from evaluation.study.recordings.recording_search import find_recordings
+from cns_drake.drives import driven_way
+from evaluation.study import drives_by_map, find_recordings
 
 LEGS = ROUTES["a"]
 

@@ -1,0 +1,2 @@
+from cns_drake.export.exporting import export_drive as export_drive
+from cns_drake.export.marked_drive import MarkedDrive as MarkedDrive

@@ -1,0 +1,30 @@
+from evaluation.drives.cns_folder import holds_cns as holds_cns
+from evaluation.drives.comparison import DriveComparison as DriveComparison
+from evaluation.drives.comparison import Driving as Driving
+from evaluation.drives.comparison import compare_drives as compare_drives
+from evaluation.drives.drive_views import CountedDrive as CountedDrive
+from evaluation.drives.drive_views import DriveView as DriveView
+from evaluation.drives.drive_views import MovedDrive as MovedDrive
+from evaluation.drives.drive_views import RecentScans as RecentScans
+from evaluation.drives.helipr import read_helipr_scan as read_helipr_scan
+from evaluation.drives.joined_drive import JoinedDrive as JoinedDrive
+from evaluation.drives.kitti import holds_kitti as holds_kitti
+from evaluation.drives.mulran import MulranDrive as MulranDrive
+from evaluation.drives.nclt import read_nclt_scan as read_nclt_scan
+from evaluation.drives.opening import find_readers as find_readers
+from evaluation.drives.opening import open_drive as open_drive
+from evaluation.drives.query_sensor import QuerySensor as QuerySensor
+from evaluation.drives.sampling import sample_frames as sample_frames
+from evaluation.drives.sampling import travelled as travelled
+from evaluation.drives.scan_clouds import cloud_at as cloud_at
+from evaluation.drives.scan_clouds import cropped as cropped
+from evaluation.drives.scan_clouds import (
+    cropped_with_fields as cropped_with_fields,
+)
+from evaluation.drives.scan_clouds import within_range as within_range
+from evaluation.drives.scan_files import BinDrive as BinDrive
+from evaluation.drives.scan_files import FileDrive as FileDrive
+from evaluation.drives.text_tables import parse_seconds as parse_seconds
+from evaluation.drives.trajectories import StampedPoses as StampedPoses
+from evaluation.drives.trajectories import read_poses as read_poses
+from evaluation.drives.trajectories import read_quaternions as read_quaternions

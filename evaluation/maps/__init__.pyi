@@ -1,0 +1,17 @@
+from evaluation.maps.grid_cells import CELLS_PER_AXIS as CELLS_PER_AXIS
+from evaluation.maps.grid_cells import cell_keys as cell_keys
+from evaluation.maps.grid_cells import extremes as extremes
+from evaluation.maps.grid_cells import packed_cells as packed_cells
+from evaluation.maps.mapped_drive import MappedDrive as MappedDrive
+from evaluation.maps.thumbnails import CELL as CELL
+from evaluation.maps.thumbnails import HEIGHT_STEP as HEIGHT_STEP
+from evaluation.maps.thumbnails import MAX_POINTS as MAX_POINTS
+from evaluation.maps.thumbnails import thumbnail as thumbnail
+from evaluation.maps.voxel_maps import CELL_SIZE as CELL_SIZE
+from evaluation.maps.voxel_maps import VOXEL_SIZE as VOXEL_SIZE
+from evaluation.maps.voxel_maps import Z_ORIGIN as Z_ORIGIN
+from evaluation.maps.voxel_maps import VoxelAccumulator as VoxelAccumulator
+from evaluation.maps.voxel_maps import VoxelMap as VoxelMap
+from evaluation.maps.voxel_maps import downsample as downsample
+from evaluation.maps.voxel_maps import map_drive as map_drive
+from evaluation.maps.voxel_maps import voxelise as voxelise

@@ -1,0 +1,1 @@
+from evaluation.paper.section import paper_section as paper_section

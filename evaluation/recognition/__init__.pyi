@@ -1,0 +1,113 @@
+from evaluation.recognition.bootstrap import UNKNOWN as UNKNOWN
+from evaluation.recognition.bootstrap import Interval as Interval
+from evaluation.recognition.bootstrap import paired_samples as paired_samples
+from evaluation.recognition.bootstrap import (
+    percentile_interval as percentile_interval,
+)
+from evaluation.recognition.bootstrap import (
+    resampled_metrics as resampled_metrics,
+)
+from evaluation.recognition.bootstrap import (
+    resampled_weights as resampled_weights,
+)
+from evaluation.recognition.bootstrap import route_blocks as route_blocks
+from evaluation.recognition.bootstrap import (
+    weights_by_drive as weights_by_drive,
+)
+from evaluation.recognition.costs import NUM_TRIALS as NUM_TRIALS
+from evaluation.recognition.costs import Cost as Cost
+from evaluation.recognition.costs import QueryCost as QueryCost
+from evaluation.recognition.costs import measure_cost as measure_cost
+from evaluation.recognition.costs import measure_search as measure_search
+from evaluation.recognition.costs import query_ms as query_ms
+from evaluation.recognition.describing import Request as Request
+from evaluation.recognition.describing import Role as Role
+from evaluation.recognition.describing import describe_drive as describe_drive
+from evaluation.recognition.descriptors import DescribedScans as DescribedScans
+from evaluation.recognition.descriptors import (
+    DriveDescriptors as DriveDescriptors,
+)
+from evaluation.recognition.descriptors import joined_scans as joined_scans
+from evaluation.recognition.faults import FAULTS as FAULTS
+from evaluation.recognition.metrics import MODES as MODES
+from evaluation.recognition.metrics import Mode as Mode
+from evaluation.recognition.metrics import (
+    PlaceRecognitionMetrics as PlaceRecognitionMetrics,
+)
+from evaluation.recognition.metrics import evaluate as evaluate
+from evaluation.recognition.metrics import main_metrics as main_metrics
+from evaluation.recognition.overlap_truth import (
+    compared_frames as compared_frames,
+)
+from evaluation.recognition.overlap_truth import (
+    overlap_matrix as overlap_matrix,
+)
+from evaluation.recognition.overlap_truth import (
+    overlaps_with_best_match as overlaps_with_best_match,
+)
+from evaluation.recognition.overlap_truth import read_overlaps as read_overlaps
+from evaluation.recognition.overlap_truth import (
+    write_overlaps as write_overlaps,
+)
+from evaluation.recognition.place_metrics import kept_share as kept_share
+from evaluation.recognition.place_metrics import place_numbers as place_numbers
+from evaluation.recognition.place_metrics import pose_numbers as pose_numbers
+from evaluation.recognition.place_outcome import PlaceOutcome as PlaceOutcome
+from evaluation.recognition.place_outcome import QueryDrive as QueryDrive
+from evaluation.recognition.place_outcome import (
+    check_has_match as check_has_match,
+)
+from evaluation.recognition.place_selection import KEEP_ALL as KEEP_ALL
+from evaluation.recognition.place_selection import checked_keep as checked_keep
+from evaluation.recognition.place_selection import kept_places as kept_places
+from evaluation.recognition.pose_errors import (
+    SUCCESS_ROTATION_DEG as SUCCESS_ROTATION_DEG,
+)
+from evaluation.recognition.pose_errors import (
+    SUCCESS_TRANSLATION as SUCCESS_TRANSLATION,
+)
+from evaluation.recognition.pose_errors import PoseErrors as PoseErrors
+from evaluation.recognition.pose_errors import PoseMetrics as PoseMetrics
+from evaluation.recognition.pose_errors import pose_error as pose_error
+from evaluation.recognition.precision_recall import pr_curve as pr_curve
+from evaluation.recognition.protocol import FAIR_PROTOCOL as FAIR_PROTOCOL
+from evaluation.recognition.protocol import PAPER_PROTOCOL as PAPER_PROTOCOL
+from evaluation.recognition.protocol import PROTOCOL_NAMES as PROTOCOL_NAMES
+from evaluation.recognition.protocol import PROTOCOLS as PROTOCOLS
+from evaluation.recognition.protocol import (
+    RECORDED_PROTOCOL as RECORDED_PROTOCOL,
+)
+from evaluation.recognition.protocol import (
+    ProtocolFieldError as ProtocolFieldError,
+)
+from evaluation.recognition.protocol import (
+    RetrievalProtocol as RetrievalProtocol,
+)
+from evaluation.recognition.protocol_options import (
+    with_protocol as with_protocol,
+)
+from evaluation.recognition.protocol_options import (
+    with_protocols as with_protocols,
+)
+from evaluation.recognition.query_outcomes import QueryOutcomes as QueryOutcomes
+from evaluation.recognition.query_outcomes import judge as judge
+from evaluation.recognition.result_number import Number as Number
+from evaluation.recognition.retrieval import Retrieval as Retrieval
+from evaluation.recognition.retrieval import (
+    compare_with_gates as compare_with_gates,
+)
+from evaluation.recognition.retrieval import (
+    matches_within_radius as matches_within_radius,
+)
+from evaluation.recognition.retrieval import retrieve as retrieve
+from evaluation.recognition.roc import auroc as auroc
+from evaluation.recognition.scan_folders import write_scores as write_scores
+from evaluation.recognition.scoring import score_places as score_places
+from evaluation.recognition.seen_surfaces import TOLERANCE as TOLERANCE
+from evaluation.recognition.seen_surfaces import SeenSurfaces as SeenSurfaces
+from evaluation.recognition.significance import Difference as Difference
+from evaluation.recognition.significance import (
+    compared_by_auc as compared_by_auc,
+)
+from evaluation.recognition.stored_places import MOST_BYTES as MOST_BYTES
+from evaluation.recognition.stored_places import StoredDrives as StoredDrives

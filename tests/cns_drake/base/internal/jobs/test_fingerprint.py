@@ -1,0 +1,286 @@
+"""Fingerprints: the code that a result depends on."""
+
+import ast
+import importlib.metadata
+import shutil
+import subprocess
+import sys
+
+from helpers.documents import ROOT
+import pytest
+
+from cns_drake.base import code_digest, fingerprint, script_digest
+from cns_drake.base.jobs import fingerprint as fingerprints
+
+EXTRACTION = "evaluation.study.feature_extraction"
+SIMULATION = "cns_drake.simulation.simulation"
+SOURCES = {
+    "evaluation/__init__.py": "import sys\n",
+    "evaluation/top.py": """
+from __future__ import annotations
+from typing import TYPE_CHECKING
+from . import level
+from .inner import first
+from evaluation.inner.second import *
+import evaluation.inner.third as third, evaluation.fourth
+if TYPE_CHECKING:
+    from evaluation import types_only
+else:
+    from evaluation import otherwise
+def late():
+    try:
+        with open("page.css") as stream:
+            from evaluation.inner import offered
+    except ImportError:
+        import evaluation.fallback
+""",
+    "evaluation/inner/__init__.py": "import evaluation.initial\n",
+    # A name that another package offers, too.
+    "evaluation/inner/__init__.pyi": """
+from evaluation.door import offered
+from evaluation.unasked import other
+""",
+    "evaluation/door/__init__.py": "",
+    "evaluation/door/__init__.pyi": """
+from evaluation.hidden import offered, unasked
+""",
+    "evaluation/page.css": "",
+    "evaluation/page.js": "",
+    "evaluation/unrelated.py": "",
+}
+COUNTED = {
+    "evaluation/inner/first.py": "from .deep import deeper",
+    "evaluation/inner/deep/deeper.py": "from ...fifth import one",
+    "evaluation/inner/deep/__init__.py": "",
+    **{
+        f"evaluation/{name}.py": ""
+        for name in (
+            "level", "inner/second", "inner/third", "fourth", "fifth",
+            "initial", "otherwise", "hidden", "fallback",
+        )
+    },
+}  # fmt: skip
+NOT_COUNTED = {
+    f"evaluation/{name}.py": ""
+    for name in ("types_only", "unasked", "inner/unasked", "sys")
+}
+
+
+@pytest.fixture
+def packages(tmp_path, monkeypatch):
+    """A folder from which packages are imported."""
+    monkeypatch.setattr(fingerprints, "_ROOT", tmp_path)
+    code_digest.cache_clear()
+    yield tmp_path
+    code_digest.cache_clear()
+
+
+def differs(file, module, change="\nchanged = True\n", **options):
+    """Returns whether the digest of a module changes with a file."""
+    code_digest.cache_clear()
+    before = code_digest(module, **options)
+    content = file.read_text()
+    file.write_text(content + change)
+    code_digest.cache_clear()
+    after = code_digest(module, **options)
+    file.write_text(content)
+    return after != before
+
+
+def test_every_kind_of_import_counts(packages):
+    for name, text in (SOURCES | COUNTED | NOT_COUNTED).items():
+        path = packages / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    changing = {
+        path.relative_to(packages).as_posix()
+        for path in sorted(packages.rglob("*.*"))
+        if differs(path, "evaluation.top")
+    }
+    expected = {*SOURCES, *COUNTED} - {
+        "evaluation/inner/__init__.pyi",
+        "evaluation/door/__init__.pyi",
+        "evaluation/unrelated.py",
+        "evaluation/page.js",
+    }
+    assert changing == expected
+    # All modules of a package.
+    assert differs(packages / "evaluation/inner/unasked.py", "evaluation.*")
+    assert not differs(
+        packages / "evaluation/inner/first.py",
+        "evaluation.top",
+        without=("evaluation.inner",),
+    )
+
+
+@pytest.mark.parametrize(
+    "end",
+    [
+        "",
+        "import b",
+        "import b\n",
+        "import b; c = 1\n",
+        "if a: import b\n",
+        "try:\n    import b\nexcept ImportError:\n    c = 1\n",
+        "from b import (\nc,\n)\nd = 1\n",
+        "import b, \\\nc\nd = 1\n",
+        "from b \\\nimport c\nd = 1\n",
+        "def b():\n    import c\n\n    return 'import'\n",
+        'b = """\nimport c\nd\n"""\nimport e\nf = """\nimport\ng"""\n',
+        "import b\r\nc = 1\r\n",
+        "import b\rimport c\rd = 1\r",
+        "# import\nb = 1\n",
+    ],
+)
+@pytest.mark.parametrize("start", ["", "import a\n", "a = 1\n"])
+def test_every_import_of_a_source_is_found(start, end):
+    found = fingerprints._find_imports((start + end).encode(), "evaluation")
+    expected = [
+        (node.module, name.name)
+        if isinstance(node, ast.ImportFrom)
+        else (name.name, "")
+        for node in ast.walk(ast.parse(start + end))
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for name in node.names
+    ]
+    assert sorted(found) == sorted(expected)
+
+
+def test_packages_of_others_beside_ours_do_not_count(packages):
+    """Installed, ours stand in `site-packages`; a script there does, too."""
+    files = {
+        "evaluation/top.py": "import others.core\nfrom alone import one\n",
+        "others/__init__.py": "",
+        "others/core.py": "from .more import one\n",
+        "others/more.py": "one = 1\n",
+        "alone.py": "one = 1\n",
+        "script.py": "import evaluation.top\nimport helper\n",
+        "helper.py": "import others\n",
+    }
+    for name, text in files.items():
+        path = packages / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+
+    def changing(digest):
+        found = set()
+        for name, text in files.items():
+            code_digest.cache_clear()
+            before = digest()
+            (packages / name).write_text(text + "# Changed.\n")
+            code_digest.cache_clear()
+            if digest() != before:
+                found.add(name)
+            (packages / name).write_text(text)
+        return found
+
+    ours = {"evaluation/top.py"}
+    assert changing(lambda: code_digest("evaluation.top")) == ours
+    assert changing(lambda: script_digest(packages / "script.py")) == {
+        *ours, "script.py", "helper.py", "others/__init__.py"
+    }  # fmt: skip
+
+
+def test_line_ends_do_not_count(packages):
+    path = packages / "evaluation" / "top.py"
+    path.parent.mkdir()
+    path.write_bytes(b"one\ntwo\n")
+    before = code_digest("evaluation.top")
+    path.write_bytes(b"one\r\ntwo\r\n")
+    code_digest.cache_clear()
+    assert code_digest("evaluation.top") == before
+
+
+def test_versions_of_libraries_count(packages, monkeypatch):
+    (packages / "evaluation").mkdir()
+    (packages / "evaluation" / "top.py").write_text("import numpy\n")
+    before = code_digest("evaluation.top")
+    version = importlib.metadata.version
+    for library in ("numpy", "scipy", "drake"):
+        monkeypatch.setattr(
+            importlib.metadata,
+            "version",
+            lambda name, library=library: (
+                "9.9.9" if name == library else version(name)
+            ),
+        )
+        code_digest.cache_clear()
+        assert code_digest("evaluation.top") != before
+
+
+@pytest.mark.slow
+def test_of_our_own_code_the_right_modules_count(packages):
+    for name in ("cns_drake", "evaluation"):
+        shutil.copytree(
+            ROOT / name,
+            packages / name,
+            ignore=shutil.ignore_patterns("__pycache__"),
+        )
+    for path, counts, module in (
+        ("cns_drake/sensors/lidar/presets.py", True, SIMULATION),
+        ("cns_drake/sensors/lidar/presets.py", False, EXTRACTION),
+        ("evaluation/methods/btc.py", True, EXTRACTION),
+        ("evaluation/methods/btc.py", False, SIMULATION),
+        ("evaluation/results/page_template/frame.css", False, EXTRACTION),
+        ("evaluation/results/page_template/frame.css", True, "evaluation.*"),
+        ("cns_drake/pictures/page_template/drive.css", True, SIMULATION),
+        ("cns_drake/base/progress_display.py", False, EXTRACTION),
+    ):
+        assert differs(packages / path, module) == counts, (path, module)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "module",
+    [
+        EXTRACTION,
+        pytest.param("evaluation.study.recorded_city", marks=pytest.mark.night),
+        pytest.param(
+            "cns_drake.simulation.simulated_drive", marks=pytest.mark.night
+        ),
+        "cns_drake.studies.recordings.recording",
+    ],
+)
+def test_what_python_imports_is_found_in_the_sources(module, monkeypatch):
+    script = (
+        f"import sys, {module}\n"
+        "for name, module in sys.modules.items():\n"
+        "    if name.startswith(('cns_drake.', 'evaluation.')):\n"
+        "        print(name)"
+    )
+    loaded = subprocess.run(
+        [sys.executable, "-c", script],
+        check=True,
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+    ).stdout.split()
+    assert module in loaded
+    named = [fingerprints._Module(ROOT, module)]
+    found = fingerprints._source_files(named, ())
+    assert {f"{name}.py" for name in loaded} <= found.keys()
+
+
+def test_a_script_counts_with_the_modules_beside_it(tmp_path):
+    path = tmp_path / "own.py"
+    path.write_text("import own_help\nfrom evaluation.methods import Method\n")
+    (tmp_path / "own_help.py").write_text("from own_parts import one\n")
+    (tmp_path / "own_parts").mkdir()
+    (tmp_path / "own_parts/__init__.py").write_text("from .core import one\n")
+    (tmp_path / "own_parts/core.py").write_text("one = 1\n")
+    (tmp_path / "unused.py").write_text("")
+    before = script_digest(path)
+    for file in sorted(tmp_path.rglob("*.py")):
+        text = file.read_text()
+        file.write_text(text + "\n# Changed.\n")
+        assert (script_digest(path) != before) == (file.name != "unused.py")
+        file.write_text(text)
+    path.write_text("no Python at all")
+    assert script_digest(path) != before
+
+
+def test_inputs_in_another_order_are_the_same():
+    assert fingerprint({"a": 1, "b": [2.5, None]}) == fingerprint(
+        {"b": (2.5, None), "a": 1}
+    )
+    assert fingerprint({"a": 1}) != fingerprint({"a": 2})

@@ -1,0 +1,142 @@
+"""Interrupts at different moments, and how they end a process."""
+
+import os
+import signal
+import threading
+
+import pytest
+
+from cns_drake.base import (
+    interrupt_on_termination,
+    interrupts_wait,
+    uninterrupted,
+)
+
+
+@pytest.fixture
+def handlers():
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+def interrupt_and_go_on(number, done):
+    with uninterrupted():
+        os.kill(os.getpid(), number)
+        done.append("all of it")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupts_wait(handlers, number):
+    interrupt_on_termination()
+    done = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupt_and_go_on(number, done)
+    assert done
+    with pytest.raises(KeyboardInterrupt):
+        os.kill(os.getpid(), number)
+
+
+def test_interrupts_wait_for_the_outermost_block(handlers):
+    done = []
+
+    def interrupt_within():
+        with uninterrupted():
+            interrupt_and_go_on(signal.SIGINT, done)
+            done.append("the rest")
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupt_within()
+    assert len(done) == 2
+
+
+def test_an_exception_gives_way_to_the_interrupt(handlers):
+    def interrupt_and_fail():
+        with uninterrupted():
+            os.kill(os.getpid(), signal.SIGINT)
+            raise ImportError
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupt_and_fail()
+
+
+def test_a_second_termination_does_not_interrupt_the_closing(handlers):
+    interrupt_on_termination(once=True)
+    with pytest.raises(KeyboardInterrupt):
+        os.kill(os.getpid(), signal.SIGTERM)
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_strikes_where_it_may(handlers, number):
+    interrupt_on_termination()
+    done = []
+
+    def work():
+        with interrupts_wait() as strike:
+            strike()
+            os.kill(os.getpid(), number)
+            done.append("goes on")
+            strike()
+            done.append("never")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["goes on"]
+    with pytest.raises(KeyboardInterrupt):
+        os.kill(os.getpid(), number)
+
+
+def test_a_second_interrupt_strikes_at_once_and_a_third_does_not(handlers):
+    done = []
+
+    def work():
+        with interrupts_wait() as strike:
+            os.kill(os.getpid(), signal.SIGINT)
+            done.append("goes on")
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+                done.append("never")
+            finally:
+                os.kill(os.getpid(), signal.SIGINT)
+                strike()
+                done.append("closes")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["goes on", "closes"]
+
+
+def test_an_interrupt_that_found_no_place_strikes_at_the_end(handlers):
+    done = []
+
+    def work():
+        with interrupts_wait():
+            os.kill(os.getpid(), signal.SIGINT)
+            done.append("all of it")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done
+
+
+def test_ignored_signals_stay_ignored(handlers):
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    with interrupts_wait() as strike:
+        os.kill(os.getpid(), signal.SIGTERM)
+        strike()
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_IGN
+
+
+def test_other_threads_have_no_signals_to_wait_for():
+    done = []
+
+    def work():
+        with interrupts_wait() as strike:
+            strike()
+            done.append("all of it")
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert done

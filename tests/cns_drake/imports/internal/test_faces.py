@@ -1,0 +1,101 @@
+"""Faces against known areas and normals."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cns_drake.imports import ImportFaults
+from cns_drake.imports.faces import face_triangles
+
+# An L with a square hole, counter-clockwise; 12 - 1 = 11 m^2.
+OUTER = [(0, 0), (4, 0), (4, 2), (2, 2), (2, 4), (0, 4)]
+HOLE = [(0.5, 0.5), (0.5, 1.5), (1.5, 1.5), (1.5, 0.5)]
+
+
+def ring(xy, X=None):
+    points = np.column_stack([np.array(xy, float), np.zeros(len(xy))])
+    return points if X is None else points @ X.T
+
+
+def areas(triangles):
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    return 0.5 * np.cross(b - a, c - a)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_face_with_a_hole_however_it_lies(seed):
+    R = Rotation.random(random_state=seed).as_matrix()
+    faults = ImportFaults()
+    rings = [ring(OUTER, R) + seed, ring(HOLE, R) + seed]
+    triangles = face_triangles(rings, "one", faults)
+    vectors = areas(triangles)
+    normal = R[:, 2]
+    # Each triangle has the direction of the outer ring; none overlap.
+    assert (vectors @ normal > 0).all()
+    assert (vectors @ normal).sum() == pytest.approx(11.0, abs=5e-3)
+    corners = np.concatenate(rings)
+    away = np.linalg.norm(triangles.reshape(-1, 1, 3) - corners, axis=2)
+    assert away.min(axis=1).max() < 1e-12
+    assert faults.rows() == []
+
+
+def test_small_faces_stay_as_they_are():
+    faults = ImportFaults()
+    triangle = ring([(0, 0), (1, 0), (0, 1)])
+    np.testing.assert_array_equal(
+        face_triangles([triangle], "one", faults), triangle[None]
+    )
+    square = ring([(0, 0), (2, 0), (2, 2), (0, 2)])
+    assert len(face_triangles([square[::-1]], "one", faults)) == 2
+    turned = areas(face_triangles([square[::-1]], "one", faults))
+    assert turned[:, 2].sum() == pytest.approx(-4.0)
+
+
+def test_an_arrowhead_is_not_filled_across_its_notch():
+    dart = ring([(0, 0), (4, 0), (1, 1), (0, 4)])
+    triangles = face_triangles([dart], "one", ImportFaults())
+    vectors = areas(triangles)
+    assert (vectors[:, 2] > 0).all()
+    assert vectors[:, 2].sum() == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(
+    ("xy", "kind", "area"),
+    [
+        ([(0, 0), (2, 2), (2, 0), (0, 2)], "crosses itself, repaired", 2.0),
+        ([(0, 0), (1, 0), (2, 0)], "without area", 0.0),
+        ([(0, 0), (1, 0)], "without area", 0.0),
+        ([], "without area", 0.0),
+        ([(0, 0), (0, 0), (3, 0), (3, 1), (0, 0)], "repeated corner", 1.5),
+    ],
+)
+def test_faults_are_repaired_or_left_out_and_noted(xy, kind, area):
+    faults = ImportFaults()
+    points = ring(xy) if xy else np.zeros((0, 3))
+    found = areas(face_triangles([points], "the one", faults))
+    assert np.abs(found[:, 2]).sum() == pytest.approx(area)
+    assert any(
+        kind in told and example == "the one"
+        for told, _, example in faults.rows()
+    )
+
+
+def test_a_face_that_is_not_quite_flat_keeps_its_corners():
+    points = ring([(0, 0), (4, 0), (4, 4), (2, 5), (0, 4)])
+    points[3, 2] = 0.3
+    triangles = face_triangles([points], "one", ImportFaults())
+    heights = {round(z, 6) for z in triangles.reshape(-1, 3)[:, 2].tolist()}
+    assert heights == {0.0, 0.3}
+
+
+@pytest.mark.parametrize("size", [0.09, 0.11])
+def test_faces_that_are_bent_are_counted(size):
+    # A corner lifted by h is h / 2 from the plane through the middle.
+    faults = ImportFaults()
+    ring = np.array([(0, 0, 0), (4, 0, size), (4, 4, 0), (0, 4, size)], float)
+    triangles = face_triangles([ring], "a", faults)
+    # Folded, and nowhere farther from the corners' heights.
+    assert len(triangles) == 2
+    assert set(map(tuple, triangles.reshape(-1, 3))) == set(map(tuple, ring))
+    counted = ("face that is not plane, folded between its corners", 1, "a")
+    assert faults.rows() == ([counted] if size > 0.1 else [])

@@ -1,0 +1,259 @@
+"""Grounds, the sea, bridges and tunnels of OpenStreetMap."""
+
+from helpers.small_osm import OsmWriter
+import numpy as np
+import pytest
+
+from cns_drake.imports import import_openstreetmap
+from cns_drake.imports.dressing.dressed_city import lane_marks
+from cns_drake.imports.dressing.street_dressing import may_park_on
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.streets import Street
+
+
+def read(osm, folder, dressed=True):
+    path = osm.write(folder / "city.osm")
+    return import_openstreetmap(path, None, dressed)
+
+
+def area(one):
+    a, b, c = np.moveaxis(one.triangles, 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+def kinds(city):
+    return {one.structure.name: one.object_type for one in city.objects}
+
+
+@pytest.mark.parametrize(
+    ("tags", "kind", "plain"),
+    [({"natural": "sand"}, "Sand", None),
+     ({"leisure": "pitch"}, "Pitch", "LandUse"),
+     ({"leisure": "playground"}, "Playground", "LandUse"),
+     ({"landuse": "basin"}, "WaterBody", None),
+     ({"highway": "footway", "area": "yes"}, "Square", None),
+     ({"highway": "footway"}, None, None),
+     ({"highway": "pedestrian"}, None, None),
+     ({"highway": "pedestrian", "area": "yes"}, "Square", "Square"),
+     ({"highway": "pedestrian", "place": "square"}, "Square", "Square"),
+     ({"highway": "platform"}, "Square", None),
+     ({"amenity": "parking"}, "Parking", "Parking"),
+     ({"amenity": "parking", "parking": "underground"}, None, "Parking"),
+     ({"natural": "water", "layer": "-1"}, None, "WaterBody"),
+     ({"landuse": "grass"}, "LandUse", "LandUse")],
+)  # fmt: skip
+def test_grounds_by_what_they_are_made_of(tmp_path, tags, kind, plain):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    name = f"land_w{osm.box(20, 0, 30, 20, **tags)}"
+    dressed, bare = read(osm, tmp_path), read(osm, tmp_path, dressed=False)
+    assert kinds(dressed).get(name) == kind
+    assert kinds(bare).get(name) == plain
+    for one in dressed.objects:
+        if one.structure.name == name:
+            assert area(one) == pytest.approx(600.0, abs=1.0)
+            assert (one.triangles[:, :, 2] < 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("building", "land", "expected"),
+    [
+        ({"building": "chapel"}, {"leisure": "park"}, ["church", "park"]),
+        (
+            {"building": "yes", "amenity": "place_of_worship"},
+            {"landuse": "cemetery"},
+            ["church", "cemetery"],
+        ),
+        (
+            {"building": "public", "amenity": "townhall"},
+            {"natural": "water"},
+            ["town_hall", "water_body"],
+        ),
+        (
+            {"building": "yes", "amenity": "cafe"},
+            {"landuse": "grass"},
+            ["building", "grass"],
+        ),
+        (
+            {"building": "Row House"},
+            {"amenity": "parking"},
+            ["row_house", "parking"],
+        ),
+    ],
+)
+def test_kinds_are_those_of_the_tags(tmp_path, building, land, expected):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, **building)
+    osm.box(20, 0, 30, 20, **land)
+    for dressed in (False, True):
+        found = read(osm, tmp_path, dressed).objects
+        assert [one.structure.kind for one in found] == expected
+
+
+def test_a_multipolygon_of_a_path_is_an_area(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    outer, inner = osm.box(20, 0, 30, 20), osm.box(30, 5, 10, 10)
+    square = osm.relation(
+        {"outer": [outer], "inner": [inner]},
+        type="multipolygon",
+        highway="pedestrian",
+    )
+    (one,) = (
+        o for o in read(osm, tmp_path).objects if o.object_type == "Square"
+    )
+    assert one.structure.name == f"land_r{square}"
+    assert area(one) == pytest.approx(500.0, abs=1.0)
+
+
+def test_the_ground_looks_upwards(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    osm.box(20, 0, 30, 20, landuse="grass")
+    crossing = osm.node(0, -20, highway="crossing", crossing="zebra")
+    ends = osm.node(-50, -20), osm.node(50, -20)
+    osm.way_of(
+        [ends[0], crossing, ends[1]], highway="tertiary", sidewalk="both"
+    )
+    surfaces = [
+        o
+        for o in read(osm, tmp_path).objects
+        if o.is_ground or o.object_type == "Sidewalk"
+    ]
+    assert {o.object_type for o in surfaces} == {
+        "LandUse", "Road", "Sidewalk", "Crossing"
+    }  # fmt: skip
+    for one in surfaces:
+        a, b, c = np.moveaxis(one.triangles, 1, 0)
+        assert (np.cross(b - a, c - a)[:, 2] > 0.0).all(), one.object_type
+
+
+def test_a_pitch_has_the_colour_of_its_surface(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    lawn = osm.box(20, 0, 9, 9, leisure="pitch", sport="soccer")
+    hard = osm.box(40, 0, 9, 9, leisure="pitch", sport="basketball")
+    found = {o.structure.name: o for o in read(osm, tmp_path).objects}
+    assert found[f"land_w{lawn}"].structure.semantic_class == "terrain"
+    assert found[f"land_w{hard}"].structure.semantic_class == "other-ground"
+
+
+@pytest.mark.parametrize("is_eastward", [True, False])
+def test_the_sea_lies_right_of_the_coast(tmp_path, is_eastward):
+    osm = OsmWriter()
+    osm.box(-50, -50, 10, 10, building="yes")
+    osm.box(40, 40, 10, 10, building="yes")
+    # The coastline ends within the city, where the file was cut.
+    line = [(-30, 0), (0, 0), (70, 0)]
+    osm.way(line if is_eastward else line[::-1], natural="coastline")
+    # A coastline without length has no effect.
+    osm.way([(10, 30), (10, 30)], natural="coastline")
+    # An island has the land inside its coastline.
+    island = [(0, -60), (20, -60), (20, -40), (0, -40)]
+    osm.way(island, closed=True, natural="coastline")
+    city = read(osm, tmp_path)
+    (sea,) = (o for o in city.objects if o.structure.name[:4] == "sea_")
+    half = 220.0 * 110.0
+    expected = half - 400.0 if is_eastward else half
+    assert area(sea) == pytest.approx(expected, rel=0.01)
+    y = sea.triangles[:, :, 1].mean()
+    assert bool(y < 0.0) is is_eastward
+    assert not any("coastline" in kind for kind, _, _ in city.faults.rows())
+
+
+def test_bridges_are_level_or_left_out(tmp_path):
+    osm = OsmWriter()
+    osm.box(-60, 20, 10, 10, building="yes")
+    below = [osm.node(0, -80), osm.node(0, 80)]
+    osm.way_of(below, highway="residential", width="8")
+    over = [osm.node(-40, 0), osm.node(40, 0)]
+    over = osm.way_of(over, highway="primary", width="10", bridge="yes")
+    level = [osm.node(60, -30), osm.node(60, 30)]
+    level = osm.way_of(level, highway="primary", width="10", bridge="yes")
+    under = [osm.node(-90, -50), osm.node(-60, -50)]
+    under = osm.way_of(under, highway="primary", tunnel="yes", layer="-1")
+    city = read(osm, tmp_path)
+    names = set(kinds(city))
+    assert f"road_w{over}" not in names
+    assert f"w{over}" not in {street.name for street in city.streets}
+    assert {f"road_w{level}", f"parapet_w{level}"} <= names
+    faults = {kind: number for kind, number, _ in city.faults.rows()}
+    assert faults["bridge over a street or railway, left out"] == 1
+    assert faults["tunnel, left out"] == 1
+    assert not any(kind.startswith("highway=") for kind in faults)
+    (wall,) = (o for o in city.objects if o.object_type == "Parapet")
+    x = wall.triangles[:, :, 0] - city.streets[-1].line[0, 0]
+    # 0.2 m beside a carriageway of 10 m, 0.25 m thick.
+    assert np.abs(x).min() == pytest.approx(5.075, abs=0.02)
+    assert wall.triangles[:, :, 2].max() == pytest.approx(1.0)
+    plain = read(osm, tmp_path, dressed=False)
+    assert f"road_w{over}" in kinds(plain)
+
+
+@pytest.mark.parametrize(
+    ("layers", "upper"),
+    [
+        (("1", "2"), 1),
+        (("2", "1"), 0),
+        # A bridge is in layer 1 if its tags do not say otherwise.
+        ((None, "2"), 1),
+        (("0", None), 1),
+        (("-1", "-2"), 0),
+        (("1", "1"), None),
+    ],
+)
+def test_the_upper_one_of_two_bridges_is_left_out(tmp_path, layers, upper):
+    osm = OsmWriter()
+    osm.box(-60, 20, 10, 10, building="yes")
+    names = []
+    for line, layer in zip(
+        ([(-40, 0), (40, 0)], [(0, -40), (0, 40)]), layers, strict=True
+    ):
+        tags = {"layer": layer} if layer is not None else {}
+        names.append(osm.way(line, highway="primary", bridge="yes", **tags))
+    city = read(osm, tmp_path)
+    built = {
+        o.structure.name for o in city.objects if o.object_type != "Building"
+    }
+    (out,) = (n for n in names if f"road_w{n}" not in built)
+    assert upper is None or out == names[upper]
+    names.remove(out)
+    assert built == {f"road_w{names[0]}", f"parapet_w{names[0]}"}
+    row = ("bridge over a street or railway, left out", 1, f"w{out}")
+    assert row in city.faults.rows()
+
+
+@pytest.mark.parametrize(
+    ("tags", "right", "left"),
+    [({}, True, True),
+     ({"parking:both": "no"}, False, False),
+     ({"parking:left": "no", "parking:right": "lane"}, True, False),
+     ({"parking:lane:right": "no_stopping"}, False, True),
+     ({"parking:right:restriction": "no_parking"}, False, True),
+     ({"highway": "service"}, False, False)],
+)  # fmt: skip
+def test_cars_park_on_the_side_that_tags_allow(tags, right, left):
+    street = Street(np.zeros((2, 2)), (1, 2), True, True, 1.5, 7.0, "a", tags)
+    assert may_park_on("right", street) is right
+    assert may_park_on("left", street) is left
+
+
+def test_marks_lie_on_the_middle_and_end_before_junctions():
+    main = {"highway": "secondary"}
+    line = np.array([[0.0, 0.0], [50.0, 0.0], [100.0, 0.0]])
+    side = np.array([[50.0, 0.0], [50.0, 60.0]])
+    streets = [
+        Street(line, (1, 2, 3), True, True, 2.0, 8.0, "main", main),
+        Street(side, (2, 4), True, True, 2.0, 8.0, "side", {}),
+    ]
+    path = np.column_stack([np.linspace(0, 100, 30), np.full(30, -2.0)])
+    (marks,) = lane_marks(streets, [WaypointRoute(path, path)])
+    x, y = marks.triangles[:, :, 0], marks.triangles[:, :, 1]
+    assert np.abs(y).max() == pytest.approx(0.06)
+    # Half of the street, 4 m before the junction, and half a dash.
+    assert np.abs(x - 50.0).min() > 4.0 + 4.0 - 1.5 - 1e-9
+    assert area(marks) == pytest.approx(len(x) / 2 * 3.0 * 0.12)
+    (free,) = lane_marks(streets[:1], [WaypointRoute(path, path)])
+    assert len(free.triangles) > len(marks.triangles)
+    far = path + np.array([0.0, 500.0])
+    assert not list(lane_marks(streets, [WaypointRoute(far, far)]))

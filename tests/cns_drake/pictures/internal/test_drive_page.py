@@ -1,0 +1,446 @@
+"""The page of a drive in a browser."""
+
+import json
+import re
+
+from helpers.browser import chromium, has_chromium
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+import pytest
+
+from cns_drake import load_scenario
+from cns_drake.pictures import ShownStages
+from cns_drake.pictures.drive_page import make_drive_page, moving_frames
+from cns_drake.pictures.drive_record import DriveRecord
+from cns_drake.pictures.meshcat_recorder import (
+    _MAX_POINTS_PER_SCAN,
+    _MAX_SCANS,
+)
+from cns_drake.recording import FRAME_PERIOD
+from cns_drake.scenarios import DrivePlan
+from cns_drake.scene import load_world
+from cns_drake.simulation import load_drive
+
+PERIOD = 0.5
+NUM_FRAMES = 21
+SCREENS = {"desktop": (1440, 900), "laptop": (1200, 750), "phone": (390, 844)}
+VEHICLE = """<sdf version="1.9"><model name="vehicle"><link name="base_link">
+<visual name="body"><geometry><box><size>4 2 1</size></box></geometry></visual>
+</link></model></sdf>"""
+
+
+def visual(name, place, size, rgb):
+    return (
+        f'<visual name="{name}"><pose>{place} 0 0 0</pose><geometry><box>'
+        f"<size>{size}</size></box></geometry><material><diffuse>{rgb} 1"
+        "</diffuse></material></visual>"
+    )
+
+
+GROUND = visual("ground/slab", "0 0 -0.1", "80 80 0.2", "0.4 0.5 0.3")
+HALL = visual("hall/wall", "-15 12 3", "8 4 6", "0.8 0.5 0.2")
+HIGHER_HALL = visual("hall/wall", "-15 12 6", "8 4 12", "0.8 0.5 0.2")
+KIOSK = visual("kiosk/wall", "12 -12 2", "4 4 4", "0.2 0.6 0.3")
+TOWER = visual("tower/wall", "15 15 10", "6 6 20", "0.7 0.7 0.7")
+
+
+def stage(folder, name, *visuals, **arguments):
+    path = folder / f"{name}.sdf"
+    path.write_text(
+        '<sdf version="1.9"><world name="w"><model name="town">'
+        f'<static>true</static><link name="city">{"".join(visuals)}</link>'
+        "</model></world></sdf>"
+    )
+    return load_world(path, **arguments)
+
+
+def X_WB_at(frame):
+    """A left turn of 90 degrees on the way."""
+    yaw = np.pi / 2 * frame / (NUM_FRAMES - 1)
+    place = [20.0 * np.sin(yaw), 20.0 * (1.0 - np.cos(yaw)), 0.5]
+    return RigidTransform(RollPitchYaw(0.0, 0.0, yaw), place)
+
+
+def make_page(folder, other_stage=None):
+    vehicle = folder / "vehicle.sdf"
+    vehicle.write_text(VEHICLE)
+    world = stage(folder, "here", GROUND, HALL, KIOSK, vehicle=vehicle)
+    X_WBs = [X_WB_at(frame) for frame in range(NUM_FRAMES)]
+    grid = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), axis=-1)
+    drive = DriveRecord(
+        PERIOD,
+        X_WBs,
+        dict.fromkeys(moving_frames(world), X_WBs),
+        [(0, grid.reshape(-1, 3)), (10, grid.reshape(-1, 3) + 10.0)],
+        speeds=[0.5 * frame for frame in range(NUM_FRAMES)],
+        specific_forces_I=[np.array([0.1, 0.2, 9.81])] * NUM_FRAMES,
+        angular_velocities_I=[np.array([0.0, 0.0, 0.1])] * NUM_FRAMES,
+    )
+    return make_drive_page(
+        drive,
+        world,
+        ShownStages(other_stage, "stage <02>", "01", ("01", "02")),
+        title="a < b",
+    )
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    other = stage(folder, "there", GROUND, HIGHER_HALL, TOWER)
+    path = folder / "page.html"
+    path.write_text(make_page(folder, other))
+    return path
+
+
+def test_page_has_title_length_and_legend(page):
+    text = page.read_text()
+    assert "<title>a &lt; b</title>" in text
+    assert "<h1>a &lt; b</h1>" in text
+    # A quarter of a circle of 20 m, in 20 steps of half a second.
+    assert "<p>31 m in 10 s</p>" in text
+    for line in ("LiDAR points, 0 to 25 m high", "Route"):
+        assert f">{line}</label>" in text
+    for line in (
+        "not here, but in stage &lt;02&gt;",
+        "higher in stage &lt;02&gt;",
+        "not in stage &lt;02&gt;, or lower there",
+    ):
+        assert f">{line}</dd>" in text
+    assert not re.search(r"\{\{\w+\}\}", text)
+
+
+def test_page_says_that_it_loads_before_the_city_comes(page):
+    text = page.read_text()
+    assert "Loading the city" in text[: text.index("<script")]
+
+
+def test_without_another_stage_nothing_is_said_of_change(tmp_path):
+    text = make_page(tmp_path)
+    assert 'id="change"' not in text
+    assert 'class="change"' not in text
+
+
+@pytest.mark.slow
+@pytest.mark.night
+def test_page_of_a_shipped_drive_is_small():
+    """With as many scans and points as a page shows, hard to compress."""
+    scenario = load_scenario("downtown_01")  # It has the largest page.
+    loaded = load_drive(DrivePlan(scenario))
+    world, trajectory = loaded.world, loaded.trajectory
+    X_WBs = [
+        trajectory.pose(frame * FRAME_PERIOD)
+        for frame in range(loaded.num_frames)
+    ]
+    rng = np.random.default_rng(0)
+    scans = [
+        (
+            int(frame),
+            X_WBs[int(frame)].translation()
+            + rng.normal(scale=30.0, size=(_MAX_POINTS_PER_SCAN, 3)),
+        )
+        for frame in np.linspace(0, len(X_WBs) - 1, _MAX_SCANS)
+    ]
+    motion = rng.normal(size=(len(X_WBs), 7))
+    drive = DriveRecord(
+        FRAME_PERIOD,
+        X_WBs,
+        dict.fromkeys(moving_frames(world), X_WBs),
+        scans,
+        speeds=motion[:, 0].tolist(),
+        specific_forces_I=list(motion[:, 1:4]),
+        angular_velocities_I=list(motion[:, 4:]),
+    )
+    page = make_drive_page(
+        drive, world, ShownStages(load_world(scenario.folder.stage("04")))
+    )
+    assert 15e6 < len(page.encode()) < 25e6
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    profile = tmp_path_factory.mktemp("profile")
+    software = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+    with chromium(profile, *software) as browser:
+        yield browser
+
+
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(
+            size, id=name, marks=pytest.mark.night if name == "laptop" else ()
+        )
+        for name, size in SCREENS.items()
+    ],
+)
+def opened(browser, page, request):
+    """The page, standing still, with its sheet unfolded."""
+    browser.open(page.as_uri(), *request.param)
+    # Nobody looks at the picture, which software draws pixel by pixel.
+    browser.evaluate("viewer.renderer.setPixelRatio(0.1)")
+    browser.wait_for('!document.getElementById("loading")')
+    browser.evaluate("viewer.animator.pause()")
+    browser.evaluate("viewer.controls.saveState()")
+    is_folded = browser.evaluate('document.body.className === "folded"')
+    assert is_folded is (request.param == SCREENS["phone"])
+    if is_folded:
+        click(browser, "fold")
+    return browser
+
+
+@pytest.fixture
+def reader(opened):
+    """The page at the drive's start; tests leave its buttons as they were."""
+    browser = opened
+    browser.evaluate("viewer.controls.reset()")
+    go_to(browser, 0.0)
+    yield browser
+    # Software renderers warn of their own slowness.
+    assert not [c for c in browser.complaints if "'rendering'" not in c]
+
+
+def click(browser, name):
+    """Clicks at the visible position of a button."""
+    x, y = browser.evaluate(
+        f"""(() => {{
+          const box = document.getElementById("{name}").getBoundingClientRect();
+          return [box.x + box.width / 2, box.y + box.height / 2];
+        }})()"""
+    )
+    browser.click(x, y)
+
+
+def go_to(browser, time):
+    """Moves the slider to a time [s], and draws the picture."""
+    browser.evaluate(
+        f"""(() => {{
+          const slider = document.getElementById("time");
+          slider.value = {time};
+          slider.dispatchEvent(new Event("input"));
+          viewer.render();
+        }})()"""
+    )
+
+
+def is_visible(browser, *path):
+    find = f"viewer.scene_tree.find({json.dumps(path)})"
+    return browser.evaluate(f"{find}.object.visible")
+
+
+def p_WC(browser):
+    """Returns where the camera is [m]."""
+    x, y, z = browser.evaluate("viewer.camera.position.toArray()")
+    return np.array([x, -z, y])  # In three.js y is up.
+
+
+slow_in_chromium = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not has_chromium(), reason="no chromium"),
+]
+
+
+@pytest.mark.usefixtures("reader")
+class TestInChromium:
+    pytestmark = slow_in_chromium
+
+    def test_panels_fit_the_screen(self, reader):
+        assert not reader.evaluate(
+            """[...document.querySelectorAll(".panel, .panel *")].filter(
+              (one) => {
+                const box = one.getBoundingClientRect();
+                return box.left < 0 || box.right > innerWidth ||
+                  box.top < 0 || box.bottom > innerHeight;
+              }).map((one) => one.outerHTML)"""
+        )
+
+    def test_bar_comes_when_the_city_is_there(self, reader):
+        is_seen = (
+            'document.getElementById("bar")'
+            ".checkVisibility({visibilityProperty: true})"
+        )
+        assert reader.evaluate(is_seen) is True
+        reader.evaluate(
+            'document.body.insertAdjacentHTML("afterbegin",'
+            " \"<div id='loading'></div>\")"
+        )
+        assert reader.evaluate(is_seen) is False
+        reader.evaluate('document.getElementById("loading").remove()')
+        assert reader.evaluate(is_seen) is True
+
+    def test_change_is_off_until_the_button_is_pressed(self, reader):
+        legend = 'document.querySelector("dd.change").checkVisibility()'
+        color = (
+            'viewer.scene_tree.find(["stage_difference", "additional",'
+            ' "unlabeled", "<object>"]).object.material.color.getHexString()'
+        )
+        additional = reader.evaluate(
+            'document.getElementById("change").dataset.additional'
+        )
+        for is_on in (False, True, False, True):
+            for layer in ("absent", "lower"):
+                assert is_visible(reader, "stage_difference", layer) is is_on
+            assert is_visible(reader, "stage_difference", "additional")
+            assert reader.evaluate(legend) is is_on
+            tint = additional if is_on else "#ffffff"
+            assert "#" + reader.evaluate(color) == tint
+            click(reader, "change")
+
+    def test_camera_follows_the_car(self, reader):
+        before = p_WC(reader)
+        click(reader, "follow")
+        p_BCs = []
+        for time in (0.0, 2.5, 10.0):
+            go_to(reader, time)
+            X_WB = X_WB_at(round(time / PERIOD))
+            p_BCs.append(X_WB.inverse() @ p_WC(reader))
+        # The camera is always behind the car and above it.
+        assert p_BCs[0][0] < -5.0
+        assert abs(p_BCs[0][1]) < 1e-6
+        assert p_BCs[0][2] > 2.0
+        np.testing.assert_allclose(p_BCs, [p_BCs[0]] * 3, atol=1e-6)
+        click(reader, "follow")
+        np.testing.assert_allclose(p_WC(reader), before, atol=1e-6)
+        go_to(reader, 0.0)
+        np.testing.assert_allclose(p_WC(reader), before, atol=1e-6)
+
+    @pytest.mark.parametrize("time", [0.0, 6.0])
+    def test_panels_do_not_cover_the_car_that_is_followed(self, reader, time):
+        go_to(reader, time)
+        click(reader, "follow")
+        go_to(reader, time)
+        covered = reader.evaluate(
+            """(() => {
+              const places = [];
+              viewer.scene_tree.find(["vehicle", "base_link"]).object.traverse(
+                ({geometry, matrixWorld}) => {
+                  const {array = []} = geometry?.attributes.position ?? {};
+                  for (let k = 0; k < array.length; k += 3) {
+                    const {x, y} = new MeshCat.THREE.Vector3()
+                      .fromArray(array, k).applyMatrix4(matrixWorld)
+                      .project(viewer.camera);
+                    places.push([(1 + x) / 2 * innerWidth,
+                      (1 - y) / 2 * innerHeight]);
+                  }
+                });
+              if (!places.length) return "no car";
+              return places.filter((place) => {
+                const there = document.elementFromPoint(...place);
+                return !there || there.closest(".panel");
+              });
+            })()"""
+        )
+        click(reader, "follow")
+        assert covered == []
+
+    def test_slider_goes_forth_and_back(self, reader):
+        clock = 'document.getElementById("clock").value'
+        for time, text in (
+            (10.0, "0:10"),
+            (2.0, "0:02"),
+            (6.4, "0:06"),
+            (9.95, "0:10"),
+        ):
+            go_to(reader, time)
+            assert reader.evaluate(clock) == f"{text} / 0:10"
+            assert is_visible(reader, "scans", "001") is (time >= 5.0)
+
+    def test_plots_say_the_value_at_the_time(self, reader):
+        for time in (0.0, 5.0, 10.0):
+            go_to(reader, time)
+            said = reader.evaluate(
+                '[...document.querySelectorAll(".plot output")]'
+                ".map((one) => one.value)"
+            )
+            # Half a metre a second more each frame.
+            assert said[0] == f"{3.6 * 0.5 * time / PERIOD:.1f} km/h"
+            assert said[1:] == ["0.1 m/s²", "0.2 m/s²", "5.7 deg/s"]
+            line = 'document.getElementById("now").style.left'
+            assert reader.evaluate(line) == f"{100 * time / 10.0:g}%"
+
+    @pytest.mark.parametrize("away", [[30, 20, 5], [0.1, 90, 0], [-9, 2, 9]])
+    def test_marker_is_above_the_car_on_the_screen(self, reader, away):
+        go_to(reader, 5.0)
+        x, y = reader.evaluate(
+            f"""(() => {{
+              const at = (name) => viewer.scene_tree.find(["vehicle", name])
+                .object.getWorldPosition(new MeshCat.THREE.Vector3());
+              const car = at("base_link");
+              viewer.controls.target.copy(car);
+              viewer.camera.position.set(...{away}).add(car);
+              viewer.camera.lookAt(car);
+              viewer.render();
+              const tip = at("marker").project(viewer.camera);
+              return tip.sub(car.project(viewer.camera)).toArray().slice(0, 2);
+            }})()"""
+        )
+        assert abs(x) < 1e-6
+        assert y > 0.02
+
+    def test_controls_of_meshcat_are_hidden(self, reader):
+        seen = reader.evaluate("viewer.gui.domElement.checkVisibility()")
+        assert seen is False
+
+    def test_panels_fold_and_leave_the_city(self, reader):
+        def heights():
+            return reader.evaluate(
+                """["about", "plots", "course"].map(
+                  (id) => document.getElementById(id).clientHeight)"""
+            )
+
+        assert all(heights())
+        click(reader, "fold")
+        about, plots, course = heights()
+        assert about == plots == 0
+        assert course > 0
+        top = "document.getElementById('bar').getBoundingClientRect().top"
+        assert reader.evaluate(f"{top} / innerHeight") > 0.8
+        expanded = "document.getElementById('fold').ariaExpanded"
+        assert reader.evaluate(expanded) == "false"
+        click(reader, "fold")
+        assert reader.evaluate(expanded) == "true"
+        assert all(heights())
+
+    def test_keys_play_and_move_in_time(self, reader):
+        reader.evaluate("document.activeElement.blur()")
+        reader.evaluate("viewer.animator.mixer.timeScale = 0.01")
+        for is_playing in (True, False):
+            reader.press(" ")
+            assert reader.evaluate("viewer.animator.playing") is is_playing
+        reader.evaluate("viewer.animator.mixer.timeScale = 1.0")
+        go_to(reader, 4.0)
+        reader.evaluate("document.getElementById('time').focus()")
+        reader.press("ArrowRight")
+        assert 4.0 < reader.evaluate("viewer.animator.time") < 10.0
+        reader.evaluate("document.getElementById('points').focus()")
+        for is_on in (False, True):
+            reader.press(" ")
+            assert is_visible(reader, "scans") is is_on
+        assert reader.evaluate("viewer.animator.playing") is False
+
+    @pytest.mark.parametrize(
+        ("name", "layers"),
+        [
+            ("points", [["scans"]]),
+            ("route", [["route"]]),
+            ("city", [["city"], ["stage_difference", "additional"]]),
+        ],
+    )
+    def test_layers_can_be_hidden(self, reader, name, layers):
+        for is_on in (True, False, True):
+            assert [is_visible(reader, *layer) for layer in layers] == [
+                is_on
+            ] * len(layers)
+            click(reader, name)
+        click(reader, name)
+
+    def test_drive_plays(self, reader):
+        # Even a slow machine presses the button again before the end.
+        reader.evaluate("viewer.animator.mixer.timeScale = 0.1")
+        click(reader, "play")
+        reader.wait_for("viewer.animator.time > 0.02")
+        click(reader, "play")
+        reader.evaluate("viewer.animator.mixer.timeScale = 1.0")
+        label = reader.evaluate('document.getElementById("play").textContent')
+        assert label == "Play"
+        assert reader.evaluate("viewer.animator.playing") is False

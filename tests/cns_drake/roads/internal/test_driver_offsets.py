@@ -1,0 +1,226 @@
+"""Drivers who wander and change lanes, against closed forms and real drives."""
+
+import math
+
+from helpers.small_map import box_visual, scenario_values, world_text
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+import shapely
+import yaml
+
+from cns_drake.roads import (
+    FINE_SPACING,
+    LanePath,
+    driven_path,
+    kerbs,
+    load_road_network,
+)
+from cns_drake.roads.driver_offsets import _change_lanes, _draw_offsets
+from cns_drake.scenarios import (
+    REAL_DRIVER,
+    DriverConfig,
+    load_scenario,
+    make_scenario,
+    plan_drive,
+)
+
+NOTHING = shapely.STRtree([])
+# Absolute lateral offsets of two real drives along one route: the quantiles of
+# 50, 75, 90, 95 and 99 % of Boreas 2021-08-05 and 2021-09-02 (pyboreas), and of
+# MulRan KAIST 01 and 02 [m].
+QUANTILES = np.array([0.50, 0.75, 0.90, 0.95, 0.99])
+REAL_OFFSETS = {
+    "boreas": (0.33, 0.64, 1.53, 2.82, 3.48),
+    "kaist": (0.37, 1.11, 2.44, 2.83, 3.14),
+}
+
+
+def straight(length, beside=(0.0, 0.0)):
+    x = np.arange(0.0, length, FINE_SPACING)
+    points = np.column_stack([x, np.zeros((len(x), 2))])
+    lanes = np.tile(beside, (len(x), 1))
+    return LanePath(points, FINE_SPACING, np.full(len(x), np.inf), lanes)
+
+
+def with_driver(scenario, **fields):
+    return scenario.model_copy(update={"driver": DriverConfig(**fields)})
+
+
+def positions(trajectory, spacing):
+    """Returns (N, 2) places and directions about every so many metres."""
+    t = np.arange(0.0, trajectory.duration, 0.05)
+    travelled = trajectory.travelled(t)
+    wanted = np.arange(0.0, travelled[-1], spacing)
+    R, p = trajectory.poses(np.interp(wanted, travelled, t))
+    return p[:, :2], R[:, :2, 0]
+
+
+@pytest.mark.parametrize(("spread", "length"), [(0.35, 50.0), (0.2, 20.0)])
+def test_wander_has_its_spread_and_its_length(spread, length):
+    far = np.full(1_000_000, 9.0)
+    offset = _draw_offsets(-far, far, spread, length, np.random.default_rng(1))
+    assert abs(offset.mean()) < 0.03 * spread
+    assert offset.std() == pytest.approx(spread, rel=0.03)
+    lag = round(length / FINE_SPACING)
+    correlation = np.mean(offset[lag:] * offset[:-lag]) / offset.var()
+    assert correlation == pytest.approx(1 / math.e, abs=0.02)
+
+
+def test_wander_keeps_between_bounds_and_away_from_the_nearer_one():
+    low, high = np.full(100_000, -0.1), np.full(100_000, 0.8)
+    offset = _draw_offsets(low, high, 0.35, 50.0, np.random.default_rng(2))
+    assert offset.min() >= -0.1 - 1e-12
+    assert offset.max() <= 0.8 + 1e-12
+    assert offset.mean() == pytest.approx(0.35, abs=0.03)
+
+
+@pytest.mark.slow
+def test_changes_of_lane_have_their_rate_and_lengths():
+    path = straight(30_000.0, (0.0, 3.5))
+    rng = np.random.default_rng(3)
+    y = _change_lanes(path, NOTHING, 2.0, rng)[:, 1]
+    assert y.max() == 0.0
+    assert y.min() == pytest.approx(-3.5)
+    edges = np.flatnonzero(np.diff(y < -1.75, prepend=False))
+    lengths = FINE_SPACING * (edges[1::2] - edges[::2])
+    # Episodes of at least the 80 m of a way over reach their whole width.
+    whole = lengths[lengths > 80.0]
+    assert whole.max() <= 270.0 + FINE_SPACING
+    ratio = math.log(270 / 15)
+    mean = (270 - 15) / ratio
+    # The rate counts from the end of one episode to the start of the next.
+    episodes = 30_000 / (500.0 + 40.0 + mean)
+    expected = episodes * math.log(270 / 80) / ratio
+    assert len(whole) == pytest.approx(expected, abs=3 * math.sqrt(expected))
+    expected = math.log(150 / 80) / math.log(270 / 80)
+    assert np.mean(whole < 150) == pytest.approx(expected, abs=0.15)
+
+
+def test_lanes_are_left_only_for_others_with_room():
+    path = straight(2000.0, (0.0, 3.5))
+    rng = np.random.default_rng(4)
+    kerb = shapely.STRtree([shapely.LineString([(0, -4.7), (2000, -4.7)])])
+    assert not _change_lanes(path, kerb, 5.0, rng)[:, 1].any()
+    kerb = shapely.STRtree([shapely.LineString([(0, -5.0), (2000, -5.0)])])
+    assert _change_lanes(path, kerb, 5.0, rng)[:, 1].any()
+    alone = straight(2000.0)
+    assert not _change_lanes(alone, NOTHING, 5.0, rng)[:, 1].any()
+
+
+def test_a_departing_path_keeps_limits_ends_and_heights():
+    path = straight(500.0, (3.5, 0.0))
+    driver = {"wander": 0.3, "wander_length": 50.0, "lane_changes": 5.0}
+    path.points[:, 2] = 0.02 * path.points[:, 0]
+    moved = driven_path(
+        path, 2.0, NOTHING, "test", rng=np.random.default_rng(5), **driver
+    )
+    assert moved.spacing == pytest.approx(2.0, rel=0.01)
+    np.testing.assert_allclose(moved.points[[0, -1], 0], [0.0, 499.5], atol=0.1)
+    np.testing.assert_allclose(
+        moved.points[:, 2], 0.02 * moved.points[:, 0], atol=0.01
+    )
+    assert np.ptp(moved.points[:, 1]) > 0.3
+
+
+@pytest.mark.slow
+def test_a_driver_follows_from_seed_or_name_alone(small_map):
+    scenario = make_scenario(scenario_values(small_map), "test")
+
+    def points(**fields):
+        return plan_drive(with_driver(scenario, **fields)).positions([8, 16])
+
+    np.testing.assert_array_equal(
+        points(seed=5, follows=True, wander_length=99.0),
+        plan_drive(scenario).positions([8, 16]),
+    )
+    np.testing.assert_array_equal(
+        points(wander=0.3, seed=5), points(wander=0.3, seed=5)
+    )
+    assert np.abs(points(wander=0.3, seed=5) - points(wander=0.3)).max() > 0.02
+    other = scenario.model_copy(update={"name": "other"})
+    moved = plan_drive(with_driver(other, wander=0.3)).positions([8, 16])
+    assert np.abs(points(wander=0.3) - moved).max() > 0.02
+    named = plan_drive(with_driver(other, wander=0.3, seed=scenario.name))
+    np.testing.assert_array_equal(points(wander=0.3), named.positions([8, 16]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "seed"), [("downtown_03", 1), ("riverside_01", 2)]
+)
+def test_drivers_keep_clear_of_kerbs(name, seed):
+    scenario = load_scenario(name)
+    network = load_road_network(scenario.folder.roads)
+    real = REAL_DRIVER.model_copy(update={"seed": seed})
+    trajectory = plan_drive(scenario.model_copy(update={"driver": real}))
+    p, along = positions(trajectory, 1.0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    left = np.column_stack([-along[:, 1], along[:, 0]])
+    # The car of worlds/vehicle.sdf, mirrors included.
+    corners = [
+        p + x * along + y * left
+        for x, y in ((-1.0, -1.03), (3.7, -1.03), (3.7, 1.03), (-1.0, 1.03))
+    ]
+    cars = shapely.polygons(np.stack(corners, axis=1))
+    near, _ = kerbs(network).query(cars, "dwithin", 0.3)
+    assert len(near) == 0
+    still = positions(plan_drive(scenario), 1.0)[0]
+    assert np.quantile(cKDTree(still).query(p)[0], 0.9) > 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.night
+def test_pairs_of_drives_differ_as_real_ones_do():
+    scenario = load_scenario("metropolis_04")
+    offsets = []
+    for seed in range(0, 10, 2):
+        drives = [
+            positions(
+                plan_drive(
+                    scenario.model_copy(
+                        update={
+                            "driver": REAL_DRIVER.model_copy(
+                                update={"seed": one}
+                            )
+                        }
+                    )
+                ),
+                spacing,
+            )
+            for one, spacing in ((seed, 5.0), (seed + 1, 0.25))
+        ]
+        (p, along), (p_B, along_B) = drives
+        # Places in another direction are far away.
+        tree = cKDTree(np.hstack([p_B, 30 * along_B]))
+        distance, nearest = tree.query(np.hstack([p, 30 * along]))
+        ahead = p_B[nearest] - p
+        across = along[:, 0] * ahead[:, 1] - along[:, 1] * ahead[:, 0]
+        offsets.append(np.abs(across[distance < 12.0]))
+    pooled = np.concatenate(offsets)
+    for real in REAL_OFFSETS.values():
+        parts = np.array([np.mean(pooled <= one) for one in real])
+        assert np.abs(parts - QUANTILES).max() <= 0.1
+    assert 0.08 < np.mean(pooled > 1.5) < 0.2
+
+
+def test_along_waypoints_walls_and_kerbs_bound_the_wander(tmp_path):
+    visuals = [
+        box_visual("ground/plate", (0, 0, -0.5, 0, 0, 0), (400, 400, 1)),
+        box_visual("kerb/r", (0, -1.9, 0.07, 0, 0, 0), (300, 0.4, 0.16)),
+        box_visual("wall/l", (0, 2.0, 1.0, 0, 0, 0), (300, 0.4, 2.0)),
+    ]
+    (tmp_path / "yard.sdf").write_text(world_text(visuals))
+    (tmp_path / "tour.csv").write_text("x,y\n-140,0\n140,0\n")
+    values = {
+        "world": "yard.sdf",
+        "waypoints": "tour.csv",
+        "speeds": {"cruise": 10.0},
+        "driver": {"wander": 0.35, "wander_length": 20.0, "seed": 1},
+    }
+    (tmp_path / "drive.yaml").write_text(yaml.safe_dump(values))
+    y = positions(plan_drive(load_scenario(tmp_path / "drive.yaml")), 1.0)[0]
+    # From the kerb at -1.7 m and the wall at 1.8 m to a car of 1.03 m.
+    assert y[:, 1].min() >= -1.7 + 1.33
+    assert y[:, 1].max() <= 1.8 - 1.33
+    assert np.ptp(y[:, 1]) > 0.3

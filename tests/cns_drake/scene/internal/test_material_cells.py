@@ -1,0 +1,57 @@
+"""The cells `material` of the structure table, written and read."""
+
+import pytest
+
+from cns_drake.scene import MATERIALS, StructureEntry, read_materials, shortened
+from cns_drake.scene.material_cells import write_materials
+
+
+@pytest.mark.parametrize(
+    ("semantic_class", "parts", "cell"),
+    [
+        ("building", {"wall": "plaster", "roof": "plaster"}, ""),
+        ("building", {"wall": "brick", "roof": "brick"}, "brick"),
+        (
+            "building",
+            {"wall": "brick", "roof": "brick", "pane": "glass"},
+            "brick pane=glass",
+        ),
+        (
+            "building",
+            {"pane_1": "glass", "pane_2": "glass", "wall": "plaster"},
+            "glass wall=plaster",
+        ),
+        ("vegetation", {"crown": "leaves", "wood": "bark"}, "wood=bark"),
+        ("terrain", {}, ""),
+        ("pole", {"a b=c/1": "sheet", "d": "metal"}, "sheet d=metal"),
+        ("pole", {"d": "metal", "a b": "sheet"}, "a%20b=sheet"),
+    ],
+)
+def test_a_cell_has_the_materials_of_all_parts(semantic_class, parts, cell):
+    assert write_materials(semantic_class, shortened(parts)) == cell
+    entry = StructureEntry(
+        1, "one", semantic_class, materials=read_materials(cell)
+    )
+    for part, material in parts.items():
+        assert entry.material(part) is MATERIALS[material]
+
+
+@pytest.mark.parametrize(
+    "cell", ["", "brick", "pane=glass", "brick pane=glass"]
+)
+def test_a_cell_is_written_as_it_was_read(cell):
+    assert write_materials("building", read_materials(cell)) == cell
+
+
+@pytest.mark.parametrize(
+    ("cell", "fault"),
+    [
+        ("gold", "'gold' is none of asphalt,"),
+        ("wall=", "'' is none of"),
+        ("wall=brick wall=glass", "'wall=glass': a second material"),
+        ("brick plaster", "'plaster': a second material"),
+    ],
+)
+def test_wrong_cells_are_refused(cell, fault):
+    with pytest.raises(ValueError, match=fault):
+        read_materials(cell)

@@ -1,0 +1,356 @@
+"""Meshes whose shapes would be misread, and what is not read of others."""
+
+import json
+import struct
+
+from helpers.mesh_texts import gltf_text
+from helpers.small_map import world_text
+import pytest
+
+from cns_drake.base import InputError
+from cns_drake.scene import load_world
+from cns_drake.scene.mesh_check import check_mesh_file
+from cns_drake.scene.obj_check import check_obj
+
+
+def write(tmp_path, change, suffix=".gltf"):
+    """Writes the prism with a change of the file's top."""
+    top = json.loads(gltf_text()[0])
+    change(top)
+    text = json.dumps(top).encode()
+    if suffix == ".glb":
+        text += b" " * (-len(text) % 4)
+        head = struct.pack("<4sII", b"glTF", 2, 20 + len(text))
+        text = head + struct.pack("<I4s", len(text), b"JSON") + text
+    path = tmp_path / f"thing{suffix}"
+    path.write_bytes(text)
+    return path
+
+
+def extension(name, required=True):
+    keys = ["extensionsUsed"] + ["extensionsRequired"] * required
+    return lambda top: top.update({key: [name] for key in keys})
+
+
+@pytest.mark.parametrize("suffix", [".gltf", ".glb"])
+@pytest.mark.parametrize(
+    ("name", "required"),
+    [
+        ("KHR_draco_mesh_compression", True),
+        ("EXT_meshopt_compression", True),
+        ("KHR_mesh_quantization", True),
+        ("KHR_mesh_quantization", False),
+        ("EXT_mesh_gpu_instancing", False),
+        ("KHR_node_visibility", False),
+        ("ACME_folded_space", True),
+    ],
+)
+def test_extensions_that_change_shapes_are_refused(
+    tmp_path, name, required, suffix
+):
+    path = write(tmp_path, extension(name, required), suffix)
+    with pytest.raises(ValueError, match=f"needs the extension {name} of glTF"):
+        check_mesh_file(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "required"),
+    [
+        ("KHR_texture_transform", True),
+        ("KHR_materials_unlit", True),
+        ("KHR_texture_basisu", True),
+        ("KHR_lights_punctual", True),
+        # Shapes are there without it, too.
+        ("KHR_draco_mesh_compression", False),
+        ("ACME_folded_space", False),
+    ],
+)
+def test_other_extensions_are_no_matter(tmp_path, name, required):
+    assert check_mesh_file(write(tmp_path, extension(name, required))) == ()
+
+
+def test_numbers_that_are_no_floats_are_refused(tmp_path):
+    def change(top):
+        top["accessors"][0] |= {"componentType": 5122, "normalized": True}
+
+    with pytest.raises(ValueError, match="no floats"):
+        check_mesh_file(write(tmp_path, change))
+
+
+@pytest.mark.parametrize(
+    ("change", "note"),
+    [
+        (lambda top: top["nodes"][0].update(skin=0), "1 skins of"),
+        (
+            lambda top: top["meshes"][0].update(weights=[0, 0.5]),
+            "1 weights of morph targets",
+        ),
+        (lambda top: top.update(animations=[{}, {}]), "2 animations of"),
+        (
+            lambda top: top["meshes"][0]["primitives"].append(
+                {"attributes": {"POSITION": 0}, "mode": 0}
+            ),
+            "1 points or lines of",
+        ),
+        (
+            lambda top: top.update(materials=[{"alphaMode": "BLEND"}]),
+            "1 see-through materials of glTF taken as solid",
+        ),
+        (lambda top: top["scenes"].append({"nodes": []}), "1 further scenes"),
+    ],
+)
+def test_what_is_not_read_is_named(tmp_path, change, note):
+    path = write(tmp_path, change)
+    mesh = "<geometry><mesh><uri>thing.gltf</uri></mesh></geometry>"
+    sdf = tmp_path / "world.sdf"
+    sdf.write_text(world_text([f'<visual name="thing">{mesh}</visual>']))
+    (found,) = load_world(sdf).notes
+    assert found.startswith(f"{path}: {note}")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [b"", b"[]", b"glTF", b'{"meshes": 1}', b'{"meshes": [{}]}', b"{", b"\xff"],
+)
+def test_files_that_are_no_gltf(tmp_path, text):
+    path = tmp_path / "thing.gltf"
+    path.write_bytes(text)
+    with pytest.raises(ValueError, match=r"\w"):
+        check_mesh_file(path)
+
+
+def test_a_world_names_the_file_and_the_extension(tmp_path):
+    path = write(tmp_path, extension("KHR_mesh_quantization"))
+    mesh = "<geometry><mesh><uri>thing.gltf</uri></mesh></geometry>"
+    sdf = tmp_path / "world.sdf"
+    sdf.write_text(world_text([f'<visual name="thing">{mesh}</visual>']))
+    with pytest.raises(InputError, match="KHR_mesh_quantization") as refusal:
+        load_world(sdf)
+    assert str(refusal.value).startswith(str(path))
+
+
+@pytest.mark.parametrize(
+    ("element", "note"),
+    [
+        ("<instance_controller url='#c'/>", "1 skins or morphs of COLLADA"),
+        ("<animation/><animation/>", "2 animations of COLLADA"),
+        ("<lines count='1'/><linestrips/>", "2 lines of COLLADA"),
+        ("<geometry><spline closed='1'/></geometry>", "1 lines of COLLADA"),
+        ("<instance_geometry url='#g'/>", None),
+    ],
+)
+def test_what_is_not_read_of_collada_is_named(tmp_path, element, note):
+    path = tmp_path / "thing.dae"
+    path.write_text(f"<COLLADA>{element}</COLLADA>")
+    expected = () if note is None else (f"{note} ignored",)
+    assert check_mesh_file(path) == expected
+
+
+SQUARE = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+FACES = "element face 1\nproperty list uchar int {}\n"
+LIST = "property list int int vertex_indices\n"
+
+
+def ply(elements, rows):
+    """A PLY file with four vertices and further elements."""
+    return (
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\n"
+        f"property float y\nproperty float z\n{elements}end_header\n"
+        f"{SQUARE}{rows}"
+    )
+
+
+def facet(*corners):
+    rows = "".join("vertex {} {} {}\n".format(*p) for p in corners)
+    return f"facet normal 0 0 1\nouter loop\n{rows}endloop\nendfacet\n"
+
+
+def stl(*facets):
+    return f"solid a\n{''.join(facet(*one) for one in facets)}endsolid a\n"
+
+
+# The corners of a square.
+A = (0, 0, 0)
+B = (1, 0, 0)
+C = (1, 1, 0)
+D = (0, 1, 0)
+BY_INDEX = FACES.format("vertex_index")
+VERTICES = "".join(f"v {row}\n" for row in SQUARE.splitlines())
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "fault"),
+    [
+        (
+            "strip.ply",
+            ply(
+                BY_INDEX + "element tristrips 1\n" + LIST, "3 0 1 2\n3 0 2 3\n"
+            ),
+            "surfaces in the element tristrips of PLY",
+        ),
+        (
+            "polygon.ply",
+            ply("element polygon 1\n" + LIST + BY_INDEX, "3 0 1 2\n3 0 2 3\n"),
+            "surfaces in the element polygon of PLY",
+        ),
+        (
+            "again.ply",
+            ply(2 * BY_INDEX, "3 0 1 2\n3 0 2 3\n"),
+            "the element face of PLY twice",
+        ),
+        (
+            "lists.ply",
+            ply(BY_INDEX + LIST, "3 0 1 2 3 0 2 3\n"),
+            "two lists of vertices in each face, vertex_index and vertex_ind",
+        ),
+        ("quad.stl", stl((A, B, C), (A, B, C, D)), "7 vertices in 2 facets"),
+        ("torn.stl", stl((A, B, C))[:-11], "ends within a solid of STL"),
+        ("TORN.STL", stl((A, B, C), (A, C, D))[:-40].upper(), "ends within"),
+        ("brep.dae", "<COLLADA><brep/></COLLADA>", "has <brep> of COLLADA"),
+        (
+            "hull.dae",
+            "<COLLADA><convex_mesh/></COLLADA>",
+            "has <convex_mesh> of COLLADA",
+        ),
+    ],
+)
+def test_surfaces_that_would_be_missing_are_refused(
+    tmp_path, name, text, fault
+):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ValueError, match=fault):
+        check_mesh_file(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "notes"),
+    [
+        ("plain.ply", ply(BY_INDEX, "4 0 1 2 3\n"), ()),
+        (
+            "none.ply",
+            ply(BY_INDEX + "element tristrips 0\n" + LIST, "4 0 1 2 3\n"),
+            (),
+        ),
+        (
+            "uv.ply",
+            ply(
+                BY_INDEX + "property list uchar float texcoord\n",
+                "3 0 1 2 6 0 0 1 0 1 1\n",
+            ),
+            (),
+        ),
+        (
+            "edge.ply",
+            ply(
+                BY_INDEX + "element edge 2\nproperty int vertex1\n"
+                "property int vertex2\n",
+                "3 0 1 2\n0 1\n1 2\n",
+            ),
+            ("2 elements edge of PLY ignored",),
+        ),
+        ("whole.stl", stl((A, B, C), (A, C, D)), ()),
+        ("two.stl", stl((A, B, C)) + stl((A, C, D)), ()),
+    ],
+)
+def test_what_is_read_as_a_whole_is_not_refused(tmp_path, name, text, notes):
+    (tmp_path / name).write_text(text)
+    assert check_mesh_file(tmp_path / name) == notes
+
+
+def binary_ply(order, faces, size="uchar", end="\n", more=b""):
+    """The square with faces, one property before their list and one after."""
+    kind = {"<": "little", ">": "big"}[order]
+    head = (
+        f"ply\nformat binary_{kind}_endian 1.0\nelement vertex 4\nproperty"
+        " double x\nproperty double y\nproperty double z\n"
+        f"element face {len(faces)}\nproperty short id\nproperty list {size}"
+        " int vertex_indices\nproperty uchar red\nend_header\n"
+    )
+    length = {"uchar": "B", "int": "i"}[size]
+    rows = [struct.pack(order + "3d", *p) for p in (A, B, C, D)]
+    rows += [
+        struct.pack(f"{order}h{length}{len(f)}iB", 7, len(f), *f, 255)
+        for f in faces
+    ]
+    return head.replace("\n", end).encode() + b"".join(rows) + more
+
+
+@pytest.mark.parametrize("corners", [0, 1, 2])
+def test_faces_of_ply_have_three_corners(tmp_path, corners):
+    """Open3D 0.19 reads the other ones from memory that is not theirs."""
+    path = tmp_path / "thing.ply"
+    few = tuple(range(corners))
+    good = (0, 1, 2, 3)
+    row = " ".join(map(str, (corners, *few)))
+    texts = [ply(FACES.format("vertex_index").replace("face 1", "face 2"),
+                 f"4 0 1 2 3\n{row}\n").encode()]  # fmt: skip
+    for order in "<>":
+        texts.append(binary_ply(order, [good, few, good]))
+        texts.append(binary_ply(order, [few], "int", "\r\n", b"more"))
+    for text in texts:
+        path.write_bytes(text)
+        with pytest.raises(ValueError, match=f"PLY with {corners} corners"):
+            check_mesh_file(path)
+    for order in "<>":
+        path.write_bytes(binary_ply(order, [good, (2, 1, 0)]))
+        assert check_mesh_file(path) == ()
+
+
+def test_a_binary_stl_may_begin_like_a_text(tmp_path):
+    path = tmp_path / "solid.stl"
+    facets = [struct.pack("<12fH", *(0.0,) * 3, *A, *B, *C, 0)] * 2
+    head = b"solid made by a program".ljust(80)
+    path.write_bytes(head + struct.pack("<I", len(facets)) + b"".join(facets))
+    assert check_mesh_file(path) == ()
+
+
+def test_a_mode_that_is_none_of_gltf_is_refused(tmp_path):
+    def change(top):
+        top["meshes"][0]["primitives"].append(
+            {"attributes": {"POSITION": 0}, "mode": 7}
+        )
+
+    with pytest.raises(ValueError, match="mode is none of glTF"):
+        check_mesh_file(write(tmp_path, change))
+
+
+@pytest.mark.parametrize(
+    ("lines", "fault"),
+    [
+        ("fo 1 2 3 4\n", "statement 'fo' of OBJ"),
+        ("cstype bezier\ndeg 1 1\n  surf 0 1 0 1 1 2 4 3\nend", "'surf'"),
+        ("call other.obj\n", "statement 'call'"),
+        ("f 1 2 \\\n3 4\n", "line 6: a face that goes on"),
+    ],
+)
+def test_surfaces_of_obj_that_would_be_missing_are_refused(
+    tmp_path, lines, fault
+):
+    path = tmp_path / "thing.obj"
+    path.write_text(f"{VERTICES}f 1 2 3\n{lines}")
+    with pytest.raises(ValueError, match=fault):
+        check_obj(path)
+    # Lines and points have no surface, and names are no statements.
+    path.write_text(f"{VERTICES}o surf\ng call me\nf 1 2 3\nl 1 2\np 1\n")
+    check_obj(path)
+
+
+@pytest.mark.parametrize(
+    "vertex",
+    ["1 2", "1,5 2 3", "nan 2 3", "1 2 inf", "1 2 x", "1 2 3d0", "1 2 \\\n3"],
+)
+def test_a_vertex_of_obj_that_is_no_numbers_is_refused(tmp_path, vertex):
+    """Drake's reader takes such a coordinate for 0."""
+    path = tmp_path / "thing.obj"
+    path.write_text(f"v 0 0 0\nv {vertex}\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(ValueError, match="line 2: a vertex that is not three"):
+        check_obj(path)
+
+
+@pytest.mark.parametrize(
+    "vertex", ["+1 .5 -2.e-3", "\t1 2 3 ", "1 2 3 1.0", "1 2 3 .1 .2 .3# red"]
+)
+def test_vertices_of_obj_in_other_forms_are_read(tmp_path, vertex):
+    path = tmp_path / "thing.obj"
+    path.write_text(f"v 0 0 0\n  v {vertex}\r\nv 0 1 0\nf 1 2 3\nv {vertex}")
+    check_obj(path)

@@ -1,0 +1,390 @@
+"""Errors of a unit, and the texture of surfaces, in calibrated returns."""
+
+from dataclasses import replace
+
+from helpers.plates import facing, plate, scan, unit
+import numpy as np
+from pydrake.geometry import HalfSpace
+from pydrake.math import RigidTransform, RollPitchYaw
+import pytest
+
+from cns_drake.ray_casting import SceneHits, SurfaceFrames
+from cns_drake.scene import StructureEntry, StructureTable
+from cns_drake.sensors import (
+    CalibratedReturns,
+    Response,
+    describe_unit,
+    make_beam_pattern,
+    make_lidar_config,
+    make_pattern,
+)
+from cns_drake.sensors.returns.light import Light
+from cns_drake.sensors.returns.materials import LAMBERT, Materials
+from cns_drake.sensors.returns.surface_texture import with_texture
+
+# Elevations of the first and the last laser of each block of an HDL-64E [deg].
+LIMITS = 2.0, -8.33, -8.83, -24.33
+# The frame of surfaces that do not move.
+STILL = SurfaceFrames(np.zeros(1, int), np.eye(3)[None], np.zeros((1, 3)))
+ROAD = StructureTable([StructureEntry(1, "asphalt", "road")])
+
+
+def offsets(seed, frame=0, name="lidar"):
+    """Returns the mean error of range of each laser of an HDL-64E [m]."""
+    returns = CalibratedReturns.of_preset(
+        "hdl-64e", seed=seed, unit_seed=7, sensor_name=name
+    )
+    returns = replace(returns, sheet=replace(returns.sheet, angle_error_deg=0))
+    pattern = make_beam_pattern("hdl-64e").within((-8, 8))
+    points = scan([plate("wall", 0.8, facing(8.0))], pattern, returns, frame)
+    p = np.stack([points[axis] for axis in "xyz"], axis=1)
+    error = np.linalg.norm(p, axis=1) * (1.0 - 8.0 / p[:, 0])
+    number = np.bincount(points["ring"], minlength=64)
+    return np.bincount(points["ring"], error, minlength=64) / number
+
+
+def test_errors_of_range_belong_to_the_unit():
+    one, again = offsets(1), offsets(2, frame=5)
+    other = offsets(1, name="other")
+    assert 0.6 * 0.035 < one.std() < 1.4 * 0.035
+    # What differs is the mean over 46 shots of 9 mm.
+    assert np.std(one - again) < 0.003
+    # Every second laser measures farther; lower ones are off by 0.7 of that.
+    block = np.where(np.arange(64) < 32, 1.0, 0.7)
+    shared = 0.024 * block * np.where(np.arange(64) % 2, -1.0, 1.0)
+    rest, other_rest = one - shared, other - shared
+    assert abs(np.corrcoef(rest, other_rest)[0, 1]) < 0.4
+    assert 0.6 * 0.026 < np.std(rest / block) < 1.4 * 0.026
+
+
+def test_reported_angles_are_nominal_and_true_ones_are_not():
+    pattern = make_beam_pattern("hdl-64e")
+    beams = pattern.beams(0)
+    returns = CalibratedReturns.of_preset("hdl-64e", unit_seed=3)
+    unit = returns.unit_beams(beams)
+    true = unit.d_Sset
+    nominal = beams.d_Sset[beams.packet_order]
+    np.testing.assert_allclose(np.linalg.norm(true, axis=1), 1.0, atol=1e-12)
+    ring = beams.ring[beams.packet_order]
+    up = np.degrees(np.arcsin(true[:, 2]) - np.arcsin(nominal[:, 2]))
+    round_ = np.angle(
+        (true[:, 0] + 1j * true[:, 1]) / (nominal[:, 0] + 1j * nominal[:, 1]),
+        deg=True,
+    )
+    # Each laser has an azimuth of its own, too, up to a step of 0.09 deg aside.
+    azimuth = np.hypot(0.015, 2.0 * 0.09 / 12**0.5)
+    for error, size in ((up, 0.015), (round_, azimuth)):
+        of_laser = np.array([error[ring == k].mean() for k in range(64)])
+        np.testing.assert_allclose(error, of_laser[ring], atol=1e-4)
+        assert size / 1.5 < of_laser.std() < size / 0.75
+    points = scan([plate("wall", 0.8, facing(8.0))], pattern, returns)
+    p = np.stack([points[axis] for axis in "xyz"], axis=1)
+    # Blocks are at these heights, by the sheet.
+    p[:, 2] -= np.where(points["ring"] < 32, 0.21, 0.13)
+    elevation = np.arcsin(p[:, 2] / np.linalg.norm(p, axis=1))
+    expected = np.array(pattern.elevations_rad)[points["ring"]]
+    np.testing.assert_allclose(elevation, expected, atol=1e-6)
+    # Azimuths of a laser are whole steps apart.
+    steps = np.arctan2(p[:, 1], p[:, 0]) / np.radians(0.09)
+    for ring in (0, 31, 32, 63):
+        rest = np.exp(2j * np.pi * steps[points["ring"] == ring])
+        assert abs(rest.mean()) > 0.999
+
+
+def test_calibrated_returns_have_the_elevations_of_a_real_unit():
+    """They are those of KITTI's HDL-64E; ideal ones are the manual's."""
+    ideal = make_lidar_config("hdl-64e")
+    calibrated = ideal.replaced(returns="calibrated")
+    nominal, own = (
+        np.degrees(make_pattern(one).elevations_rad)
+        for one in (ideal, calibrated)
+    )
+    np.testing.assert_allclose(nominal[[0, 31, 32, 63]], LIMITS)
+    assert len(own) == 64
+    assert (np.diff(own) < 0.0).all()
+    # Blocks have steps of a third and half a degree, and are tilted a little.
+    assert -np.diff(own[:32]).mean() == pytest.approx(1 / 3, rel=0.05)
+    assert -np.diff(own[32:]).mean() == pytest.approx(1 / 2, rel=0.05)
+    assert 0.03 < np.diff(own[:32]).std() < 0.06
+    described = describe_unit(calibrated)["elevations_deg"]
+    np.testing.assert_allclose(described, own, atol=1e-6)
+    other = make_lidar_config("vlp-16").replaced(returns="calibrated")
+    assert make_pattern(other).elevations_rad[0] == np.radians(15.0)
+
+
+def test_some_lasers_are_dim():
+    base = unit()
+    pattern = make_beam_pattern("os1-128")
+    gains = {}
+    for dim in (0.0, 3.0):
+        response = Response(gain=0.1, dim=dim)
+        returns = replace(base, sheet=replace(base.sheet, response=response))
+        gains[dim] = returns.unit_beams(pattern.beams(0)).gain[:128]
+    even, dim = gains.values()
+    expected = np.where(even < 0.9, 0.9 + 4.0 * (even - 0.9), even)
+    np.testing.assert_allclose(dim, np.maximum(expected, 0.0))
+    assert 5 < np.sum(dim < 0.85) < 30
+
+
+def test_every_second_shot_of_a_laser_is_brighter():
+    base = unit()
+    pattern = make_beam_pattern("os1-128")
+    response = Response(gain=0.0, flicker=0.1)
+    returns = replace(base, sheet=replace(base.sheet, response=response))
+    beams = pattern.beams(0)
+    brighter = returns.unit_beams(beams).gain - 1.0
+    is_odd = beams.column % 2 == 1
+    of_laser = brighter[is_odd][:128]
+    np.testing.assert_allclose(
+        brighter, np.where(is_odd, 1.0, -1.0) * of_laser[beams.ring], atol=1e-12
+    )
+    assert 0.07 < of_laser.std() < 0.13
+
+
+def test_an_hdl_64e_reports_no_faint_echoes_however_near():
+    pattern = make_beam_pattern("hdl-64e").within((-2, 2), (-2, 2))
+    returns = CalibratedReturns.of_preset("hdl-64e")
+    for reflectivity, is_seen in ((0.0089, False), (0.0093, True)):
+        wall = plate("wall", reflectivity, facing(4.0))
+        assert (len(scan([wall], pattern, returns)) > 0) == is_seen
+    wall = plate("wall", 0.0089, facing(4.0))
+    assert len(scan([wall], pattern, unit())) > 0
+
+
+def test_beams_start_at_their_lasers():
+    whole = make_beam_pattern("hdl-64e")
+    pattern = whole.within((-8, 8))
+    returns = CalibratedReturns.of_preset("hdl-64e", unit_seed=3)
+    returns = replace(returns, sheet=replace(returns.sheet, angle_error_deg=0))
+    wall = plate("wall", 0.8, facing(8.0), (0.1, 400.0, 0.4))
+    points = scan([wall], pattern, returns)
+    height = np.where(np.arange(64) < 32, 0.21, 0.13)
+    met = height + 8.0 * np.tan(whole.elevations_rad)
+    # Beams beside an edge may meet it or not.
+    for is_met, least in ((np.abs(met) < 0.19, 40), (np.abs(met) > 0.21, 0)):
+        found = np.bincount(points["ring"], minlength=64)[is_met]
+        assert (found >= least).all() if least else not found.any()
+
+
+class Wall:
+    """A scene with a wall 8 m ahead, for a unit that does not turn."""
+
+    def cast_rays(self, p_WSset, d_Sset, max_range, **_):
+        p_WSset = np.resize(p_WSset, d_Sset.shape)
+        ranges = (8.0 - p_WSset[:, 0]) / d_Sset[:, 0]
+        normals = np.tile(np.float32([-1.0, 0.0, 0.0]), (len(ranges), 1))
+        is_met = (ranges > 0.0) & (ranges < 30.0)
+        return SceneHits(
+            np.where(is_met, ranges, np.inf).astype(np.float32),
+            np.where(is_met, 0, -1).astype(np.int32),
+            normals * is_met[:, None],
+            is_met,
+        )
+
+    def surface_frames(self):
+        return STILL
+
+
+def test_lasers_have_their_places_however_poses_are_given():
+    pattern = make_beam_pattern("hdl-64e")
+    returns = CalibratedReturns.of_preset("hdl-64e", unit_seed=3)
+    unit = returns.unit_beams(pattern.beams(0))
+    zero = np.zeros(1, np.float32)
+    half = np.full(1, 0.5, np.float32)
+    materials = Materials(
+        np.array([LAMBERT], np.uint8), half, zero, zero, half, *[zero] * 5
+    )
+    found = [
+        returns.measure(
+            Wall(),
+            materials,
+            pattern,
+            unit,
+            np.zeros((count, 3)),
+            np.tile(np.eye(3), (count, 1, 1)),
+            np.zeros(count),
+            0,
+        )
+        for count in (1, pattern.num_columns, pattern.num_beams)
+    ]
+    assert len(found[0].beam) > 20_000
+    for other in found[1:]:
+        np.testing.assert_array_equal(other.beam, found[0].beam)
+        np.testing.assert_array_equal(other.distance, found[0].distance)
+        np.testing.assert_array_equal(other.intensity, found[0].intensity)
+
+
+def textured(p_WGset, contrast=0.5, **fields):
+    """Returns the light of beams from 2 m above to places of a surface."""
+    count = len(p_WGset)
+    fields |= {"contrast": contrast}
+    materials = Materials(
+        np.array([LAMBERT], np.uint8),
+        *(
+            np.full(1, fields.get(name, 0.0), np.float32)
+            for name in Materials._fields[1:]
+        ),
+    )
+    every = np.arange(count)
+    geometry = np.zeros(count, np.int32)
+    return with_texture(
+        Light(every, np.full(count, 2.0), np.ones(count), geometry),
+        every,
+        p_WGset + np.array([0.0, 0.0, 2.0]),
+        np.tile([0.0, 0.0, -1.0], (count, 1)),
+        materials,
+        STILL,
+    )
+
+
+def test_albedo_is_within_nine_times_the_mean_either_way():
+    rng = np.random.default_rng(3)
+    p_WGset = rng.uniform(-500.0, 500.0, (40_000, 3)) * (1.0, 1.0, 0.0)
+    energy = textured(p_WGset, 1.0).energy
+    assert energy.min() == pytest.approx(1 / 9)
+    assert energy.max() == pytest.approx(9.0)
+    # Less contrast stays within: parts are at most 0.3 * 1.4 + 0.15 brighter.
+    brightest = textured(p_WGset, 0.3).energy.max()
+    assert brightest == pytest.approx(1.57 / 0.43, rel=0.1)
+    assert brightest < 1.57 / 0.43
+
+
+def ground_heights(tufts, swell, p_WGset):
+    """Returns the heights at which beams from above end [m]."""
+    return 2.0 - textured(p_WGset, tufts=tufts, swell=swell).distance
+
+
+def test_tufts_stand_on_rough_grass_that_swells():
+    rng = np.random.default_rng(4)
+    p_WGset = rng.uniform(-2e3, 2e3, (40_000, 3)) * (1.0, 1.0, 0.0)
+    # What is left without both: from 2 m the mean of a spot is uniform, too.
+    rough = ground_heights(0.0, 1e-12, p_WGset)
+    assert np.abs(rough).max() == pytest.approx(3e-4, rel=1e-3)
+    assert rough.std() == pytest.approx(3e-4 / 3**0.5, rel=0.02)
+    tufts = ground_heights(0.12, 0.0, p_WGset) - rough
+    assert tufts.mean() == pytest.approx(0.06, abs=0.002)
+    # Patches and grains are uniform.
+    spread = 0.12 * np.hypot(0.7, 0.3) / 12**0.5
+    assert tufts.std() == pytest.approx(spread, abs=0.002)
+    swell = ground_heights(0.0, 0.1, p_WGset) - rough
+    assert abs(swell.mean()) < 0.001
+    assert np.abs(swell).max() < 0.1
+    # The mean square of a wave of parabolas is 8 / 15.
+    square = 0.25 * (8 / 15) ** 2 + 0.25 * (8 / 15)
+    assert swell.std() == pytest.approx(0.1 * square**0.5, rel=0.02)
+    both = ground_heights(0.12, 0.1, p_WGset) - rough
+    np.testing.assert_allclose(both, tufts + swell, atol=1e-7)
+    # It is smooth, and steeper than no road.
+    p_WGset = p_WGset + np.array([0.01, 0.0, 0.0])
+    step = ground_heights(0.0, 0.1, p_WGset) - swell
+    step -= ground_heights(0.0, 1e-12, p_WGset)
+    assert np.abs(step).max() < 0.2 * 0.01
+
+
+def test_things_hang_on_fronts():
+    house = StructureTable([StructureEntry(1, "house", "building")])
+    pattern = make_beam_pattern("os1-128").within((-20, 20))
+    front = plate("house", None, facing(9.0))
+    points = scan([front], pattern, unit(), structures=house)
+    out = 9.0 - points["x"]
+    assert 0.05 < np.mean(out > 0.12) < 0.15
+    assert out.min() > -0.2
+    assert out.max() < 0.55
+
+
+def test_one_of_four_rays_passes_a_spray():
+    tree = StructureTable([StructureEntry(1, "tree", "vegetation")])
+    # From afar there are thousands of clumps.
+    X_WG = RigidTransform(RollPitchYaw(0.0, -np.pi / 2, 0.0), [60.0, 0.0, 0.0])
+    spray = plate("tree/leaves", None, X_WG, shape=HalfSpace())
+    wall = plate("behind", 0.9, facing(63.0))
+    pattern = make_beam_pattern("os1-128").within((-30, 30), (-15, 15))
+    points = scan([spray, wall], pattern, unit(), structures=tree)
+    passed = np.mean(points["x"] > 62.0)
+    assert passed == pytest.approx(np.exp(-1.4), abs=0.02)
+
+
+def road(x, distance, returns, seed=5):
+    """Scans a wall of asphalt from a place x away from it along the world."""
+    X_WG = RigidTransform([x + distance, 0.0, 0.0])
+    pattern = make_beam_pattern("os1-128").within((-20, 20), (-20, 20))
+    wall = plate("asphalt", None, X_WG)
+    return scan([wall], pattern, replace(returns, seed=seed), structures=ROAD)
+
+
+def test_texture_belongs_to_the_surface():
+    returns = unit()
+    points, again = (road(0.0, 9.0, returns, seed) for seed in (1, 2))
+    assert np.std(points["intensity"]) > 1.0
+    # Noise of ranges alone moves a few points into other grains.
+    same = points["intensity"] == again["intensity"]
+    assert np.mean(same) > 0.95
+    given = scan(
+        [plate("asphalt", 0.15, RigidTransform([9.0, 0.0, 0.0]))],
+        make_beam_pattern("os1-128").within((-20, 20), (-20, 20)),
+        returns,
+        structures=ROAD,
+    )
+    assert np.std(given["intensity"]) < 0.6
+
+
+@pytest.mark.parametrize("speckle", [0.0, 0.2])
+def test_speckle_gain_and_floor(speckle):
+    base = unit()
+    response = Response(gain=0.0, speckle=speckle, floor=50.0)
+    returns = replace(base, sheet=replace(base.sheet, response=response))
+    pattern = make_beam_pattern("os1-128").within((-10, 10), (-10, 10))
+    bright = scan([plate("wall", 0.6, facing(8.0))], pattern, returns)
+    bright = bright["intensity"]
+    # 60 is less than 50 where 0.2 n^3 / sqrt(15) is below -1 / 6.
+    assert np.mean(bright == 0.0) == pytest.approx(
+        0.0 if speckle == 0.0 else 0.070, abs=0.025
+    )
+    assert bright[bright > 0.0].min() >= 50.0
+    if speckle == 0.0:
+        assert bright.max() <= 60.0
+    else:
+        assert bright.max() > 75.0
+
+
+@pytest.mark.parametrize(
+    ("reflectivity", "distance", "expected"),
+    [
+        (0.5, 5.0, 60.0 + 15.0 * np.log(0.5)),
+        (0.5, 9.9, 60.0 + 15.0 * np.log(0.5)),
+        # It does not make up for what is lost beyond.
+        (0.5, 20.0, 60.0 + 15.0 * np.log(0.5 / 4.0)),
+        (0.5, 40.0, 0.0),
+        (0.04, 5.0, 60.0 + 15.0 * np.log(0.04)),
+        (0.03, 5.0, 0.0),
+    ],
+)
+def test_intensity_by_the_logarithm(reflectivity, distance, expected):
+    base = unit()
+    response = Response(15.0, 60.0, 10.0, 10.0, gain=0.0, speckle=0.0)
+    returns = replace(base, sheet=replace(base.sheet, response=response))
+    pattern = make_beam_pattern("os1-128").within((-5, 5), (-5, 5))
+    wall = plate("wall", reflectivity, facing(distance))
+    points = scan([wall], pattern, returns)
+    assert np.median(points["intensity"]) == pytest.approx(expected, abs=0.7)
+
+
+def test_a_part_of_a_surface_is_stained():
+    p_WGset = np.random.default_rng(8).uniform(-2e3, 2e3, (200_000, 3))
+    shares = []
+    for stains in (0.0, 0.2):
+        energy = textured(p_WGset, 1e-9, stains=stains).energy
+        # The energy is (1 + share) / (1 - share).
+        shares.append((energy - 1.0) / (energy + 1.0))
+    clean, stained = shares
+    # Areas alone are uniform.
+    assert np.abs(clean).max() == pytest.approx(0.15, rel=1e-3)
+    assert clean.std() == pytest.approx(0.15 / 3**0.5, rel=0.02)
+    depth = clean - stained
+    assert np.mean(depth > 0.0) == pytest.approx(0.2, abs=0.01)
+    # Depths are uniform, too, up to 1.15.
+    assert np.mean(depth > 0.3) == pytest.approx(0.2 * 0.85 / 1.15, abs=0.01)
+    assert stained.min() == pytest.approx(-0.8)
+    # The means of (1 - a)^2 over dark and bright areas are 7 / 3 and 1 / 3.
+    of_dark = np.mean(clean[depth > 0.0] < 0.0)
+    assert of_dark == pytest.approx(7.0 / 8.0, abs=0.01)

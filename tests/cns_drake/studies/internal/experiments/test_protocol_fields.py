@@ -1,0 +1,44 @@
+"""Protocols that fields of an experiment describe."""
+
+import pytest
+
+from cns_drake.base import InputError
+from cns_drake.studies import Experiment
+from cns_drake.studies.experiments.conditions import conditions
+from cns_drake.studies.experiments.protocol_fields import (
+    condition_protocol,
+    protocol_from_fields,
+)
+from evaluation.recognition import (
+    FAIR_PROTOCOL,
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
+from evaluation.results import PROTOCOL_BASE
+
+
+def test_protocols():
+    assert protocol_from_fields({}, "") == FAIR_PROTOCOL
+    assert protocol_from_fields({"base": "paper"}, "") == PAPER_PROTOCOL
+    found = protocol_from_fields({"base": "recorded", "radius": 5}, "")
+    assert found == RetrievalProtocol(radius=5)
+
+
+def test_a_list_of_names_is_a_factor():
+    experiment = Experiment(name="e", protocol=["fair", "paper"])
+    found = conditions(experiment)
+    assert [one.factors for one in found] == [
+        {PROTOCOL_BASE: "fair"},
+        {PROTOCOL_BASE: "paper"},
+    ]
+    # Each protocol has a baseline of its own.
+    assert all(one.is_baseline for one in found)
+    assert [condition_protocol(one, "") for one in found] == [
+        FAIR_PROTOCOL,
+        PAPER_PROTOCOL,
+    ]
+
+
+def test_a_list_holds_names():
+    with pytest.raises(InputError, match=r"file: protocol\.base: .* none of"):
+        protocol_from_fields({"base": {"radius": 5}}, "file")

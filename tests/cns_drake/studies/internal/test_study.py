@@ -1,0 +1,888 @@
+"""`cns-drake study`: whole experiments on a small town, and their tables."""
+
+from collections import Counter
+from pathlib import Path
+import shutil
+
+from helpers.internal import studies
+from helpers.internal.eval_program import run_program
+from helpers.measured_pairs import compare_maps, place_outcome
+from helpers.small_map import write_town
+import numpy as np
+import pytest
+
+from cns_drake.__main__ import main
+from cns_drake.base import Cluster, InputError
+from cns_drake.scenarios import load_scenario
+from cns_drake.simulation import SimulationSource
+from cns_drake.studies import (
+    Experiment,
+    ExperimentRun,
+    load_experiment,
+    run_study,
+)
+from cns_drake.studies import study as study_module
+from cns_drake.studies.maps import experiment_maps, map_step
+from cns_drake.studies.maps.experiment_maps import pairs_by_map
+from cns_drake.studies.study import plan_study
+from evaluation.change import DriveMap
+from evaluation.maps import CELL_SIZE, VoxelAccumulator
+from evaluation.methods import make_method
+from evaluation.recognition import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.results import QueryRows, Results
+from evaluation.study import engine
+
+TABLES = ("results.csv", "queries.csv")
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    """Folder of a map with two drives of 40 frames along one route."""
+    routes = {"01": "metropolis_04", "04": "metropolis_04"}
+    return write_town(tmp_path_factory.mktemp("maps") / "town", routes, 40)
+
+
+@pytest.fixture
+def jobs_done(monkeypatch):
+    """The names of the jobs of each run, which run in this process."""
+    runs = []
+    monkeypatch.setattr(
+        engine,
+        "run_jobs",
+        lambda jobs, cluster, unit="": runs.append(studies.do(jobs)),
+    )
+
+    def page(results, queries, folder, **options):
+        return folder / "index.html"
+
+    monkeypatch.setattr(study_module, "write_page", page)
+    return runs
+
+
+def experiment(town, **fields):
+    return Experiment.model_validate(
+        {"name": "mine", "maps": [str(town)], "methods": ["solid"], **fields}
+    )
+
+
+def measure(wanted, output, **options):
+    """Runs an experiment; returns its rows."""
+    run_study(wanted, output, Cluster(), **options)
+    return Results.read(output / "results.csv")
+
+
+def planned(wanted, output, **options):
+    """The jobs of an experiment, and the comparisons that they measure."""
+    run = ExperimentRun(wanted, output, "mine.yaml", Cluster(), **options)
+    made = plan_study(run)
+    return made.jobs, made.measured
+
+
+def values(results, **columns):
+    """Metric -> value of the rows with these values of columns."""
+    named = {name.replace("__", "."): one for name, one in columns.items()}
+    found = results.where(**named).rows
+    assert len({row.metric for row in found}) == len(found)
+    return {row.metric: row.value for row in found}
+
+
+@pytest.mark.slow
+def test_a_long_study_says_so_before_its_parts_are_there(
+    town, tmp_path, jobs_done, monkeypatch
+):
+    """A job may need descriptions that another one has yet to write."""
+    monkeypatch.setattr(engine, "_LONG", 1e-9)
+    notes = []
+    wanted = experiment(
+        town,
+        drives="stages",
+        database={"transient": [{}, {"leaves": 0.0}]},
+        protocol={"base": "recorded", "query_spacing": 5},
+    )
+    measure(wanted, tmp_path, on_note=notes.append)
+    assert any("run the same command again" in note for note in notes)
+
+
+def contents(folder):
+    return [(folder / name).read_bytes() for name in TABLES]
+
+
+STAGES = {
+    "drives": "stages",
+    "database": {"stage": ["last", "own"]},
+    "protocol": {"base": "recorded", "query_spacing": 5},
+}
+
+
+@pytest.mark.slow
+def test_the_numbers_are_those_of_the_single_commands(
+    town, tmp_path, jobs_done
+):
+    wanted = experiment(
+        town,
+        **STAGES,
+        tasks=["place", "pose", "change"],
+        methods={"btc": {}, "solid": {"ranges": [20, 40]}},
+    )
+    results = measure(wanted, tmp_path)
+    database, query = (
+        load_scenario(town / f"sequence_{k}.yaml") for k in ("01", "04")
+    )
+    assert {(r.map, r.database, r.query) for r in results.rows} == {
+        ("town", "town_01", "town_04")
+    }
+    assert {row.protocol for row in results.rows} == {"own"}
+    protocol = RetrievalProtocol(query_spacing=5)
+    drives = {
+        "own": SimulationSource(database)(),
+        "last": SimulationSource(database.replaced(stage="04"))(),
+        "query": SimulationSource(query)(),
+    }
+    mapped = {}
+    for name, drive in drives.items():
+        voxels = VoxelAccumulator(CELL_SIZE)
+        for frame in range(len(drive)):
+            voxels.add(drive.scan(frame), drive.X_WS[frame])
+        mapped[name] = DriveMap(name, voxels.to_map(), drive.X_WS[:, :3, 3])
+    for stage in ("last", "own"):
+        there = {"database__stage": stage, "gate": False}
+        found = values(results, **there, task="change")
+        change = compare_maps(mapped[stage], mapped["query"]).change
+        assert found["tcr_sym"] == pytest.approx(change.symmetric, abs=1e-9)
+        for ranges in (20, 40):
+            alone = place_outcome(
+                drives[stage],
+                drives["query"],
+                make_method("solid", {"ranges": str(ranges)}),
+                protocol=protocol,
+            ).by_mode["all"]
+            with_it = {**there, "methods__solid__ranges": ranges}
+            found = values(results, **with_it, task="place")
+            assert found["auc"] == pytest.approx(alone.auc, abs=1e-9)
+            assert found["r1"] == pytest.approx(alone.recall_at_1, abs=1e-9)
+            before = values(
+                results,
+                **{**with_it, "database__stage": "last"},
+                task="place",
+            )
+            assert found["kept"] == pytest.approx(
+                found["auc"] / before["auc"], abs=1e-6
+            )
+    # Stage 01 lacks towers that the query sees.
+    assert found["visible_change"] > before["visible_change"]
+    assert found["visible_change_added"] == pytest.approx(
+        found["visible_change"] - before["visible_change"], abs=1e-6
+    )
+    assert before["visible_change_added"] == 0.0
+    # Answers of a method are those that its numbers count.
+    queries = QueryRows.read(tmp_path / "queries.csv")
+    # Two gates, two stages, three methods.
+    assert len(queries.answers) == 2 * 2 * 3
+    for one in queries.answers:
+        (row,) = [
+            row
+            for row in results.rows
+            if row.metric == "r1" and row.identity == one.identity
+        ]
+        assert np.mean(one.columns["correct"]) == pytest.approx(
+            row.value * row.n / len(one.columns["correct"])
+        )
+
+
+@pytest.mark.slow
+def test_finished_work_is_not_repeated(town, tmp_path, jobs_done):
+    folder = shutil.copytree(town, tmp_path / "town")
+    wanted = experiment(folder, **STAGES, tasks=["place", "change"])
+    output = tmp_path / "out"
+    measure(wanted, output)
+    # Two databases are compared with one query.
+    assert len(jobs_done[-1]) == len(set(jobs_done[-1])) == 8
+    tables = contents(output)
+    measure(wanted, output)
+    assert (jobs_done[-1], contents(output)) == ([], tables)
+    # Poses are known with the places.
+    measure(wanted.replaced(tasks={"pose": {}}), output)
+    assert jobs_done[-1] == []
+    # Other settings of a method.
+    measure(wanted.replaced(methods={"solid": {"ranges": 20}}), output)
+    kinds = Counter(name.split()[0] for name in jobs_done[-1])
+    assert kinds == {"describe": 1, "place": 2}
+    measure(wanted, output)
+    assert contents(output) == tables
+    # Another city at one stage.
+    stage = folder / "stage_01.sdf"
+    text = stage.read_text()
+    stage.write_text(text.replace("</world>", "<!-- Changed. --></world>"))
+    measure(wanted, output)
+    again = {" ".join(name.split()[:2]) for name in jobs_done[-1]}
+    assert again == {"mapped town_01", "place town_01", "change town_01"}
+    assert contents(output) == tables
+
+
+class InterruptedHereError(Exception):
+    """An interruption between two jobs."""
+
+
+@pytest.mark.slow
+@pytest.mark.night
+def test_an_interrupted_study_goes_on(town, tmp_path, jobs_done, monkeypatch):
+    wanted = experiment(town, **STAGES, tasks=["place", "change"])
+    measure(wanted, tmp_path / "whole")
+    whole = jobs_done[-1]
+    done = []
+
+    def some(jobs, cluster):
+        for job in jobs:
+            if len(done) == 5:
+                raise InterruptedHereError
+            done.extend(studies.do([job]))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(engine, "run_jobs", some)
+        with pytest.raises(InterruptedHereError):
+            measure(wanted, tmp_path / "parts")
+    assert not (tmp_path / "parts" / "results.csv").exists()
+    measure(wanted, tmp_path / "parts")
+    assert [*done, *jobs_done[-1]] == whole
+    assert contents(tmp_path / "parts") == contents(tmp_path / "whole")
+
+
+@pytest.mark.slow
+def test_processes_change_nothing(town, tmp_path, jobs_done, capsys):
+    wanted = experiment(town, **STAGES)
+    measure(wanted, tmp_path / "here")
+    path = tmp_path / "mine.yaml"
+    path.write_text(wanted.text)
+    with pytest.MonkeyPatch.context() as patch:
+        from cns_drake.base import run_jobs
+
+        patch.setattr(engine, "run_jobs", run_jobs)
+        status, out, err = run_program(
+            capsys,
+            "cns-drake",
+            main,
+            "study",
+            path,
+            "--jobs",
+            "2",
+            "--output",
+            tmp_path / "there",
+        )
+    assert status == 0
+    assert any(line.endswith("3 of 3 jobs done") for line in err.splitlines())
+    assert out == f"{tmp_path / 'there' / 'index.html'}\n"
+    assert contents(tmp_path / "there") == contents(tmp_path / "here")
+
+
+@pytest.mark.slow
+def test_protocols_are_factors(town, tmp_path, jobs_done):
+    """Each radius has numbers and a baseline of its own."""
+    fields = STAGES | {"protocol": {"base": "recorded", "radius": [2.0, 9.0]}}
+    results = measure(experiment(town, **fields), tmp_path)
+    database, query = (
+        SimulationSource(load_scenario(town / f"sequence_{k}.yaml"))()
+        for k in ("01", "04")
+    )
+    for radius in (2.0, 9.0):
+        alone = place_outcome(
+            database,
+            query,
+            make_method("solid", {}),
+            protocol=RetrievalProtocol(radius=radius),
+        ).by_mode["all"]
+        own, last = (
+            values(
+                results,
+                protocol__radius=radius,
+                database__stage=stage,
+                gate=False,
+            )
+            for stage in ("own", "last")
+        )
+        assert own["auc"] == pytest.approx(alone.auc, abs=1e-9)
+        assert own["with_match"] == alone.num_with_match
+        assert last["kept"] == 1.0
+        assert own["kept"] == pytest.approx(own["auc"] / last["auc"], abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.night
+def test_queries_are_scored_once_for_all_radii(town, tmp_path, jobs_done):
+    """The numbers are those of a study of each radius alone."""
+    fields = {"tasks": ["place", "pose", "cost"], "methods": ["ring++"]}
+
+    def found(radii, folder):
+        protocol = {"base": "fair", "radius": radii}
+        wanted = experiment(town, **fields, protocol=protocol)
+        rows = measure(wanted, tmp_path / folder).rows
+        answers = (tmp_path / folder / "queries.csv").read_text().splitlines()
+        return [row for row in rows if row.task != "cost"], answers
+
+    both, answers = found([2.0, 9.0], "both")
+    assert sum(name.startswith("place ") for name in jobs_done[0]) == 1
+    for radius in (2.0, 9.0):
+        alone, own_answers = found(radius, f"{radius}")
+        assert {row.gate for row in alone} == {False, True}
+        of_radius = [row for row in both if row["protocol.radius"] == radius]
+        assert [
+            (row.task, row.gate, row.metric, repr(row.value), repr(row.low))
+            for row in of_radius
+        ] == [
+            (row.task, row.gate, row.metric, repr(row.value), repr(row.low))
+            for row in alone
+        ]
+        assert len(answers) - 1 == 2 * (len(own_answers) - 1)
+
+
+def test_descriptions_are_shared(town, tmp_path):
+    """A drive that several pairs need is described once, and kept."""
+    jobs, measured = planned(
+        experiment(
+            town,
+            query={"transient": {"snow": [0, 0.1, 0.2]}},
+            both={"title": ["a", "b"]},
+            tasks=["place", "pose", "change"],
+        ),
+        tmp_path,
+    )
+    assert len(measured) == 2 * 3
+    kinds = Counter(name.split()[0] for name in jobs)
+    # Each of two databases meets three queries; each query meets one.
+    assert kinds["describe"] == 2
+    # Poses come with places.
+    assert (kinds["place"], kinds["pose"], kinds["change"]) == (6, 0, 6)
+    for name, job in jobs.items():
+        assert jobs.keys() >= set(job.needs)
+        if name.startswith("place"):
+            (need,) = job.needs
+            assert need.startswith("describe town_04_database")
+    outputs = [job.step.output for job in jobs.values()]
+    assert len(set(outputs)) == len(outputs)
+
+
+@pytest.mark.slow
+def test_a_condition_without_draws_is_measured_once(town, tmp_path, jobs_done):
+    wanted = experiment(
+        town,
+        query={"transient": {"snow": [0, 0.2]}},
+        seeds=[4, 5, 6],
+        protocol={"base": "fair", "query_spacing": 20},
+    )
+    results = measure(wanted, tmp_path)
+    found = {
+        (row.factors["query.transient.snow"], row.seed) for row in results.rows
+    }
+    assert found == {(0, 4), (0.2, 4), (0.2, 5), (0.2, 6)}
+    # Each draw is compared with the only baseline.
+    for seed in (4, 5, 6):
+        before, after = (
+            values(
+                results,
+                query__transient__snow=snow,
+                seed=one,
+                gate=False,
+            )
+            for snow, one in ((0, 4), (0.2, seed))
+        )
+        if before["auc"]:
+            assert after["kept"] == pytest.approx(
+                after["auc"] / before["auc"], abs=1e-6
+            )
+
+
+def test_queries_that_are_asked_otherwise_are_no_other_drives(town, tmp_path):
+    """They change no map, and neither do places elsewhere."""
+    _, measured = planned(
+        experiment(
+            town,
+            tasks=["place", "change", "localise"],
+            cases={
+                "hidden": {"query": {"hide_sector": 90}},
+                "size": {"database": {"distractors": 0}},
+                "construction": {"database": {"stage": "first"}},
+            },
+        ),
+        tmp_path,
+    )
+    found = {one.factors["cause"]: set(one.parts) for one in measured}
+    every = {"place", "change", "localise"}
+    assert found == {
+        "none": every,
+        "hidden": {"place"},
+        "size": every,
+        "construction": every,
+    }
+
+
+def test_the_change_is_measured_if_all_queries_are_turned(town, tmp_path):
+    _, measured = planned(
+        experiment(
+            town,
+            tasks=["change"],
+            database={"stage": ["last", "first"]},
+            query={"turn_queries": True},
+        ),
+        tmp_path,
+    )
+    assert [set(one.parts) for one in measured] == [{"change"}, {"change"}]
+
+
+def test_the_sensor_of_a_place_is_no_change_of_the_city(
+    town, tmp_path, jobs_done
+):
+    wanted = experiment(
+        town,
+        tasks=["change"],
+        database={"viewpoint": ["near", "lane"], "stage": ["last", "first"]},
+        query={"lidar": ["vlp-16", "os1-32"]},
+    )
+    jobs, measured = planned(wanted, tmp_path)
+    for one in measured:
+        way, query = (
+            one.way.source.scenario,
+            one.query.source.scenario,
+        )
+        same = one.factors["database.stage"] == "last"
+        assert (one.way == one.query) == same
+        assert way.lidars == query.lidars
+        assert way.stage == ("04" if same else "01")
+        assert (way.route, way.aside) == (query.route, query.aside)
+    # Each way through each stage is mapped once.
+    mapped = [name for name in jobs if name.startswith("mapped ")]
+    assert len(mapped) == 2 * 2
+
+
+def test_an_unchanged_city_has_no_change(town, tmp_path, jobs_done):
+    wanted = experiment(
+        town,
+        tasks={"change": {"spacing": 5}},
+        database={"viewpoint": ["near", "reversed"]},
+        methods=["solid"],
+    )
+    results = measure(wanted, tmp_path)
+    for viewpoint in ("near", "reversed"):
+        found = values(results, database__viewpoint=viewpoint)
+        assert found["tcr_sym"] == 0.0
+    assert {row.method for row in results.rows} == {""}
+
+
+def test_pairs_of_maps_begin_with_the_first_drive(town, tmp_path):
+    _, measured = planned(
+        experiment(town, drives="first-and-last", tasks=["map"]), tmp_path
+    )
+    (one,) = measured
+    stages = [
+        drive.source.scenario.stage for drive in (one.database, one.query)
+    ]
+    assert (one.names, stages) == (("town_01", "town_04"), ["01", "04"])
+
+
+@pytest.mark.slow
+def test_maps_are_labelled(town, tmp_path, jobs_done, monkeypatch):
+    from cns_drake.studies.tasks import map_task as update
+
+    monkeypatch.setattr(update, "find_spec", lambda name: None)
+    notes = []
+    results = measure(
+        experiment(
+            town,
+            tasks={"map": {"spacing": 20}},
+            both={"lidars": {"lidar": {"columns": 128}}},
+            cases={"construction": {"database": {"stage": "first"}}},
+        ),
+        tmp_path,
+        on_note=notes.append,
+    )
+    left_out, told = notes
+    assert left_out == "m3c2 is left out: it needs the extra map-update"
+    assert told.startswith("2 jobs: about ")
+    found = {
+        (cause, method): values(results, cause=cause, method=method)
+        for cause in ("none", "construction")
+        for method in ("truth", "free-space", "distance")
+    }
+    assert {(r.factors["cause"], r.method) for r in results.rows} == set(found)
+    for cause in ("none", "construction"):
+        truth = found[cause, "truth"]
+        assert truth["miou"] == truth["right_structures"] == 1.0
+    before, after = (found[c, "truth"] for c in ("none", "construction"))
+    # Nothing changes between two drives through one city.
+    assert before["called_points"] == 0.0 < after["called_points"]
+    assert before["gone"] == before["new"] == 0.0
+    assert after["gone"] + after["new"] > 0.0
+
+
+@pytest.mark.slow
+def test_scans_are_localised(town, tmp_path, jobs_done):
+    own = tmp_path / "stay.py"
+    own.write_text("def stay(map, scan, start):\n    return start, 1.0\n")
+    wanted = experiment(
+        town,
+        tasks={
+            "localise": {
+                "methods": ["gicp", str(own)],
+                "starts": [[0.5, 5], [2, 10]],
+                "spacing": 10.0,
+            }
+        },
+        database={"stage": ["last", "first"]},
+    )
+    output = tmp_path / "out"
+    results = measure(wanted, output)
+    assert {row.method for row in results.rows} == {
+        f"{method} from {far} m"
+        for method in ("gicp", "stay")
+        for far in ("0.5", "2")
+    }
+    # A start that stays is as far off as it was drawn.
+    for far in (0.5, 2):
+        found = values(
+            results, method=f"stay from {far:g} m", database__stage="last"
+        )
+        assert found["translation_median"] == pytest.approx(far)
+    queries = QueryRows.read(output / "queries.csv")
+    for one in queries.answers:
+        found = values(
+            results,
+            method=one.method,
+            database__stage=one.factors["database.stage"],
+        )
+        right = (np.asarray(one.columns["translation_error"]) <= 0.3) & (
+            np.asarray(one.columns["rotation_error_deg"]) <= 1.0
+        )
+        assert np.mean(right) == found["success_03m_1deg"]
+        np.testing.assert_array_equal(one.columns["correct"], right)
+    tables = contents(output)
+    measure(wanted, output)
+    assert (jobs_done[-1], contents(output)) == ([], tables)
+    # Another text of the own method is another method.
+    own.write_text("def stay(map, scan, start):\n    return start, 2.0\n")
+    measure(wanted, output)
+    assert len(jobs_done[-1]) == 2
+
+
+@pytest.mark.slow
+def test_costs_follow_the_number_of_places(town, tmp_path, jobs_done):
+    results = measure(experiment(town, tasks=["cost", "place"]), tmp_path)
+    cost, place = (
+        values(results, task=task, gate=False) for task in ("cost", "place")
+    )
+    assert min(cost["query_time"], cost["build_time"]) > 0
+    (number,) = {r.n for r in results.rows if r.task == "cost"}
+    assert number == place["places"]
+
+
+def test_an_own_method(town, tmp_path, jobs_done, monkeypatch):
+    from evaluation.methods import registry
+
+    # Other tests do not find the method registered.
+    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
+    own = tmp_path / "counting.py"
+    own.write_text(
+        """
+import numpy as np
+from evaluation import Method, MethodConfig, register
+
+@register("counting")
+class Counting(Method):
+    class Config(MethodConfig):
+        unit: float = 1.0
+
+    def describe(self, points):
+        return len(points)
+
+    def build_database(self, places):
+        return np.array(places)
+
+    def score(self, query, database, *, exhaustive=False):
+        return -np.abs(database - query) / 1e6
+"""
+    )
+    wanted = experiment(town, methods={str(own): {"unit": [1.0, 2.0]}})
+    results = measure(wanted, tmp_path / "out")
+    assert {
+        (row.method, row.factors["methods.counting.unit"])
+        for row in results.rows
+    } == {("counting", 1), ("counting", 2)}
+
+
+class PlannedError(Exception):
+    """All maps are known."""
+
+
+def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
+    runs = []
+    monkeypatch.setattr(
+        map_step, "run_jobs", lambda jobs, *_: runs.append([*jobs])
+    )
+
+    def stop(jobs, cluster):
+        runs.append([*jobs])
+        raise PlannedError
+
+    monkeypatch.setattr(engine, "run_jobs", stop)
+    wanted = experiment(
+        town,
+        database={"redraw": [3, 8], "years": [0, 5]},
+        both={"rates": 2},
+        cases={"slow": {"database": {"rates": 1}}},
+        seeds=[1, 2],
+    )
+    with pytest.raises(PlannedError):
+        run_study(wanted, tmp_path / "out", Cluster())
+    cities, measuring = runs
+    made = {job.step.folder: job.name for job in cities}
+    assert len(made) == len(cities) == 2 * 2 + 2
+    used = {
+        Path(job.step.source.scenario.map)
+        for job in measuring
+        if job.name.startswith("describe ")
+    }
+    # Each drive is through the town, or a city that was made.
+    assert used - {town} <= made.keys()
+    assert {path.name for path in made} >= {"town_c3", "town_c8"}
+
+
+@pytest.mark.parametrize(
+    ("fields", "fault"),
+    [
+        ({"tasks": ["dance"]}, "tasks: no task 'dance' .*place, pose"),
+        ({"tasks": {"place": {"x": 1}}}, "tasks.place.x: no such setting"),
+        ({"tasks": {"change": {"spacing": 0}}}, "tasks.change.spacing: 0 is"),
+        (
+            {"tasks": {"change": {"spacing": [1, 2]}}},
+            r"tasks.change.spacing: \[1, 2\] is not a positive number",
+        ),
+        (
+            {"tasks": {"map": {"methods": "guess"}}},
+            "tasks.map.methods: 'guess'",
+        ),
+        ({"tasks": {"map": {"methods": []}}}, r"tasks.map.methods: \[\] is no"),
+        ({"tasks": {"map": {"spacing": True}}}, "tasks.map.spacing: True is"),
+        (
+            {"tasks": {"localise": {"methods": ["gicp", "gicp"]}}},
+            "tasks.localise.methods: 'gicp' is there twice",
+        ),
+        (
+            {"tasks": {"localise": {"methods": "bow"}}},
+            "tasks.localise.methods: 'bow' is neither",
+        ),
+        ({"tasks": {"localise": {"starts": []}}}, "tasks.localise.starts: "),
+        ({"tasks": {"localise": {"starts": 2}}}, "tasks.localise.starts: 2 is"),
+        (
+            {"tasks": {"localise": {"starts": [[51, 0]]}}},
+            "tasks.localise.starts: 51 m is not above 0",
+        ),
+        (
+            {"tasks": {"localise": {"starts": [[1, 5], [1, 9]]}}},
+            "tasks.localise.starts: two starts at one distance",
+        ),
+        ({"methods": ["bow"]}, "methods: no method 'bow' .known: btc"),
+        ({"methods": ["svt-net"]}, "methods: svt-net: weights: Field"),
+        ({"methods": ["none.py"]}, "methods: .*none.py: no such file"),
+        ({"methods": {"solid": {"x": 1}}}, "methods: solid: no parameter 'x'"),
+        (
+            {"methods": {"solid": {"ranges": [20, "far"]}}},
+            "methods: solid: ranges: ",
+        ),
+        ({"protocol": {"base": "best"}}, "protocol.base: 'best' is none of"),
+        ({"frozen": "no.csv"}, "frozen: .*no.csv: No such file"),
+        ({"charts": [{"kind": "pie"}]}, "charts: kind: 'pie' is none of"),
+        ({"charts": [{"kind": "matrix"}]}, "charts: matrix: .*a name is"),
+    ],
+)
+def test_faults_before_any_work(town, tmp_path, fields, fault):
+    with pytest.raises(InputError, match=f"^mine.yaml: {fault}") as error:
+        run_study(
+            experiment(town, **fields), tmp_path, Cluster(), source="mine.yaml"
+        )
+    assert "\n" not in str(error.value)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("fields", "fault"),
+    [
+        ({"database": {"foo": 1}}, "mine: database: foo: Extra"),
+        (
+            {"database": {"years": [0, 5], "foo": 1}},
+            "mine: database: foo: Extra",
+        ),
+        ({"maps": ["atlantis"]}, "mine: maps: unknown map 'atlantis'"),
+        (
+            {
+                "maps": [
+                    {"name": "a", "age": "suburbia", "years": 1, "seed": 1},
+                    "atlantis",
+                ]
+            },
+            "mine: maps: unknown map 'atlantis'",
+        ),
+        ({"database": {"years": 1.5}}, "mine: database.years: 1.5 is not"),
+        ({"query": {"years": 0.5}}, "mine: query.years: 0.5 is not"),
+        (
+            {"both": {"redraw": {"frozen": 1}}},
+            "mine: both.redraw.frozen: .*town: no shipped map",
+        ),
+        (
+            {
+                "maps": [
+                    {"name": "a", "age": "suburbia", "years": 1, "seed": 1}
+                ],
+                "both": {"redraw": {"frozen": 1}},
+            },
+            "mine: both.redraw.frozen: a: no shipped map",
+        ),
+        (
+            {"maps": ["suburbia"], "both": {"redraw": {"frozen": [1, 6]}}},
+            "mine: both.redraw.frozen: no frozen redraw 6",
+        ),
+        (
+            {"database": {"stage": "earlier 1"}},
+            "mine: no condition that can be measured",
+        ),
+    ],
+)
+def test_faults_before_anything_is_made(
+    town, tmp_path, monkeypatch, fields, fault
+):
+    monkeypatch.setattr(
+        engine, "run_jobs", lambda *_: pytest.fail("a job runs")
+    )
+    with pytest.raises(InputError, match=f"^{fault}"):
+        run_study(experiment(town, **fields), tmp_path / "out", Cluster())
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_case_with_fewer_levels_is_noted(town, tmp_path):
+    wanted = experiment(
+        town,
+        cases={
+            "snow": {"query": {"transient": {"snow": [0.1, 0.2]}}},
+            "returns": {"query": {"returns": "calibrated"}},
+        },
+        levels=[2],
+    )
+    notes = []
+    with pytest.raises(InputError, match="no-map"):
+        run_study(wanted, tmp_path, Cluster(), ["no-map"], on_note=notes.append)
+    assert notes == ["measured at their last level: returns (1)"]
+
+
+@pytest.mark.parametrize("given", [[3, 1], 3, [5, 4, 2]])
+def test_fresh_cities_have_their_numbers(tmp_path, monkeypatch, given):
+    monkeypatch.setattr(
+        map_step, "run_jobs", lambda jobs, cluster, unit="": None
+    )
+    wanted = experiment("suburbia", both={"redraw": {"frozen": given}})
+    monkeypatch.setattr(
+        experiment_maps, "_drive_pairs", lambda folder, _: [(folder, folder)]
+    )
+    run = ExperimentRun(wanted, tmp_path, "mine.yaml", Cluster())
+    found = {
+        one.factors["both.redraw.frozen"]: one.pairs[0][0].name
+        for one in pairs_by_map(run, ["suburbia"])
+    }
+    numbers = given if isinstance(given, list) else [given]
+    assert found == {one: f"suburbia_f{one:02d}" for one in numbers}
+
+
+@pytest.mark.parametrize("name", ["results.csv", "queries.csv", "index.html"])
+def test_a_folder_with_the_name_of_a_result(town, tmp_path, monkeypatch, name):
+    monkeypatch.setattr(
+        engine, "run_jobs", lambda *_: pytest.fail("a job runs")
+    )
+    (tmp_path / name).mkdir()
+    with pytest.raises(InputError, match=f"{name}: Is a directory"):
+        run_study(experiment(town), tmp_path, Cluster())
+
+
+def test_two_maps_of_one_name(town, tmp_path):
+    shutil.copytree(town, tmp_path / "town")
+    both = experiment(town, maps=[str(town), str(tmp_path / "town")])
+    with pytest.raises(InputError, match=r"another map, .* town, too"):
+        run_study(both, tmp_path / "out", Cluster())
+    # Nor may two drives share a name, whose results share a file.
+    other = shutil.copytree(town, tmp_path / "village")
+    (other / "sequence_01.yaml").unlink()
+    file = other / "sequence_04.yaml"
+    file.write_text(file.read_text() + "name: town_04\n")
+    both = experiment(town, maps=[str(town), str(other)])
+    with pytest.raises(InputError, match=r"village: another .* town_04, too"):
+        run_study(both, tmp_path / "out", Cluster())
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_map_with_one_drive_has_no_stages_to_compare(town, tmp_path):
+    lonely = shutil.copytree(town, tmp_path / "lonely")
+    (lonely / "sequence_01.yaml").unlink()
+    notes = []
+    _, measured = planned(
+        experiment(town, maps=[str(lonely), str(town)], drives="stages"),
+        tmp_path / "out",
+        on_note=notes.append,
+    )
+    assert notes == ["lonely: no two drives to compare"]
+    assert {one.map_name for one in measured} == {"town"}
+
+
+def test_maps_on_the_command_line(town, tmp_path):
+    wanted = experiment(
+        town,
+        maps=["suburbia", {"name": "a", "age": "x", "years": 2, "seed": 1}],
+    )
+    run = ExperimentRun(wanted, tmp_path, "mine.yaml", Cluster())
+    (drives,) = pairs_by_map(run, [str(town)])
+    assert drives.map_name == "town"
+    with pytest.raises(InputError, match="maps: a: no map 'x'"):
+        list(pairs_by_map(run, ["a"]))
+
+
+def test_each_part_of_years_has_a_job_of_its_own(tmp_path):
+    """If two have one name, one of them never runs."""
+    wanted = load_experiment(
+        "years",
+        [
+            "database.years=[0, 5, 20]",
+            "query.years=[0, 5, 20]",
+            "seeds=[1, 2]",
+            "methods=[solid]",
+            "tasks=[place, localise, map]",
+            "maps=[suburbia, riverside]",
+        ],
+    )
+    jobs, measured = planned(wanted, tmp_path)
+    # Today and after two times of two histories each, both ways, of two maps.
+    assert len(measured) == 2 * (1 + 2 * 2 * 2)
+    starts = Counter(name.split()[0] for name in jobs)
+    assert starts["place"] == starts["localise"] == starts["map"] == 18
+    outputs = [job.step.output for job in jobs.values()]
+    assert len(set(outputs)) == len(outputs)
+
+
+def test_places_elsewhere_are_described_once(tmp_path):
+    wanted = load_experiment(
+        "size",
+        [
+            "database.distractors=[0, 100, 300]",
+            "methods=[solid]",
+            "maps=[suburbia]",
+        ],
+    )
+    jobs, _ = planned(wanted, tmp_path)
+    described = [name for name in jobs if name.startswith("describe ")]
+    # One or two drives of other cities have 300 places; the database and the
+    # query serve all sizes.
+    assert 3 <= len(described) <= 4
+    place = [job for name, job in jobs.items() if name.startswith("place ")]
+    # The overlaps come first, then the one method.
+    steps = [job.step.steps[1] for job in place]
+    assert [step.arguments[3] for step in steps] == [0, 100, 300]
+    assert steps[0].arguments[2] == ()
+    assert len(steps[-1].arguments[2]) == len(described) - 2
+    assert set(place[-1].needs) == set(described)
+
+
+def test_fair_is_the_protocol_of_studies(town, tmp_path):
+    _, (one,) = planned(experiment(town), tmp_path)
+    assert one.protocol == FAIR_PROTOCOL

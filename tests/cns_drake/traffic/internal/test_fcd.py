@@ -1,0 +1,451 @@
+"""Replayed traces of SUMO: places, headings, velocities in closed form."""
+
+import re
+
+import numpy as np
+from pydrake.geometry import SceneGraph
+import pytest
+
+from cns_drake.base import InputError
+from cns_drake.traffic import (
+    EgoBox,
+    LaneGraph,
+    Piece,
+    fcd_trace,
+    play_trace,
+    read_fcd,
+)
+from cns_drake.traffic.traffic_motion import make_traffic
+from cns_drake.traffic.walkers import gait_rate
+
+# Time step of the trace [s].
+DT = 0.1
+# Radius of the circle on which a vehicle drives [m].
+RADIUS = 30.0
+# Angular velocity of this vehicle [rad/s].
+RATE = 0.2
+TURN = np.linspace(0.0, 2 * np.pi, 400)
+SLOPE = 0.05
+GRAPH = LaneGraph(
+    (
+        Piece(
+            np.column_stack(
+                [
+                    RADIUS * np.cos(TURN),
+                    RADIUS * np.sin(TURN),
+                    2.0 + SLOPE * RADIUS * np.cos(TURN),
+                ]
+            ),
+            13.9,
+            False,
+        ),
+    )
+)
+EGO_BOX = EgoBox(-1.05, 3.75, 1.05)
+
+
+def far_away(times):
+    return np.tile((500.0, 0.0), (len(times), 1)), np.zeros(len(times))
+
+
+def front_of_bus(t, length):
+    """The bus's middle follows a circle; its front follows a turned one."""
+    angle = RATE * t
+    yaw = angle + np.pi / 2
+    middle = RADIUS * np.array([np.cos(angle), np.sin(angle)])
+    return middle + length / 2 * np.array([np.cos(yaw), np.sin(yaw)]), yaw
+
+
+def write_trace(path, count=80, change=lambda text: text):
+    """A bus on a circle, a car from 2 s to 4 s, and a walker."""
+    length = 11.26
+    rows = ['<?xml version="1.0"?>', "<fcd-export>"]
+    for k in range(count):
+        t = k * DT
+        xy, yaw = front_of_bus(t, length)
+        angle = (90.0 - np.degrees(yaw)) % 360.0
+        rows.append(f'<timestep time="{100 + t:.2f}">')
+        rows.append(
+            f'<vehicle id="b" x="{xy[0]:.6f}" y="{xy[1]:.6f}" '
+            f'angle="{angle:.6f}" type="city_bus" speed="6" slope="2"/>'
+        )
+        if 20 <= k <= 40:
+            rows.append(
+                f'<vehicle id="c" x="{-RADIUS}" y="{7 * t - 20:.6f}" '
+                'angle="0" type="DEFAULT_VEHTYPE" speed="7" pos="1" '
+                'lane="e_0"/>'
+            )
+        rows.append(
+            f'<person id="p" x="{20 - 1.25 * t:.6f}" y="3" angle="270" '
+            'speed="1.25" pos="1" edge="e"/>'
+        )
+        rows.append("</timestep>")
+    rows.append("</fcd-export>")
+    path.write_text(change("\n".join(rows)))
+    return path
+
+
+def play(path, duration=7.0, ego=far_away, seed=1, end=7.0):
+    return play_trace(
+        read_fcd(path), path, GRAPH, [], seed=seed, duration=duration,
+        end=end, ego=ego, ego_box=EGO_BOX,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def trace(tmp_path):
+    return write_trace(tmp_path / "trace.xml")
+
+
+def test_places_and_velocities(trace):
+    plan = play(trace)
+    assert plan.kinds[0].name == "bus"
+    assert plan.kinds[1].semantic_class == "car"
+    assert plan.left_out == 0
+    for t in (0.0, 0.1 - 1e-9, 0.1, 1.234, 3.05, 5.5, 6.999, 7.9):
+        (values, rates) = plan.vehicles.at(t)
+        angle = RATE * t
+        expected = RADIUS * np.array([np.cos(angle), np.sin(angle)])
+        np.testing.assert_allclose(values[0, :2], expected, atol=1e-5)
+        np.testing.assert_allclose(
+            rates[0, :2],
+            RATE * RADIUS * np.array([-np.sin(angle), np.cos(angle)]),
+            atol=2e-3,
+        )
+        assert values[0, 3] == pytest.approx(angle + np.pi / 2, abs=1e-6)
+        assert rates[0, 3] == pytest.approx(RATE, abs=1e-6)
+        # Uphill is nose up, which is a turn about -y.
+        assert values[0, 4] == pytest.approx(-np.radians(2.0))
+        height = 2.0 + SLOPE * expected[0]
+        assert values[0, 2] == pytest.approx(height, abs=2e-2)
+        walkers, walker_rates = plan.walkers.at(t)
+        np.testing.assert_allclose(walkers[0, :2], [20 - 1.25 * t, 3.0])
+        assert abs(walkers[0, 3]) == pytest.approx(np.pi)
+        np.testing.assert_allclose(walker_rates[0, :2], [-1.25, 0], atol=1e-9)
+        assert walker_rates[0, 4] == pytest.approx(gait_rate(1.25))
+
+
+def test_velocities_are_continuous(trace):
+    plan = play(trace)
+    for knot in DT * np.arange(1, 70):
+        before, after = (
+            plan.vehicles.at(knot + sign * 1e-9)[1] for sign in (-1, 1)
+        )
+        there = plan.vehicles.is_present(knot - 1e-6)
+        there &= plan.vehicles.is_present(knot + 1e-6)
+        np.testing.assert_allclose(before[there], after[there], atol=1e-5)
+
+
+def test_objects_that_come_and_go(trace):
+    plan = play(trace)
+    for t, there in ((1.95, False), (2.05, True), (3.95, True), (4.05, False)):
+        assert plan.vehicles.is_present(t).tolist() == [True, there]
+    values, rates = plan.vehicles.at(3.05)
+    half = plan.kinds[1].size[0] / 2
+    expected = [-RADIUS, 7 * 3.05 - 20 - half]
+    np.testing.assert_allclose(values[1, :2], expected, atol=1e-9)
+    np.testing.assert_allclose(rates[1, :2], [0.0, 7.0], atol=1e-9)
+
+
+def test_the_same_trace_gives_the_same_plan(trace):
+    one, other = play(trace), play(trace)
+    np.testing.assert_array_equal(one.vehicles.values, other.vehicles.values)
+    assert one.kinds == other.kinds
+    kinds = {play(trace, seed=seed).kinds[1].name for seed in range(20)}
+    assert len(kinds) > 2
+
+
+def test_walkers_do_not_walk_in_step(tmp_path):
+    """Each begins at its own place of the gait, in the first frame too."""
+
+    def add(text):
+        one = re.search(r'<person id="p" .*?/>', text)[0].partition(" x=")[2]
+        others = "".join(f'<person id="q{k}" x={one}' for k in range(9))
+        return text.replace("</timestep>", others + "</timestep>")
+
+    plan = play(write_trace(tmp_path / "many.xml", change=add))
+    for t in (0.0, 3.3):
+        phases = plan.walkers.at(t)[0][:, 4] % (2 * np.pi)
+        assert len(np.unique(phases.round(2))) > 7
+        assert np.ptp(np.sin(phases)) > 1.0
+
+
+def test_objects_that_would_meet_the_ego_car_are_left_out(trace):
+    def ego(times):
+        # The ego car stands where the traced car passes at 3.5 s.
+        return np.tile((-RADIUS, 4.0), (len(times), 1)), np.zeros(len(times))
+
+    plan = play(trace, ego=ego)
+    assert [kind.name for kind in plan.kinds] == ["bus"]
+    assert plan.left_out == 1
+    assert plan.walkers.values.shape[1] == 1
+
+
+def test_what_meets_the_ego_car_after_its_drive_stays(trace):
+    def ego(times):
+        return np.tile((-RADIUS, 4.0), (len(times), 1)), np.zeros(len(times))
+
+    # The traced car is there from 2 s on, and at the ego car after 3 s.
+    assert play(trace, ego=ego, duration=2.5, end=2.5).left_out == 0
+    assert play(trace, ego=ego, duration=2.5, end=3.5).left_out == 1
+
+
+@pytest.mark.parametrize("dt", [0.1, 1.0])
+def test_a_constant_speed_is_constant_from_first_to_last(tmp_path, dt):
+    """A car at 10 m/s on a straight lane."""
+    rows = [
+        f'<timestep time="{k * dt:.2f}"><vehicle id="c" '
+        f'x="{10 * k * dt - 20:g}" y="30" angle="90"/></timestep>'
+        for k in range(5)
+    ]
+    path = tmp_path / "straight.xml"
+    path.write_text(f"<fcd-export>{''.join(rows)}</fcd-export>")
+    plan = play(path, duration=4 * dt, end=0.0)
+    half = plan.kinds[0].size[0] / 2
+    for t in np.append(np.linspace(0.0, 4 * dt, 37), 4 * dt + 0.05):
+        (place,), (rate,) = plan.vehicles.at(t)
+        x = 10 * t - 20 - half
+        np.testing.assert_allclose(place[:2], [x, 30], atol=1e-9)
+        np.testing.assert_allclose(rate[:2], [10.0, 0.0], atol=1e-9)
+
+
+def test_a_lidar_that_turns_sees_bodies_come_and_go_in_motion(trace):
+    """The traced car is there from 2 s to 4 s, at 7 m/s."""
+    plan = play(trace)
+    traffic = make_traffic(SceneGraph(), plan, turn=0.05)
+    context = traffic.CreateDefaultContext()
+    port = traffic.GetOutputPort("body_spatial_velocities")
+    for t in (2.001, 3.0, 3.97, 3.999):
+        context.SetTime(t)
+        velocity = port.Eval(context)[1].translational()
+        np.testing.assert_allclose(velocity[:2], [0, 7], atol=1e-6)
+        # Heights are means of the lane's points.
+        assert abs(velocity[2]) < 0.5
+
+
+def fault(path, **options):
+    with pytest.raises(InputError) as error:
+        play(path, **options)
+    assert "\n" not in str(error.value)
+    assert str(error.value).startswith(f"{path}: ")
+    return str(error.value)[len(f"{path}: ") :]
+
+
+def write_moves(path, tag, kind, dt, xs):
+    """A trace of one body that moves along x; None where it is absent."""
+    rows = "".join(
+        f'<timestep time="{k * dt:.2f}">'
+        + (
+            ""
+            if x is None
+            else f'<{tag} id="a" x="{x}" y="{-RADIUS}" angle="90" type="{kind}"'
+            ' speed="1"/>'
+        )
+        + f'<vehicle id="b" x="{-k * dt}" y="{RADIUS}" angle="270"/></timestep>'
+        for k, x in enumerate(xs)
+    )
+    path.write_text(f"<fcd-export>{rows}</fcd-export>")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("tag", "kind", "fastest"),
+    [
+        ("vehicle", "passenger", 80.0),
+        ("vehicle", "DEFAULT_BIKETYPE", 20.0),
+        ("vehicle", "city_bus", 80.0),
+        ("person", "DEFAULT_PEDTYPE", 12.0),
+    ],
+)
+@pytest.mark.parametrize("dt", [0.1, 1.0])
+def test_what_jumps_is_absent_meanwhile(tmp_path, tag, kind, fastest, dt):
+    """SUMO teleports vehicles; nobody flies through the city at that speed."""
+    for factor, jumps in ((0.999, 0), (1.001, 1)):
+        far = factor * fastest * dt
+        xs = [0.0, 0.1, 0.2, 0.2 + far, 0.3 + far, 0.4 + far]
+        path = write_moves(tmp_path / "a.xml", tag, kind, dt, xs)
+        trace = read_fcd(path)
+        plan = play(path, duration=5 * dt, end=5 * dt)
+        tracks = plan.vehicles if tag == "vehicle" else plan.walkers
+        own = [0, 1][: 1 + jumps]
+        for k in range(5):
+            t = (k + 0.5) * dt
+            there = tracks.is_present(t)[own]
+            assert there.sum() == (0 if jumps and k == 2 else 1)
+            speed = np.abs(tracks.at(t)[1][own, 0][there])
+            if jumps:
+                np.testing.assert_allclose(speed, 0.1 / dt, rtol=1e-6)
+        if not jumps:
+            assert trace.notes == ()
+            continue
+        (note,) = trace.notes
+        assert note.startswith(
+            f"{path}: left out: 1 jumps from one timestep to the next, such as"
+            f" that of 'a' at {3 * dt:g} s, by "
+        )
+        # It stays the same kind of body.
+        assert tag == "person" or plan.kinds[0] == plan.kinds[1]
+
+
+def test_a_trace_of_jumps_has_other_units(tmp_path, monkeypatch):
+    monkeypatch.setattr(fcd_trace, "_MOST_JUMPS", 3)
+    for number in (4, 5):
+        xs = [1000.0 * k for k in range(number)]
+        path = write_moves(tmp_path / "a.xml", "vehicle", "", 1.0, xs)
+        if number == 4:
+            assert len(read_fcd(path).vehicles) == 4 + 1
+            continue
+        fault = r"4 jumps from .* in seconds"
+        with pytest.raises(InputError, match=fault):
+            read_fcd(path)
+
+
+def test_what_is_away_for_a_time_may_come_back_elsewhere(tmp_path):
+    xs = [0.0, 3.0, None, None, 500.0, 503.0]
+    path = write_moves(tmp_path / "a.xml", "vehicle", "passenger", 1.0, xs)
+    assert read_fcd(path).notes == ()
+    tracks = play(path, duration=5.0, end=5.0).vehicles
+    there = [bool(tracks.is_present(k + 0.5)[0]) for k in range(5)]
+    assert there == [True, False, False, False, True]
+    for t in (0.01, 0.99, 4.01, 4.99):
+        assert tracks.at(t)[1][0, 0] == pytest.approx(3.0)
+
+
+def test_a_trace_that_is_too_short(trace):
+    play(trace, duration=7.9)
+    assert fault(trace, duration=7.91) == (
+        "the trace has 7.9 s from 100 s on, but the drive takes 7.91 s: record"
+        " more, or lower frames"
+    )
+
+
+def test_a_trace_of_another_map(tmp_path):
+    def move(text):
+        return re.sub(
+            r' x="([^"]+)"', lambda m: f' x="{float(m[1]) + 900}"', text
+        )
+
+    path = write_trace(tmp_path / "moved.xml", change=move)
+    assert re.fullmatch(
+        r"half of the trace is more than 5 m from the map's lanes: the trace "
+        r"is at x 8\d\d to 9\d\d, .* m, the lanes are at x -30 to 30, y -30 to "
+        r"30 m; give a trace of this map, without an offset",
+        fault(path),
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('time="103.00"', 'time="103.05"', "timestep 103.05: times are not ev"),
+        ('time="103.00"', 'time="x"', "line .*: timestep: time: 'x' is no num"),
+        ('angle="0" ', "", "line .*: vehicle: no angle"),
+        ('id="c"', 'id="b"', "line .*: vehicle 'b' is there twice"),
+        ("</fcd-export>", "", "cannot be parsed: line .*: no element found"),
+        ("fcd-export", "sumo", "line 2: sumo is no fcd-export"),
+        ("vehicle|person", "container", "the trace has no vehicle"),
+        ("<fcd-export>", '<!DOCTYPE a [<!ENTITY b "c">]><fcd-export>', "line"),
+    ],
+)
+def test_traces_that_are_none(tmp_path, old, new, expected):
+    path = write_trace(
+        tmp_path / "bad.xml", change=lambda text: re.sub(old, new, text)
+    )
+    assert re.match(expected, fault(path))
+
+
+@pytest.mark.parametrize("vehicle", ["", ' vehicle="b"'])
+def test_persons_are_not_seen_while_they_ride(tmp_path, vehicle):
+    """Walker p boards the bus at 3 s and leaves it at 5 s; q rides throughout.
+
+    A container rides, too.
+    """
+    number = iter(range(80))
+
+    def boards(match):
+        k = next(number)
+        x, y = re.search(r'id="b" x="(\S+)" y="(\S+)"', match[0]).groups()
+        row = '<person id="{}" x="{}" y="{}" angle="0" speed="6"{}/>'
+        rider = row.format("q", x, y, vehicle)
+        if 30 <= k <= 50:
+            own = row.format("p", x, y, vehicle)
+            match = re.sub(r'<person id="p".*?/>', own, match[0])
+        else:
+            match = match[0]
+        load = f'<container id="load" x="{x}" y="{y}" angle="0"/>'
+        return match.replace("</timestep>", f"{rider}{load}</timestep>")
+
+    def change(text):
+        return re.sub(r"<timestep.*?</timestep>", boards, text, flags=re.DOTALL)
+
+    path = write_trace(tmp_path / "trace.xml", change=change)
+    plan = play(path)
+    for t, there in ((2.85, True), (3.05, False), (4.95, False), (5.15, True)):
+        assert plan.walkers.is_present(t).tolist() == [there]
+        assert plan.vehicles.is_present(t)[0]
+    values, _ = plan.walkers.at(5.15)
+    np.testing.assert_allclose(values[0, :2], [20 - 1.25 * 5.15, 3.0])
+    assert plan.notes == (
+        f"{path}: left out: 2 persons, while they ride in vehicles",
+        f"{path}: left out: 1 elements container",
+    )
+
+
+LINE = np.arange(-60.0, 60.5, 0.5)
+ABOVE = 6.0
+BRIDGE = np.column_stack([0 * LINE - 1.75, LINE, 0 * LINE + ABOVE])
+BELOW = np.column_stack([LINE, 0 * LINE + 1.75, 0 * LINE])
+# A street on two levels, one above the other.
+STACKED = np.column_stack([LINE, 0 * LINE + 1.75, 0 * LINE + ABOVE])
+
+
+@pytest.mark.parametrize("zero", [None, 0.0, -40.0])
+@pytest.mark.parametrize(
+    ("ways", "starts", "heights"),
+    [
+        ((BRIDGE, BELOW), ((-1.75, -50, 0, 8), (-50, 1.75, 8, 0)), (ABOVE, 0)),
+        ((BELOW, STACKED), ((-50, 1.75, 8, 0), (50, 1.75, -8, 0)), (0, ABOVE)),
+    ],
+)
+def test_vehicles_are_on_their_own_level(tmp_path, zero, ways, starts, heights):
+    """Over a crossing on two levels; the trace has heights, or none."""
+    if zero is None and ways[1] is STACKED:
+        pytest.skip("nothing tells the level")
+    steps = []
+    for k in range(120):
+        rows = [f'<timestep time="{k / 10}">']
+        for name, (x, y, u, v), z in zip("ab", starts, heights, strict=True):
+            place = f'x="{x + u * k / 10}" y="{y + v * k / 10}"'
+            if zero is not None:
+                place += f' z="{z + zero}"'
+            angle = np.degrees(np.arctan2(u, v))
+            rows.append(f'<vehicle id="{name}" {place} angle="{angle}"/>')
+        steps.append("".join([*rows, "</timestep>"]))
+    path = tmp_path / "trace.xml"
+    path.write_text(f"<fcd-export>{''.join(steps)}</fcd-export>")
+    graph = LaneGraph(tuple(Piece(way, 13.9, False) for way in ways))
+    plan = play_trace(
+        read_fcd(path), path, graph, [], seed=1, duration=10.0, end=10.0,
+        ego=far_away, ego_box=EGO_BOX,
+    )  # fmt: skip
+    for t in np.arange(0.0, 10.0, 0.1):
+        values, _ = plan.vehicles.at(t)
+        np.testing.assert_allclose(values[:, 2], heights, atol=1e-6)
+
+
+def test_a_walker_stays_on_the_bridge_on_which_he_came(tmp_path):
+    rows = [
+        f'<timestep time="{k}">'
+        f'<person id="p" x="-1.75" y="{k - 30}" angle="0"/>'
+        "</timestep>"
+        for k in range(60)
+    ]
+    path = tmp_path / "trace.xml"
+    path.write_text(f"<fcd-export>{''.join(rows)}</fcd-export>")
+    graph = LaneGraph(tuple(Piece(way, 13.9, False) for way in (BRIDGE, BELOW)))
+    plan = play_trace(
+        read_fcd(path), path, graph, [], seed=1, duration=50.0, end=50.0,
+        ego=far_away, ego_box=EGO_BOX,
+    )  # fmt: skip
+    heights = [plan.walkers.at(t)[0][0, 2] for t in np.arange(0.0, 50.0)]
+    np.testing.assert_allclose(heights, ABOVE, atol=1e-6)

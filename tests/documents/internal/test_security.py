@@ -1,0 +1,95 @@
+"""Every line of SECURITY.md has a test, and those that have none elsewhere."""
+
+import ast
+import pickle
+
+from helpers import documents
+import numpy as np
+import pytest
+
+from cns_drake.base import InputError
+from cns_drake.scene import ForeignMeshes, foreign_meshes
+from evaluation.clouds import read_cloud
+from evaluation.methods import load_method, registry
+
+
+def rows():
+    """Returns all rows of the page's tables."""
+    page = documents.read("SECURITY.md")
+    return [
+        row
+        for header in (
+            "| file or input | what it cannot do | test |",
+            "| file or option | risk | test |",
+        )
+        for row in documents.table(page, header)
+    ]
+
+
+def test_each_line_has_a_test():
+    assert len(rows()) > 15
+    for *_, place in rows():
+        path, _, name = place.replace("`", "").partition(": ")
+        tree = ast.parse((documents.ROOT / path).read_text())
+        names = {
+            node.name for node in tree.body if isinstance(node, ast.FunctionDef)
+        }
+        assert name in names, place
+
+
+class Trap:
+    """Leaves a file behind when it is unpickled."""
+
+    def __init__(self, path):
+        self._path = path
+
+    def __reduce__(self):
+        return (open, (str(self._path), "w"))
+
+
+def test_an_array_of_objects_is_not_unpickled(tmp_path):
+    path = tmp_path / "map.npy"
+    np.save(path, np.array([[Trap(tmp_path / "ran")] * 3]), allow_pickle=True)
+    assert b"builtins" in path.read_bytes() or b"open" in path.read_bytes()
+    with pytest.raises(InputError, match=r"map\.npy: "):
+        read_cloud(path)
+    assert not (tmp_path / "ran").exists()
+    pickle.loads(pickle.dumps(Trap(tmp_path / "ran"))).close()
+    assert (tmp_path / "ran").exists()
+
+
+@pytest.mark.slow
+def test_a_mesh_reader_that_crashes_is_a_fault(tmp_path, monkeypatch):
+    (tmp_path / "crashing.py").write_text("import os\nos.abort()\n")
+    monkeypatch.setattr(foreign_meshes, "__name__", "crashing")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with (
+        ForeignMeshes() as meshes,
+        pytest.raises(ValueError, match="Open3D cannot read it"),
+    ):
+        meshes.read(tmp_path / "a.stl")
+
+
+def test_a_method_file_is_a_program(tmp_path, monkeypatch):
+    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
+    path = tmp_path / "program.py"
+    path.write_text(f"open({str(tmp_path / 'ran')!r}, 'w').close()\n")
+    with pytest.raises(InputError, match="registers 0 methods"):
+        load_method(path)
+    assert (tmp_path / "ran").exists()
+
+
+def test_a_page_in_the_making_is_seen_from_this_machine_alone():
+    source = (documents.ROOT / "cns_drake/pictures/drive_page.py").read_text()
+    calls = [
+        node
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Call)
+        and getattr(node.func, "id", "") == "MeshcatParams"
+    ]
+    assert calls
+    for call in calls:
+        given = {
+            word.arg: ast.literal_eval(word.value) for word in call.keywords
+        }
+        assert given == {"host": "127.0.0.1", "port": 0}

@@ -1,0 +1,180 @@
+"""Tracking of a drive through a map, against closed forms."""
+
+import json
+import math
+
+from helpers.internal.eval_program import run
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cns_drake.base import from_xyz, poses
+from evaluation.drives import travelled
+from evaluation.localisation import (
+    Localiser,
+    Settings,
+    Starts,
+    localisation_summary,
+    map_of,
+    track_drive,
+    tracking_summary,
+)
+from evaluation.localisation.estimators import Estimate
+from evaluation.localisation.tracking import drifting_steps, losses
+
+MOUNT = Rotation.from_euler("ZYX", [130.0, 20.0, -8.0], degrees=True)
+CLOUD = np.random.default_rng(1).uniform(-20.0, 20.0, (400, 3))
+
+
+class Line:
+    """A drive of N scans, 2 m apart, along a curve, with a tilted LiDAR."""
+
+    name = "line"
+
+    def __init__(self, number):
+        heading = 0.002 * np.arange(number)
+        steps = 2.001 * np.stack(
+            [np.cos(heading), np.sin(heading), np.zeros(number)], axis=1
+        )
+        p_WS = np.cumsum(steps, axis=0)
+        yaw = Rotation.from_euler("z", heading[:, None])
+        self.X_WS = poses.make_pose((yaw * MOUNT).as_matrix(), p_WS)
+        self.stamps_ns = np.arange(number)
+
+    def __len__(self):
+        return len(self.X_WS)
+
+    def scan(self, index):
+        return from_xyz(CLOUD)
+
+
+def follow(line, estimator, drift=0.0, mapped=None, starts=None):
+    place = map_of(CLOUD, "map", Settings.neighbours)
+    found = Localiser(place, estimator, Settings())
+    mapped = np.ones(len(line), bool) if mapped is None else mapped
+    starts = Starts(0.5, 0.0) if starts is None else starts
+    return track_drive(found, line, mapped, starts, drift)
+
+
+def stay(place, scan, measured, start):
+    return Estimate(start, 1.0)
+
+
+def test_an_exact_odometry_keeps_the_first_error():
+    rows = follow(Line(40), stay)
+    assert rows["translation_error"] == pytest.approx(0.5)
+    assert rows["rotation_error_deg"] == pytest.approx(0.0, abs=1e-6)
+    values = tracking_summary(rows)
+    assert values["way"] == pytest.approx(78.0, abs=0.2)
+    assert values["within_03m"] == 0.0
+    assert values["lost_per_km"] == 0.0
+    assert values["back_after_median"] is None
+
+
+def test_drift_in_closed_form():
+    # Over one stretch of 100 m: all lengths wrong by a, a turn of b deg/m.
+    X_WS = np.tile(np.eye(4), (49, 1, 1))
+    X_WS[:, :3, :3] = MOUNT.as_matrix()
+    X_WS[:, 0, 3] = 2.0 * np.arange(49)
+    way = travelled(X_WS[:, :3, 3])
+    a, b = 0.01 * np.random.default_rng([4, 5]).normal(size=2)
+    pose = X_WS[0]
+    for step in drifting_steps(X_WS, way, 0.01, 4):
+        pose = pose @ step
+    headings = np.radians(b * 2.0 * np.arange(1, 49))
+    expected = 2.0 * (1.0 + a) * np.stack([np.cos(headings), np.sin(headings)])
+    assert pose[:2, 3] == pytest.approx(expected.sum(axis=1))
+    assert pose[2, 3] == pytest.approx(0.0, abs=1e-9)
+    turned = Rotation.from_matrix(pose[:3, :3] @ MOUNT.inv().as_matrix())
+    assert turned.as_euler("ZYX") == pytest.approx([headings[-1], 0, 0])
+    exact = drifting_steps(X_WS, way, 0.0, 4)
+    assert np.allclose(exact, poses.inverse(X_WS[:-1]) @ X_WS[1:])
+
+
+def test_the_deviation_of_a_drift():
+    X_WS = np.tile(np.eye(4), (10001, 1, 1))
+    X_WS[:, 0, 3] = 10.0 * np.arange(10001)
+    steps = drifting_steps(X_WS, X_WS[:, 0, 3], 0.01, 0)
+    lengths = np.linalg.norm(steps[:, :3, 3], axis=1) / 10.0 - 1.0
+    turns = Rotation.from_matrix(steps[:, :3, :3]).as_rotvec()[:, 2]
+    assert lengths.std() == pytest.approx(0.01, rel=0.1)
+    assert np.degrees(turns).std() / 10.0 == pytest.approx(0.01, rel=0.1)
+
+
+def test_losses_and_returns():
+    line = Line(100)
+    # Far off at scans 20 to 24 and from 90 on; no pose at 50.
+    calls = iter(range(100))
+
+    def wavering(place, scan, measured, start):
+        k = next(calls)
+        X_WS = line.X_WS[k].copy()
+        if 20 <= k < 25 or k >= 90:
+            X_WS[2, 3] += 2.1
+        return Estimate(None if k == 50 else X_WS, 1.0)
+
+    rows = follow(line, wavering)
+    # The odometry's error is none of a result.
+    assert rows["track_error"][50] == pytest.approx(0.0, abs=1e-9)
+    assert np.flatnonzero(np.isnan(rows["translation_error"])).tolist() == [50]
+    assert localisation_summary(rows)["without_pose"] == 1
+    (one, two), values = losses(rows), tracking_summary(rows)
+    assert one == (pytest.approx(10.0, abs=0.02), True)
+    assert two == (pytest.approx(18.0, abs=0.02), False)
+    assert values["lost"] == 2
+    assert values["lost_for_good"] == 1
+    assert values["lost_per_km"] == pytest.approx(2.0 / 0.198, rel=1e-3)
+    assert values["back_after_median"] == pytest.approx(10.0, abs=0.02)
+    assert values["within_03m"] == pytest.approx(84.0 / 99.0, rel=1e-3)
+
+
+def test_a_scan_without_points_is_passed_by_odometry(monkeypatch):
+    line = Line(9)
+    some = {4: CLOUD[:0], 5: CLOUD[:9]}
+    monkeypatch.setattr(line, "scan", lambda k: from_xyz(some.get(k, CLOUD)))
+    rows = follow(line, stay)
+    assert np.flatnonzero(np.isnan(rows["unmapped"])).tolist() == [4, 5]
+    assert rows["track_error"] == pytest.approx(0.5)
+
+
+def test_each_stretch_has_a_start_of_its_own():
+    line = Line(60)
+    mapped = np.ones(60, bool)
+    mapped[20:35] = False
+    rows = follow(line, stay, 0.0, mapped)
+    assert rows["stretch"].tolist() == [0] * 20 + [1] * 25
+    assert rows["translation_error"] == pytest.approx(0.5)
+    first = [rows[f"start_{axis}"][[0, 20]] for axis in "xyz"]
+    assert not np.allclose(*np.transpose(first))
+    assert tracking_summary(rows)["way"] == pytest.approx(86.0, abs=0.2)
+
+
+def test_drift_moves_the_start_and_not_the_truth():
+    line = Line(200)
+    rows = follow(line, stay, 0.02, starts=Starts(1e-9, 0.0))
+    end = rows["translation_error"][-1]
+    # Some 2 % of 400 m, and the turn.
+    assert 1.0 < end < 60.0
+    offsets = [rows[f"start_{axis}"][-1] for axis in "xyz"]
+    assert math.hypot(*offsets) == pytest.approx(end)
+
+
+@pytest.mark.slow
+def test_the_command_tracks(towns, tmp_path, capsys):
+    town = towns / "town_01"
+    command = ["localise", town, town, "--method", "gicp", "--track"]
+    options = ["--output", tmp_path, "--odometry-drift", "0.02", "--json"]
+    status, out, _ = run(capsys, *command, *options)
+    assert status == 0
+    values = json.loads(out)
+    assert values["queries"] == 8
+    assert values["odometry_drift"] == 0.02
+    assert values["way"] == pytest.approx(70.0)
+    assert 0.0 <= values["within_03m"] <= 1.0
+    assert values["lost_per_km"] >= 0.0
+    picture = (tmp_path / "track.png").read_bytes()
+    assert picture.startswith(b"\x89PNG")
+    table = (tmp_path / "localisation.csv").read_text().splitlines()
+    assert table[0].startswith("stretch,way,step,track_error,frame,")
+    status, out, _ = run(capsys, *command)
+    assert "a kilometre" in out

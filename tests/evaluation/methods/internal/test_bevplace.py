@@ -1,0 +1,221 @@
+"""BEVPlace: each step against its definition, and the method as a whole."""
+
+import itertools
+import math
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+import pytest
+from scipy.ndimage import map_coordinates
+
+from cns_drake.base import InputError
+from evaluation.clouds import count_image, image_points
+from evaluation.methods import make_method
+from evaluation.methods.bevplace import (
+    SHAPES,
+    _turned_images,
+    describe_image,
+)
+
+RNG = np.random.default_rng(7)
+# As large as an image must be for all scales.
+SIZE = 63
+
+
+def random_weights(seed=1):
+    """Returns weights that neither explode nor vanish."""
+    rng = np.random.default_rng(seed)
+    weights = {
+        name: rng.normal(
+            scale=1.0 / math.sqrt(max(math.prod(shape[1:]), 1)), size=shape
+        ).astype(np.float32)
+        for name, shape in SHAPES.items()
+    }
+    # Otherwise the centroids outweigh what is in an image.
+    weights["netvlad.centroids"] *= 0.01
+    return weights
+
+
+def picture(seed=3, size=SIZE):
+    """Returns an image of walls."""
+    rng = np.random.default_rng(seed)
+    image = np.zeros((size, size), np.uint8)
+    for _ in range(12):
+        row, column = rng.integers(2, size - 12, 2)
+        image[row : row + rng.integers(1, 10), column : column + 2] = 255
+        image[row, column : column + 9] = 102
+    return image
+
+
+def reference(weights, image):
+    """The descriptor by definition, in double precision and in loops."""
+    weights = {name: value.astype(float) for name, value in weights.items()}
+    local = []
+    for turned, points in _turned_images(image):
+        x = turned.transpose(2, 0, 1).astype(float)
+        name = "encoder.extractor.extractor.conv"
+        for block, inner in itertools.product("01", "03"):
+            x = convolved(x, weights[f"{name}{block}.{inner}.weight"])
+            mean = x.mean(axis=(1, 2), keepdims=True)
+            variance = x.var(axis=(1, 2), keepdims=True)
+            x = (x - mean) / np.sqrt(variance + 1e-5)
+            if (block, inner) != ("1", "3"):
+                x = np.maximum(x, 0.0)
+            if (block, inner) == ("0", "3"):
+                _, height, width = x.shape
+                x = x[:, : height // 2 * 2, : width // 2 * 2]
+                x = (x[:, ::2, ::2] + x[:, 1::2, ::2]) / 4.0 + (
+                    x[:, ::2, 1::2] + x[:, 1::2, 1::2]
+                ) / 4.0
+        x /= np.linalg.norm(x, axis=0)
+        # Positions are scaled as if the outer pixels' centres were the borders.
+        last = np.array(x.shape[:0:-1]) - 1.0
+        at = (points + 0.5) / 2.0 - 0.5
+        at = at / last * (last + 1.0) - 0.5
+        local.append(
+            [
+                map_coordinates(
+                    np.pad(one, 1), at.T[::-1] + 1.0, order=1, cval=0.0
+                )
+                for one in x
+            ]
+        )
+    # (points, channels, scales, turns)
+    grid = np.array(local).transpose(2, 1, 0).reshape(-1, 32, 5, 5)
+    one, two = (
+        embedded(weights, f"encoder.embedder.embedder.network{k}_", grid)
+        for k in "12"
+    )
+    vlad = np.zeros((64, 128))
+    for a, b in zip(one, two, strict=True):
+        x = (a.reshape(8, 25) @ b.reshape(16, 25).T).ravel()
+        x /= np.linalg.norm(x)
+        logits = weights["netvlad.conv.weight"][:, :, 0, 0] @ x
+        shares = np.exp(logits - logits.max())
+        shares /= shares.sum()
+        vlad += shares[:, None] * (x - weights["netvlad.centroids"])
+    vlad /= np.linalg.norm(vlad, axis=1, keepdims=True)
+    return vlad.ravel() / np.linalg.norm(vlad)
+
+
+def convolved(x, kernel):
+    """Cross-correlation of (..., channels, H, W) with zeros around."""
+    half = kernel.shape[-1] // 2
+    around = [(0, 0)] * (x.ndim - 2) + [(half, half)] * 2
+    windows = sliding_window_view(np.pad(x, around), kernel.shape[2:], (-2, -1))
+    result = np.tensordot(windows, kernel, ([-5, -2, -1], [1, 2, 3]))
+    return np.moveaxis(result, -1, -3)
+
+
+def embedded(weights, name, x):
+    def layer(part, x):
+        bias = weights[f"{name}{part}.bias"][:, None, None]
+        return convolved(x, weights[f"{name}{part}.weight"]) + bias
+
+    for block in ("embed1", "embed2"):
+        y = layer(f"{block}.2", np.maximum(layer(f"{block}.0", x), 0.0))
+        x = np.maximum(y + layer(f"{block}_short", x), 0.0)
+    return layer("embed3.2", np.maximum(layer("embed3.0", x), 0.0))
+
+
+@pytest.mark.slow
+def test_the_descriptor_by_definition():
+    weights = random_weights()
+    found, other = (describe_image(weights, picture(k)) for k in (3, 9))
+    assert found.dtype == np.float32
+    wanted = reference(weights, picture(3))
+    # Random weights see little in an image, but far more than this.
+    assert np.linalg.norm(found - wanted) < 1e-6
+    assert np.linalg.norm(found - other) > 3e-4
+    assert np.linalg.norm(found) == pytest.approx(1.0, abs=1e-5)
+
+
+def channels(image):
+    """The three channels of an image, as the weights expect them."""
+    mean = np.array([0.485, 0.456, 0.406])
+    deviation = np.array([0.229, 0.224, 0.225])
+    scaled = (image[..., None] / 255.0 - mean) / deviation * 255.0
+    return (scaled - 127.0) / 128.0
+
+
+def test_quarter_turns_move_pixels_only():
+    image = picture()
+    turned = list(itertools.islice(_turned_images(image), 5))
+    np.testing.assert_allclose(turned[2][0], channels(image), atol=1e-5)
+    grid = turned[2][1].astype(int)
+    for number in (0, 4):
+        pixels, points = turned[number]
+        # Points move with their pixels, and to other places.
+        wanted = channels(image)[grid[:, 1], grid[:, 0]]
+        column, row = np.rint(points).astype(int).T
+        np.testing.assert_allclose(pixels[row, column], wanted, atol=1e-4)
+    # Indices turn about the corner of a pixel: (x, y) becomes (y, S - x).
+    np.testing.assert_allclose(
+        turned[0][1], np.stack([grid[:, 1], SIZE - grid[:, 0]], 1), atol=1e-4
+    )
+
+
+def test_turns_by_half_a_quarter():
+    image = picture()
+    pixels, points = list(itertools.islice(_turned_images(image), 5))[1]
+    assert pixels.shape == (89, 89, 3)
+    # From the points, which are known in both images, the map follows.
+    grid = np.stack(np.meshgrid(*[np.arange(5, SIZE - 5, 5)] * 2), axis=-1)
+    ones = np.c_[points.astype(float), np.ones(len(points))]
+    back = np.linalg.lstsq(ones, grid.reshape(-1, 2), rcond=None)[0]
+    column, row = np.meshgrid(np.arange(89), np.arange(89))
+    at = np.stack([column, row, np.ones_like(row)], axis=-1) @ back
+    for channel in range(3):
+        padded = np.pad(channels(image)[..., channel], 99)
+        wanted = map_coordinates(
+            padded, at.transpose(2, 0, 1)[::-1] + 99, order=1
+        )
+        gap = np.abs(pixels[..., channel] - wanted)
+        # Positions are rounded to 1/32 pixel; a step is at most that of a wall.
+        step = np.ptp(channels(image)[..., channel])
+        assert gap.max() < 2.0 * step / 32.0
+    # Far from the image is the border, which is 0.
+    assert not pixels[0, 0].any()
+
+
+def test_scales_halve():
+    sizes = [len(one) for one, _ in _turned_images(picture(size=151))]
+    assert sizes[2::5] == [151, 76, 38, 19, 9]
+    # Of 45 deg: the diagonal.
+    assert sizes[1::5] == [214, 107, 53, 27, 13]
+
+
+@pytest.mark.slow
+def test_the_method(tmp_path):
+    weights = random_weights()
+    path = tmp_path / "w.npz"
+    np.savez(path, **weights, **{"netvlad.wq.bias": np.zeros(64, np.float32)})
+    method = make_method("bevplace", {"weights": path})
+    assert method.sees_images
+    clouds = [image_points(picture(seed, 111)) for seed in (1, 2)]
+    clouds.append(np.zeros((0, 3)))
+    described = [method.describe(one) for one in clouds]
+    np.testing.assert_array_equal(
+        described[0], describe_image(weights, count_image(clouds[0]))
+    )
+    database = method.build_database(described)
+    scores = method.score(described[0], database)
+    assert scores[0] == pytest.approx(0.0, abs=1e-3)
+    gap = np.linalg.norm(described[0] - described[1])
+    assert scores[1] == pytest.approx(-gap, rel=1e-4)
+    assert gap > 1e-4
+    # A place without a pixel is no candidate, and a query finds none.
+    assert np.isnan(scores[2])
+    assert np.isnan(method.score(described[2], database)).all()
+    assert method.relative_pose(described[0], database, 0) is None
+
+
+def test_weights_of_another_network(tmp_path):
+    other = random_weights()
+    del other["netvlad.centroids"]
+    path = tmp_path / "w.npz"
+    np.savez(path, **other)
+    with pytest.raises(InputError, match=r"netvlad.centroids is missing"):
+        make_method("bevplace", {"weights": path})
+    with pytest.raises(InputError, match=r"bevplace: weights: Field required"):
+        make_method("bevplace", {})

@@ -1,0 +1,325 @@
+"""Summaries of tables whose numbers are known in closed form."""
+
+import math
+
+import numpy as np
+import pytest
+import scipy.stats
+from scipy.stats import spearmanr
+
+from evaluation.recognition import Interval
+from evaluation.results import (
+    Answers,
+    QueryRows,
+    Results,
+    Row,
+    rank_methods,
+    summaries,
+)
+
+YEARS = "database.years"
+SNOW = "query.transient.snow"
+BLOCKS = np.repeat(np.arange(5), 4)
+
+
+def key(factors, method="btc", seed=1, task="place", gate=False, town="town"):
+    return {
+        "experiment": "e",
+        "map": town,
+        "database": f"{town}_01",
+        "query": f"{town}_02",
+        "seed": seed,
+        "factors": factors,
+        "task": task,
+        "method": method,
+        "gate": gate,
+        "protocol": "fair",
+    }
+
+
+def row(value, factors, metric="auc", **names):
+    return Row(**key(factors, **names), metric=metric, value=value, n=20)
+
+
+def answers(right, factors, **names):
+    """Answers with equal scores to queries that all have a match.
+
+    AUC is the part that is right: precision at recall 1.
+    """
+    right = np.asarray(right, dtype=bool)
+    number = len(right)
+    return Answers(
+        **key(factors, **names),
+        columns={
+            "query_frame": np.arange(number),
+            "block": BLOCKS[:number],
+            "correct": right,
+            "has_match": np.ones(number, dtype=bool),
+            "score": np.full(number, 0.5),
+        },
+    )
+
+
+def firsts(number):
+    return np.arange(20) < number
+
+
+def test_means_stand_between_the_least_and_the_greatest():
+    rows = [
+        row(0.1 * seed + year / 100.0, {YEARS: year}, seed=seed)
+        for seed in (1, 2, 4)
+        for year in (0, 5)
+    ]
+    rows.append(row(math.nan, {YEARS: 5}, seed=5))
+    rows.append(row(math.nan, {YEARS: 9}))
+    first, second, third = summaries.means(rows, YEARS, "method")
+    assert first.key == (0, "btc")
+    assert first[1:] == pytest.approx((0.7 / 3.0, 0.1, 0.4, 3))
+    assert second[1:] == pytest.approx((0.7 / 3.0 + 0.05, 0.15, 0.45, 3))
+    assert math.isnan(third.value)
+    assert third.number == 0
+
+
+def test_two_causes_cost_more_than_the_product():
+    cause = "cause"
+    level = {"level": 1}
+    queries = QueryRows.of(
+        [
+            answers(firsts(20), {cause: "none", "level": 0}),
+            answers(firsts(2), {cause: "snow", "level": 1}),
+            answers(firsts(10), {cause: "snow", "level": 2}),
+            answers(firsts(16), {cause: "leaves", **level}),
+            answers(firsts(4), {cause: "snow+leaves", "level": 2}),
+            answers(firsts(4), {cause: "snow+rain", "level": 2}),
+        ]
+    )
+    (one,) = summaries.excesses(queries)
+    assert one.what == "excess of snow and leaves"
+    # 50 % and 80 % are left of it alone, and 20 % of both.
+    assert one.value == pytest.approx(0.5 * 0.8 - 0.2)
+    assert one.low < 0.2 < one.high
+
+
+def test_lifetimes_of_seeds_surround_that_of_the_mean():
+    kept = {0: {0: 1.0}, 10: {1: 0.8, 2: 0.6}, 20: {1: 0.4, 2: 0.2}}
+    rows = [
+        row(value, {YEARS: year}, metric="kept", seed=seed)
+        for year, some in kept.items()
+        for seed, value in some.items()
+    ]
+    tenth, half = summaries.lifetimes(Results.of(rows), YEARS)
+    assert tenth.what == f"{YEARS} until 90 % is left (of 20)"
+    assert half.what == f"{YEARS} until 50 % is left (of 20)"
+    # Means are 1, 0.7 and 0.3.
+    assert tenth.value == pytest.approx(10.0 / 3.0)
+    assert (tenth.low, tenth.high) == pytest.approx((2.5, 5.0))
+    assert half.value == pytest.approx(15.0)
+    assert (half.low, half.high) == pytest.approx((12.5, 17.5))
+    (never,) = summaries.lifetimes(Results.of(rows), YEARS, [0.1])
+    assert math.isinf(never.value)
+
+
+def test_a_lifetime_needs_all_shares():
+    times = [0.0, 1.0, 2.0]
+    assert summaries.lifetime(times, [1.0, 0.5, 0.2], 0.5) == 1.0
+    assert summaries.lifetime(times, [1.0, 0.5 + 1e-9, 0.2], 0.5) > 1.0
+    assert math.isnan(summaries.lifetime(times, [1.0, math.nan, 0.2], 0.5))
+
+
+def test_growth_of_a_power_law():
+    rows = []
+    for number in (100, 200, 800):
+        at = {"database.distractors": number - 50}
+        rows += [
+            row(float(number), at, metric="places"),
+            row(float(number), at, metric="places", gate=True),
+            row(3.0 * number**1.5, at, metric="query_time", task="cost"),
+        ]
+    found = summaries.growths(Results.of(rows), "places", "query_time")
+    what = "exponent of query_time over places, at"
+    assert [one.what for one in found] == [f"{what} 200", f"{what} 800"]
+    assert [one.value for one in found] == pytest.approx([1.5, 1.5])
+
+
+def test_rank_correlations_are_those_of_scipy():
+    rng = np.random.default_rng(3)
+    rows, drawn = [], []
+    for k in range(25):
+        stage = {"both.stage": f"s{k}"}
+        tcr = rng.random()
+        seen = rng.random()
+        auc = np.round(rng.random(), 1)
+        drawn.append((tcr, seen, 1.0 - auc))
+        rows += [
+            row(tcr, stage, metric="tcr_sym", task="change", method=""),
+            row(seen, stage, metric="visible_change"),
+            row(auc, stage),
+        ]
+    # A condition without one of them does not count.
+    rows.append(row(0.5, {"both.stage": "alone"}))
+    results = Results.of(rows)
+    tcr, seen, failure = np.transpose(drawn)
+    for name, x in (("tcr_sym", tcr), ("visible_change", seen)):
+        (one,) = summaries.correlations(results, name)
+        expected = spearmanr(failure, x).statistic
+        assert one.value == pytest.approx(expected)
+        assert one.low < expected < one.high
+        assert one.n == 25
+
+
+@pytest.mark.parametrize(("number", "is_shown"), [(4, False), (5, True)])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_trend_needs_five_points(number, is_shown, sign):
+    rows = [row(0.5 + 0.1 * sign * k, {YEARS: k}) for k in range(number)]
+    found = summaries.correlations(Results.of(rows), YEARS)
+    assert bool(found) == is_shown
+    for one in found:
+        # Not 1.0000000000000002, which rounding would make of it.
+        assert (one.value, one.low, one.high) == (-sign, -sign, -sign)
+
+
+def test_what_is_kept_is_the_median_of_what_is_known():
+    assert summaries.median_kept([0.9, math.nan, 0.1, 0.5]) == 0.5
+    assert summaries.median_kept([0.25, 0.75]) == 0.5
+    assert math.isnan(summaries.median_kept([math.nan]))
+
+
+def test_summaries_of_charts():
+    rows = [
+        *(
+            row(value, {YEARS: year}, metric="kept")
+            for year, value in ((0, 1.0), (10, 0.6))
+        ),
+        *(
+            row(
+                10.0 ** (k * 2),
+                {YEARS: 10**k},
+                metric="query_time",
+                task="cost",
+            )
+            for k in (0, 1)
+        ),
+        *(row(0.9 - 0.1 * k, {YEARS: k, "query.nth": k}) for k in range(5)),
+    ]
+    causes = {"none": (20, 0), "a": (10, 1), "b": (16, 1), "a+b": (4, 1)}
+    queries = QueryRows.of(
+        answers(firsts(number), {"cause": cause, "level": level})
+        for cause, (number, level) in causes.items()
+    )
+    lines = {"kind": "lines", "over": YEARS}
+    found = summaries.summarised(
+        Results.of(rows),
+        queries,
+        [
+            {**lines, "metric": "kept"},
+            {**lines, "metric": "query_time"},
+            {"kind": "scatter", "x": "query.nth", "y": "auc"},
+            {"kind": "matrix", "over": "method", "metric": "auc"},
+        ],
+    )
+    numbers = {one.what: one.value for one in found}
+    assert numbers == pytest.approx(
+        {
+            f"{YEARS} until 90 % is left (of 10)": 2.5,
+            f"{YEARS} until 50 % is left (of 10)": math.inf,
+            f"exponent of query_time over {YEARS}, at 10": 2.0,
+            "rank correlation of 1 - auc with query.nth": 1.0,
+            "excess of a and b": 0.2,
+        }
+    )
+    assert {one.method for one in found} == {"btc"}
+
+
+def test_a_ranking_counts_what_all_methods_have():
+    rows = [
+        row(value, {SNOW: snow}, method=method, town=town)
+        for method, town, snow, value in (
+            ("a", "x", 0, 0.9),
+            ("a", "x", 1, 0.7),
+            ("a", "y", 0, 0.2),
+            ("b", "x", 0, 0.5),
+            ("b", "x", 1, 0.5),
+            ("b", "y", 0, 0.5),
+            ("a", "y", 1, 0.9),
+            ("b", "y", 1, math.nan),
+        )
+    ]
+    found, samples = rank_methods(rows)
+    assert [one.method for one in found] == ["a", "b"]
+    assert [one.value for one in found] == pytest.approx([0.6, 0.5])
+    # Maps are drawn: both, or one of them twice.
+    assert set(np.round(samples[:, 0], 9)) == {0.2, 0.6, 0.8}
+    # Two maps say next to nothing.
+    assert np.isnan([one.interval.low for one in found]).all()
+    assert np.isnan([one.interval.high for one in found]).all()
+
+
+@pytest.mark.parametrize("metric", ["auc", "query_time"])
+def test_the_interval_of_a_mean_over_maps(metric):
+    """SciPy's t interval; maps with more conditions count more often."""
+    means = {"x": 0.5, "y": 0.7, "z": 0.8, "w": 0.6}
+    rows = [
+        Row(**key({SNOW: snow}, town=town), metric=metric, value=value + more)
+        for snow, more in ((0, -0.1), (1, 0.1))
+        for town, value in means.items()
+    ]
+    (found,), _ = rank_methods(rows)
+    values = list(means.values())
+    expected = scipy.stats.t.interval(
+        0.95, 3, np.mean(values), scipy.stats.sem(values)
+    )
+    assert (found.interval.low, found.interval.high) == pytest.approx(expected)
+    # Only conditions, if there is one map: four of them, and not three.
+    some = [
+        Row(**key({SNOW: snow}), metric=metric, value=value)
+        for snow, value in enumerate((0.1, 0.5, 0.9, 0.9))
+    ]
+    (found,), _ = rank_methods(some)
+    values = [one.value for one in some]
+    _, high = scipy.stats.t.interval(
+        0.95, 3, np.mean(values), scipy.stats.sem(values)
+    )
+    assert high > 1.0
+    assert found.interval.high == pytest.approx(
+        1.0 if metric == "auc" else high
+    )
+    (found,), _ = rank_methods(some[:3])
+    assert math.isnan(found.interval.high)
+
+
+def test_a_ranking_of_one_condition_has_its_intervals():
+    one = Row(**key({}), metric="auc", value=0.5, low=0.4, high=0.7)
+    found, _ = rank_methods([one])
+    assert found[0].interval == Interval(0.4, 0.7)
+    assert rank_methods([one, row(0.1, {SNOW: 1}, method="b")])[0] == []
+
+
+MAINTAIN = "database.maintain"
+
+
+def maintained(values, year=5, **names):
+    return [
+        row(value, {MAINTAIN: how, YEARS: year}, metric="r1", **names)
+        for how, value in values.items()
+    ]
+
+
+def test_a_detector_is_worth_its_share_of_the_way_to_the_truth():
+    """Two conditions: (0.1 + 0.2) of (0.2 + 0.4); harm is negative."""
+    rows = [
+        *maintained({"none": 0.5, "truth": 0.7, "distance": 0.6}),
+        *maintained({"none": 0.4, "truth": 0.8, "distance": 0.6}, seed=2),
+        *maintained({"none": 0.5, "truth": 0.6, "m3c2": 0.4}, method="solid"),
+        # Nothing to gain; and no exact updates, or others are unknown.
+        *maintained({"none": 0.5, "truth": 0.5, "m3c2": 0.5}, gate=True),
+        *maintained({"none": 0.5, "distance": 0.9}, year=9),
+        *maintained({"none": 0.5, "truth": 0.9, "m3c2": math.nan}, year=7),
+    ]
+    charts = [{"kind": "matrix", "over": MAINTAIN, "metric": "r1"}]
+    found = summaries.summarised(Results.of(rows), None, charts)
+    assert [(one.method, one.gate, one.n) for one in found] == [
+        ("btc", False, 2),
+        ("solid", False, 1),
+    ]
+    assert [one.value for one in found] == pytest.approx([0.5, -1.0])
+    assert found[0].what == "worth of distance, of the way to truth: r1"

@@ -1,0 +1,644 @@
+"""Tables beside each other, and beside those that ship."""
+
+import csv
+from dataclasses import replace
+import itertools
+import json
+
+from helpers.internal.eval_program import assert_refused, run
+import numpy as np
+import pytest
+
+from cns_drake.base import InputError
+from evaluation.command_line import name_tables, suggest_comparison
+from evaluation.recognition import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.results import (
+    LAST,
+    OWN,
+    STAGE,
+    Answers,
+    QueryRows,
+    Results,
+    Row,
+    compare_tables,
+    made_by,
+)
+from evaluation.results.metric_tables import _BASELINES
+
+
+def key(method, town="town", **changes):
+    values = {
+        "experiment": "e",
+        "map": town,
+        "database": f"{town}_01",
+        "query": f"{town}_02",
+        "seed": 1,
+        "factors": {},
+        "task": "place",
+        "method": method,
+        "gate": False,
+        **made_by(FAIR_PROTOCOL),
+    }
+    return {**values, **changes}
+
+
+def write_table(folder, towns, number=40, *, queries=False, **changes):
+    """Writes a table in which all scores of a method are equal.
+
+    AUC is then the part of its answers that are right.
+
+    Args:
+        folder: to write.
+        towns: town -> (method -> the part that is right).
+        number: of queries of each town.
+        queries: whether there are answers.
+        changes: of all keys.
+    """
+    folder.mkdir()
+    rows, answers = [], []
+    for town, parts in towns.items():
+        for method, part in parts.items():
+            keys = key(method, town, **changes)
+            rows.append(Row(**keys, metric="auc", value=part))
+            right = np.arange(number) < part * number
+            columns = {
+                "query_frame": np.arange(number),
+                "block": np.arange(number) % 10,
+                "correct": right,
+                "has_match": np.ones(number, dtype=bool),
+                "score": np.full(number, 0.5),
+            }
+            answers.append(Answers(**keys, columns=columns))
+    Results.of(rows).write_csv(folder / "results.csv")
+    if queries:
+        QueryRows.of(answers).write_csv(folder / "queries.csv")
+    return folder
+
+
+def shipped(**columns):
+    stages = Results.read(_BASELINES / "stages.csv")
+    return stages.where(columns).rows
+
+
+def test_the_shipped_tables_hold_the_published_numbers():
+    """Both files of the documents, read by another reader."""
+    for name, source, version in (
+        ("stages.csv", "docs/notes/results_fair.csv", None),
+        ("fresh.csv", "docs/notes/fresh.csv", "version"),
+    ):
+        found = {
+            (
+                row.map,
+                row.database,
+                row.query,
+                row.method,
+                row["both.redraw.frozen"],
+                row["both.stage"],
+                row.gate,
+                row.metric,
+            ): row
+            for row in Results.read(_BASELINES / name).rows
+        }
+        with open(source, newline="") as file:
+            lines = list(csv.DictReader(file))
+        assert lines
+        for line in lines:
+            # Drives through fresh cities have the version in their names.
+            fresh = f"_f0{line[version]}" if version else ""
+            drives = (
+                line["map"],
+                *(
+                    f"{line['map']}{fresh}_{line[one]}"
+                    for one in ("db", "query")
+                ),
+                line["method"],
+                int(line[version]) if version else None,
+            )
+            for column, place in (
+                ("auc_unchanged", ("last", False, "auc")),
+                ("auc", ("own", False, "auc")),
+                ("auc_strict_unchanged", ("last", False, "auc_strict")),
+                ("auc_strict", ("own", False, "auc_strict")),
+                ("kept_strict", ("own", False, "kept_strict")),
+                ("r1", ("own", False, "r1")),
+                ("kept", ("own", False, "kept")),
+                ("gate_auc", ("own", True, "auc")),
+                ("gate_unchanged_auc", ("last", True, "auc")),
+            ):
+                if column in line:
+                    row = found.pop((*drives, *place))
+                    assert row.value == float(line[column])
+            # The interval of the share that is kept.
+            if row := found.get((*drives, "own", False, "kept")):
+                ends = float(line["kept_low"]), float(line["kept_high"])
+                assert (row.low, row.high) == ends
+        # The files of the documents have few numbers with verification.
+        rest = {place[-1] for place in found if not place[-2]}
+        assert rest <= {
+            "visible_change",
+            "recall_at_full_precision",
+            "pose_success",
+        }
+
+
+def test_an_entrant_stands_among_the_shipped(tmp_path):
+    """Each value is just above the best shipped method's, or below it."""
+    best = {}
+    changed = {"map": "suburbia", STAGE: OWN, "metric": "auc", "gate": False}
+    for row in shipped(**changed):
+        condition = row.without("method")
+        if condition not in best or best[condition].value < row.value:
+            best[condition] = row
+    rows = [
+        Row(**{**vars(row), "method": name, "value": row.value - less})
+        for row in best.values()
+        for name, less in (("mine", -0.001), ("solid", 0.01))
+    ]
+    path = tmp_path / "entrant.csv"
+    Results.of(rows).write_csv(path)
+    found = compare_tables([path])
+    assert found.conditions == 2
+    names = [one.method for one in found.ranked]
+    assert names[0] == "mine"
+    assert {"solid", "solid (entrant)"} < set(names)
+    value = {one.method: one.value for one in found.ranked}
+    expected = np.mean([row.value for row in best.values()])
+    assert value["mine"] == pytest.approx(expected + 0.001)
+    assert value["solid (entrant)"] == pytest.approx(expected - 0.01)
+    mean = np.mean([row.value for row in shipped(**changed, method="ring++")])
+    assert value["ring++"] == pytest.approx(mean)
+    (note,) = found.notes
+    assert note.startswith("solid: other values in entrant and ")
+    assert " in 2 of 2 conditions, by up to " in note
+    assert found.agreements == []
+
+
+@pytest.mark.parametrize(
+    ("change", "may_be_rounding"), [(0.0069, True), (0.011, False)]
+)
+def test_small_differences_can_be_rounding(tmp_path, change, may_be_rounding):
+    """One query of 152 changes R@1 by 0.0066."""
+    rows = [
+        Row(**{**vars(row), "value": row.value + change})
+        for row in shipped(map="metropolis", metric="r1", method="btc")
+    ]
+    path = tmp_path / "mine.csv"
+    Results.of(rows).write_csv(path)
+    notes = compare_tables([path], "r1").notes
+    (note,) = (note for note in notes if note.startswith("btc: other values"))
+    assert f"by up to {change:.4f}" in note
+    assert ("rounding" in note) == may_be_rounding
+
+
+def test_controls_are_not_ranked(tmp_path):
+    """Nothing changes in them; they count only if there is nothing else."""
+    plain = {"x": 0.5, "y": 0.4}
+    own, last, both = tmp_path / "own", tmp_path / "last", tmp_path / "both"
+    write_table(own, {"a": plain}, factors={STAGE: OWN})
+    write_table(last, {"a": {"x": 0.9, "y": 1.0}}, factors={STAGE: LAST})
+    both.mkdir()
+    rows = [Results.read(one).rows for one in (own, last)]
+    Results.of(itertools.chain(*rows)).write_csv(both / "results.csv")
+    left = (
+        "left out, as nothing changes in them (both.stage last): 1 conditions"
+    )
+    found = compare_tables([both, both / "results.csv"])
+    assert [one.value for one in found.ranked] == [0.5, 0.4]
+    assert left in found.notes
+    found = compare_tables([both, own], rankings=True)
+    assert [one.value for one in found.ranked] == [0.5, 0.4, 0.5, 0.4]
+    assert found.agreements[0].tau == pytest.approx(1.0)
+    assert found.notes == [f"both: {left}"]
+    found = compare_tables([last, both])
+    assert [one.value for one in found.ranked] == [1.0, 0.9]
+
+
+def test_what_lacks_conditions_is_left_out_and_named(tmp_path):
+    one = write_table(
+        tmp_path / "one",
+        {"a": {"x": 0.5, "y": 0.4}, "b": {"x": 0.6}, "c": {"x": 0.1}},
+    )
+    two = write_table(tmp_path / "two", {"a": {"z": 0.2}, "b": {"z": 0.3}})
+    found = compare_tables([one, two])
+    assert found.conditions == 2
+    assert [(r.method, r.value) for r in found.ranked] == [
+        ("x", pytest.approx(0.55)),
+        ("z", pytest.approx(0.25)),
+    ]
+    assert found.notes == [
+        "one: left out, as two lacks them: 1 conditions",
+        "the shipped tables have none of these conditions",
+        "y: left out, with 1 of 2 conditions",
+    ]
+
+
+def test_differences_of_answers(tmp_path):
+    parts = {"a": {"x": 0.9}, "b": {"x": 0.7}}
+    one = write_table(tmp_path / "one", parts, queries=True)
+    two = write_table(
+        tmp_path / "two", {"a": {"x": 0.5}, "b": {"x": 0.7}}, queries=True
+    )
+    found = compare_tables([one, two])
+    assert [r.method for r in found.ranked] == ["x (one)", "x (two)"]
+    (difference,) = found.differences
+    assert (difference.first, difference.second) == ("x (one)", "x (two)")
+    assert difference.difference.value == pytest.approx(0.2)
+    # It is 0.4 in a, with some deviation, and 0 in b, without any: the mean
+    # has half of that deviation.
+    (alone,) = compare_tables(
+        [
+            write_table(tmp_path / "three", {"a": {"x": 0.9}}, queries=True),
+            write_table(tmp_path / "four", {"a": {"x": 0.5}}, queries=True),
+        ]
+    ).differences
+    assert alone.difference.value == pytest.approx(0.4)
+    widths = [
+        one.difference.interval.high - one.difference.value
+        for one in (difference, alone)
+    ]
+    # More degrees of freedom make it a little less than half.
+    assert 0.9 < widths[0] / (0.5 * widths[1]) < 1.0
+    fewer = write_table(
+        tmp_path / "fewer", {"a": {"x": 0.5}, "b": {"x": 0.5}}, 8, queries=True
+    )
+    with pytest.raises(InputError, match="different queries"):
+        compare_tables([one, fewer])
+
+
+def written_times(folder, number, parts):
+    """Writes the same answers for one drive under several conditions."""
+    tables = [
+        write_table(
+            folder / str(k), {"a": parts}, queries=True, factors={"cause": k}
+        )
+        for k in range(number)
+    ]
+    for name, reader, items in (
+        ("results.csv", Results, "rows"),
+        ("queries.csv", QueryRows, "answers"),
+    ):
+        read = [getattr(reader.read(one / name), items) for one in tables]
+        reader.of(itertools.chain(*read)).write_csv(folder / name)
+    return folder
+
+
+def test_conditions_of_a_drive_are_not_independent(tmp_path):
+    """The same answers under four conditions are no stronger evidence."""
+    found = []
+    for number in (1, 4):
+        pair = []
+        for name, parts in (
+            ("one", {"x": 0.6, "y": 0.5}),
+            ("two", {"x": 0.5, "y": 0.55}),
+        ):
+            folder = tmp_path / f"{name} {number}"
+            folder.mkdir()
+            pair.append(written_times(folder, number, parts))
+        found.append(compare_tables(pair))
+    once, again = found
+    assert (once.conditions, again.conditions) == (1, 4)
+    assert len(once.differences) == 6
+    for one, other in zip(once.differences, again.differences, strict=True):
+        assert other.p_value == pytest.approx(one.p_value)
+    assert once.agreements[0].interval == again.agreements[0].interval
+
+
+def counted_tau(first, second):
+    """Pairs in the same order less those in the opposite, over all pairs."""
+    signs = [
+        np.sign((one - other) * (second[i] - second[k]))
+        for (i, one), (k, other) in itertools.combinations(enumerate(first), 2)
+    ]
+    return np.mean(signs)
+
+
+@pytest.mark.parametrize("queries", [False, True])
+def test_tau_of_mean_areas(tmp_path, queries):
+    names = "wxyz"
+    simulated = write_table(
+        tmp_path / "simulated",
+        {
+            "a": dict(zip(names, (0.9, 0.7, 0.5, 0.1), strict=True)),
+            "b": dict(zip(names, (0.7, 0.9, 0.2, 0.3), strict=True)),
+        },
+        queries=queries,
+    )
+    real = write_table(
+        tmp_path / "real",
+        {"c": dict(zip(names, (0.6, 0.2, 0.4, 0.1), strict=True))},
+        queries=queries,
+    )
+    found = compare_tables([simulated, real], rankings=True)
+    (one,) = found.agreements
+    assert one.methods == tuple(names)
+    # Each table stands beside the other, with its own means.
+    shown = {entry.method: entry.value for entry in found.ranked}
+    assert shown == pytest.approx(
+        dict(
+            zip(
+                [f"{n} ({t})" for t in ("simulated", "real") for n in names],
+                (0.8, 0.8, 0.35, 0.2, 0.6, 0.2, 0.4, 0.1),
+                strict=True,
+            )
+        )
+    )
+    # The first two are equal on one side: tau-b divides by the root of the
+    # 5 of 6 pairs that are not.
+    expected = counted_tau((0.8, 0.8, 0.35, 0.2), (0.6, 0.2, 0.4, 0.1))
+    assert one.tau == pytest.approx(expected / np.sqrt(5 / 6))
+
+
+def images_ranked(folder, real):
+    """Writes a half of the published ranking; returns R@1 (4 maps, methods)."""
+    with open("docs/notes/image_ranking.csv", newline="") as file:
+        lines = [
+            line
+            for line in csv.DictReader(file)
+            if line["images"].startswith("KITTI") == real
+        ]
+    rows = [
+        Row(
+            **key(line["method"], line["images"]),
+            metric="r1",
+            value=int(line["right"]) / int(line["queries"]),
+        )
+        for line in lines
+    ]
+    Results.of(rows).write_csv(folder)
+    methods = sorted({row.method for row in rows})
+    maps = dict.fromkeys(row.map for row in rows)
+    value = {(row.map, row.method): row.value for row in rows}
+    return np.array([[value[one, m] for m in methods] for one in maps])
+
+
+def test_maps_are_drawn_for_the_published_ranking(tmp_path):
+    """All 256 x 256 samples of four sequences and of four cities."""
+    paths = [tmp_path / "real.csv", tmp_path / "simulated.csv"]
+    signs = []
+    for path, real in zip(paths, (True, False), strict=True):
+        r1 = images_ranked(path, real)
+        draws = np.array(list(itertools.product(range(4), repeat=4)))
+        means = np.vstack([r1.mean(axis=0), r1[draws].mean(axis=1)])
+        one, other = np.triu_indices(r1.shape[1], 1)
+        apart = np.round(means[:, one] - means[:, other], 9)
+        signs.append(np.sign(apart))
+    untied = [(one != 0).sum(axis=1) for one in signs]
+    taus = (signs[0] @ signs[1].T) / np.sqrt(np.outer(*untied))
+    assert taus[0, 0] == 1.0
+    (found,) = compare_tables(paths, "r1", rankings=True).agreements
+    assert found.tau == pytest.approx(1.0)
+    assert found.interval.high == pytest.approx(1.0)
+    # As published, and between exact quantiles around 2.5 %.
+    assert found.interval.low == pytest.approx(0.55, abs=0.005)
+    low, high = np.quantile(taus[1:, 1:], [0.015, 0.035])
+    assert low - 1e-9 <= found.interval.low <= high + 1e-9
+
+
+def test_tables_of_the_same_maps_are_drawn_alike(tmp_path):
+    """Each sample of a table then has the order of the same sample of a copy.
+
+    Answers to queries change nothing: maps are drawn, not blocks of routes.
+    """
+    towns = {
+        town: {"x": 0.5 + step, "y": 0.5, "z": 0.5 - step}
+        for town, step in zip("abcd", (0.4, -0.2, 0.1, -0.3), strict=True)
+    }
+    paths = [
+        write_table(tmp_path / "asked", towns, 10, queries=True),
+        write_table(tmp_path / "copy", towns),
+    ]
+    (same,) = compare_tables(paths, rankings=True).agreements
+    assert same.interval.low == pytest.approx(1.0)
+    elsewhere = {f"{town} elsewhere": values for town, values in towns.items()}
+    paths[1] = write_table(tmp_path / "elsewhere", elsewhere)
+    (other,) = compare_tables(paths, rankings=True).agreements
+    assert other.interval.low == pytest.approx(-1.0)
+
+
+def test_opposite_rankings(tmp_path):
+    up = {"a": {"x": 0.1, "y": 0.4, "z": 0.9}}
+    down = {"a": {"x": 0.9, "y": 0.6, "z": 0.1}}
+    found = compare_tables(
+        [
+            write_table(tmp_path / "up", up, queries=True),
+            write_table(tmp_path / "down", down, queries=True),
+        ]
+    )
+    (one,) = found.agreements
+    assert one.tau == pytest.approx(-1.0)
+    # The values are far apart, so no sample swaps two of them.
+    assert one.interval.low == one.interval.high == pytest.approx(-1.0)
+
+
+def test_rankings_are_of_one_protocol(tmp_path):
+    parts = {"a": {"x": 0.1, "y": 0.4}}
+    fair = write_table(tmp_path / "fair", parts)
+    rows = [
+        Row(**key(method, protocol=name), metric="auc", value=value)
+        for name in ("paper", "own")
+        for method, value in (("x", 0.9), ("y", 0.1))
+    ]
+    both = tmp_path / "both.csv"
+    Results.of(rows).write_csv(both)
+    with pytest.raises(InputError, match="paper and own in one table"):
+        compare_tables([fair, both], rankings=True)
+    also_fair = tmp_path / "also.csv"
+    Results.of([*rows, *Results.read(fair).rows]).write_csv(also_fair)
+    (one,) = compare_tables([fair, also_fair], rankings=True).agreements
+    assert one.tau == pytest.approx(1.0)
+    with pytest.raises(InputError, match=r"no row of auc .* protocol paper"):
+        compare_tables([fair, both], protocol="paper", rankings=True)
+
+
+def test_less_may_be_better(tmp_path):
+    rows = [
+        Row(**key(name, task="localise"), metric="translation_median", value=v)
+        for name, v in (("gicp", 0.1), ("icp", 0.4))
+    ]
+    paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for path in paths:
+        Results.of(rows).write_csv(path)
+    found = compare_tables(paths, "translation_median")
+    assert found.task == "localise"
+    assert [r.method for r in found.ranked] == ["gicp", "icp"]
+
+
+def test_the_command(tmp_path, capsys):
+    one = write_table(tmp_path / "one", {"a": {"x": 0.5, "y": 0.25}})
+    two = write_table(tmp_path / "two", {"a": {"x": 0.75, "y": 0.5}})
+    status, out, err = run(capsys, "compare", one, two)
+    assert (status, err.count("\n")) == (0, 1)
+    head, first, *_ = out.splitlines()
+    # An interval that is unknown is left out.
+    assert head.split() == ["method", "auc,", "mean", "of", "1", "conditions"]
+    assert first.split() == ["x", "(two)", "0.7500"]
+    status, out, _ = run(capsys, "compare", one, two, "--json")
+    found = json.loads(out)
+    assert found["conditions"] == 1
+    assert [m["value"] for m in found["methods"]] == [0.75, 0.5, 0.5, 0.25]
+    assert found["agreements"][0]["kendall_tau"] == pytest.approx(1.0)
+
+
+def test_a_comparison_is_suggested_if_it_can_be_made(tmp_path, capsys):
+    """Results of the shipped cities, of another city, of another metric."""
+    folder = tmp_path / "of shipped"
+    folder.mkdir()
+    table = folder / "results.csv"
+    Results.of(shipped(map="suburbia", method="solid")).write_csv(table)
+    suggest_comparison(folder)
+    suggested = f"next: cns-eval compare '{folder}'\n"
+    assert capsys.readouterr().err == suggested
+    Results.of(shipped(map="suburbia", metric="r1")).write_csv(table)
+    suggest_comparison(folder)
+    suggest_comparison(
+        write_table(tmp_path / "own", {"a": {"x": 0.5}}, experiment="stages")
+    )
+    suggest_comparison(tmp_path / "none")
+    assert capsys.readouterr().err == ""
+
+
+def test_faults_are_one_line(tmp_path, capsys):
+    one = write_table(tmp_path / "one", {"a": {"x": 0.5}})
+    other = write_table(tmp_path / "other", {"b": {"x": 0.5}})
+    assert_refused(capsys, ["compare", one, other], one, "in common")
+    assert_refused(capsys, ["compare", one], "shipped tables")
+    assert_refused(capsys, ["compare", one, "--metric", "r1"], "r1", "auc")
+    assert_refused(
+        capsys, ["compare", one, "--verified"], "with geometric verification"
+    )
+    assert_refused(capsys, ["compare", one, "--protocol", "x"], "--protocol")
+    assert_refused(capsys, ["compare", one, "--rankings"], "two tables")
+    pair = ["compare", one, other, "--rankings"]
+    assert_refused(capsys, pair, "fewer than two methods")
+    assert_refused(capsys, ["compare", tmp_path / "none.csv"], "none.csv")
+
+
+def test_queries_without_blocks_are_noted(tmp_path):
+    pair = [
+        write_table(tmp_path / name, {"town": {name: part}}, queries=True)
+        for name, part in (("one", 0.9), ("other", 0.5))
+    ]
+    assert len(compare_tables(pair).differences) == 1
+    for folder in pair:
+        file = folder / "queries.csv"
+        lines = [line.split(",") for line in file.read_text().splitlines()]
+        block = lines[0].index("block")
+        shorter = [line[:block] + line[block + 1 :] for line in lines]
+        file.write_text("\n".join(map(",".join, shorter)))
+    notes = compare_tables(pair).notes[:2]
+    files = [str(folder / "queries.csv") for folder in pair]
+    assert [note.split(": ")[0] for note in notes] == files
+    assert "column block" in notes[0]
+
+
+def test_rows_by_another_protocol_are_left_out_and_named(tmp_path):
+    """They have the name of no shipped protocol, and each digest is its own."""
+    fair = made_by(FAIR_PROTOCOL)
+    wide, coarse = (
+        made_by(replace(FAIR_PROTOCOL, **one))
+        for one in ({"radius": 25.0}, {"place_spacing": 8})
+    )
+    assert [one["protocol"] for one in (fair, wide, coarse)] == [
+        "fair",
+        "own",
+        "own",
+    ]
+    both = {"x": 0.5, "y": 0.4}
+    one = write_table(tmp_path / "one", {"a": both}, **fair)
+    two = write_table(tmp_path / "two", {"a": {"z": 0.9}}, **wide)
+    with pytest.raises(InputError, match="protocol: fair in one, but own in t"):
+        compare_tables([one, two])
+    three = write_table(tmp_path / "three", {"a": {"z": 0.9}}, **coarse)
+    with pytest.raises(InputError, match=f"digest: {wide['protocol_digest']}"):
+        compare_tables([two, three])
+    rows = [Results.read(path).rows for path in (one, two)]
+    mixed = tmp_path / "mixed.csv"
+    Results.of(itertools.chain(*rows)).write_csv(mixed)
+    found = compare_tables([one, mixed])
+    assert [(r.method, r.value) for r in found.ranked] == [
+        ("x", 0.5),
+        ("y", 0.4),
+    ]
+    assert (
+        f"mixed: left out, by protocol own ({wide['protocol_digest']}), not"
+        f" fair ({fair['protocol_digest']}) in one: 1 conditions"
+    ) in found.notes
+
+
+def test_settings_outside_of_the_protocol_count():
+    """The height of a LiDAR changes numbers; the gate has its own column."""
+    fair = made_by(FAIR_PROTOCOL)
+    assert made_by(replace(FAIR_PROTOCOL, gate=True)) == fair
+    other = made_by(FAIR_PROTOCOL, {"sensor_height": 2.0})
+    assert other["protocol"] == "own"
+    assert other["protocol_digest"] != fair["protocol_digest"]
+    # A whole number is the same number; a seed counts where it draws.
+    same = replace(FAIR_PROTOCOL, query_spacing=10)
+    assert made_by(same) == fair
+    assert made_by(RetrievalProtocol(seed=4))["protocol"] == "recorded"
+    assert made_by(replace(FAIR_PROTOCOL, seed=4))["protocol"] == "own"
+
+
+@pytest.mark.parametrize("fault", ["value", "n"])
+def test_answers_that_contradict_their_results_are_refused(tmp_path, fault):
+    folder = write_table(tmp_path / "mine", {"a": {"x": 0.5}}, queries=True)
+    other = write_table(tmp_path / "other", {"a": {"y": 0.4}}, queries=True)
+    rows = [
+        replace(row, **{"n": 40, fault: {"n": 39, "value": 0.475}[fault]})
+        for row in Results.read(folder).rows
+    ]
+    Results.of(rows).write_csv(folder / "results.csv")
+    with pytest.raises(
+        InputError, match=r"queries.csv: contradicts .*: auc of x"
+    ):
+        compare_tables([folder, other])
+    (folder / "queries.csv").unlink()
+    assert len(compare_tables([folder, other]).ranked) == 2
+
+
+def test_other_numbers_of_queries_are_named(tmp_path):
+    paths = []
+    for name, number in (("one", 12), ("two", 141), ("three", None)):
+        folder = write_table(tmp_path / name, {"a": {name: 0.5}})
+        rows = [replace(row, n=number) for row in Results.read(folder).rows]
+        Results.of(rows).write_csv(folder / "results.csv")
+        paths.append(folder)
+    notes = compare_tables(paths).notes
+    assert "three: of how many queries is not known" in notes
+    assert any("not the same queries: 12 (one), 141 (two)" in n for n in notes)
+    alike = compare_tables(
+        [paths[0], write_table(tmp_path / "four", {"a": {"z": 0.1}})]
+    )
+    assert not any("not the same queries" in note for note in alike.notes)
+
+
+def test_what_a_table_does_not_say_is_unknown(tmp_path):
+    """Tables of other programs have neither digest nor version."""
+    folder = write_table(tmp_path / "theirs", {"a": {"x": 0.5, "y": 0.4}})
+    file = folder / "results.csv"
+    lines = [line.split(",") for line in file.read_text().splitlines()]
+    kept = [
+        k
+        for k, name in enumerate(lines[0])
+        if name not in ("protocol_digest", "version")
+    ]
+    file.write_text(
+        "\n".join(",".join(line[k] for k in kept) for line in lines)
+    )
+    assert {row.protocol_digest for row in Results.read(file).rows} == {""}
+    new = write_table(
+        tmp_path / "new", {"a": {"z": 0.3}}, **made_by(FAIR_PROTOCOL)
+    )
+    found = compare_tables([folder, new])
+    assert len(found.ranked) == 3
+    assert any(
+        "theirs: rows do not say how they were made" in n for n in found.notes
+    )
+
+
+def test_tables_beside_a_page_are_named(tmp_path, capsys):
+    name_tables(tmp_path / "a")
+    assert capsys.readouterr().err == ""
+    write_table(tmp_path / "a", {"a": {"x": 0.5}})
+    name_tables(tmp_path / "a")
+    assert capsys.readouterr().err.startswith("wrote ")

@@ -1,0 +1,348 @@
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+import io
+import json
+import os
+import pickle
+import struct
+import tracemalloc
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import zstandard
+
+from cns_drake.base import InputError, Reporter, fingerprint, nothing_left
+from evaluation.study import MakePart, Part
+from evaluation.study.storage import parts
+from evaluation.study.storage.value_encoding import decode, encode
+
+INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
+
+
+@dataclass(frozen=True)
+class Description:
+    spectrum: np.ndarray
+    filled: np.ndarray
+    empty: np.ndarray
+
+
+@pytest.fixture
+def part(tmp_path):
+    part = Part(tmp_path / "new" / "folder" / "values.data")
+    part.write(INPUTS, list(range(1000)))
+    return part
+
+
+def test_arrays_come_back_bit_by_bit(tmp_path):
+    rng = np.random.default_rng(5)
+    spectrum = (rng.normal(size=(40, 7)) * 1j).astype(np.complex64)
+    spectrum[3, 3] = complex(np.nan, -0.0)
+    value = Description(
+        np.asfortranarray(spectrum),
+        np.flatnonzero(rng.integers(2, size=50)),
+        np.empty((0, 3)),
+    )
+    part = Part(tmp_path / "one.data")
+    part.write(INPUTS, value)
+    again = part.read()
+    for name in ("spectrum", "filled", "empty"):
+        old, new = getattr(value, name), getattr(again, name)
+        assert (old.dtype, old.shape) == (new.dtype, new.shape)
+        assert old.flags.f_contiguous == new.flags.f_contiguous
+        assert old.tobytes("A") == new.tobytes("A")
+
+
+def test_equal_inputs_and_values_give_equal_bytes(part, tmp_path):
+    turned = {key: INPUTS[key] for key in reversed(INPUTS)}
+    again = Part(tmp_path / "again.data")
+    again.write(turned, list(range(1000)))
+    assert again.path.read_bytes() == part.path.read_bytes()
+
+
+def test_a_part_belongs_to_its_inputs(part):
+    assert part.is_current(INPUTS)
+    assert part.identity() == fingerprint(INPUTS)
+    assert part.is_current({**INPUTS, "roles": ["places"]})
+    for other in (
+        {**INPUTS, "roles": []},
+        {**INPUTS, "more": 1},
+        {**INPUTS, "z": {"b": 1.5000001, "a": None}},
+    ):
+        assert not part.is_current(other)
+
+
+def test_only_a_whole_part_is_one(part, tmp_path):
+    whole = part.path.read_bytes()
+    assert not Part(tmp_path / "none.data").is_current(INPUTS)
+    with pytest.raises(InputError, match=r"none.data: No such file"):
+        Part(tmp_path / "none.data").read()
+    for length in (0, 10, 16, 60, len(whole) - 1):
+        part.path.write_bytes(whole[:length])
+        assert not part.is_current(INPUTS)
+        with pytest.raises(InputError, match=r"values.data: damaged"):
+            part.read()
+    part.path.write_bytes(whole + b"x")
+    assert not part.is_current(INPUTS)
+
+
+@pytest.mark.parametrize("place", [-1, -5, -200])
+def test_damage_is_noticed_before_it_is_used(part, place):
+    data = bytearray(part.path.read_bytes())
+    data[place] ^= 1
+    part.path.write_bytes(bytes(data))
+    with pytest.raises(InputError, match=r"values.data: damaged .* delete it"):
+        part.read()
+
+
+def test_what_cannot_be_kept_leaves_the_part_as_it_was(part):
+    whole = part.path.read_bytes()
+    with pytest.raises(InputError, match=r"function cannot be kept"):
+        part.write(INPUTS, lambda: None)
+    assert [path.name for path in part.path.parent.iterdir()] == ["values.data"]
+    assert part.path.read_bytes() == whole
+
+
+def test_a_part_runs_nothing_of_what_it_names(tmp_path, monkeypatch):
+    """It may come from others, so it runs neither imports nor constructors."""
+    path = tmp_path / "ran"
+    (tmp_path / "evil_module.py").write_text(
+        f"from pathlib import Path\nPath({str(path)!r}).touch()\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    described = Description(*[np.zeros(1)] * 3)
+    data = encode(described)
+
+    def refuses(changed, fault):
+        (length,) = struct.unpack_from("<Q", data)
+        assert len(changed) != length or changed != data[8 : 8 + length]
+        with pytest.raises(ValueError, match=fault):
+            decode(
+                struct.pack("<Q", len(changed)) + changed + data[8 + length :]
+            )
+
+    module = __name__.encode()
+    (length,) = struct.unpack_from("<Q", data)
+    tree = data[8 : 8 + length]
+    assert module in tree
+    refuses(tree.replace(module, b"evil_module"), "evil_module")
+    refuses(tree.replace(module, b"evaluation.nothing.here"), "ModuleNotFound")
+    refuses(tree.replace(b'"Description"', b'"np"'), "no type")
+    refuses(tree.replace(b'"Description"', b'"Painter"'), "dataclass")
+    refuses(tree.replace(b'"empty"', b'"full"'), "other fields")
+    refuses(tree.replace(b":0", b":9"), "IndexError|other")
+    refuses(b"[" * 100_000, "RecursionError|Expecting")
+    refuses(b"\xff", "decode")
+    assert not path.exists()
+    # A pickle with any bytes is refused.
+    (tmp_path / "old.data").write_bytes(
+        b"cns-eval part 1\n{}\n" + pickle.dumps(described)
+    )
+    with pytest.raises(InputError, match="damaged"):
+        Part(tmp_path / "old.data").read()
+
+
+class Painter:
+    def __init__(self):
+        raise AssertionError("run")
+
+
+class Pair(NamedTuple):
+    low: float
+    high: float
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        None,
+        True,
+        2**200,
+        -0.0,
+        float("inf"),
+        "\u00e9\n\0",
+        (),
+        [(), [], {}],
+        {("a", 1): {2: None}, "array": 3, "dict": [1]},
+        Pair(1.0, 2.5),
+        np.float32(0.1),
+        b"\0\xff",
+    ],
+)
+def test_plain_values_come_back(value):
+    again = decode(encode(value))
+    assert type(again) is type(value)
+    assert repr(again) == repr(value)
+
+
+def test_an_array_that_is_there_twice_is_stored_once():
+    array = np.arange(10_000)
+    value = [Description(array, array, array), array]
+    assert len(encode(value)) < 2 * array.nbytes
+    again = decode(encode(value))
+    assert again[0].spectrum is again[1]
+
+
+@pytest.mark.parametrize(
+    "value", [{1, 2}, object(), np.array([None]), [lambda: 0]]
+)
+def test_what_cannot_be_kept(tmp_path, value):
+    path = tmp_path / "a.data"
+    with pytest.raises(InputError, match=f"^{path}: .*cannot be kept"):
+        Part(path).write({}, value)
+    assert not list(tmp_path.iterdir())
+
+
+def _replaced(part, header=None, data=None, **fields):
+    """Writes a part again with another header or another value."""
+    magic, line, old = part.path.read_bytes().split(b"\n", 2)
+    data = old if data is None else data
+    values = json.loads(line) | {"bytes": len(data)} | fields
+    line = json.dumps(values).encode() if header is None else header
+    part.path.write_bytes(b"\n".join([magic, line, data]))
+
+
+@pytest.mark.parametrize(
+    "header",
+    [b"[" * 100_000, b"[]", b"null", b"3", b"{}", b'{"bytes": "1"}', b"\xff"],
+)
+def test_headers_that_are_none(part, header):
+    _replaced(part, header)
+    assert not part.is_current(INPUTS)
+    with pytest.raises(InputError, match=r"values\.data: damaged"):
+        part.read()
+
+
+def test_a_part_neither_fills_the_memory_nor_waits(part, monkeypatch):
+    monkeypatch.setattr(parts, "_ALWAYS_BYTES", 1 << 16)
+    bomb = zstandard.compress(bytes(1 << 24))
+    assert len(bomb) < 2_000
+    _replaced(part, data=bomb)
+    tracemalloc.start()
+    with pytest.raises(InputError, match=r"damaged .*stand for 16777216"):
+        part.read()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 5e6
+    monkeypatch.undo()
+    lying = struct.pack("<Q", 2) + b"{}" + npy_header("(100000000000000,)")
+    _replaced(part, data=zstandard.compress(lying))
+    with pytest.raises(InputError, match="damaged"):
+        part.read()
+    part.path.unlink()
+    os.mkfifo(part.path)
+    assert not part.is_current(INPUTS)
+    with pytest.raises(InputError, match="not a regular file"):
+        part.read()
+
+
+def npy_header(shape):
+    stream = io.BytesIO()
+    np.save(stream, np.zeros(0))
+    return stream.getvalue().replace(b"(0,)", shape.encode())
+
+
+def test_a_part_of_zeros_is_read_however_small_it_could_be(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(parts, "_ALWAYS_BYTES", 1 << 16)
+    part = Part(tmp_path / "zeros.data")
+    part.write(INPUTS, np.zeros(1 << 20))
+    assert not part.read().any()
+    assert part.fits(np.ndarray)
+    assert not part.fits(list[float])
+
+
+@dataclass(frozen=True)
+class Measured:
+    name: str
+    auc: float
+    rows: tuple[int, ...] = ()
+    more: dict[str, float | None] = field(default_factory=dict)
+    drawn: "list[Pair] | None" = None
+
+
+@pytest.mark.parametrize(
+    ("value", "hint", "expected"),
+    [
+        (None, None, True),
+        (None, Measured, False),
+        (None, Measured | None, True),
+        (3, float, True),
+        (np.float32(3), float, True),
+        ("3", float, False),
+        ([1.0, 2], list[float], True),
+        ([1.0, None], list[float], False),
+        ((1, "a"), tuple[int, str], True),
+        ((1, "a", 2), tuple[int, str], False),
+        ((1, 2), Sequence[int], True),
+        ({"a": {"b": None}}, dict[str, dict[str, float | None]], True),
+        ({"a": [1]}, dict[str, dict[str, float | None]], False),
+        (Measured("a", 0.5, (1, 2), {"x": None}, [Pair(0, 1)]), Measured, True),
+        (Measured("a", None), Measured, False),
+        (Measured("a", 0.5, (1, "2")), Measured, False),
+        (Pair(0, 1), Measured, False),
+        (np.zeros(2), np.ndarray, True),
+        (b"12", bytes, True),
+        ([], Any, True),
+    ],
+)
+def test_values_of_another_type_are_made_again(tmp_path, value, hint, expected):
+    part = Part(tmp_path / "one.data")
+    part.write(INPUTS, value)
+    assert part.fits(hint) == expected
+
+
+def test_a_step_whose_part_holds_something_else_is_not_done(tmp_path):
+    step = MakePart(Part(tmp_path / "one.data"), measured, (2.0,))
+    step.run(Reporter())
+    assert step.is_done()
+    for value in (None, [None], {"a": 1}, [Measured(1, 0.5)]):
+        _replaced(step.part, data=zstandard.compress(encode(value)))
+        assert step.part.read() == value
+        assert not step.is_done()
+
+
+def test_a_value_that_is_removed_keeps_its_results(tmp_path):
+    part = Part(tmp_path / "one.data")
+    part.discard_if_value_removed()
+    part.write(INPUTS, np.arange(10_000.0))
+    result = MakePart(Part(tmp_path / "result.data"), summed, (("a", part),))
+    result.run(Reporter())
+    before = part.identity()
+    for _ in range(2):
+        part.remove_value()
+        assert part.path.stat().st_size < 1000
+        assert part.is_current(INPUTS)
+        assert part.identity() == before
+        assert nothing_left(result)
+        assert not part.fits(np.ndarray)
+        with pytest.raises(InputError, match="its value was removed"):
+            part.read()
+    (read,) = result.parts()
+    read.discard_if_value_removed()
+    assert not part.path.exists()
+    assert not nothing_left(result)
+    with pytest.raises(InputError, match=r"one\.data"):
+        part.remove_value()
+    part.write(INPUTS, np.arange(10_000.0))
+    part.discard_if_value_removed()  # Nothing to discard.
+    assert len(part.read()) == 10_000
+    assert nothing_left(result)
+
+
+def test_a_damaged_part_is_not_discarded(tmp_path):
+    part = Part(tmp_path / "one.data")
+    part.write(INPUTS, [1])
+    content = part.path.read_bytes()[:-1]
+    part.path.write_bytes(content)
+    part.discard_if_value_removed()
+    assert part.path.read_bytes() == content
+
+
+def summed(reporter: Reporter, named: tuple[str, Part]) -> float:
+    return float(named[1].read().sum())
+
+
+def measured(reporter: Reporter, value: float) -> list[Measured]:
+    return [Measured("one", value)]

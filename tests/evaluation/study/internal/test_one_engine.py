@@ -1,0 +1,133 @@
+"""Commands of one pair beside a report of it: the same rows, one engine."""
+
+import re
+
+from helpers import documents
+from helpers.internal import studies
+from helpers.internal.eval_program import run
+import numpy as np
+import pytest
+
+from evaluation.results import QueryRows, Results
+from evaluation.study import choose_methods, engine
+
+pytestmark = pytest.mark.slow
+METHODS = ("solid", "ring++")
+
+
+@pytest.fixture(scope="module")
+def report(towns, tmp_path_factory):
+    """The folder of a report on two recordings."""
+    output = tmp_path_factory.mktemp("report")
+    with pytest.MonkeyPatch.context() as patch:
+        studies.leave_figures_unrendered(patch)
+        studies.report(towns, output, choose_methods(METHODS))
+    return output
+
+
+def measured(rows):
+    """Where and what was measured -> its numbers.
+
+    A report takes the name of the map from the name of the drive; a command of
+    one pair takes that of the world frame.
+    """
+    return {
+        (*row.without("experiment", "map", "seed", "both.stage"), row.metric): (
+            row.value,
+            row.low,
+            row.high,
+            row.n,
+        )
+        for row in rows
+    }
+
+
+def own_rows(folder, **columns):
+    """The rows of town_01 > town_02 that compare with no baseline."""
+    table = Results.read(folder)
+    if "both.stage" in table.factors:
+        table = table.where({"both.stage": "own"})
+    named = {"database": "town_01", "query": "town_02", **columns}
+    return measured(table.where(**named).rows)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_pr_has_the_rows_of_a_report(capsys, towns, report, tmp_path, method):
+    both = towns / "town_01", towns / "town_02"
+    words = ["pr", *both, "--method", method, "--seed", 0]
+    assert run(capsys, *words, "--output", tmp_path)[0] == 0
+    expected = own_rows(report, task=("place", "pose"), method=method)
+    found = own_rows(tmp_path)
+    assert found
+    for key, numbers in found.items():
+        np.testing.assert_equal(numbers, expected[key])
+    answers = {
+        (one.method, one.gate): one.columns
+        for one in QueryRows.read(report).answers
+        if (one.database, one["both.stage"]) == ("town_01", "own")
+    }
+    for one in QueryRows.read(tmp_path).answers:
+        of_report = answers[one.method, one.gate]
+        assert one.columns.keys() == of_report.keys()
+        for name, values in one.columns.items():
+            np.testing.assert_array_equal(values, of_report[name])
+
+
+def test_tcr_has_the_rows_of_a_report(capsys, towns, report, tmp_path):
+    words = ["tcr", towns / "town_01", towns / "town_02", "--output", tmp_path]
+    assert run(capsys, *words)[0] == 0
+    found = own_rows(tmp_path)
+    assert len(found) == 4
+    expected = own_rows(report, task="change")
+    assert found.keys() == expected.keys()
+    for key, numbers in found.items():
+        np.testing.assert_equal(numbers, expected[key])
+
+
+@pytest.mark.night
+def test_every_command_writes_its_tables_by_the_engine(
+    capsys, towns, tmp_path, monkeypatch
+):
+    written = []
+    write = engine.Engine._write
+
+    def record(self, *tables):
+        written.append((self.experiment, set(self.tasks)))
+        return write(self, *tables)
+
+    monkeypatch.setattr(engine.Engine, "_write", record)
+    studies.leave_figures_unrendered(monkeypatch)
+    both = towns / "town_01", towns / "town_02"
+    for number, words in enumerate(
+        (
+            ("pr", *both, "--method", "solid"),
+            ("tcr", *both),
+            ("localise", *both, "--method", "icp", "--query-spacing", 40),
+        )
+    ):
+        output = tmp_path / str(number)
+        assert run(capsys, *words, "--output", output)[0] == 0
+        assert Results.read(output).rows
+        QueryRows.read(output)
+    assert written == [
+        ("pr", {"place", "pose"}),
+        ("tcr", {"change"}),
+        ("localise", {"localise"}),
+    ]
+    studies.report(towns, tmp_path / "report", choose_methods(["solid"]))
+    assert written[3:] == [("stages", {"place", "pose", "change"})]
+
+
+def test_only_the_engine_writes_both_tables():
+    users = {
+        path.as_posix()
+        for package in ("evaluation", "cns_drake")
+        for path in (documents.ROOT / package).rglob("*.py")
+        if {"RESULTS", "QUERIES", "write_csv"}
+        <= set(re.findall(r"\w+", path.read_text()))
+    }
+    root = documents.ROOT / "evaluation"
+    assert users == {
+        (root / "study/engine.py").as_posix(),
+        (root / "results/table.py").as_posix(),
+    }
