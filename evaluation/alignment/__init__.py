@@ -6,14 +6,5 @@ loops. `trajectory_errors` compares an estimated trajectory with ground truth.
 """
 
 from cns_drake.base import attach
-from evaluation.alignment.align import (
-    Alignment,
-    AlignmentReport,
-    When,
-    align,
-    in_one_world,
-)
-
-__all__ = ["Alignment", "AlignmentReport", "When", "align", "in_one_world"]
 
 __getattr__, __dir__, __all__ = attach(__name__, __file__)

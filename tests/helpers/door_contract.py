@@ -1,13 +1,14 @@
-"""The contract of import-linter that packages are imported through their doors.
+"""The contract of import-linter that others import packages by their doors.
 
-A package is a folder directly below `cns_drake` or `evaluation`. Its door is its
-`__init__`: the stub `__init__.pyi` lists the names that others may import. All
-other modules of the package are its own.
+A package is a folder directly below `cns_drake` or `evaluation`. Its door is
+its `__init__`: the stub `__init__.pyi` lists the names that others may import.
+All other modules of the package are its own.
 """
 
 from __future__ import annotations
 
 import ast
+import functools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,7 @@ def package_of(module: str) -> str | None:
     return ".".join(parts[:2]) if inside else None
 
 
+@functools.cache
 def offered_modules(package: str) -> set[str]:
     """Returns the modules that a package's door offers as a whole."""
     stub = ROOT / package.replace(".", "/") / "__init__.pyi"
@@ -46,10 +48,20 @@ def inner_imports(code: str) -> Iterator[str]:
         if isinstance(node, ast.Import):
             modules = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            modules = [node.module or ""]
+            home = node.module or ""
+            names = [f"{home}.{alias.name}" for alias in node.names]
+            modules = [home, *filter(_is_module, names)]
         else:
             continue
-        yield from (module for module in modules if package_of(module))
+        for module in modules:
+            package = package_of(module)
+            if package and module not in offered_modules(package):
+                yield module
+
+
+def _is_module(name: str) -> bool:
+    place = ROOT.joinpath(*name.split("."))
+    return place.is_dir() or place.with_suffix(".py").is_file()
 
 
 class DoorContract(Contract):

@@ -1,0 +1,106 @@
+"""Packages are imported through their doors, and doors offer what they list."""
+
+import ast
+import importlib
+from pathlib import Path
+import subprocess
+import sys
+
+from helpers.door_contract import ROOTS, inner_imports, offered_modules
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DOORS = sorted(
+    ".".join(path.parent.relative_to(ROOT).parts)
+    for root in ROOTS
+    for path in (ROOT / root).glob("*/__init__.py")
+)
+OUTSIDE = sorted(
+    path
+    for folder in ("tests", "docs", "diagrams")
+    for path in (ROOT / folder).rglob("*.py")
+    if "internal" not in path.relative_to(ROOT).parts
+)
+
+
+def listed(package):
+    """Returns name -> module of what the stub of a package lists."""
+    stub = ROOT / package.replace(".", "/") / "__init__.pyi"
+    return {
+        alias.name: node.module
+        for node in ast.parse(stub.read_text()).body
+        for alias in node.names
+    }
+
+
+@pytest.mark.parametrize("package", DOORS)
+def test_a_door_offers_what_its_stub_lists(package):
+    door = importlib.import_module(package)
+    modules = offered_modules(package)
+    for name, home in listed(package).items():
+        if f"{package}.{name}" in modules:
+            assert getattr(door, name).__name__ == f"{package}.{name}"
+        else:
+            assert getattr(door, name) is getattr(
+                importlib.import_module(home), name
+            )
+
+
+@pytest.mark.parametrize("package", DOORS)
+def test_no_module_takes_the_place_of_a_name(package):
+    # Once imported, a module is an attribute of its package.
+    folder = ROOT / package.replace(".", "/")
+    inside = {path.stem for path in folder.iterdir()}
+    taken = {
+        name
+        for name in listed(package)
+        if name in inside
+        and f"{package}.{name}" not in offered_modules(package)
+    }
+    assert taken == set()
+
+
+@pytest.mark.parametrize(
+    "path", OUTSIDE, ids=lambda path: str(path.relative_to(ROOT))
+)
+def test_who_is_outside_uses_doors(path):
+    assert list(inner_imports(path.read_text())) == []
+
+
+def test_imports_behind_a_door_are_noticed():
+    code = """
+import cns_drake.base.units
+from cns_drake.base.units import wrapped
+def late():
+    from evaluation.methods import registry
+"""
+    assert list(inner_imports(code)) == [
+        "cns_drake.base.units",
+        "cns_drake.base.units",
+        "evaluation.methods.registry",
+    ]
+    fine = "from cns_drake.base import poses, wrapped\nimport evaluation\n"
+    assert list(inner_imports(fine)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("package", DOORS)
+def test_a_door_loads_nothing_before_a_name_is_used(package):
+    code = f"import {package}, sys; print(*sys.modules)"
+    loaded = subprocess.check_output(
+        [sys.executable, "-c", code], cwd=ROOT, text=True
+    ).split()
+    ours = {name for name in loaded if name.split(".")[0] in ROOTS}
+    inside = {name for name in ours if name.startswith(f"{package}.")}
+    assert inside <= {"cns_drake.base.public_names", *_run_by_doors(package)}
+    assert {"numpy", "pydrake", "pydantic", "typer"}.isdisjoint(loaded)
+
+
+def _run_by_doors(package):
+    """Returns the modules that the door of a package runs by itself."""
+    own = ROOT / package.replace(".", "/") / "__init__.py"
+    return {
+        f"{node.module}"
+        for node in ast.parse(own.read_text()).body
+        if isinstance(node, ast.ImportFrom)
+    }
