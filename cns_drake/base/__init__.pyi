@@ -6,6 +6,9 @@ from cns_drake.base import shared_options as shared_options
 from cns_drake.base import terminal as terminal
 from cns_drake.base.commands import Command as Command
 from cns_drake.base.compilation import compiled as compiled
+from cns_drake.base.compilation import (
+    compiled_callback as compiled_callback,
+)
 from cns_drake.base.complete_files import (
     check_folder_writable as check_folder_writable,
 )

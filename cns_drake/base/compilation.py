@@ -58,6 +58,33 @@ def compiled(function: _Function) -> _Function:
         numba.config.CACHE_LOCATOR_CLASSES = before
 
 
+@functools.cache
+def compiled_callback(function: Callable) -> int:
+    """Compiles a function that C code calls; returns its address.
+
+    The function takes one pointer, to integers of 8 bytes, and returns nothing.
+    It may call compiled functions. Its machine code is kept as that of
+    `compiled`.
+    """
+    before = numba.config.CACHE_LOCATOR_CLASSES
+    numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.{_ByContent.__name__}"
+    signature = numba.void(numba.types.CPointer(numba.int64))
+    options = {"nopython": True}
+    with interlude(f"compiling {function.__name__}"), uninterrupted():
+        try:
+            made = numba.cfunc(signature, cache=True, **options)(function)
+        except RuntimeError:  # See `compiled`.
+            made = numba.cfunc(signature, **options)(function)
+        finally:
+            numba.config.CACHE_LOCATOR_CLASSES = before
+    _CALLBACKS.append(made)
+    return int(made.address)
+
+
+# The machine code lives as long as these.
+_CALLBACKS: list[object] = []
+
+
 class _ByContent:
     """Cache folder of a function, named by the contents of its source folder.
 

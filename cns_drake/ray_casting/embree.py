@@ -12,10 +12,11 @@ import importlib
 import importlib.util
 from pathlib import Path
 
+import numba
 from numba import types
 
 # With this import, numba accepts functions as arguments of compiled functions.
-from numba.extending import typeof_impl
+from numba.extending import intrinsic, typeof_impl
 
 # Types of geometries (`RTC_GEOMETRY_TYPE_...`).
 TRIANGLE = 0
@@ -23,6 +24,7 @@ CONE = 15
 ROUND_SEGMENT = 16
 SPHERE = 50
 DISC = 52
+USER = 120
 INSTANCE = 121
 # Types of buffers (`RTC_BUFFER_TYPE_...`).
 INDEX_BUFFER = 0
@@ -103,6 +105,10 @@ def load() -> ctypes.CDLL:
         ("rtcReleaseGeometry", None, [pointer]),
         ("rtcAttachGeometry", uint, [pointer, pointer]),
         ("rtcSetGeometryMask", None, [pointer, uint]),
+        ("rtcSetGeometryUserPrimitiveCount", None, [pointer, uint]),
+        ("rtcSetGeometryUserData", None, [pointer, pointer]),
+        ("rtcSetGeometryBoundsFunction", None, [pointer, pointer, pointer]),
+        ("rtcSetGeometryIntersectFunction", None, [pointer, pointer]),
         ("rtcSetGeometryInstancedScene", None, [pointer, pointer]),
         ("rtcSetGeometryTransform", None, [pointer, uint, integer, pointer]),
         ("rtcSetGeometryTransformQuaternion", None, [pointer, uint, pointer]),
@@ -161,3 +167,20 @@ def native_packet(
         if embree.rtcGetDeviceProperty(device, supported):
             lanes = more
     return lanes, PacketFunction(getattr(embree, f"rtcIntersect{lanes}"))
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # numba has no hints.
+def _pointer(context: object, address: object) -> tuple:
+    """In compiled code, the pointer that an integer stands for."""
+
+    def cast(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        kind = context.get_value_type(signature.return_type)
+        return builder.inttoptr(arguments[0], kind)
+
+    return numba.types.voidptr(address), cast
+
+
+@numba.njit  # type: ignore[untyped-decorator]  # numba has no hints.
+def array_at(address: int, shape: object, dtype: object) -> object:
+    """In compiled code, the array at an address."""
+    return numba.carray(_pointer(address), shape, dtype)

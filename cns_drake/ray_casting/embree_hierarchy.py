@@ -4,9 +4,9 @@ Embree works in single precision. Where a ray runs nearly in the plane of a
 triangle, or the triangle is slender, Embree's hit can be metres beside the
 triangle; and a ray through a vertex can pass between the triangles that share
 the vertex. Such hits and misses are therefore doubted. A doubtful hit is kept
-if double precision says that its point is on the triangle. Otherwise a bundle
-of rays around the ray finds the triangles near the ray, and the ray meets these
-in double precision.
+if double precision says that its point is on the triangle. Otherwise the ray is
+cast again, on the boxes of the triangles: Embree finds the boxes, and the ray
+meets the triangles in double precision.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ import ctypes
 from typing import NamedTuple
 import weakref
 
+from numba import carray
 import numpy as np
-from pydrake.math import RotationMatrix
+from pydrake.math import RotationMatrix, inv
 
-from cns_drake.base import compiled, product, rotated
+from cns_drake.base import compiled, compiled_callback, product, rotated
 from cns_drake.ray_casting import embree
-from cns_drake.ray_casting.embree_primitives import ALL, Primitives
+from cns_drake.ray_casting.embree_primitives import ALL, FLAT, Primitives
 from cns_drake.ray_casting.moving_groups import Placed
 from cns_drake.ray_casting.ray_groups import RayGroup
-from cns_drake.ray_casting.rays import CERTAIN, Hits, Rays
+from cns_drake.ray_casting.rays import CERTAIN, MISSED, Hits, Rays
 from cns_drake.scene import TriangleSurface
 
 # Least number of rays that a thread takes at once: a multiple of every packet
 # size, and large enough that the call costs little.
 _BLOCK = 1024
-_NO_TURN = np.eye(3)[None]
 # Embree treats smaller direction components as positive, whatever their sign. A
 # packet that mixes such rays with rays of truly positive components loses hits.
 _TINY = 1e-18
@@ -46,25 +46,13 @@ _TINY = 1e-18
 _TOLERANCE = 2.0**-9
 # Points are on a triangle if they are at most this far away [m].
 _GAP = 2.0**-11
-# Typical error of a coordinate in single precision, as a share of the distances
-# from which the coordinate follows. With it, the error that is expected of a
-# range is less than `_TOLERANCE` only if the true error is (measured; see
-# `test_doubtful_hits.py`).
-_ROUNDING = 2.0**-26
-# Lateral distance between rays that ask for the same hit, as a share of the
-# distances from which their coordinates follow: some roundings.
-_ASIDE = 2.0**-20
-# These rays, in units of `_ASIDE` across the ray: it, and two rings around it.
-_BUNDLE = np.array(
-    [(0.0, 0.0)]
-    + [
-        (r * np.cos(a), r * np.sin(a))
-        for r, count in ((1.0, 8), (0.4, 7))
-        for a in np.linspace(0.1, 0.1 + 2.0 * np.pi, count, endpoint=False)
-    ]
-)
-# Greatest number of surfaces that are tried for each ray of a bundle.
-_MOST_LAYERS = 16
+# A hit on a triangle is sure if the square of its longest edge, multiplied by
+# the distances from which its range follows, is less than this multiple of the
+# product of the ray's direction and the triangle's normal (of twice its area).
+# The error of its range is then less than `_TOLERANCE` (measured; see
+# `test_doubtful_hits.py`): coordinates are typically wrong by 2^-26 of
+# themselves.
+_SURE = np.float32(_TOLERANCE / 2.0**-26)
 # A miss is doubtful if rays hit that are turned by this angle to either side of
 # the ray [rad].
 _TURN_ASIDE = 1e-5
@@ -76,6 +64,9 @@ _EDGE_TOLERANCE = 1e-9
 _ROUNDING_TOLERANCE = 1e-14
 # Greatest error of a hit by rounding, as a share of the triangle's size.
 _LARGEST_ERROR = 1e-3
+# Margin of the boxes of triangles: more than single precision moves a ray
+# within 1 km of its origin, if the origin is within 1 km of the scene's [m].
+_MARGIN = 2e-3
 
 
 class _Built(NamedTuple):
@@ -93,6 +84,54 @@ class _Built(NamedTuple):
     surface: TriangleSurface | None
 
 
+class _Places(NamedTuple):
+    """The places of G groups, in a scene's frame O.
+
+    Attributes:
+        X_OLs: (G, 3, 4) float64 maps from each group's local frame L to O at
+            the start of a revolution.
+        p_FLs: (G, 3) position of L in the frame F that moves, in axes of O [m].
+        rotvecs: (G, 2, 3) rotation vector of F at the start of a revolution,
+            and what is added during the revolution [rad].
+        ways: (G, 2, 3) displacement of F, likewise [m].
+        turns: (G,) float32 greatest angle by which F turns [rad].
+        in_sight: (G,) bool, whether rays can meet each group.
+    """
+
+    X_OLs: np.ndarray
+    p_FLs: np.ndarray
+    rotvecs: np.ndarray
+    ways: np.ndarray
+    turns: np.ndarray
+    in_sight: np.ndarray
+
+    @classmethod
+    def of(cls, groups: Sequence[RayGroup]) -> _Places:
+        """Returns the places of groups at rest."""
+        count = len(groups)
+        return cls(
+            np.reshape([group.X_OL for group in groups], (-1, 3, 4)),
+            np.zeros((count, 3)),
+            np.zeros((count, 2, 3)),
+            np.zeros((count, 2, 3)),
+            np.zeros(count, np.float32),
+            np.ones(count, bool),
+        )
+
+    def place(self, row: int, group: RayGroup, is_in_motion: bool) -> None:
+        """Sets the motion of the group with a given row."""
+        self.rotvecs[row] = self.ways[row] = 0.0
+        if is_in_motion:
+            assert group.motion is not None
+            motion = group.motion
+            spans = np.array([[motion.start], [motion.duration]])
+            self.rotvecs[row] = spans * motion.w
+            self.ways[row] = spans * motion.v
+            p_LF = rotated(inv(group.X_FL[:3, :3]), group.X_FL[:3, 3])
+            self.p_FLs[row] = rotated(group.X_OL[:, :3], p_LF)
+        self.turns[row] = np.abs(self.rotvecs[row]).sum()
+
+
 class _PacketScenes(NamedTuple):
     """The scenes on which packets are cast, and the owners of their primitives.
 
@@ -101,22 +140,22 @@ class _PacketScenes(NamedTuple):
         fixed: address of the RTCScene of static geometry, or 0.
         instances: address of the RTCScene of I instances, or 0.
         arguments: address of the RTCIntersectArguments.
-        first_primitive: (1 + I, G) int64, the index in `owner_of_primitive` of
-            the first primitive of geometry g in the fixed scene (first row) and
-            in each instance.
-        owner_of_primitive: (P,) int32 number of the member of the group to
-            which each primitive belongs.
+        first_primitive: (1 + I, G) int64, the index in `primitives` of the
+            first primitive of geometry g in the fixed scene (first row) and in
+            each instance.
+        primitives: (P,) records of `owner`, the number of the member of the
+            group to which each primitive belongs; and of `span`, the square of
+            a triangle's longest edge [m^2], 0 for other shapes and proxies.
         groups: (1 + I,) int32 row of a group: first of the group of the fixed
             scene (-1 if there is no fixed scene), then of the group of each
             instance.
         first_member: (1 + I,) int64 index in `geometries` of each group's first
             member.
         geometries: (M,) int32 index of the geometry of each member.
-        spans: (P,) float32 square of the longest edge of each triangle that
-            rays hit [m^2]; 0 for all other primitives.
-        R_OLs: (G, 3, 3) float64 orientation of the frame L of each group in O,
-            at the start of a revolution.
-        in_motion: (G,) bool, whether each group moves during the revolution.
+        vertices: (V, 3) float64 vertices of the triangles that rays hit, in the
+            frame L of their group [m].
+        triangles: (P, 3) int32 vertices of each of these triangles.
+        places: the places of G groups.
     """
 
     lanes: int
@@ -124,13 +163,37 @@ class _PacketScenes(NamedTuple):
     instances: int
     arguments: int
     first_primitive: np.ndarray
-    owner_of_primitive: np.ndarray
+    primitives: np.ndarray
     groups: np.ndarray
     first_member: np.ndarray
     geometries: np.ndarray
-    spans: np.ndarray
-    R_OLs: np.ndarray
-    in_motion: np.ndarray
+    vertices: np.ndarray
+    triangles: np.ndarray
+    places: _Places
+
+
+class _Boxes(NamedTuple):
+    """The boxes of all triangles, and what their callback reads and writes.
+
+    Attributes:
+        scenes: (1 + I,) int64 address of the RTCScene of boxes of the fixed
+            scene and of each instance, or 0.
+        p_LRset: (lanes, 3) float64 origins of the rays of a packet [m].
+        d_Lset: (lanes, 3) float64 their directions.
+        best: (lanes,) float64 their greatest ranges, then the ranges of their
+            hits [m].
+        met: (lanes,) int64 the triangles that they meet, -1 for none.
+        controls: (S, 7) int64 of each scene of boxes: the addresses of its
+            triangles, of all vertices and of the four arrays above; and the
+            number of vertices.
+    """
+
+    scenes: np.ndarray
+    p_LRset: np.ndarray
+    d_Lset: np.ndarray
+    best: np.ndarray
+    met: np.ndarray
+    controls: np.ndarray
 
 
 class EmbreeHierarchy:
@@ -191,8 +254,8 @@ class EmbreeHierarchy:
         self._instances: dict[int, int] = {}
         # Rows of groups that rays cannot meet.
         self._disabled: set[int] = set()
-        self._R_OLs = np.reshape([g.X_OL[:, :3] for g in groups], (-1, 3, 3))
-        self._in_motion = np.zeros(len(groups), bool)
+        self._in_motion: set[int] = set()
+        self._places = _Places.of(groups)
         self._has_triangles = any(b.surface is not None for b in self._built)
         if moving:
             self._top = self._new_scene()
@@ -201,11 +264,17 @@ class EmbreeHierarchy:
                 self._instances[row] = self._new_instance(scene)
             self.place(Placed.of(groups, moving))
         self._check_device()
-        self._arguments = embree.IntersectArguments(
-            embree.COHERENT_RAYS, embree.INVALID_ID
+        self._coherent, self._scattered = (
+            embree.IntersectArguments(flags, embree.INVALID_ID)
+            for flags in (embree.COHERENT_RAYS, 0)
         )
         lanes, self._intersect = embree.native_packet(self._lib, self._device)
         self._packet_scenes = self._make_packet_scenes(lanes, fixed, moving)
+        # Few rays in all directions: each for itself.
+        self._scattered_scenes = self._packet_scenes._replace(
+            arguments=ctypes.addressof(self._scattered)
+        )
+        self._boxes: _Boxes | None = None
 
     def place(self, placed: Placed) -> None:
         """Moves the groups in sight to their poses, and disables all others.
@@ -218,7 +287,8 @@ class EmbreeHierarchy:
         # Lists and one address: NumPy takes long for single values.
         address, size = places.ctypes.data, places.strides[0]
         in_sight, moves = placed.in_sight.tolist(), placed.moves.tolist()
-        self._R_OLs[placed.rows] = placed.X_OLs[:, :, :3]
+        self._places.X_OLs[placed.rows] = placed.X_OLs
+        self._places.in_sight[placed.rows] = placed.in_sight
         has_changed = False
         for k, row in enumerate(placed.rows.tolist()):
             handle = self._instances.get(row)
@@ -235,7 +305,8 @@ class EmbreeHierarchy:
                 lib.rtcEnableGeometry(handle)
                 self._disabled.remove(row)
             if moves[k]:
-                self._in_motion[row] = True
+                self._in_motion.add(row)
+                self._places.place(row, self._groups[row], True)
                 steps = _decompose_motion(self._groups[row])
                 lib.rtcSetGeometryTimeStepCount(handle, len(steps))
                 for step in range(len(steps)):
@@ -243,9 +314,10 @@ class EmbreeHierarchy:
                         handle, step, steps[step].ctypes.data
                     )
             else:
-                if self._in_motion[row]:
+                if row in self._in_motion:
                     lib.rtcSetGeometryTimeStepCount(handle, 1)
-                    self._in_motion[row] = False
+                    self._in_motion.remove(row)
+                    self._places.place(row, self._groups[row], False)
                 lib.rtcSetGeometryTransform(
                     handle, 0, embree.FLOAT3X4_ROW_MAJOR, address + k * size
                 )
@@ -259,6 +331,7 @@ class EmbreeHierarchy:
         *,
         mask: int = ALL,
         with_normals: bool = False,
+        doubt_all: bool = False,
     ) -> Hits:
         """Casts rays on the geometry; returns the hits.
 
@@ -266,51 +339,55 @@ class EmbreeHierarchy:
             rays: the rays.
             mask: bits of the geometry that can be hit, such as `SOLID`.
             with_normals: whether to find normals as well.
+            doubt_all: whether to meet all triangles in double precision, not
+                only where single precision is doubtful.
         """
-        hits = self._cast(rays, mask, with_normals)
+        hits = self._cast(self._packet_scenes, rays, mask, with_normals)
         if self._has_triangles:
-            wrong = np.concatenate(
-                [
-                    self._find_wrong_hits(rays, hits),
-                    self._find_wrong_misses(rays, mask, hits),
-                ]
-            )
+            if doubt_all:
+                wrong = np.arange(len(hits.owner))
+            else:
+                wrong = np.flatnonzero(hits.doubt != CERTAIN)
+            if len(wrong) and not doubt_all:
+                wrong = _keep_wrong(
+                    self._intersect,
+                    self._scattered_scenes,
+                    mask,
+                    rays,
+                    hits,
+                    wrong,
+                )
             if len(wrong):
                 self._cast_again(rays, mask, hits, wrong)
         return hits
 
     def _cast(
-        self,
-        rays: Rays,
-        mask: int,
-        with_normals: bool,
-        tolerance: float = _TOLERANCE,
+        self, scenes: _PacketScenes, rays: Rays, mask: int, with_normals: bool
     ) -> Hits:
-        """Casts rays in single precision.
+        """Casts rays in single precision, and marks doubtful hits.
 
         Args:
+            scenes: the scenes, for coherent or for scattered rays.
             rays: the rays.
             mask: bits of the geometry that can be hit.
             with_normals: whether to find normals as well.
-            tolerance: error of a certain hit on a triangle [m]; if it is
-                negative, all hits on triangles are doubtful.
         """
         num_rays = len(rays.d_Sset)
         hits = Hits.misses(num_rays, with_normals)
         # All threads take parts from one iterator, which yields each part once.
-        parts = iter(_ray_ranges(num_rays, self._num_threads))
+        ranges = _ray_ranges(num_rays, self._num_threads)
+        parts = iter(ranges)
 
         def cast() -> None:
             for first, last in parts:
                 _cast_packets(
                     self._intersect,
-                    self._packet_scenes,
+                    scenes,
                     mask,
                     rays,
                     hits,
                     first,
                     last,
-                    tolerance,
                 )
 
         num_helpers = min(self._num_threads, -(-num_rays // _BLOCK)) - 1
@@ -318,56 +395,14 @@ class EmbreeHierarchy:
         cast()
         for helper in helpers:
             helper.result()
+        for first, _ in ranges[1:]:
+            _doubt_lone_misses(hits, first - 2, first + 2)
         return hits
-
-    def _find_wrong_hits(self, rays: Rays, hits: Hits) -> np.ndarray:
-        """Returns the indices of doubtful hits that double precision refutes.
-
-        A hit is right if the ray meets the triangle at the same range, or if
-        the ray passes the triangle so closely that the point is on it.
-        """
-        doubtful = np.flatnonzero(hits.doubt != CERTAIN)
-        if not len(doubtful):
-            return doubtful
-        corners, _ = self._find_corners(
-            hits.group[doubtful],
-            hits.doubt[doubtful],
-            rays.times[doubtful % len(rays.times)],
-        )
-        return doubtful[_are_wrong(rays, hits.ranges, doubtful, corners)]
-
-    def _find_wrong_misses(
-        self, rays: Rays, mask: int, hits: Hits
-    ) -> np.ndarray:
-        """Returns the indices of misses that rays on either side contradict.
-
-        Only a miss between two successive hits on one geometry is examined (and
-        the miss of a ray that is cast alone): among other rays, a ray that
-        passes through a vertex is the only one.
-        """
-        owner = hits.owner
-        rows = 1 + np.flatnonzero(
-            (owner[1:-1] == -1) & (owner[:-2] == owner[2:]) & (owner[2:] != -1)
-        )
-        if len(owner) == 1:
-            rows = np.flatnonzero(owner == -1)
-        for angle in (_TURN_ASIDE, -_TURN_ASIDE):
-            if len(rows):
-                near = rays.select(rows, rays.max_ranges_of(rows))
-                # Not parallel to the ray, but for one direction.
-                aside = near.d_Sset + angle * near.d_Sset[:, [1, 2, 0]]
-                beside = self._cast(near._replace(d_Sset=aside), mask, False)
-                rows = rows[beside.owner != -1]
-        return rows
 
     def _cast_again(
         self, rays: Rays, mask: int, hits: Hits, wrong: np.ndarray
     ) -> None:
-        """Replaces wrong hits and misses.
-
-        The triangles near a ray are those that rays around it hit, one behind
-        the other. The ray meets these triangles in double precision, and all
-        other shapes in single precision.
+        """Replaces hits and misses: triangles are met in double precision.
 
         Args:
             rays: all rays.
@@ -376,84 +411,78 @@ class EmbreeHierarchy:
             wrong: indices of the rays to cast again.
         """
         near = rays.select(wrong, rays.max_ranges_of(wrong))
-        p, d, best = near.p_OSset, near.d_Oset(), near.max_ranges.astype(float)
-        times = near.times
-        nothing = Hits.misses(len(wrong), bool(hits.normals.shape[1]))
-        for field, none in zip(hits, nothing, strict=True):
-            field[wrong] = none
-        p_set, d_set = (x.reshape(-1, 3) for x in _move_aside(p, d, _BUNDLE))
-        begins = np.zeros(len(p_set))
-        lanes = np.arange(len(p_set))
-        for _ in range(_MOST_LAYERS):
-            ray = lanes // len(_BUNDLE)
-            starts = p_set[lanes] + begins[lanes, None] * d_set[lanes]
-            reach = best[ray] + _TOLERANCE - begins[lanes]
-            found = self._cast(
-                Rays(
-                    starts,
-                    _NO_TURN,
-                    reach.astype(np.float32),
-                    d_set[lanes],
-                    times[ray],
-                ),
-                mask,
-                True,
-                -1.0,
-            )
-            is_flat = found.doubt != CERTAIN
-            ranges = begins[lanes] + found.ranges
-            begins[lanes] = ranges + _step_behind(starts, ranges)
-            # Only the ray itself meets other shapes.
-            ranges[~is_flat & (lanes % len(_BUNDLE) > 0)] = np.inf
-            flat = np.flatnonzero(is_flat)
-            corners, corners_L = self._find_corners(
-                found.group[flat], found.doubt[flat], times[ray[flat]]
-            )
-            ranges[flat] = _meet_each(corners, p[ray[flat]], d[ray[flat]])
-            found.normals[flat] = np.cross(
-                corners_L[:, 1] - corners_L[:, 0],
-                corners_L[:, 2] - corners_L[:, 0],
-            )
-            # The nearest last: it overwrites all others.
-            order = np.argsort(-ranges, kind="stable")
-            order = order[ranges[order] <= best[ray[order]]]
-            to = wrong[ray[order]]
-            best[ray[order]] = hits.ranges[to] = ranges[order]
-            hits.owner[to] = found.owner[order]
-            hits.group[to] = found.group[order]
-            if hits.normals.shape[1]:
-                hits.normals[to] = found.normals[order]
-            lanes = lanes[is_flat & (begins[lanes] < best[ray])]
-            if not len(lanes):
-                break
+        others = self._cast(
+            self._scattered_scenes,
+            near,
+            mask & ~FLAT,
+            bool(hits.normals.shape[1]),
+        )
+        if self._boxes is None:
+            self._boxes = self._make_boxes()
+        _cast_on_boxes(
+            self._intersect, self._scattered_scenes, self._boxes, near, others
+        )
+        for field, other in zip(hits, others, strict=True):
+            field[wrong] = other
 
-    def _find_corners(
-        self, groups: np.ndarray, triangles: np.ndarray, times: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the corners of N triangles in O, and in their own frames L.
+    def _make_boxes(self) -> _Boxes:
+        """Builds the boxes of the triangles of all groups."""
+        scenes = self._packet_scenes
+        flat = [
+            (row, self._built[group])
+            for row, group in enumerate(scenes.groups.tolist())
+            if group >= 0 and self._built[group].surface is not None
+        ]
+        lanes = scenes.lanes
+        boxes = _Boxes(
+            np.zeros(len(scenes.groups), np.int64),
+            np.zeros((lanes, 3)),
+            np.zeros((lanes, 3)),
+            np.zeros(lanes),
+            np.zeros(lanes, np.int64),
+            np.zeros((len(flat), 7), np.int64),
+        )
+        known: dict[int, int] = {}
+        for control, (row, built) in zip(boxes.controls, flat, strict=True):
+            if built.scene not in known:
+                assert built.surface is not None
+                first = scenes.first_primitive[row, 0]
+                arrays = (
+                    scenes.triangles[first:],
+                    scenes.vertices,
+                    boxes.p_LRset,
+                    boxes.d_Lset,
+                    boxes.best,
+                    boxes.met,
+                )
+                control[:6] = [array.ctypes.data for array in arrays]
+                control[6] = len(scenes.vertices)
+                known[built.scene] = self._build_boxes(
+                    control.ctypes.data, len(built.surface.triangles)
+                )
+            boxes.scenes[row] = known[built.scene]
+        self._check_device()
+        return boxes
 
-        Args:
-            groups: (N,) row of the group of each triangle.
-            triangles: (N,) its number in the group.
-            times: (N,) fractions of the revolution.
-
-        Returns:
-            Two arrays (N, 3, 3) [m].
-        """
-        corners_O = np.empty((len(groups), 3, 3))
-        corners_L = np.empty((len(groups), 3, 3))
-        for row in np.unique(groups):
-            chosen = np.flatnonzero(groups == row)
-            surface = self._built[row].surface
-            assert surface is not None
-            corners = surface.p_GVset[surface.triangles[triangles[chosen]]]
-            corners_L[chosen] = corners
-            if not self._groups[row].is_merged_world:
-                X_OL = self._groups[row].X_OL_at(times[chosen])
-                corners = rotated(X_OL[:, None, :, :3], corners)
-                corners = corners + X_OL[:, None, :, 3]
-            corners_O[chosen] = corners
-        return corners_O, corners_L
+    def _build_boxes(self, control: int, count: int) -> int:
+        """Returns the address of a scene of `count` boxes of triangles."""
+        lib = self._lib
+        handle = lib.rtcNewGeometry(self._device, embree.USER)
+        lib.rtcSetGeometryUserPrimitiveCount(handle, count)
+        lib.rtcSetGeometryUserData(handle, control)
+        lib.rtcSetGeometryBoundsFunction(
+            handle, compiled_callback(_bound_triangle), None
+        )
+        lib.rtcSetGeometryIntersectFunction(
+            handle, compiled_callback(_meet_triangle)
+        )
+        lib.rtcSetGeometryMask(handle, ALL)
+        lib.rtcCommitGeometry(handle)
+        scene = self._new_scene()
+        lib.rtcAttachGeometry(scene, handle)
+        lib.rtcReleaseGeometry(handle)
+        lib.rtcJoinCommitScene(scene)
+        return scene
 
     def _check_device(self) -> None:
         """Raises an error if a call of Embree has failed."""
@@ -479,22 +508,23 @@ class EmbreeHierarchy:
         rows = [*(fixed or [-1]), *moving]
         nothing = _Built(0, (), None)
         built = [self._built[row] if row >= 0 else nothing for row in rows]
-        first_primitive, owner_of_primitive, spans = _list_primitives(built)
+        first_primitive, primitives = _list_primitives(built)
+        vertices, triangles = _list_triangles(built)
         counts = [len(group.members) for group in self._groups]
         indices = [index for g in self._groups for index, *_ in g.members]
         return _PacketScenes(
             lanes=lanes,
             fixed=built[0].scene,
             instances=self._top,
-            arguments=ctypes.addressof(self._arguments),
+            arguments=ctypes.addressof(self._coherent),
             first_primitive=first_primitive,
-            owner_of_primitive=owner_of_primitive,
+            primitives=primitives,
             groups=np.array(rows, np.int32),
             first_member=np.cumsum([0, *counts])[rows],
             geometries=np.array(indices, np.int32),
-            spans=spans,
-            R_OLs=self._R_OLs,
-            in_motion=self._in_motion,
+            vertices=vertices,
+            triangles=triangles,
+            places=self._places,
         )
 
     def _scene_of_group(
@@ -567,28 +597,25 @@ def _cast_packets(
     hits: Hits,
     first: int,
     last: int,
-    tolerance: float,
 ) -> None:
-    """Casts the rays `first` to `last` - 1, and marks doubtful hits.
+    """Casts the rays `first` to `last` - 1, and marks doubtful hits and misses.
 
     A hit on a triangle is doubtful if single precision can move it by more than
-    `tolerance` [m].
+    `_TOLERANCE`. A miss is doubtful between two hits on one geometry: of the
+    rays of a scan, a ray through a vertex of a mesh is the only one.
 
     Directions are rotated here, in double precision and in a fixed order,
     because the result of a matrix library depends on the processor. The
     function is compiled, because a Python call per packet would take longer
     than its rays.
     """
-    # A packet is an RTCRayHit16, or one of fewer lanes: 12 ray fields and 9 hit
-    # fields (10 with room for the primitive of an instance array). It and the
-    # mask of lanes are aligned to 64 bytes, as Embree's vector loads demand.
     lanes = scenes.lanes
-    storage = np.zeros((12 + 10 + 1) * lanes + 16, np.float32)
-    start = (-storage.ctypes.data % 64) // 4
-    aligned = storage[start : start + 23 * lanes].reshape(23, lanes)
-    packet = aligned[:22]
-    valid = aligned[22].view(np.int32)
+    packet, valid = _new_packet(lanes)
     packet_id = packet.view(np.uint32)
+    # The error of a hit grows with the coordinates from which it follows.
+    size = np.float32(np.abs(rays.p_OSset).max())
+    # The last geometry that was hit, and the misses since.
+    last_owner, num_missed = np.int32(-1), 0
     num_origins, num_rotations = len(rays.p_OSset), len(rays.R_OSset)
     num_ranges = len(rays.max_ranges)
     # Indices are incremented: remainders would take a tenth of the casting
@@ -616,10 +643,7 @@ def _cast_packets(
             rotation = rotation + 1 if rotation + 1 < num_rotations else 0
             reach = reach + 1 if reach + 1 < num_ranges else 0
             time = time + 1 if time + 1 < len(rays.times) else 0
-        packet[3] = 0.0
-        packet_id[9] = mask
-        packet_id[10:12] = 0
-        packet_id[18:20] = embree.INVALID_ID
+        _prepare(packet_id, mask)
         # Two calls are faster than one scene of two levels: the second call
         # keeps a hit unless it finds a nearer one.
         for scene in (scenes.fixed, scenes.instances):
@@ -634,70 +658,374 @@ def _cast_packets(
             ray = begin + lane
             hit = packet_id[18, lane]
             if hit == embree.INVALID_ID:
+                num_missed += 1
                 continue
             hits.ranges[ray] = packet[8, lane]
             instance = packet_id[19, lane]
             row = 0 if instance == embree.INVALID_ID else 1 + np.int64(instance)
             primitive = np.int64(packet_id[17, lane])
             primitive += scenes.first_primitive[row, hit]
-            owner = scenes.owner_of_primitive[primitive]
+            owner = scenes.primitives[primitive].owner
             if owner >= 0:
                 owner = scenes.geometries[scenes.first_member[row] + owner]
+            group = scenes.groups[row]
             hits.owner[ray] = owner
-            hits.group[ray] = scenes.groups[row]
+            hits.group[ray] = group
             for axis in range(hits.normals.shape[1]):
                 hits.normals[ray, axis] = packet[12 + axis, lane]
-            span = scenes.spans[primitive]
-            if span == 0.0:
-                continue
-            # The error across the ray, in a triangle that may be slender and
+            if num_missed == 1 and owner == last_owner and owner >= 0:
+                hits.doubt[ray - 1] = MISSED
+            last_owner, num_missed = owner, 0
+            # The error along the ray, on a triangle that may be slender and
             # seen along its plane.
-            R_OL = scenes.R_OLs[scenes.groups[row]]
-            along = size = 0.0
-            for axis in range(3):
-                along += packet[12 + axis, lane] * (
-                    R_OL[0, axis] * packet[4, lane]
-                    + R_OL[1, axis] * packet[5, lane]
-                    + R_OL[2, axis] * packet[6, lane]
-                )
-                size = max(size, abs(packet[axis, lane]))
-            error = _ROUNDING * (size + packet[8, lane]) * span
-            is_unsure = error > tolerance * abs(along)
-            if is_unsure or scenes.in_motion[scenes.groups[row]]:
-                hits.doubt[ray] = packet_id[17, lane]
+            error = (size + packet[8, lane]) * scenes.primitives[primitive].span
+            towards = np.float32(0.0)
+            if row == 0:
+                for axis in range(3):
+                    towards += packet[4 + axis, lane] * packet[12 + axis, lane]
+                towards = abs(towards)
+            elif error > 0.0:
+                length = np.float32(0.0)
+                for axis in range(3):
+                    length += abs(packet[12 + axis, lane])
+                    for other in range(3):
+                        towards += (
+                            packet[12 + axis, lane]
+                            * packet[4 + other, lane]
+                            * scenes.places.X_OLs[group, other, axis]
+                        )
+                towards = abs(towards) - scenes.places.turns[group] * length
+            if error > _SURE * towards:
+                hits.doubt[ray] = primitive
 
 
 @compiled
-def _are_wrong(
-    rays: Rays, ranges: np.ndarray, rows: np.ndarray, corners: np.ndarray
-) -> np.ndarray:
-    """Returns which of M hits on triangles are wrong in double precision.
-
-    If a ray passes its triangle, its hit is right if the point is on the
-    triangle all the same.
+def _doubt_lone_misses(hits: Hits, first: int, last: int) -> None:
+    """Marks misses between two hits on one geometry; see `_cast_packets`.
 
     Args:
-        rays: the N rays.
-        ranges: (N,) ranges at which they were found to hit [m].
-        rows: (M,) indices of the rays that are examined.
-        corners: (M, 3, 3) corners of the triangle that each one hit [m].
+        hits: all hits.
+        first: the first hit that is considered.
+        last: the one after the last hit.
     """
-    wrong = np.empty(len(rows), np.bool_)
-    d, q = np.empty(3), np.empty(3)
-    for k in range(len(rows)):
-        row = rows[k]
-        p = rays.p_OSset[row % len(rays.p_OSset)]
-        R = rays.R_OSset[row % len(rays.R_OSset)]
-        d_S = rays.d_Sset[row]
+    owner = hits.owner
+    for ray in range(max(first, 0) + 1, min(last, len(owner)) - 1):
+        if owner[ray] == -1 and owner[ray - 1] == owner[ray + 1] >= 0:
+            hits.doubt[ray] = MISSED
+
+
+@compiled
+def _keep_wrong(
+    intersect: embree.PacketFunction,
+    scenes: _PacketScenes,
+    mask: int,
+    rays: Rays,
+    hits: Hits,
+    doubtful: np.ndarray,
+) -> np.ndarray:
+    """Returns which doubtful hits and misses are wrong.
+
+    A hit is wrong if double precision refutes it, and a miss is wrong if rays
+    turned to either side of the ray hit.
+
+    Args:
+        intersect: Embree's function.
+        scenes: the scenes, for scattered rays.
+        mask: bits of the geometry that can be hit.
+        rays: all rays.
+        hits: their hits.
+        doubtful: (M,) indices of the doubtful hits and misses.
+    """
+    packet, valid = _new_packet(scenes.lanes)
+    packet_id = packet.view(np.uint32)
+    kept = np.empty(len(doubtful), np.bool_)
+    aside, d = np.empty(3), np.empty(3)
+    for k in range(len(doubtful)):
+        ray = doubtful[k]
+        if hits.doubt[ray] != MISSED:
+            kept[k] = _is_wrong(scenes, rays, ray, hits)
+            continue
+        R = rays.R_OSset[ray % len(rays.R_OSset)]
+        for side in range(2):
+            angle = _TURN_ASIDE if side == 0 else -_TURN_ASIDE
+            for i in range(3):
+                # Not parallel to the ray, but for one direction.
+                aside[i] = (
+                    rays.d_Sset[ray, i] + angle * rays.d_Sset[ray, (i + 1) % 3]
+                )
+            _rotate(R, aside, d)
+            _load_ray(
+                packet,
+                side,
+                rays.p_OSset[ray % len(rays.p_OSset)],
+                d,
+                rays.times[ray % len(rays.times)],
+                rays.max_ranges[ray % len(rays.max_ranges)],
+            )
+            valid[side] = -1
+        _prepare(packet_id, mask)
+        for scene in (scenes.fixed, scenes.instances):
+            if scene != 0:
+                intersect(
+                    valid.ctypes.data,
+                    scene,
+                    packet.ctypes.data,
+                    scenes.arguments,
+                )
+        kept[k] = (
+            packet_id[18, 0] != embree.INVALID_ID
+            and packet_id[18, 1] != embree.INVALID_ID
+        )
+    return doubtful[kept]
+
+
+@compiled
+def _new_packet(lanes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Returns a packet, and the mask of its lanes, all inactive.
+
+    A packet is an RTCRayHit16, or one of fewer lanes: 12 ray fields and 9 hit
+    fields (10 with room for the primitive of an instance array). It and the
+    mask of lanes are aligned to 64 bytes, as Embree's vector loads demand.
+    """
+    storage = np.zeros((12 + 10 + 1) * lanes + 16, np.float32)
+    start = (-storage.ctypes.data % 64) // 4
+    aligned = storage[start : start + 23 * lanes].reshape(23, lanes)
+    return aligned[:22], aligned[22].view(np.int32)
+
+
+@compiled
+def _rotate(R: np.ndarray, v: np.ndarray, rotated_v: np.ndarray) -> None:
+    """Sets `rotated_v` to R v."""
+    for i in range(3):
+        rotated_v[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
+
+
+@compiled
+def _load_ray(
+    packet: np.ndarray,
+    lane: int,
+    p: np.ndarray,
+    d: np.ndarray,
+    time: float,
+    reach: float,
+) -> None:
+    """Sets a ray of a packet."""
+    for axis in range(3):
+        packet[axis, lane] = p[axis]
+        packet[4 + axis, lane] = d[axis] if abs(d[axis]) >= _TINY else 0.0
+    packet[7, lane] = time
+    packet[8, lane] = reach
+
+
+@compiled
+def _prepare(packet_id: np.ndarray, mask: int) -> None:
+    """Sets what the rays of a packet share; it hits nothing yet.
+
+    Args:
+        packet_id: the packet as numbers, uint32.
+        mask: bits of the geometry that can be hit.
+    """
+    packet_id[3] = 0
+    packet_id[9] = mask
+    packet_id[10:12] = 0
+    packet_id[18:20] = embree.INVALID_ID
+
+
+@compiled
+def _pose_at(places: _Places, group: int, time: float, X: np.ndarray) -> None:
+    """Sets X (3, 4) to the map from a group's frame L to O at a time.
+
+    The time is a fraction of the revolution; see `RayGroup.X_OL_at`.
+    """
+    X_OL = places.X_OLs[group]
+    rotvecs, ways = places.rotvecs[group], places.ways[group]
+    r, p = np.empty(3), np.empty(3)
+    angle = 0.0
+    for i in range(3):
+        r[i] = rotvecs[0, i] + time * rotvecs[1, i]
+        angle += r[i] * r[i]
+        p[i] = ways[0, i] + time * ways[1, i]
+    angle = np.sqrt(angle)
+    # Rodrigues' formula.
+    along = np.sin(angle) / angle if angle > 0.0 else 1.0
+    half = np.sin(angle / 2.0) / angle if angle > 0.0 else 0.5
+    across = 2.0 * half * half
+    for column in range(4):
+        v = X_OL[:, column] if column < 3 else places.p_FLs[group]
+        inner = r[0] * v[0] + r[1] * v[1] + r[2] * v[2]
         for i in range(3):
-            d[i] = R[i, 0] * d_S[0] + R[i, 1] * d_S[1] + R[i, 2] * d_S[2]
-            q[i] = p[i] + np.float64(ranges[row]) * d[i]
-        error = abs(_meet(corners[k], p, d) - ranges[row])
-        if _TOLERANCE < error < np.inf:
-            wrong[k] = True
-        else:
-            wrong[k] = error > _GAP and _distance(corners[k], q) > _GAP
-    return wrong
+            j, k = (i + 1) % 3, (i + 2) % 3
+            turned = along * (r[j] * v[k] - r[k] * v[j])
+            turned += across * (r[i] * inner - angle * angle * v[i])
+            X[i, column] = X_OL[i, column] + turned
+            if column == 3:
+                X[i, 3] += p[i]
+
+
+@compiled
+def _is_wrong(scenes: _PacketScenes, rays: Rays, ray: int, hits: Hits) -> bool:
+    """Returns whether a doubtful hit on a triangle is wrong.
+
+    If the ray passes the triangle, the hit is right if the point is on the
+    triangle all the same.
+    """
+    X = np.empty((3, 4))
+    c, d, q = np.empty((3, 3)), np.empty(3), np.empty(3)
+    time = np.float64(rays.times[ray % len(rays.times)])
+    distance = np.float64(hits.ranges[ray])
+    _pose_at(scenes.places, hits.group[ray], time, X)
+    p = rays.p_OSset[ray % len(rays.p_OSset)]
+    R = rays.R_OSset[ray % len(rays.R_OSset)]
+    d_S = rays.d_Sset[ray]
+    for i in range(3):
+        d[i] = R[i, 0] * d_S[0] + R[i, 1] * d_S[1] + R[i, 2] * d_S[2]
+        q[i] = p[i] + distance * d[i]
+    for corner in range(3):
+        v = scenes.vertices[scenes.triangles[hits.doubt[ray], corner]]
+        for i in range(3):
+            c[corner, i] = (
+                X[i, 0] * v[0] + X[i, 1] * v[1] + X[i, 2] * v[2] + X[i, 3]
+            )
+    error = abs(_meet(c, p, d) - distance)
+    if _TOLERANCE < error < np.inf:
+        return True
+    return bool(error > _GAP and _distance(c, q) > _GAP)
+
+
+@compiled
+def _cast_on_boxes(
+    intersect: embree.PacketFunction,
+    scenes: _PacketScenes,
+    boxes: _Boxes,
+    rays: Rays,
+    hits: Hits,
+) -> None:
+    """Casts N rays on triangles in double precision.
+
+    Args:
+        intersect: Embree's function.
+        scenes: the scenes.
+        boxes: the boxes of their triangles.
+        rays: the rays, each with an origin, an orientation, a maximum range and
+            a time of its own.
+        hits: their hits on other shapes, changed in place.
+    """
+    lanes = scenes.lanes
+    packet, valid = _new_packet(lanes)
+    packet_id = packet.view(np.uint32)
+    X, d = np.empty((3, 4)), np.empty(3)
+    for row in range(len(boxes.scenes)):
+        group = scenes.groups[row]
+        if boxes.scenes[row] == 0 or not scenes.places.in_sight[group]:
+            continue
+        first_primitive = scenes.first_primitive[row, 0]
+        for begin in range(0, len(rays.d_Sset), lanes):
+            count = min(lanes, len(rays.d_Sset) - begin)
+            valid[:] = 0
+            for lane in range(count):
+                ray = begin + lane
+                _pose_at(scenes.places, group, rays.times[ray], X)
+                _rotate(rays.R_OSset[ray], rays.d_Sset[ray], d)
+                p = rays.p_OSset[ray]
+                p_L, d_L = boxes.p_LRset[lane], boxes.d_Lset[lane]
+                for i in range(3):
+                    p_L[i] = d_L[i] = 0.0
+                    # The inverse of a rotation is its transpose.
+                    for j in range(3):
+                        p_L[i] += X[j, i] * (p[j] - X[j, 3])
+                        d_L[i] += X[j, i] * d[j]
+                limit = min(hits.ranges[ray], rays.max_ranges[ray])
+                boxes.best[lane], boxes.met[lane] = limit, -1
+                _load_ray(packet, lane, p_L, d_L, 0.0, limit)
+                valid[lane] = -1
+            _prepare(packet_id, ALL)
+            for lane in range(count):
+                packet_id[10, lane] = lane
+            intersect(
+                valid.ctypes.data,
+                boxes.scenes[row],
+                packet.ctypes.data,
+                scenes.arguments,
+            )
+            for lane in range(count):
+                if boxes.met[lane] < 0:
+                    continue
+                ray = begin + lane
+                primitive = first_primitive + boxes.met[lane]
+                member = scenes.primitives[primitive].owner
+                member += scenes.first_member[row]
+                hits.ranges[ray] = boxes.best[lane]
+                hits.owner[ray] = scenes.geometries[member]
+                hits.group[ray] = group
+                if hits.normals.shape[1] == 0:
+                    continue
+                corners = scenes.triangles[primitive]
+                a, b, c = (
+                    scenes.vertices[corners[0]],
+                    scenes.vertices[corners[1]],
+                    scenes.vertices[corners[2]],
+                )
+                for i in range(3):
+                    j, k = (i + 1) % 3, (i + 2) % 3
+                    hits.normals[ray, i] = (b[j] - a[j]) * (c[k] - a[k]) - (
+                        b[k] - a[k]
+                    ) * (c[j] - a[j])
+
+
+# Callbacks of Embree, for the boxes of triangles. Their argument is a struct of
+# numbers of 8 bytes.
+
+
+def _bound_triangle(arguments: object) -> None:
+    """Sets a triangle's bounds (RTCBoundsFunctionArguments)."""
+    words = carray(arguments, 3, np.int64)
+    control = embree.array_at(words[0], 7, np.int64)
+    primitive = words[1] & 0xFFFFFFFF
+    corners = embree.array_at(control[0] + 12 * primitive, 3, np.int32)
+    vertices = embree.array_at(control[1], (control[6], 3), np.float64)
+    bounds = embree.array_at(words[2], 8, np.float32)
+    for i in range(3):
+        a, b, c = (
+            vertices[corners[0], i],
+            vertices[corners[1], i],
+            vertices[corners[2], i],
+        )
+        bounds[i] = min(a, b, c) - _MARGIN
+        bounds[4 + i] = max(a, b, c) + _MARGIN
+
+
+def _meet_triangle(arguments: object) -> None:
+    """Casts a packet on a triangle (RTCIntersectFunctionNArguments)."""
+    words = carray(arguments, 6, np.int64)
+    control = embree.array_at(words[1], 7, np.int64)
+    primitive = words[2] & 0xFFFFFFFF
+    lanes = words[5] & 0xFFFFFFFF
+    valid = embree.array_at(words[0], lanes, np.int32)
+    packet = embree.array_at(words[4], (12, lanes), np.float32)
+    packet_id = embree.array_at(words[4], (12, lanes), np.uint32)
+    corners = embree.array_at(control[0] + 12 * primitive, 3, np.int32)
+    vertices = embree.array_at(control[1], (control[6], 3), np.float64)
+    c = np.empty((3, 3))
+    for corner in range(3):
+        for i in range(3):
+            c[corner, i] = vertices[corners[corner], i]
+    for lane in range(lanes):
+        if valid[lane] == 0:
+            continue
+        ray = np.int64(packet_id[10, lane])
+        p = embree.array_at(control[2] + 24 * ray, 3, np.float64)
+        d = embree.array_at(control[3] + 24 * ray, 3, np.float64)
+        best = embree.array_at(control[4] + 8 * ray, 1, np.float64)
+        met = embree.array_at(control[5] + 8 * ray, 1, np.int64)
+        distance = _meet(c, p, d)
+        # Of triangles at the same range, the first, in whatever order they are
+        # tried.
+        if distance < best[0] or (
+            distance == best[0] and not 0 <= met[0] < primitive
+        ):
+            best[0], met[0] = distance, primitive
+            # A little farther, because it is rounded.
+            packet[8, lane] = distance * (1.0 + 1e-6)
 
 
 @compiled
@@ -742,15 +1070,6 @@ def _meet(c: np.ndarray, p: np.ndarray, d: np.ndarray) -> float:
 
 
 @compiled
-def _meet_each(corners: np.ndarray, p: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """Returns the ranges of N rays on a triangle each; see `_meet`."""
-    ranges = np.empty(len(corners))
-    for k in range(len(corners)):
-        ranges[k] = _meet(corners[k], p[k], d[k])
-    return ranges
-
-
-@compiled
 def _distance(c: np.ndarray, q: np.ndarray) -> float:
     """Returns the distance of a point q (3,) from a triangle [m].
 
@@ -781,30 +1100,6 @@ def _distance(c: np.ndarray, q: np.ndarray) -> float:
     return nearest
 
 
-def _move_aside(
-    p: np.ndarray, d: np.ndarray, steps: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns M rays around each of N rays: origins and directions, (N, M, 3).
-
-    Args:
-        p: (N, 3) origins [m].
-        d: (N, 3) unit directions.
-        steps: (M, 2) steps across the ray, in units of `_ASIDE`.
-    """
-    axis = np.eye(3)[np.argmin(np.abs(d), axis=1)]
-    u = np.cross(d, axis)
-    u /= np.sqrt((u * u).sum(axis=1))[:, None]
-    v = np.cross(d, u)
-    way = steps[:, :1] * u[:, None] + steps[:, 1:] * v[:, None]
-    size = np.abs(p).max(axis=1)[:, None, None]
-    return p[:, None] + _ASIDE * size * way, d[:, None] + _ASIDE * way
-
-
-def _step_behind(p: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-    """Returns how far behind a hit a ray starts to find the next one [m]."""
-    return _ASIDE * (np.abs(p).max(axis=1, initial=0.0) + ranges) + 1e-6
-
-
 def _ray_ranges(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
     """Returns ranges of ray indices for threads to take, the longest first.
 
@@ -824,12 +1119,12 @@ def _ray_ranges(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
 
 def _list_primitives(
     scenes: Collection[_Built],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns `first_primitive`, `owner_of_primitive`, `spans` of a scene."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns `first_primitive` and `primitives` of a scene."""
     widest = max(1, *(len(built.owners) for built in scenes))
     first = np.zeros((len(scenes), widest), np.int64)
-    owners = [np.zeros(0, np.int32)]
-    spans = [np.zeros(0, np.float32)]
+    kind = np.dtype([("owner", np.int32), ("span", np.float32)])
+    records = [np.zeros(0, kind)]
     count = 0
     known: dict[int, int] = {}
     for row, built in enumerate(scenes):
@@ -837,17 +1132,32 @@ def _list_primitives(
         if same < row:
             first[row] = first[same]
             continue
-        for k, part in enumerate(built.owners):
+        for k, owners in enumerate(built.owners):
             first[row, k] = count
-            owners.append(part)
-            is_flat = k == 0 and built.surface is not None
-            spans.append(
-                _spans(built.surface)
-                if is_flat
-                else np.zeros(len(part), np.float32)
-            )
+            part = np.zeros(len(owners), kind)
+            part["owner"] = owners
+            if k == 0 and built.surface is not None:
+                part["span"] = _spans(built.surface)
+            records.append(part)
             count += len(part)
-    return first, np.concatenate(owners), np.concatenate(spans)
+    return first, np.concatenate(records)
+
+
+def _list_triangles(
+    scenes: Collection[_Built],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns `vertices` and `triangles` of a scene."""
+    vertices, triangles = [np.zeros((0, 3))], [np.zeros((0, 3), np.int32)]
+    count = 0
+    for built in {built.scene: built for built in scenes}.values():
+        for k, owners in enumerate(built.owners):
+            part = np.zeros((len(owners), 3), np.int32)
+            if k == 0 and built.surface is not None:
+                part[:] = built.surface.triangles + count
+                vertices.append(built.surface.p_GVset)
+                count += len(built.surface.p_GVset)
+            triangles.append(part)
+    return np.concatenate(vertices), np.concatenate(triangles)
 
 
 def _spans(surface: TriangleSurface) -> np.ndarray:

@@ -22,8 +22,11 @@ from cns_drake.scene import (
     merge_triangles,
 )
 
-# Masks of geometry: what rays hit; polyhedra around curved shapes; and all.
-SOLID = 1
+# Masks of geometry: the triangles and the curved shapes that rays hit;
+# polyhedra around curved shapes; and all.
+FLAT = 1
+CURVED = 4
+SOLID = FLAT | CURVED
 PROXY = 2
 ALL = SOLID | PROXY
 # Owner of the primitives of proxies.
@@ -43,14 +46,14 @@ class Primitives(NamedTuple):
         buffers: slot, format and array of each buffer.
         owners: (P,) int32 for each primitive, the number of its member in the
             group.
-        mask: `SOLID`, or `PROXY` for polyhedra around curved shapes.
+        mask: `FLAT`, `CURVED`, or `PROXY` for polyhedra around curved shapes.
         surface: the triangles in double precision, if rays hit triangles.
     """
 
     kind: int
     buffers: list[tuple[int, int, np.ndarray]]
     owners: np.ndarray
-    mask: int = SOLID
+    mask: int = CURVED
     surface: TriangleSurface | None = None
 
 
@@ -68,7 +71,7 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
         if isinstance(surface, TriangleSurface)
     ]
     if flat:
-        yield _triangle_primitives(flat, SOLID)
+        yield _triangle_primitives(flat, FLAT)
     if group.frame_id is not None:
         yield from merge_curved(members)
         return
@@ -117,7 +120,7 @@ def _triangle_primitives(
         buffers,
         owners,
         mask,
-        merged if mask == SOLID else None,
+        merged if mask == FLAT else None,
     )
 
 

@@ -81,21 +81,26 @@ class EmbreeScene:
         """Moves all groups to their current poses."""
         self._first.place(placed)
 
-    def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
+    def cast_rays(
+        self, rays: Rays, with_normals: bool, doubt_all: bool
+    ) -> Hits:
         """Casts rays on the scene; returns the hits.
 
         Args:
             rays: the rays.
             with_normals: whether to find normals as well.
+            doubt_all: whether to meet all triangles in double precision.
         """
-        hits = self._first.cast(rays, with_normals=with_normals)
+        hits = self._first.cast(
+            rays, with_normals=with_normals, doubt_all=doubt_all
+        )
         if self._second.rows:
-            self._cast_on_curved_shapes(rays, hits, with_normals)
+            self._cast_on_curved_shapes(rays, hits, with_normals, doubt_all)
         self._axes.cast(rays, hits)
         return hits
 
     def _cast_on_curved_shapes(
-        self, rays: Rays, hits: Hits, with_normals: bool
+        self, rays: Rays, hits: Hits, with_normals: bool, doubt_all: bool
     ) -> None:
         """Updates hits of rays that may meet curved shapes that never move."""
         is_near = self._proxies.contain(rays.p_OSset)
@@ -112,6 +117,7 @@ class EmbreeScene:
                 rest._replace(max_ranges=reach),
                 mask=SOLID,
                 with_normals=with_normals,
+                doubt_all=doubt_all,
             )
             is_first = in_first.owner >= 0
             for result, first, second in zip(

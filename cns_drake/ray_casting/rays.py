@@ -11,8 +11,9 @@ import numpy as np
 
 from cns_drake.base import compiled
 
-# Value of `Hits.doubt` for certain hits, and for misses.
+# Values of `Hits.doubt` for certain hits and misses, and for doubtful misses.
 CERTAIN = -1
+MISSED = -2
 
 
 class Rays(NamedTuple):
@@ -88,8 +89,8 @@ class Hits(NamedTuple):
             geometries of a group are fixed to the same frame L.
         normals: (N, 3) float32 normal of the surface, expressed in L, of any
             length; zero for a miss. (N, 0) unless normals were requested.
-        doubt: (N,) int32 number of the triangle that was hit, in its group, if
-            single precision may be wrong; otherwise `CERTAIN`.
+        doubt: (N,) int32 number of the triangle that was hit, in its hierarchy,
+            if single precision may be wrong; otherwise `CERTAIN` or `MISSED`.
     """
 
     ranges: np.ndarray

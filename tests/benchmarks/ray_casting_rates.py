@@ -130,7 +130,7 @@ def _all_in_one(geometries, stands):
         group.place(np.zeros(3), still)
 
     def merge(group):
-        solid = [part for part in merge_first(group) if part.mask == SOLID]
+        solid = [part for part in merge_first(group) if part.mask & SOLID]
         return [*solid, *merge_second(group)]
 
     return EmbreeHierarchy(groups, merge, 1)
