@@ -75,8 +75,7 @@ class Trajectory:
         """Returns a drive along the same path with another timing.
 
         Args:
-            positions: (N,) path parameters [m] at evenly spaced times, see
-                `cns_drake.motion.speed_profile.make_time_scaling`.
+            positions: (N,) path parameters [m] at times `KNOT_PERIOD` apart.
         """
         drive = copy.copy(self)
         drive._time_scaling = SplineDerivatives(
