@@ -1,4 +1,8 @@
-"""Code that the simulator and the evaluation share: errors, files, jobs."""
+"""What the simulator and the evaluation share: a wall, it knows neither.
+
+Errors, files, numbers, jobs, progress and the frame of command lines. Nothing
+here imports Drake.
+"""
 
 from cns_drake.base.public_names import attach
 

@@ -1,4 +1,7 @@
-"""Recorded drives: their common interface, and the reader of MCAP files."""
+"""Recorded drives: a public noun, `Drive`, and its reader of MCAP files.
+
+Nothing here imports Drake, so that the evaluation runs without it.
+"""
 
 from cns_drake.base import attach
 

@@ -1,25 +1,19 @@
 """Drives recorded as MCAP by cns-drake, or by programs with the same topics."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+import contextlib
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cns_drake.base import InputError, listed
+from cns_drake.base import InputError, listed, parse_json, value_errors
 from cns_drake.base import points as point_arrays
 from cns_drake.drives import mcap_messages, ros_types
 from cns_drake.drives.drive import ODOMETRY_DTYPE, Drive, index_instances
-from cns_drake.drives.lidar_topics import (
-    LIDAR_TOPIC,
-    choose_lidar_topic,
-    cloud_topics,
-    lidar_name,
-)
-from cns_drake.drives.mcap_file import LOCATION
+from cns_drake.drives.mcap_file import LOCATION, McapFile
 from cns_drake.drives.mcap_messages import StaticTransforms, checked_poses
-from cns_drake.drives.mcap_topics import McapTopics
 from cns_drake.drives.message_rows import (
     MessageRows,
     check_agreement,
@@ -81,11 +75,11 @@ class McapDrive(Drive):
             InputError: if there is no complete recording at `path`, or no
                 such LiDAR in it.
         """
-        self._topics = McapTopics(_mcap_path(Path(path)))
+        self._topics = _McapTopics(_mcap_path(Path(path)))
         self._file = self._topics.file
         self._path = self._topics.path
         self.name = _drive_name(Path(path))
-        self._lidar_topic = choose_lidar_topic(
+        self._lidar_topic = _choose_lidar_topic(
             self._file.topics, lidar, self._path
         )
         self._topics.require(self._lidar_topic, ros_types.POINT_CLOUD)
@@ -144,14 +138,14 @@ class McapDrive(Drive):
     @property
     def lidar_names(self) -> tuple[str, ...]:
         """Names of the LiDARs; the first is the one that is read by default."""
-        clouds = cloud_topics(self._file.topics)
-        clouds.sort(key=lambda topic: topic != LIDAR_TOPIC)
-        return tuple(map(lidar_name, clouds))
+        clouds = _cloud_topics(self._file.topics)
+        clouds.sort(key=lambda topic: topic != _LIDAR_TOPIC)
+        return tuple(map(_lidar_name, clouds))
 
     @property
     def lidar_name(self) -> str:
         """Name of the LiDAR whose scans are read."""
-        return lidar_name(self._lidar_topic)
+        return _lidar_name(self._lidar_topic)
 
     @cached_property
     def lidar_section(self) -> Mapping:
@@ -447,10 +441,129 @@ class McapDrive(Drive):
             return mcap_messages.read_cloud_header(data)
 
 
+class _McapTopics:
+    """Reads and decodes messages of an MCAP file; errors name file and topic.
+
+    Attributes:
+        file: the file.
+        path: path of the file.
+    """
+
+    def __init__(self, path: Path):
+        """Opens a file; no topic is read yet.
+
+        Raises:
+            InputError: there is no complete MCAP file.
+        """
+        self.file = McapFile(path)
+        self.path = self.file.path
+        self._types: dict[str, str] = {}
+
+    def __contains__(self, topic: str) -> bool:
+        """Returns whether messages of a topic can be decoded."""
+        return topic in self._types
+
+    def require(self, topic: str, message_type: str) -> None:
+        """Checks that a topic has messages, all of one type in CDR.
+
+        Raises:
+            InputError: the topic has no message, or messages of other types.
+        """
+        found = self.file.topics.get(topic)
+        if found is None:
+            raise InputError(f"{self.path}: no topic {topic}")
+        if found != [f"{message_type} in cdr"]:
+            raise InputError(
+                f"{self.path}: {topic}: {' and '.join(found)} instead of"
+                f" {message_type} in cdr"
+            )
+        if len(self.file.locate(topic)) == 0:
+            raise InputError(f"{self.path}: {topic}: no message")
+        self._types[topic] = message_type
+
+    def find(self, message_type: str) -> list[str]:
+        """Returns all topics whose messages are of one type, in CDR.
+
+        The messages of these topics can then be decoded.
+        """
+        found = [
+            topic
+            for topic, kinds in self.file.topics.items()
+            if kinds == [f"{message_type} in cdr"]
+        ]
+        self._types |= dict.fromkeys(found, message_type)
+        return found
+
+    def message(self, topic: str, place: np.void) -> Any:
+        """Returns the decoded message at a location in the file.
+
+        Args:
+            topic: topic of the message.
+            place: the location, a row of `McapFile.locate`.
+
+        Raises:
+            InputError: the message cannot be read or decoded.
+        """
+        data = self.file.read(place)
+        with self.faults(topic):
+            return mcap_messages.decode(data, self._types[topic])
+
+    def first(self, topic: str) -> Any:
+        """Returns the first message of a topic, decoded."""
+        return self.message(topic, self.file.locate(topic)[0])
+
+    def rows(self, topic: str) -> np.ndarray:
+        """Returns all messages of a topic of odometry or of an IMU as rows.
+
+        Raises:
+            InputError: a message cannot be read, or two different messages have
+                the same stamp.
+        """
+        places = self.file.locate(topic)
+        rows = MessageRows(self._types[topic], len(places))
+        with self.faults(topic):
+            for index, data in self.file.visit(places):
+                rows.add(index, data)
+            found = rows.rows()
+            check_agreement(found)
+        return found
+
+    def logged_stamps_ns(self, topic: str) -> np.ndarray | None:
+        """Returns the stamps (N,) of a topic's messages [ns] from the index.
+
+        The result is None if the file does not state that the log times of the
+        topic are stamps.
+        """
+        places = self.file.locate(topic)
+        records = self.file.metadata(mcap_messages.STAMPED_RECORD)
+        if [record.get(topic) for record in records] != [str(len(places))]:
+            return None
+        for place in places[[0, -1]]:
+            with self.faults(topic):
+                stamp_ns = mcap_messages.read_stamp(self.file.read(place))
+            if stamp_ns != place["log_time_ns"]:
+                return None
+        return places["log_time_ns"].astype(np.int64)
+
+    def json(self, name: str) -> Any:
+        """Returns the value of a JSON attachment; None if the file lacks it.
+
+        Raises:
+            InputError: the attachment cannot be read, or is not JSON.
+        """
+        data = self.file.attachment(name)
+        with self.faults(f"attachment {name}"):
+            return None if data is None else parse_json(data)
+
+    def faults(self, where: str) -> contextlib.AbstractContextManager[None]:
+        """Turns a ValueError into an InputError that names file and place."""
+        return value_errors(f"{self.path}: {where}")
+
+
 class _McapImages:
     """The images of the first topic of compressed images, if there is one."""
 
-    def __init__(self, topics: McapTopics):
+    def __init__(self, topics: _McapTopics):
         self._topics = topics
         found = topics.find(ros_types.COMPRESSED_IMAGE)
         cameras = [topic for topic in found if not topic.endswith(_DEPTH)]
@@ -515,3 +628,61 @@ def _drive_name(path: Path) -> str:
     return (
         resolved.name if resolved.is_dir() else resolved.stem.removesuffix("_0")
     )
+
+
+_LIDAR_TOPIC = "/lidar/points"
+
+
+def _cloud_topics(topics: Mapping[str, Iterable[str]]) -> list[str]:
+    """Returns the topics with point clouds, except topics of labels.
+
+    Args:
+        topics: topic -> message types, as in `McapFile.topics`.
+    """
+    return [
+        topic
+        for topic, kinds in topics.items()
+        if any(kind.startswith(ros_types.POINT_CLOUD) for kind in kinds)
+        and not topic.endswith("/labels")
+    ]
+
+
+def _choose_lidar_topic(
+    topics: Mapping[str, Iterable[str]], lidar: str | None, source: object
+) -> str:
+    """Returns the topic of the wanted LiDAR.
+
+    If the file has no topic of point clouds, the result need not be in
+    `topics`.
+
+    Args:
+        topics: topic -> message types, as in `McapFile.topics`.
+        lidar: name or topic of the LiDAR. None stands for `/lidar/points` or,
+            if this topic is missing, for the only topic of point clouds.
+        source: the file, with which an error message begins.
+
+    Raises:
+        InputError: the topic does not exist, but other topics of point clouds
+            do; the message names them.
+    """
+    clouds = _cloud_topics(topics)
+    wanted = _LIDAR_TOPIC
+    if lidar is not None:
+        wanted = f"/{lidar}/points"
+        named = (lidar, wanted, f"/{lidar}")
+        wanted = next((topic for topic in named if topic in topics), wanted)
+    elif _LIDAR_TOPIC not in topics and len(clouds) == 1:
+        wanted = clouds[0]
+    if wanted not in topics and clouds:
+        advice = "" if lidar else "; --lidar takes one of them"
+        raise InputError(
+            f"{source}: no topic {wanted} (point clouds:"
+            f" {' '.join(clouds)}{advice})"
+        )
+    return wanted
+
+
+def _lidar_name(topic: str) -> str:
+    """Returns NAME for the topic /NAME/points, and other topics as they are."""
+    name = topic.removeprefix("/").removesuffix("/points")
+    return name if topic == f"/{name}/points" else topic

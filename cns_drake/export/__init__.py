@@ -1,4 +1,4 @@
-"""Exports recorded drives to the layouts of existing data sets."""
+"""Exports of recorded drives: a family; a data set's layout is one file."""
 
 from cns_drake.base import attach
 

@@ -1,4 +1,4 @@
-"""The vehicle's motion: from a path along lanes to poses over time."""
+"""The vehicle's motion: a public noun, `Trajectory`, along a path of lanes."""
 
 from cns_drake.base import attach
 

@@ -1,4 +1,4 @@
-"""Pictures of a map's stages, and web pages of drives."""
+"""Pictures: public nouns, `StageScene` and `MeshcatRecorder`, show cities."""
 
 from cns_drake.base import attach
 

@@ -1,4 +1,4 @@
-"""Recording of sensor data as ROS 2 messages in MCAP files."""
+"""Recordings: a public noun, `McapRecorder`, which writes ROS 2 messages."""
 
 from cns_drake.base import attach
 

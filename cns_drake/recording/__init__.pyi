@@ -1,14 +1,15 @@
-from cns_drake.recording.background_writer import (
-    BackgroundWriter as BackgroundWriter,
-)
 from cns_drake.recording.bag_writer import BagWriter as BagWriter
-from cns_drake.recording.cloud_messages import (
-    encode_point_cloud as encode_point_cloud,
+from cns_drake.recording.bag_writer import RecordingFolder as RecordingFolder
+from cns_drake.recording.mcap_recorder import (
+    BackgroundWriter as BackgroundWriter,
 )
 from cns_drake.recording.mcap_recorder import McapRecorder as McapRecorder
 from cns_drake.recording.mcap_recorder import RecordedCamera as RecordedCamera
 from cns_drake.recording.mcap_recorder import RecordedSensor as RecordedSensor
 from cns_drake.recording.messages import ENCODINGS as ENCODINGS
+from cns_drake.recording.messages import (
+    encode_point_cloud as encode_point_cloud,
+)
 from cns_drake.recording.messages import make_camera_info as make_camera_info
 from cns_drake.recording.messages import (
     make_compressed_image as make_compressed_image,
@@ -35,9 +36,6 @@ from cns_drake.recording.recorded_topics import (
 from cns_drake.recording.recorded_topics import points_topic as points_topic
 from cns_drake.recording.recorded_topics import (
     recording_topics as recording_topics,
-)
-from cns_drake.recording.recording_folder import (
-    RecordingFolder as RecordingFolder,
 )
 from cns_drake.recording.rosbag2_metadata import Topic as Topic
 from cns_drake.recording.rosbag2_metadata import to_yaml as to_yaml

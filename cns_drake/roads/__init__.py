@@ -1,4 +1,7 @@
-"""Road networks, and routes along their lanes."""
+"""Roads: a public noun, `RoadNetwork`, and the routes along its lanes.
+
+Nothing here imports Drake.
+"""
 
 from cns_drake.base import attach
 

@@ -14,7 +14,6 @@ from cns_drake.roads.network import STRAIGHT_LIMIT_DEG as STRAIGHT_LIMIT_DEG
 from cns_drake.roads.network import Connection as Connection
 from cns_drake.roads.network import RoadNetwork as RoadNetwork
 from cns_drake.roads.network import load_road_network as load_road_network
-from cns_drake.roads.random_route import draw_route as draw_route
 from cns_drake.roads.road import ENDS as ENDS
 from cns_drake.roads.road import Arm as Arm
 from cns_drake.roads.road import Direction as Direction
@@ -29,12 +28,13 @@ from cns_drake.roads.roads_file import RoadsFile as RoadsFile
 from cns_drake.roads.roads_file import RoadStyle as RoadStyle
 from cns_drake.roads.route import Route as Route
 from cns_drake.roads.route import RouteLeg as RouteLeg
+from cns_drake.roads.route import draw_route as draw_route
 from cns_drake.roads.route import make_lane_path as make_lane_path
 from cns_drake.roads.speeds import Speeds as Speeds
 from cns_drake.roads.surface_heights import KerbMap as KerbMap
 from cns_drake.roads.surface_heights import RoadSurface as RoadSurface
 from cns_drake.roads.surface_heights import SurfaceHeights as SurfaceHeights
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS as TIGHTEST_RADIUS
-from cns_drake.roads.waypoint_file import read_waypoints as read_waypoints
 from cns_drake.roads.waypoints import load_waypoint_path as load_waypoint_path
 from cns_drake.roads.waypoints import make_waypoint_path as make_waypoint_path
+from cns_drake.roads.waypoints import read_waypoints as read_waypoints

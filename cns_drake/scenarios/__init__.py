@@ -1,4 +1,4 @@
-"""Scenarios, which describe drives; their files, and plans of drives."""
+"""Scenarios: a public noun, `Scenario`, its files and the planned drive."""
 
 from cns_drake.base import attach
 

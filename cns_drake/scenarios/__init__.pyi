@@ -14,8 +14,13 @@ from cns_drake.scenarios.provenance import digest_inputs as digest_inputs
 from cns_drake.scenarios.provenance import (
     recording_fingerprint as recording_fingerprint,
 )
+from cns_drake.scenarios.scenario import REAL_DRIVER as REAL_DRIVER
+from cns_drake.scenarios.scenario import DriverConfig as DriverConfig
 from cns_drake.scenarios.scenario import Name as Name
+from cns_drake.scenarios.scenario import RideConfig as RideConfig
 from cns_drake.scenarios.scenario import Scenario as Scenario
+from cns_drake.scenarios.scenario import TrafficConfig as TrafficConfig
+from cns_drake.scenarios.scenario import TransientConfig as TransientConfig
 from cns_drake.scenarios.scenario_files import check_files as check_files
 from cns_drake.scenarios.scenario_files import (
     describe_scenario as describe_scenario,
@@ -28,11 +33,6 @@ from cns_drake.scenarios.scenario_files import make_scenario as make_scenario
 from cns_drake.scenarios.scenario_files import (
     write_scenarios as write_scenarios,
 )
-from cns_drake.scenarios.sections import REAL_DRIVER as REAL_DRIVER
-from cns_drake.scenarios.sections import DriverConfig as DriverConfig
-from cns_drake.scenarios.sections import RideConfig as RideConfig
-from cns_drake.scenarios.sections import TrafficConfig as TrafficConfig
-from cns_drake.scenarios.sections import TransientConfig as TransientConfig
 from cns_drake.scenarios.shipped import recordable_drives as recordable_drives
 from cns_drake.scenarios.shipped import recordable_map as recordable_map
 from cns_drake.scenarios.shipped import recordable_maps as recordable_maps

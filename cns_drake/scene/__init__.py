@@ -1,4 +1,4 @@
-"""SDF worlds, their structures, and the geometry that sensors see."""
+"""The scene: a public noun, `World`, with the geometry that sensors see."""
 
 from cns_drake.base import attach
 

@@ -6,9 +6,6 @@ from cns_drake.scene.drake_releases import (
 from cns_drake.scene.file_references import referenced_files as referenced_files
 from cns_drake.scene.file_watch import FileWatch as FileWatch
 from cns_drake.scene.foreign_meshes import ForeignMeshes as ForeignMeshes
-from cns_drake.scene.geometry_list import GeometryList as GeometryList
-from cns_drake.scene.geometry_list import geometry_port as geometry_port
-from cns_drake.scene.geometry_list import list_geometry as list_geometry
 from cns_drake.scene.labels import MAX_INSTANCE as MAX_INSTANCE
 from cns_drake.scene.labels import Labels as Labels
 from cns_drake.scene.labels import number_structures as number_structures
@@ -22,14 +19,12 @@ from cns_drake.scene.map_folder import check_new_map as check_new_map
 from cns_drake.scene.map_folder import drive_name as drive_name
 from cns_drake.scene.map_folder import no_drives as no_drives
 from cns_drake.scene.map_folder import stage_name as stage_name
-from cns_drake.scene.material_cells import material_word as material_word
-from cns_drake.scene.material_cells import read_materials as read_materials
-from cns_drake.scene.material_cells import shortened as shortened
 from cns_drake.scene.materials import MATERIALS as MATERIALS
 from cns_drake.scene.materials import USUAL_MATERIALS as USUAL_MATERIALS
 from cns_drake.scene.materials import Material as Material
 from cns_drake.scene.mesh_files import MeshFiles as MeshFiles
 from cns_drake.scene.perception_geometry import GREY as GREY
+from cns_drake.scene.perception_geometry import GeometryList as GeometryList
 from cns_drake.scene.perception_geometry import GeometryReader as GeometryReader
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry as PerceptionGeometry,
@@ -37,6 +32,8 @@ from cns_drake.scene.perception_geometry import (
 from cns_drake.scene.perception_geometry import (
     anchored_frames as anchored_frames,
 )
+from cns_drake.scene.perception_geometry import geometry_port as geometry_port
+from cns_drake.scene.perception_geometry import list_geometry as list_geometry
 from cns_drake.scene.perception_geometry import merge_surfaces as merge_surfaces
 from cns_drake.scene.perception_geometry import (
     read_perception_geometry as read_perception_geometry,
@@ -53,6 +50,9 @@ from cns_drake.scene.structure_table import StructureTable as StructureTable
 from cns_drake.scene.structure_table import (
     load_structure_table as load_structure_table,
 )
+from cns_drake.scene.structure_table import material_word as material_word
+from cns_drake.scene.structure_table import read_materials as read_materials
+from cns_drake.scene.structure_table import shortened as shortened
 from cns_drake.scene.surfaces import LARGEST_SIZE as LARGEST_SIZE
 from cns_drake.scene.surfaces import CapsuleSurface as CapsuleSurface
 from cns_drake.scene.surfaces import CylinderSurface as CylinderSurface

@@ -1,4 +1,4 @@
-"""The sensors of a vehicle: LiDARs, cameras, IMU and odometry."""
+"""The sensors of a vehicle: a family (LiDAR, camera, IMU, odometry)."""
 
 from cns_drake.base import attach
 

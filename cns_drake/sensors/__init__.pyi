@@ -43,15 +43,11 @@ from cns_drake.sensors.lidar.measurement import Echoes as Echoes
 from cns_drake.sensors.lidar.measurement import (
     MeasurementModel as MeasurementModel,
 )
-from cns_drake.sensors.lidar.nonrepeating_patterns import (
-    NoddingPattern as NoddingPattern,
-)
-from cns_drake.sensors.lidar.nonrepeating_patterns import (
-    RosettePattern as RosettePattern,
-)
 from cns_drake.sensors.lidar.patterns import (
     DirectionPattern as DirectionPattern,
 )
+from cns_drake.sensors.lidar.patterns import NoddingPattern as NoddingPattern
+from cns_drake.sensors.lidar.patterns import RosettePattern as RosettePattern
 from cns_drake.sensors.lidar.patterns import SpinningPattern as SpinningPattern
 from cns_drake.sensors.lidar.patterns import (
     make_flash_pattern as make_flash_pattern,
@@ -63,10 +59,12 @@ from cns_drake.sensors.lidar.presets import (
 from cns_drake.sensors.lidar.ray_queries import RayHits as RayHits
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE as POINT_DTYPE
 from cns_drake.sensors.noise_draws import noise_generator as noise_generator
-from cns_drake.sensors.odometry.config import OdometrySection as OdometrySection
-from cns_drake.sensors.odometry.odometry import Odometry as Odometry
-from cns_drake.sensors.odometry.odometry import OdometrySensor as OdometrySensor
-from cns_drake.sensors.odometry.odometry import add_odometry as add_odometry
+from cns_drake.sensors.odometry import Odometry as Odometry
+from cns_drake.sensors.odometry import (
+    OdometrySection as OdometrySection,
+)
+from cns_drake.sensors.odometry import OdometrySensor as OdometrySensor
+from cns_drake.sensors.odometry import add_odometry as add_odometry
 from cns_drake.sensors.returns.calibrated import (
     CalibratedReturns as CalibratedReturns,
 )

@@ -6,40 +6,42 @@ publishes its measurements on LCM. The sections of scenarios define which values
 the fields can have.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
 import sys
 from typing import Any, TypeAlias
 
+from drake import lcmt_drake_signal, lcmt_point_cloud
 import numpy as np
 from pydantic import ValidationError
 from pydrake.common.schema import Transform
+from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import SceneGraph
+from pydrake.lcm import DrakeLcm, DrakeLcmInterface
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import GetScopedFrameByName
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 from pydrake.perception import PointCloudToLcm
-from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.lcm import LcmBuses
+from pydrake.systems import framework
+from pydrake.systems import lcm as drake_lcm
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
+from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
+from pydrake.systems.primitives import ZeroOrderHold
 
 from cns_drake.base import describe_validation_error
+from cns_drake.scene import find_bus
+from cns_drake.sensors import odometry
 from cns_drake.sensors.imu.config import ImuDescription, ImuSection
 from cns_drake.sensors.imu.imu import Imu, add_imu
-from cns_drake.sensors.lcm_publishing import (
-    Interface,
-    SignalToLcm,
-    check_publisher_names,
-    find_interface,
-    publish_measurements,
-)
 from cns_drake.sensors.lidar.adding import add_described_lidar
 from cns_drake.sensors.lidar.config import LidarDescription, LidarSection
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
-from cns_drake.sensors.odometry import odometry
-from cns_drake.sensors.odometry.config import OdometrySection
+from cns_drake.sensors.odometry import OdometrySection
 from cns_drake.sensors.sensor_config import HIGHEST_RATE, Section
+from cns_drake.sensors.system_names import check_unused_names
 
 # Fields of a section that no config has: `X_PB` replaces the mount, and only
 # recordings have a layout.
@@ -148,13 +150,165 @@ class OdometryConfig(PublishedSensor):
 Config: TypeAlias = LidarConfig | ImuConfig | OdometryConfig
 
 
+# An interface on which messages are published.
+_Interface: TypeAlias = DrakeLcmInterface | LcmInterfaceSystem
+# Endings of the names of the systems that publish a sensor's messages.
+_PARTS = ("to_lcm", "publisher", "delay")
+
+
+def _check_publisher_names(builder: DiagramBuilder, name: str) -> None:
+    """Checks that a diagram has no systems that publish a sensor's messages.
+
+    Args:
+        builder: builder of the diagram.
+        name: name of the sensor.
+
+    Raises:
+        ValueError: the diagram already has a system with one of the names that
+            these systems have.
+    """
+    check_unused_names(builder, *(f"{name}_{part}" for part in _PARTS))
+
+
+def find_interface(
+    builder: DiagramBuilder,
+    bus: str,
+    lcm_buses: LcmBuses | None,
+    lcm: _Interface | None,
+    caller: str,
+) -> _Interface:
+    """Returns the interface on which a sensor publishes.
+
+    Args:
+        builder: builder of a diagram. If both `lcm_buses` and `lcm` are None,
+            an interface to the default URL is added to the diagram.
+        bus: name of the sensor's bus.
+        lcm_buses: the available buses.
+        lcm: the interface, instead of a bus.
+        caller: text with which an error message begins.
+
+    Raises:
+        RuntimeError: there is no such bus.
+    """
+    if lcm is not None:
+        return lcm
+    if lcm_buses is not None:
+        return find_bus(builder, lcm_buses, caller, bus)
+    if bus != "default":
+        raise RuntimeError(
+            f"{caller}: lcm_bus: there is no bus '{bus}' without lcm_buses"
+        )
+    return builder.AddSystem(LcmInterfaceSystem(lcm=DrakeLcm()))
+
+
+def _publish_measurements(
+    builder: DiagramBuilder,
+    name: str,
+    channel: str,
+    ports: list[OutputPort],
+    to_lcm: framework.System,
+    lcm: _Interface,
+    *,
+    period: float,
+    offset: float = 0.0,
+    delay: float = 0.0,
+) -> None:
+    """Adds systems that convert measurements to LCM messages and publish them.
+
+    Nothing is added for the interface of a null bus, such as in `lcm_buses:
+    {default: null}`. Drake's cameras behave in the same way.
+
+    Args:
+        builder: builder of a diagram with the sensor.
+        name: name of the sensor.
+        channel: name of the LCM channel.
+        ports: output ports of the sensor.
+        to_lcm: system that converts the ports' values to a message: a
+            `PointCloudToLcm` or a `_SignalToLcm`.
+        lcm: interface on which the messages are published.
+        period: time between two messages [s].
+        offset: time of the first conversion [s].
+        delay: time from a conversion to the publication [s].
+    """
+    if lcm.get_lcm_url() == LcmBuses.kLcmUrlMemqNull:
+        return
+    is_cloud = isinstance(to_lcm, PointCloudToLcm)
+    publisher = drake_lcm.LcmPublisherSystem.Make(
+        channel,
+        lcmt_point_cloud if is_cloud else lcmt_drake_signal,
+        lcm,
+        publish_period=period,
+        publish_offset=offset + delay,
+        use_cpp_serializer=is_cloud,
+    )
+    converter_name, publisher_name, delay_name = (
+        f"{name}_{part}" for part in _PARTS
+    )
+    builder.AddNamedSystem(converter_name, to_lcm)
+    for index, port in enumerate(ports):
+        builder.Connect(port, to_lcm.get_input_port(index))
+    builder.AddNamedSystem(publisher_name, publisher)
+    message = to_lcm.get_output_port()
+    if delay:
+        hold = builder.AddNamedSystem(
+            delay_name, ZeroOrderHold(period, message.Allocate(), offset)
+        )
+        builder.Connect(message, hold.get_input_port())
+        message = hold.get_output_port()
+    builder.Connect(message, publisher.get_input_port())
+
+
+class _SignalToLcm(framework.LeafSystem):
+    """Converts the values of ports to an `lcmt_drake_signal`."""
+
+    def __init__(
+        self,
+        ports: list[OutputPort],
+        names: list[str],
+        values: Callable[..., np.ndarray],
+    ):
+        """Declares an input for each port.
+
+        Args:
+            ports: the output ports whose values are converted.
+            names: name of each number in a message.
+            values: function that takes the values of the ports, and returns the
+                numbers of a message.
+        """
+        super().__init__()
+        self._names = names
+        self._values = values
+        for index, port in enumerate(ports):
+            if port.get_data_type() == framework.PortDataType.kVectorValued:
+                self.DeclareVectorInputPort(f"u{index}", port.size())
+            else:
+                self.DeclareAbstractInputPort(f"u{index}", port.Allocate())
+        self.DeclareAbstractOutputPort(
+            "lcmt_drake_signal",
+            lambda: Value(lcmt_drake_signal()),
+            self._calc_message,
+        )
+
+    def _calc_message(self, context: Context, output: AbstractValue) -> None:
+        inputs = [
+            self.get_input_port(index).Eval(context)
+            for index in range(self.num_input_ports())
+        ]
+        message = lcmt_drake_signal()
+        message.val = self._values(*inputs).tolist()
+        message.dim = len(message.val)
+        message.coord = self._names
+        message.timestamp = round(context.get_time() * 1e6)
+        output.set_value(message)
+
+
 def ApplyLidarConfig(
     config: LidarConfig,
     builder: DiagramBuilder,
     plant: MultibodyPlant | None = None,
     scene_graph: SceneGraph | None = None,
     lcm_buses: LcmBuses | None = None,
-    lcm: Interface | None = None,
+    lcm: _Interface | None = None,
 ) -> Lidar:
     """Adds a LiDAR to a diagram and publishes its scans on LCM.
 
@@ -191,7 +345,7 @@ def ApplyLidarConfig(
     if config.rate is not None:
         period = 1.0 / config.rate
     _check_timing(config, period)
-    check_publisher_names(builder, config.name)
+    _check_publisher_names(builder, config.name)
     scene_graph = scene_graph or builder.GetSubsystemByName("scene_graph")
     lidar = add_described_lidar(
         section,
@@ -204,7 +358,7 @@ def ApplyLidarConfig(
         motion_distortion=section.motion_distortion,
         causal=config.causal,
     )
-    publish_measurements(
+    _publish_measurements(
         builder,
         config.name,
         f"DRAKE_POINT_CLOUD_{config.name}",
@@ -224,7 +378,7 @@ def ApplyImuConfig(
     plant: MultibodyPlant | None = None,
     scene_graph: SceneGraph | None = None,
     lcm_buses: LcmBuses | None = None,
-    lcm: Interface | None = None,
+    lcm: _Interface | None = None,
 ) -> Imu:
     """Adds an IMU to a diagram and publishes its samples on LCM.
 
@@ -252,7 +406,7 @@ def ApplyImuConfig(
     """
     section = _checked_section(config, ImuSection, ("rate",))
     rate = config.rate or section.sample_rate(_RATE)
-    check_publisher_names(builder, config.name)
+    _check_publisher_names(builder, config.name)
     imu = add_imu(
         builder,
         *_carrier_frame(config, builder, plant),
@@ -263,12 +417,12 @@ def ApplyImuConfig(
     measured = imu.ports()
     ports = list(measured.values())
     axes = [f"{name}_{axis}" for name in measured for axis in "xyz"]
-    publish_measurements(
+    _publish_measurements(
         builder,
         config.name,
         f"DRAKE_IMU_{config.name}",
         ports,
-        SignalToLcm(ports, axes, lambda *values: np.hstack(values)),
+        _SignalToLcm(ports, axes, lambda *values: np.hstack(values)),
         _find_interface(config, builder, lcm_buses, lcm),
         period=1.0 / rate,
     )
@@ -281,7 +435,7 @@ def ApplyOdometryConfig(
     plant: MultibodyPlant | None = None,
     scene_graph: SceneGraph | None = None,
     lcm_buses: LcmBuses | None = None,
-    lcm: Interface | None = None,
+    lcm: _Interface | None = None,
 ) -> odometry.OdometrySensor:
     """Adds exact odometry of a frame B to a diagram, published on LCM.
 
@@ -309,18 +463,18 @@ def ApplyOdometryConfig(
         ApplyOdometryConfig(OdometryConfig(rate=100), builder)
     """
     section = _checked_section(config, OdometrySection)
-    check_publisher_names(builder, config.name)
+    _check_publisher_names(builder, config.name)
     frame, X_PB = _carrier_frame(config, builder, plant)
     sensor = odometry.add_odometry(builder, frame, X_PB=X_PB, name=config.name)
     axes = ["qw", "qx", "qy", "qz", "x", "y", "z"]
     axes += ["wx", "wy", "wz", "vx", "vy", "vz"]
     ports = [sensor.GetOutputPort("odometry")]
-    publish_measurements(
+    _publish_measurements(
         builder,
         config.name,
         f"DRAKE_ODOMETRY_{config.name}",
         ports,
-        SignalToLcm(ports, axes, _odometry_numbers),
+        _SignalToLcm(ports, axes, _odometry_numbers),
         _find_interface(config, builder, lcm_buses, lcm),
         period=1.0 / (section.rate or _RATE),
     )
@@ -378,8 +532,8 @@ def _find_interface(
     config: Config,
     builder: DiagramBuilder,
     lcm_buses: LcmBuses | None,
-    lcm: Interface | None,
-) -> Interface:
+    lcm: _Interface | None,
+) -> _Interface:
     """Returns the interface on which a configured sensor publishes.
 
     Raises:

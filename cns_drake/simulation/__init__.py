@@ -1,4 +1,4 @@
-"""Simulation of a scenario with a Drake Diagram."""
+"""Simulation: a public noun, `simulate`, from a scenario to a recording."""
 
 from cns_drake.base import attach
 

@@ -29,7 +29,7 @@ def structures_csv(
 
     The columns are instance id (from 1), name, class, label (number of the
     class), position in W [m], yaw [rad], tags, and the materials of the parts
-    (see `cns_drake.scene.material_cells`). If the name of a structure does not
+    (see `cns_drake.scene.structure_table`). If the name of a structure does not
     state its kind, the table has a last column `kind`.
 
     Args:

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from cns_drake.base import did_you_mean, parse_yaml
-from cns_drake.sensors.lidar.nonrepeating_patterns import (
+from cns_drake.sensors.lidar.patterns import (
     NoddingPattern,
     RosettePattern,
+    SpinningPattern,
 )
-from cns_drake.sensors.lidar.patterns import SpinningPattern
 
 # Name of a class of patterns in `presets.yaml` -> the class.
 _NONREPEATING = {

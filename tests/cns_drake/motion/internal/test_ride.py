@@ -23,8 +23,7 @@ from cns_drake.motion import (
     ride_on_springs,
 )
 from cns_drake.motion.body_ride import BodyRide
-from cns_drake.motion.speed_profile import Speeds
-from cns_drake.motion.trajectory import poses_and_motion
+from cns_drake.motion.trajectory import Speeds, poses_and_motion
 from cns_drake.motion.vehicle_motion import WheelMotion
 from cns_drake.scenarios import suspension_file, vehicle_file
 

@@ -5,11 +5,7 @@ import pytest
 
 from cns_drake.base import InputError
 from cns_drake.motion import Suspension, load_car_masses, load_suspension_rates
-from cns_drake.motion.suspension_data import (
-    AxleRates,
-    CarMasses,
-    SuspensionRates,
-)
+from cns_drake.motion.suspension import AxleRates, CarMasses, SuspensionRates
 from cns_drake.scenarios import suspension_file, vehicle_file
 
 GRAVITY = 9.81

@@ -7,7 +7,7 @@ import numpy as np
 from pydrake.geometry import Box, Meshcat, MeshcatParams, Rgba, Sphere
 import pytest
 
-from cns_drake.pictures.static_page import filter_rows, make_static_page
+from cns_drake.pictures.drive_page import filter_rows, make_static_page
 
 
 @pytest.fixture(scope="module")

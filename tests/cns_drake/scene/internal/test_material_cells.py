@@ -3,7 +3,7 @@
 import pytest
 
 from cns_drake.scene import MATERIALS, StructureEntry, read_materials, shortened
-from cns_drake.scene.material_cells import write_materials
+from cns_drake.scene.structure_table import write_materials
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 import pytest
 
 from cns_drake.scene import MATERIALS
-from cns_drake.sensors.camera import gltf_mesh, looks, sky
-from cns_drake.sensors.camera.gltf_mesh import (
+from cns_drake.sensors.camera import camera_scene, looks, sky
+from cns_drake.sensors.camera.camera_scene import (
     face_coordinates,
     repeated_coordinates,
 )
@@ -55,7 +55,7 @@ def test_grey_is_twice_as_bright_as_half_of_it():
         engine = geometry.MakeRenderEngineVtk(
             geometry.RenderEngineVtkParams(lights=[lamp])
         )
-        mesh = gltf_mesh.make_mesh(
+        mesh = camera_scene.make_mesh(
             corners,
             np.zeros(3),
             np.full((2, 3), grey),

@@ -17,8 +17,12 @@ from cns_drake.pictures import height_rgb
 from cns_drake.scenarios import make_scenario
 from cns_drake.sensors import CameraSection, optical_pose
 from cns_drake.simulation import make_film, with_some_traffic
-from cns_drake.simulation.film import _VIEWS, _shot_times, check_film
-from cns_drake.simulation.film_stage import _draw_points
+from cns_drake.simulation.film import (
+    _VIEWS,
+    _draw_points,
+    _shot_times,
+    check_film,
+)
 
 SIZE = (96, 54)
 # A scan costs little with it.

@@ -1,1 +1,0 @@
-"""Ground-truth odometry: its description and its system."""
