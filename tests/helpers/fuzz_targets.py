@@ -199,7 +199,7 @@ def _write_recording(folder: Path, **options) -> None:
 
 def _read_drive(path: Path):
     """Reads all parts of a drive and returns them."""
-    drive = drives.open(path)
+    drive = drives.open_drive(path)
     return repr(
         (
             len(drive),

@@ -77,7 +77,7 @@ def test_metadata_and_attachments(found, short_recording):
 
 
 def test_scans_are_those_that_we_read(found, short_recording):
-    drive = drives.open(short_recording)
+    drive = drives.open_drive(short_recording)
     messages = found["topics"]["/lidar/points"]["messages"]
     assert len(messages) == len(drive) == 40
     for i, message in enumerate(messages):
@@ -94,7 +94,7 @@ def test_scans_are_those_that_we_read(found, short_recording):
 
 
 def test_poses_are_those_that_we_read(found, short_recording):
-    odometry = drives.open(short_recording).odometry
+    odometry = drives.open_drive(short_recording).odometry
     for topic, pick in (
         ("/odometry", lambda m: m["pose"]["pose"].values()),
         ("/tf", lambda m: m["transforms"][0]["transform"].values()),

@@ -48,7 +48,7 @@ def test_kiss_icp_finds_the_drive(recording, tmp_path, capsys):
     estimated = Pipeline(dataset, config=config).run()
     stamps = np.array(dataset.get_frames_timestamps())
 
-    drive = drives.open(recording)
+    drive = drives.open_drive(recording)
     np.testing.assert_allclose(stamps, drive.stamps_ns * 1e-9, atol=1e-6)
     exact = poses.inverse(drive.X_WS[0]) @ drive.X_WS
     steps = np.diff(exact[:, :3, 3], axis=0)

@@ -287,7 +287,7 @@ def test_another_lidar_topic_if_it_is_the_only_one(tmp_path):
 
 
 def test_odometry_and_imu_of_a_simulated_drive(short_recording):
-    drive = drives.open(short_recording)
+    drive = drives.open_drive(short_recording)
     odometry, imu = drive.odometry, drive.imu
     assert len(odometry) == len(imu) == len(drive) == 40
     for table in (odometry, imu):
@@ -319,12 +319,12 @@ def test_without_an_imu(tmp_path):
 
 def test_one_lidar_of_several_by_name(tmp_path):
     path, scans, _ = record(tmp_path / "s", lidar_topic="/roof/points")
-    drive = drives.open(path, lidar="roof")
+    drive = drives.open_drive(path, lidar="roof")
     np.testing.assert_array_equal(drive.scan(2), scans[2])
     with pytest.raises(
         InputError, match=r"no topic /rear/points \(point clouds: /roof/points"
     ):
-        drives.open(path, lidar="rear")
+        drives.open_drive(path, lidar="rear")
 
 
 LIDARS = ("/velodyne_points", "/livox/lidar", "/roof/points", "/roof")
@@ -347,15 +347,15 @@ def test_a_lidar_on_any_topic(tmp_path, name, topic):
         # Number k has the scans from k on.
         messages += [one.copy(topic=other) for one in clouds[number:]]
     path.write_bytes(write_messages(messages, attachments))
-    drive = drives.open(path, lidar=name)
+    drive = drives.open_drive(path, lidar=name)
     first = scans[LIDARS.index(topic)]
     np.testing.assert_array_equal(drive.scan(0)["x"], first["x"])
     # All names that it lists can be given.
     assert len(set(drive.lidar_names)) == len(LIDARS)
     for one in drive.lidar_names:
-        assert drives.open(path, lidar=one).lidar_name == one
+        assert drives.open_drive(path, lidar=one).lidar_name == one
     with pytest.raises(InputError, match=r"/roof; --lidar takes one of them"):
-        drives.open(path)
+        drives.open_drive(path)
 
 
 def test_memory_does_not_grow_with_the_drive(tmp_path):
