@@ -1,4 +1,4 @@
-from cns_drake.studies.drives.lost_structures import Losses as Losses
+from cns_drake.studies.drives.changed_drives import Losses as Losses
 from cns_drake.studies.drives.sampled_drives import DrawnRoute as DrawnRoute
 from cns_drake.studies.drives.sampled_drives import Fleet as Fleet
 from cns_drake.studies.experiments.experiment import Experiment as Experiment
