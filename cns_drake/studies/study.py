@@ -427,7 +427,7 @@ def _recorded_conditions(
             one.changes.get("both", {}).get("stage", OWN),
             one.is_baseline,
             condition_protocol(one, source),
-            _database(city, one, source),
+            _recorded_database(city, one, source),
             checked_keep(
                 one.changes.get("database", {}).get("keep", KEEP_ALL),
                 f"{source}: database.keep",
@@ -437,7 +437,7 @@ def _recorded_conditions(
     ]
 
 
-def _database(
+def _recorded_database(
     city: MapDrives, condition: Condition, source: str
 ) -> tuple[RecordingInfo, ...]:
     """Returns the recordings of a database of several recordings."""

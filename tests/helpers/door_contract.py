@@ -1,8 +1,8 @@
 """The contract of import-linter that packages are imported through their doors.
 
-A package is a folder directly below `cns_drake` or `evaluation`. Its door is its
-`__init__`: the stub `__init__.pyi` lists the names that others may import. All
-other modules of the package are its own.
+A package is a folder directly below `cns_drake` or `evaluation`. Its door is
+its `__init__`: the stub `__init__.pyi` lists the names that others may import.
+All other modules of the package are its own.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ from cns_drake.scenarios import (
 from cns_drake.scene import MapFolder
 from cns_drake.simulation import SimulationSource
 from cns_drake.studies.drives.control_drives import control_drive
-from cns_drake.studies.recordings.recording import (
+from cns_drake.studies.recording import (
     is_recorded,
     plan_recordings,
     usual_frames,
