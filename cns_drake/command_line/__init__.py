@@ -1,4 +1,4 @@
-"""The command `cns-drake` and the diagram scripts."""
+"""The program `cns-drake` and the diagram scripts: a family, a file a verb."""
 
 from cns_drake.base import attach
 

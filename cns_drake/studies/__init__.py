@@ -1,14 +1,7 @@
-"""Studies of many drives: experiments, the pairs they compare, the results.
+"""Studies of many drives, a wall: in the simulator, they alone evaluate.
 
-`study` runs an experiment with the help of these packages, each of which
-imports only packages that stand below it:
-
-- `exports`, `tasks` and `training` use pairs, or the drives of a pair.
-- `pairs` has the drives to compare, in all conditions of an experiment.
-- `recordings` records the drives of maps, and reports on them.
-- `drives` changes drives, `maps` makes the maps that these drives need, and
-  `ground_truth` labels scans and maps by rays.
-- `experiments` reads the file of an experiment, and lists its conditions.
+`run_study` runs an experiment: it changes drives as the conditions say, makes
+the cities that these drives need, and measures the pairs.
 """
 
 from cns_drake.base import attach, check_evaluation

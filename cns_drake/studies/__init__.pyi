@@ -1,4 +1,4 @@
-from cns_drake.studies.drives.lost_structures import Losses as Losses
+from cns_drake.studies.drives.changed_drives import Losses as Losses
 from cns_drake.studies.drives.sampled_drives import DrawnRoute as DrawnRoute
 from cns_drake.studies.drives.sampled_drives import Fleet as Fleet
 from cns_drake.studies.experiments.experiment import Experiment as Experiment
@@ -15,11 +15,6 @@ from cns_drake.studies.experiments.experiment_files import (
 from cns_drake.studies.experiments.experiment_files import (
     shipped_experiments as shipped_experiments,
 )
-from cns_drake.studies.exports.pair_export import ExportOptions as ExportOptions
-from cns_drake.studies.exports.pair_export import export_pairs as export_pairs
-from cns_drake.studies.exports.pair_export import (
-    write_overlap_table as write_overlap_table,
-)
 from cns_drake.studies.ground_truth.labelled_drive import (
     open_labelled as open_labelled,
 )
@@ -27,9 +22,14 @@ from cns_drake.studies.ground_truth.map_truth import write_truth as write_truth
 from cns_drake.studies.maps.experiment_maps import (
     ExperimentRun as ExperimentRun,
 )
-from cns_drake.studies.recordings.recording import is_recorded as is_recorded
-from cns_drake.studies.recordings.recording import record_all as record_all
-from cns_drake.studies.recordings.reproduction import (
+from cns_drake.studies.pair_export import ExportOptions as ExportOptions
+from cns_drake.studies.pair_export import export_pairs as export_pairs
+from cns_drake.studies.pair_export import (
+    write_overlap_table as write_overlap_table,
+)
+from cns_drake.studies.recording import is_recorded as is_recorded
+from cns_drake.studies.recording import record_all as record_all
+from cns_drake.studies.reproduction import (
     reproduce_maps as reproduce_maps,
 )
 from cns_drake.studies.study import TASKS as TASKS

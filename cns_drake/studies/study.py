@@ -2,8 +2,11 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+import itertools
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from cns_drake.base import (
     Cluster,
@@ -11,9 +14,22 @@ from cns_drake.base import (
     did_you_mean,
     doing,
     errors_at,
+    fingerprint,
     is_there,
+    read_records,
+    whole_number,
 )
-from cns_drake.scenarios import Scenario
+from cns_drake.scenarios import (
+    Scenario,
+    combined_digest,
+    count_frames,
+    digest_inputs,
+    load_scenario,
+    plan_drive,
+    shipped_maps,
+    worlds_folder,
+)
+from cns_drake.scene import MapFolder
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
 from cns_drake.studies.experiments.conditions import (
     Condition,
@@ -21,29 +37,36 @@ from cns_drake.studies.experiments.conditions import (
 )
 from cns_drake.studies.experiments.experiment import Experiment
 from cns_drake.studies.experiments.method_variants import method_variants
-from cns_drake.studies.experiments.nested_fields import FLEET, SESSIONS
+from cns_drake.studies.experiments.nested_fields import FLEET, SESSIONS, SIDES
 from cns_drake.studies.experiments.protocol_fields import condition_protocol
 from cns_drake.studies.maps.experiment_maps import (
     ExperimentRun,
     MapPairs,
     pairs_by_map,
 )
-from cns_drake.studies.pairs.distractors import distracting_drives
-from cns_drake.studies.pairs.frozen_drives import (
-    check_frozen,
-    drives_fingerprint,
-    frozen_drives,
-)
-from cns_drake.studies.pairs.recorded_conditions import recorded_conditions
+from cns_drake.studies.maps.made_maps import ONLY_STAGE
+from cns_drake.studies.maps.redrawing import redraw_cities
+from cns_drake.studies.pairs.comparisons import ComparedDrives
 from cns_drake.studies.pairs.simulated_pairs import (
     ChangedPair,
     SimulatedPairs,
 )
 from cns_drake.studies.tasks.map_task import DrivenMapTask
 from cns_drake.studies.tasks.seen_task import SeenTask
+from evaluation.drives import sample_frames
 from evaluation.methods import optional_methods
-from evaluation.recognition import RetrievalProtocol
-from evaluation.results import LEVEL, QUERIES, RESULTS, check_chart, write_page
+from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
+from evaluation.results import (
+    CAUSE,
+    LAST,
+    LEVEL,
+    OWN,
+    QUERIES,
+    RESULTS,
+    STAGE,
+    check_chart,
+    write_page,
+)
 from evaluation.study import (
     STANDARD,
     ChangeTask,
@@ -55,10 +78,13 @@ from evaluation.study import (
     Pair,
     PlaceTask,
     PoseTask,
+    RecordedCondition,
+    RecordingInfo,
     ShownCity,
     Task,
     add_city,
     choose_methods,
+    chosen_recordings,
     made_tasks,
     recorded_pairs,
     recorded_sections,
@@ -280,7 +306,7 @@ def _recorded_pairs(run: ExperimentRun, city: MapDrives) -> Iterator[Pair]:
     experiment = run.experiment
     return recorded_pairs(
         city,
-        recorded_conditions(city, experiment.conditions, run.source),
+        _recorded_conditions(city, experiment.conditions, run.source),
         experiment.seeds[0],
         run.on_note,
         both_ways=experiment.drives == "both-ways",
@@ -373,3 +399,258 @@ def _choose_variants(
         }
         found[choice.key] = choice, columns
     return found
+
+
+# Fields of a database of several recordings.
+_OF_RECORDINGS = (f"database.{SESSIONS}", "database.keep")
+
+
+def _recorded_conditions(
+    city: MapDrives, conditions: Sequence[Condition], source: str
+) -> list[RecordedCondition]:
+    """Returns the conditions of an experiment on recordings.
+
+    Args:
+        city: the recordings of a map.
+        conditions: the conditions.
+        source: file of the experiment, for errors.
+
+    Raises:
+        InputError: a condition varies what recordings do not allow, or names a
+            recording that is missing.
+    """
+    for one in conditions:
+        _check_recordable(city, one, source)
+    return [
+        RecordedCondition(
+            one.factors,
+            one.changes.get("both", {}).get("stage", OWN),
+            one.is_baseline,
+            condition_protocol(one, source),
+            _recorded_database(city, one, source),
+            checked_keep(
+                one.changes.get("database", {}).get("keep", KEEP_ALL),
+                f"{source}: database.keep",
+            ),
+        )
+        for one in conditions
+    ]
+
+
+def _recorded_database(
+    city: MapDrives, condition: Condition, source: str
+) -> tuple[RecordingInfo, ...]:
+    """Returns the recordings of a database of several recordings."""
+    names = condition.changes.get("database", {}).get(SESSIONS)
+    if names is None:
+        return ()
+    where = f"{source}: database.{SESSIONS}"
+    is_list = isinstance(names, list) and bool(names)
+    if not (is_list and all(isinstance(one, str) for one in names)):
+        raise InputError(f"{where}: not a list of names of recordings")
+    return chosen_recordings(city, names, where)
+
+
+def _check_recordable(
+    city: MapDrives, condition: Condition, source: str
+) -> None:
+    """Checks that a condition varies only the stage, as recordings require."""
+    sides = {n: condition.changes.get(n, {}) for n in SIDES}
+    given = [f"{side}.{name}" for side in sides for name in sides[side]]
+    if SESSIONS in sides["database"]:
+        given = [one for one in given if one not in _OF_RECORDINGS]
+        if sides["both"]:
+            raise InputError(
+                f"{source}: {STAGE}: databases of several"
+                " recordings have no control"
+            )
+    given += [CAUSE] if condition.causes else []
+    for name in given:
+        if name != STAGE:
+            name = next(
+                (n for n in condition.factors if n.startswith(name)),
+                name,
+            )
+            raise InputError(
+                f"{source}: {name}: the recordings of {city.name}"
+                " are as they are; simulated drives alone can vary it"
+            )
+    stage = sides["both"].get("stage", OWN)
+    if stage not in (OWN, LAST):
+        raise InputError(
+            f"{source}: {STAGE}: {stage!r}: recordings have {OWN} and {LAST}"
+        )
+
+
+# Columns of a table of frozen drives.
+_FROZEN = ("map", "level", "drives")
+
+
+def frozen_drives(table: str) -> dict[tuple[str, int], str]:
+    """Reads a table of drives that must stay the same in all releases.
+
+    Args:
+        table: name of a CSV file in the folder of the shipped worlds.
+
+    Returns:
+        (map, level) -> fingerprint, a hash of the drives that are compared. The
+        level is the degree of difficulty, see `docs/levels.md`.
+
+    Raises:
+        InputError: there is no such file, or a level is not a number.
+    """
+    path = worlds_folder() / table
+    return {
+        (
+            row["map"],
+            whole_number(row["level"], f"{path}: line {line}: level"),
+        ): row["drives"]
+        for line, row in read_records(path, _FROZEN)
+    }
+
+
+def drives_fingerprint(
+    compared: ComparedDrives, worlds: dict[Path, str]
+) -> str:
+    """Returns a hash of all drives and of the cities along these drives.
+
+    Args:
+        compared: the drives.
+        worlds: cache, world file -> digest of the files of its world. This
+            function adds the digests of the worlds of these drives.
+
+    Raises:
+        InputError: a file of a world cannot be read.
+    """
+    for drive in compared.drives:
+        if drive.world_file not in worlds:
+            worlds[drive.world_file] = combined_digest(digest_inputs(drive))
+    return fingerprint(
+        {
+            "drives": compared.fingerprint(),
+            "worlds": [worlds[one.world_file] for one in compared.drives],
+        }
+    )
+
+
+def check_frozen(
+    table: str, compared: Mapping[tuple[str, int], Sequence[str]]
+) -> None:
+    """Checks that the drives of a comparison are listed in a table.
+
+    Maps that are not in the table are not checked.
+
+    Args:
+        table: name of a file in the folder of the shipped worlds; see
+            `frozen_drives`.
+        compared: (map, level) -> fingerprints of the compared drives. Levels
+            are degrees of difficulty, see `docs/levels.md`.
+
+    Raises:
+        InputError: a fingerprint differs from the table's.
+    """
+    frozen = frozen_drives(table)
+    for (name, level), prints in compared.items():
+        wanted = frozen.get((name, level))
+        if wanted not in (None, fingerprint({"drives": list(prints)})):
+            raise InputError(
+                f"{table}: level {level} of {name}: the experiment's drives are"
+                " not the frozen ones; leave out `frozen` to measure them"
+            )
+
+
+# Number of drives after which a note reports the search for places elsewhere.
+_NOTED_DRIVES = 20
+
+
+def distracting_drives(
+    query: Scenario,
+    number: int,
+    spacing: float,
+    output: Path,
+    cluster: Cluster,
+    on_note: Callable[[str], None] = lambda text: None,
+) -> list[Scenario]:
+    """Returns drives through cities other than the query's city.
+
+    Adding the places of these drives to a database makes recognition harder.
+    The drives come in this order, until they have about the wanted number of
+    places: the shipped drives of other maps, each through its own stage; if the
+    query's map is shipped, drives along its streets between other buildings;
+    the drives of other maps through their other stages; and drives along the
+    streets of other maps, between other buildings.
+
+    Args:
+        query: the query drive. The returned drives have the LiDARs of the query
+            drive, and do not go through its city.
+        number: approximate number of places.
+        spacing: distance between two places [m].
+        output: folder for the newly generated cities, with other buildings.
+        cluster: runs the jobs.
+        on_note: is called with each note for the user.
+
+    Raises:
+        InputError: a shipped map cannot be used.
+    """
+    drives: list[Scenario] = []
+    found = 0
+    if number:
+        on_note(f"{query.name}: looking for {number} places elsewhere")
+    for drive in _drives_elsewhere(query, output, cluster):
+        if found >= number:
+            break
+        drive = drive.replaced(lidars=query.lidars)
+        drives.append(drive)
+        found += _num_places(drive, spacing)
+        if len(drives) % _NOTED_DRIVES == 0:
+            on_note(f"{query.name}: found {found} places elsewhere")
+    return drives
+
+
+def _num_places(scenario: Scenario, spacing: float) -> int:
+    trajectory = plan_drive(scenario)
+    frames = count_frames(scenario, trajectory)
+    _, p_WB = trajectory.poses(scenario.frame_period * np.arange(frames))
+    return len(sample_frames(p_WB, spacing))
+
+
+def _drives_elsewhere(
+    query: Scenario, output: Path, cluster: Cluster
+) -> Iterator[Scenario]:
+    """Yields drives without end, in the order of `distracting_drives`."""
+    maps = {name: MapFolder(path) for name, path in shipped_maps().items()}
+    drives = {
+        name: [load_scenario(path) for path in folder.recordable_drives()]
+        for name, folder in maps.items()
+    }
+    own = Path(str(query.map)).name
+    others = [name for name in maps if name != own]
+
+    def redrawn(name: str, seed: int) -> Iterator[Scenario]:
+        cities = redraw_cities(
+            maps[name].path, ONLY_STAGE, [seed], output, cluster
+        )
+        for one in drives[name]:
+            yield _moved(one, str(cities[seed]), ONLY_STAGE, f"c{seed}")
+
+    for name in others:
+        yield from drives[name]
+    if own in maps:
+        yield from redrawn(own, 1)
+    for name in others:
+        for stage in maps[name].stages():
+            yield from (
+                _moved(one, one.map, stage, stage)
+                for one in drives[name]
+                if one.stage != stage
+            )
+    for seed in itertools.count(1):
+        for name in others:
+            yield from redrawn(name, seed)
+
+
+def _moved(
+    scenario: Scenario, place: str | None, stage: str, ending: str
+) -> Scenario:
+    name = f"{scenario.name}_in_{ending}"
+    return scenario.replaced(name=name, map=place, stage=stage)

@@ -1,4 +1,4 @@
-"""The command `cns-eval`."""
+"""The program `cns-eval`: a family, a file a verb."""
 
 from cns_drake.base import attach
 

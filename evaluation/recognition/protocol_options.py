@@ -35,8 +35,9 @@ _SeveralNames = Annotated[
     list[str],
     typer.Option(
         "--protocol",
-        # Typer knows no list of literals.
+        # Typer knows no list of literals, and would name no choices.
         click_type=click.Choice(get_args(_Name)),
+        metavar="|".join(get_args(_Name)),
         help=f"{_WHAT} May be repeated to measure by several protocols. The "
         "page compares results by the protocol paper with the paper's tables.",
     ),

@@ -37,7 +37,7 @@ except InputError:
 STUDY = """
 from cns_drake import InputError
 try:
-    import cns_drake.studies.recordings.reproduction
+    import cns_drake.studies
 except InputError as error:
     print(error)
 """

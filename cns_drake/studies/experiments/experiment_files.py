@@ -57,14 +57,14 @@ def load_experiment(
         raise InputError(f"{path}: not a mapping of an experiment's fields")
     values = in_long_form({"name": path.stem, **values})
     short = values.get("quick")
-    if quick and not isinstance(short, dict):
-        raise InputError(
-            f"{path}: quick: missing, or no mapping; --quick needs this"
-            " section, with the fields to replace"
-        )
     overrides = list(overrides)
     chosen = {"tasks": tasks, "methods": methods}
     if quick:
+        if not isinstance(short, dict):
+            raise InputError(
+                f"{path}: quick: missing, or no mapping; --quick needs this"
+                " section, with the fields to replace"
+            )
         values = _chosen_anew(values, short)
         return _checked(values, path, overrides, chosen)
     found = _checked(values, path, overrides, chosen)

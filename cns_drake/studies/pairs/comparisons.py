@@ -3,9 +3,16 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 import math
+import re
 from typing import Any, NamedTuple
 
-from cns_drake.base import InputError, errors_at, fingerprint, natural_key
+from cns_drake.base import (
+    InputError,
+    errors_at,
+    fingerprint,
+    natural_key,
+    validated,
+)
 from cns_drake.scenarios import Scenario
 from cns_drake.studies.drives.changed_drives import (
     Age,
@@ -13,22 +20,22 @@ from cns_drake.studies.drives.changed_drives import (
     DriveChanger,
     Redraw,
 )
-from cns_drake.studies.drives.control_drives import with_fixed_driver
-from cns_drake.studies.drives.named_stages import MissingError, find_stage
-from cns_drake.studies.drives.session_fields import (
-    session_factors,
-    session_fields,
-    years_aged,
+from cns_drake.studies.drives.control_drives import (
+    control_drive,
+    with_fixed_driver,
 )
+from cns_drake.studies.drives.named_stages import MissingError, find_stage
+from cns_drake.studies.drives.sampled_drives import Fleet
 from cns_drake.studies.drives.side_fields import (
+    DATABASE_FIELDS,
     QUERY_FIELDS,
     check_side,
     checked_maintainer,
 )
-from cns_drake.studies.drives.unique_names import UniqueNames
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
 from cns_drake.studies.experiments.conditions import Condition
 from cns_drake.studies.experiments.nested_fields import (
+    FLEET,
     SESSIONS,
     Changes,
     merged,
@@ -36,7 +43,7 @@ from cns_drake.studies.experiments.nested_fields import (
 from cns_drake.studies.experiments.protocol_fields import protocol_from_fields
 from evaluation.map_update import NOT_MAINTAINED
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
-from evaluation.results import CAUSE, OWN
+from evaluation.results import CAUSE, LEVEL, NO_CAUSE, OWN
 from evaluation.study import USUAL_LENGTH
 
 
@@ -163,7 +170,7 @@ class PairMaker:
                 plain["database"], *VIEWPOINTS["near"]
             )
         self._names = {
-            side: UniqueNames(side, drive, with_controls=not self.same_route)
+            side: _UniqueNames(side, drive, with_controls=not self.same_route)
             for side, drive in plain.items()
         }
 
@@ -182,7 +189,7 @@ class PairMaker:
         both = fields.get("both", {})
         database = merged(both, fields.get("database", {}))
         query = merged(both, fields.get("query", {}))
-        sessions = session_fields(database, seed, self.source)
+        sessions = _session_fields(database, seed, self.source)
         if CAUSE not in condition.factors:
             # Years of cases may need the rates of all conditions.
             self._check_rates(fields, sessions, query)
@@ -194,7 +201,7 @@ class PairMaker:
         drives = self._database_drives(
             sessions, database, query, condition, seed
         )
-        years = years_aged(database, sessions)
+        years = _years_aged(database, sessions)
         ageing = Ageing(years, database.get("rates", 1.0))
         query_drive = self._names["query"].named(
             self._changer.changed(
@@ -357,7 +364,7 @@ class PairMaker:
             seed: seed of the random choices.
         """
         since = query.get("years", 0)
-        oldest = years_aged(database, sessions)
+        oldest = _years_aged(database, sessions)
         rates = query.get("rates", 1.0)
         if any(one.get("years", 0) != oldest for one in sessions.values()):
             rates = database.get("rates", rates)
@@ -384,7 +391,7 @@ class PairMaker:
                     Ageing(years, rates),
                     seed,
                 ),
-                session_factors(place, condition.factors),
+                _session_factors(place, condition.factors),
                 seed,
             )
             found.append(((years, natural_key(stage)), place, drive))
@@ -431,3 +438,191 @@ def _drive_length(changes: Changes) -> float:
     if isinstance(route, Mapping):
         return float(route["length"])
     return USUAL_LENGTH
+
+
+# Fields that all drives of a database share.
+_SHARED_FIELDS = (*DATABASE_FIELDS, "rates")
+# Fields that describe a database, not its drives.
+_OF_DATABASE = ("keep", "maintain")
+# Fields that put a drive into another frame of reference.
+_FRAME_FIELDS = ("map", "world")
+
+
+def _session_fields(
+    database: Changes, seed: int, source: str
+) -> dict[str, dict[str, Any]]:
+    """Returns the fields of each drive of a database.
+
+    Each drive has the fields of the database. A field of the drive's own
+    replaces the same field of the database.
+
+    Args:
+        database: fields of the database.
+        seed: seed of a fleet that has no own seed.
+        source: file of the experiment, for errors.
+
+    Returns:
+        The fields of each drive, by the path of the drive in the file, such as
+        `database.sessions.2`.
+
+    Raises:
+        InputError: the drives are not a list of mappings, or a drive has a
+            field that it cannot have.
+    """
+    shared = dict(database)
+    for name in _OF_DATABASE:
+        shared.pop(name, None)
+    if FLEET in database:
+        sessions: Any = _fleet_sessions(database, seed, source)
+        del shared[FLEET]
+    elif SESSIONS in database:
+        sessions = shared.pop(SESSIONS)
+    else:
+        return {"database": shared}
+    if isinstance(sessions, Mapping):
+        # A factor of a drive makes the list a mapping of its numbers.
+        numbers = [str(k) for k in range(1, len(sessions) + 1)]
+        is_list = list(sessions) == numbers
+        sessions = list(sessions.values()) if is_list else None
+    if not (isinstance(sessions, list) and sessions):
+        raise InputError(
+            f"{source}: database.{SESSIONS}: not a list of one drive or more"
+        )
+    found = {}
+    for number, own in enumerate(sessions, start=1):
+        place = f"database.{SESSIONS}.{number}"
+        _check_own_fields(own, f"{source}: {place}")
+        found[place] = merged(shared, own)
+    return found
+
+
+def _fleet_sessions(
+    database: Changes, seed: int, source: str
+) -> list[dict[str, Any]]:
+    where = f"{source}: database.{FLEET}"
+    if SESSIONS in database:
+        raise InputError(f"{where}: give it or {SESSIONS}")
+    fleet = database[FLEET]
+    if isinstance(fleet, Mapping):
+        fleet = {"seed": seed, **fleet}
+    return validated(Fleet, fleet, where).sessions()
+
+
+def _check_own_fields(own: Any, where: str) -> None:
+    if not isinstance(own, Mapping):
+        raise InputError(f"{where}: {own!r} is no mapping of fields")
+    for name in _FRAME_FIELDS:
+        if name in own:
+            raise InputError(
+                f"{where}.{name}: another map has another frame of reference"
+                " than the other drives"
+            )
+    for name in _SHARED_FIELDS:
+        if name in own:
+            raise InputError(
+                f"{where}.{name}: all drives share it; it is a field of"
+                " database"
+            )
+
+
+def _session_factors(place: str, factors: Changes) -> dict[str, Any]:
+    """Returns the factors of a condition that concern a drive of a database.
+
+    Factors of this drive are named as if it were the only drive. Factors of
+    other drives, and factors of the whole database, are left out.
+
+    Args:
+        place: path of the drive in the file, such as `database.sessions.2`.
+        factors: name -> value, for all factors of the condition.
+    """
+    several = tuple(f"database.{name}" for name in (SESSIONS, FLEET))
+    shared = tuple(f"database.{name}" for name in _OF_DATABASE)
+    found = {}
+    for path, value in factors.items():
+        if path.startswith(f"{place}."):
+            path = f"database.{path.removeprefix(place)[1:]}"
+        elif path.startswith(several) or path in shared:
+            continue
+        found[path] = value
+    return found
+
+
+def _years_aged(database: Changes, sessions: Mapping[str, Changes]) -> int:
+    """Returns by how many years the city of the query is aged.
+
+    The result is the greatest of the fields `years` of the drives and of the
+    database. The field of the database counts even if each drive has its own
+    field, so that databases with different drives can have the same query.
+
+    Args:
+        database: fields of the database.
+        sessions: maps the path of each drive in the file to the drive's fields.
+    """
+    return max(one.get("years", 0) for one in (database, *sessions.values()))
+
+
+class _UniqueNames:
+    """The names of the drives of a database, or of the query drives.
+
+    Equal drives have one name, however they came about.
+    """
+
+    def __init__(
+        self, side: str, unchanged: Scenario, *, with_controls: bool
+    ) -> None:
+        """Begins without any changed drive.
+
+        Args:
+            side: `database` or `query`.
+            unchanged: the drive without any change, which keeps its name.
+            with_controls: whether a drive of which only the stage has changed
+                is a control drive.
+        """
+        self._side = side
+        self._unchanged = unchanged
+        self._with_controls = with_controls
+        # Content of a drive -> the drive with its name.
+        self._known: dict[str, Scenario] = {}
+
+    def named(self, drive: Scenario, factors: Changes, seed: int) -> Scenario:
+        """Returns a drive with a name that no other drive of this side has.
+
+        Args:
+            drive: the changed drive, with the name of the unchanged drive.
+            factors: name of each factor that concerns the drive -> its value.
+            seed: seed of the changes.
+        """
+        content = fingerprint(drive.replaced(name="").model_dump(mode="json"))
+        if content not in self._known:
+            if drive != self._unchanged:
+                drive = self._renamed(drive, factors, seed)
+            if drive.name in {one.name for one in self._known.values()}:
+                drive = drive.replaced(name=f"{drive.name}_{content[:6]}")
+            self._known[content] = drive
+        return self._known[content]
+
+    def _renamed(
+        self, drive: Scenario, factors: Changes, seed: int
+    ) -> Scenario:
+        """Returns a drive with a name for its changes."""
+        plain = self._unchanged
+        if self._with_controls and drive == plain.replaced(stage=drive.stage):
+            return control_drive(plain, str(drive.stage))
+        suffix = _name_suffix(self._side, factors, seed)
+        return drive.replaced(name=f"{drive.name}_{suffix}")
+
+
+def _name_suffix(side: str, given: Changes, seed: int) -> str:
+    factors = dict(given)
+    labels = []
+    cause, level = factors.pop(CAUSE, NO_CAUSE), factors.pop(LEVEL, 0)
+    for path, value in factors.items():
+        name = path.rpartition(".")[2]
+        is_own = path.partition(".")[0] in (side, "both")
+        # The years of a drive age the city of the other side.
+        if is_own != (name in ("years", "rates")) or path.startswith("both."):
+            text = str(value).replace(".", "p").replace("-", "m")
+            labels.append(f"{name}_{re.sub(r'[^A-Za-z0-9]+', '_', text)}")
+    if cause != NO_CAUSE:
+        labels.append(f"{cause}_{level}")
+    return "_".join([*labels, str(seed)])

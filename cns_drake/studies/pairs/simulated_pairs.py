@@ -14,7 +14,7 @@ from cns_drake.studies.maps.experiment_maps import ExperimentRun, MapPairs
 from cns_drake.studies.maps.made_maps import MadeMaps
 from cns_drake.studies.pairs.comparisons import ComparedDrives, PairMaker
 from cns_drake.studies.pairs.map_upkeep import UpkeptSource, update_maps
-from cns_drake.studies.recordings.recording import is_recorded
+from cns_drake.studies.recording import is_recorded
 from evaluation.map_update import NOT_MAINTAINED
 from evaluation.recognition import RetrievalProtocol
 from evaluation.results import CAUSE

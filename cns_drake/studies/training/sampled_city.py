@@ -5,22 +5,23 @@ structures, and two earlier stages, are sampled anew. Several drives follow the
 same route and differ as real visits do: in stage, effects, LiDAR and driver.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 import yaml
 
 from cns_drake.base import draft_folder
-from cns_drake.city import generate_city, make_city, start_city
+from cns_drake.city import City, generate_city, make_city, start_city
 from cns_drake.roads import draw_route, load_road_network
 from cns_drake.scenarios import Scenario, load_scenario, shipped_maps
 from cns_drake.scene import STAGES_NAME, MapFolder
 from cns_drake.studies.drives.viewpoints import with_lidars_moved
 from cns_drake.studies.maps.redrawing import marked_yaml, redrawn_inputs
-from cns_drake.studies.training.sampled_stages import STAGES, draw_stages
-from cns_drake.studies.training.sampled_streets import draw_streets
+from cns_drake.studies.maps.turned_inputs import turned_content
 
 # First seed, far from the seeds of all experiments and tests.
 _FIRST_SEED = 500_000
@@ -85,10 +86,10 @@ class SampledCity:
                 start_city(draft, self.city_seed)
             else:
                 source = shipped_maps()[self.map_name]
-                inputs = redrawn_inputs(source, STAGES[-1], self.city_seed)
+                inputs = redrawn_inputs(source, _STAGES[-1], self.city_seed)
                 for name, content in inputs.items():
                     (draft / name).write_bytes(content)
-            stages = draw_stages(make_city(draft), self._rng(0))
+            stages = _draw_stages(make_city(draft), self._rng(0))
             text = yaml.safe_dump({"stages": stages}, sort_keys=False)
             (draft / STAGES_NAME).write_text(text, encoding="utf-8")
             generate_city(draft)
@@ -106,7 +107,7 @@ class SampledCity:
         network = load_road_network(MapFolder(folder).roads)
         base = base.replaced(
             map=str(folder),
-            stage=STAGES[-1],
+            stage=_STAGES[-1],
             route=draw_route(network, _ROUTE_LENGTH, rng),
             waypoints=None,
             aside=0.0,
@@ -168,9 +169,162 @@ def _draw_changes(rng: np.random.Generator, number: int) -> dict[str, Any]:
     rough = "ABC"[int(rng.integers(3))]
     changes: dict[str, Any] = {
         # The last stage, the first, the one in between, and the last again.
-        "stage": (STAGES[-1], STAGES[0], STAGES[1], STAGES[-1])[number % 4],
+        "stage": (_STAGES[-1], _STAGES[0], _STAGES[1], _STAGES[-1])[number % 4],
         "transient": {"seed": int(rng.integers(2**31)), **parts},
     }
     if rng.random() < 0.5:
         changes["ride"] = {"roughness": rough, "seed": int(rng.integers(2**31))}
     return changes
+
+
+# Names of all stages, from older to newer.
+_STAGES = ("01", "02", "03")
+# Classes of what comes and goes with a building, as in the shipped cities.
+_BESIDE = frozenset(
+    {
+        "bicycle",
+        "car",
+        "fence",
+        "other-object",
+        "pole",
+        "traffic-sign",
+        "truck",
+        "vegetation",
+    }
+)
+# It goes with the nearest building up to this distance [m].
+_BESIDE_WITHIN = 20.0
+
+
+def _draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
+    """Returns random stages of a city, as the content of `stages.yaml`.
+
+    The last stage is the whole city. In earlier stages, whole buildings are
+    missing. Objects that stand, grow or park beside a missing building are
+    missing, too, unless another building is nearer. Some other trees are also
+    missing, and a few buildings and trees are lower than in the last stage.
+
+    Args:
+        city: the city.
+        rng: random generator.
+    """
+    buildings = [s for s in city.structures if s.semantic_class == "building"]
+    trees = [s for s in city.structures if s.kind == "tree"]
+    beside = [s for s in city.structures if s.semantic_class in _BESIDE]
+    near = cKDTree([s.xyz[:2] for s in buildings]).query(
+        [s.xyz[:2] for s in beside], distance_upper_bound=_BESIDE_WITHIN
+    )[1]
+    stages: dict[str, dict] = {}
+    gone: set[str] = set()
+    for stage in reversed(_STAGES[:-1]):
+        cleared = set(
+            _clustered_names(buildings, float(rng.uniform(0.1, 0.5)), rng)
+        )
+        absent = [
+            *(s.name for s in buildings if s.name in cleared),
+            *(
+                s.name
+                for s, k in zip(beside, near, strict=True)
+                if k < len(buildings) and buildings[k].name in cleared
+            ),
+            *_random_names(trees, float(rng.uniform(0.0, 0.4)), rng),
+        ]
+        absent = [name for name in dict.fromkeys(absent) if name not in gone]
+        gone.update(absent)
+        lower = {
+            "houses": {
+                "height": float(rng.uniform(4.0, 9.0)),
+                "structures": _random_names(
+                    buildings, rng.uniform(0.0, 0.1), rng
+                ),
+            },
+            "trees": {
+                "height": float(rng.uniform(3.0, 6.0)),
+                "structures": _random_names(trees, rng.uniform(0.0, 0.2), rng),
+            },
+        }
+        stages[stage] = {
+            "story": "Lots that are built on later, at random.",
+            "absent": {"": absent} if absent else {},
+            "lower": {k: v for k, v in lower.items() if v["structures"]},
+        }
+    return {
+        **{stage: stages[stage] for stage in _STAGES[:-1]},
+        _STAGES[-1]: {"story": "The whole city."},
+    }
+
+
+def _random_names(
+    structures: Sequence[Any], share: float, rng: np.random.Generator
+) -> list[str]:
+    chosen = rng.random(len(structures)) < share
+    return [s.name for s, one in zip(structures, chosen, strict=True) if one]
+
+
+def _clustered_names(
+    structures: Sequence[Any], share: float, rng: np.random.Generator
+) -> list[str]:
+    """Returns a share of structures: half at random, half near a place."""
+    xy = np.array([s.xyz[:2] for s in structures])
+    center = xy[int(rng.integers(len(xy)))]
+    order = np.argsort(np.linalg.norm(xy - center, axis=1), kind="stable")
+    near = [structures[k].name for k in order[: int(0.5 * share * len(order))]]
+    return sorted({*near, *_random_names(structures, 0.5 * share, rng)})
+
+
+def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
+    """Returns the content of a `roads.yaml` with random streets.
+
+    Streets run along the lines of a bent grid with random spacings; the whole
+    grid has a random orientation. Some cross streets are missing, and some are
+    bent.
+    """
+    columns, rows = rng.integers(3, 6), rng.integers(3, 5)
+    x = np.cumsum(rng.uniform(70.0, 170.0, columns))
+    y = np.cumsum(rng.uniform(60.0, 140.0, rows))
+    places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    places += rng.uniform(-14.0, 14.0, places.shape)
+    kerb = [round(float(k), 1) for k in rng.uniform(5.0, 9.0, (columns * rows))]
+    junctions = {
+        f"j{i}{k}": {
+            "position": places[i, k].round(2).tolist(),
+            "kerb_radius": kerb.pop(),
+        }
+        for i in range(columns)
+        for k in range(rows)
+    }
+    roads: dict[str, Any] = {}
+    wide = {("x", int(rng.integers(rows))), ("y", int(rng.integers(columns)))}
+
+    def add(axis: str, line: int, i: int, k: int, to: tuple[int, int]) -> None:
+        start, end = places[i, k], places[to]
+        road: dict[str, Any] = {"start": f"j{i}{k}", "end": f"j{to[0]}{to[1]}"}
+        if (axis, line) in wide:
+            road["lanes"] = [2, 2]
+        elif rng.random() < 0.5:
+            road["parking"] = 2.2
+        if rng.random() < 0.3:
+            along = end - start
+            aside = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+            bend = (start + end) / 2.0 + aside * rng.uniform(-16.0, 16.0)
+            road["via"] = [[*bend.round(2).tolist(), 30.0]]
+        roads[f"{axis}{line}_{i}{k}"] = road
+
+    for k in range(rows):
+        for i in range(columns - 1):
+            add("x", k, i, k, (i + 1, k))
+    for i in range(columns):
+        is_inside = 0 < i < columns - 1
+        for k in range(rows - 1):
+            # Every junction still has two streets.
+            if not (is_inside and rng.random() < 0.3):
+                add("y", i, i, k, (i, k + 1))
+    defaults = {
+        "lanes": [1, 1],
+        "lane_width": round(float(rng.uniform(3.2, 4.2)), 1),
+        "sidewalk": round(float(rng.uniform(2.0, 5.0)), 1),
+        "kerb_height": 0.15,
+        "speed_limit": 12.0,
+    }
+    plan = {"defaults": defaults, "junctions": junctions, "roads": roads}
+    return turned_content(plan, float(rng.uniform(0.0, 90.0)))

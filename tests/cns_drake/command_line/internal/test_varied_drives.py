@@ -9,7 +9,7 @@ import yaml
 
 from cns_drake.city import generate_city
 from cns_drake.command_line import app
-from cns_drake.studies.recordings import recording
+from cns_drake.studies import recording
 from evaluation.change import read_map
 from evaluation.drives import open_drive
 from evaluation.methods import make_method

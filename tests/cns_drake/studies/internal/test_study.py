@@ -74,7 +74,7 @@ def measure(wanted, output, **options):
 def planned(wanted, output, **options):
     """The jobs of an experiment, and the comparisons that they measure."""
     run = ExperimentRun(wanted, output, "mine.yaml", Cluster(), **options)
-    made = plan_study(run)
+    made, _ = plan_study(run)
     return made.jobs, made.measured
 
 

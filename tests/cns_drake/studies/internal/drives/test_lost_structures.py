@@ -12,7 +12,7 @@ from cns_drake.base import InputError, validated
 from cns_drake.scenarios import load_scenario, shipped_maps
 from cns_drake.scene import load_world, structures_in
 from cns_drake.studies import Losses, load_experiment
-from cns_drake.studies.drives.lost_structures import lost_structures
+from cns_drake.studies.drives.changed_drives import lost_structures
 from cns_drake.studies.pairs.comparisons import PairMaker
 
 SOURCE = "mine.yaml: database"

@@ -7,8 +7,8 @@ import pytest
 
 from cns_drake.base import Cluster
 from cns_drake.scenarios import load_scenario, make_scenario
-from cns_drake.studies.pairs import distractors
-from cns_drake.studies.pairs.distractors import distracting_drives
+from cns_drake.studies import study
+from cns_drake.studies.study import distracting_drives
 
 
 def test_drives_are_of_other_cities(tmp_path):
@@ -31,8 +31,8 @@ def drawn(monkeypatch):
         found.append((folder.name, *seeds))
         return {seed: output / f"{folder.name}_c{seed}" for seed in seeds}
 
-    monkeypatch.setattr(distractors, "redraw_cities", redraw)
-    monkeypatch.setattr(distractors, "_num_places", lambda *_: 1)
+    monkeypatch.setattr(study, "redraw_cities", redraw)
+    monkeypatch.setattr(study, "_num_places", lambda *_: 1)
     return found
 
 

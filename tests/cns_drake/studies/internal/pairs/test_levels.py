@@ -10,13 +10,13 @@ from cns_drake.scenarios import make_scenario, worlds_folder
 from cns_drake.studies import ExperimentRun, load_experiment
 from cns_drake.studies.maps.experiment_maps import pairs_by_map
 from cns_drake.studies.pairs.comparisons import ComparedDrives
-from cns_drake.studies.pairs.frozen_drives import (
+from cns_drake.studies.pairs.simulated_pairs import SimulatedPairs
+from cns_drake.studies.study import (
     check_frozen,
     drives_fingerprint,
     frozen_drives,
+    plan_study,
 )
-from cns_drake.studies.pairs.simulated_pairs import SimulatedPairs
-from cns_drake.studies.study import plan_study
 from evaluation.recognition import RECORDED_PROTOCOL
 
 TABLE = "levels.csv"

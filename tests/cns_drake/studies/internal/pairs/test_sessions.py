@@ -189,7 +189,7 @@ def test_costs_grow_with_what_is_measured(town, tmp_path):
             tasks=["place", "localise"],
             **SIMULATED,
         )
-        jobs = plan_study(run_of(wanted, tmp_path)).jobs
+        jobs = plan_study(run_of(wanted, tmp_path))[0].jobs
         found: dict[str, float] = {}
         for name, job in jobs.items():
             kind = name.partition(" ")[0]
@@ -214,7 +214,7 @@ def test_a_slow_method_costs_more(town, tmp_path, monkeypatch):
     )
 
     def cost():
-        jobs = plan_study(run_of(wanted, tmp_path)).jobs
+        jobs = plan_study(run_of(wanted, tmp_path))[0].jobs
         return sum(job.cost for job in jobs.values())
 
     usual = cost()
@@ -490,7 +490,7 @@ def test_jobs_in_a_maintained_map_wait_for_it(town, tmp_path):
         tasks=["place", "localise"],
         **SIMULATED,
     )
-    jobs = plan_study(run_of(wanted, tmp_path)).jobs
+    jobs = plan_study(run_of(wanted, tmp_path))[0].jobs
     (upkeep,) = [name for name in jobs if name.startswith("upkeep ")]
     waiting = [one.name for one in jobs.values() if upkeep in one.needs]
     kinds = sorted(name.partition(" ")[0] for name in waiting)

@@ -17,7 +17,7 @@ from cns_drake.studies.training.network import (
     scores,
     start_parameters,
 )
-from cns_drake.studies.training.sampled_streets import draw_streets
+from cns_drake.studies.training.sampled_city import draw_streets
 from cns_drake.studies.training.weights import MAPS, write_weights
 from evaluation.methods import (
     CHANNELS,

@@ -9,9 +9,9 @@ import yaml
 from cns_drake.base import Cluster, InputError, Reporter
 from cns_drake.scenarios import DriverConfig, load_scenario, plan_drive
 from cns_drake.simulation import SimulationSource, simulate
-from cns_drake.studies.recordings import reproduction
-from cns_drake.studies.recordings.recording import Record
-from cns_drake.studies.recordings.reproduction import (
+from cns_drake.studies import reproduction
+from cns_drake.studies.recording import Record
+from cns_drake.studies.reproduction import (
     control_drives,
     recording_info,
 )

@@ -11,9 +11,8 @@ import pytest
 
 from cns_drake.__main__ import main
 from cns_drake.base import InputError
-from cns_drake.studies import ExportOptions, export_pairs
-from cns_drake.studies.exports import pair_export
-from cns_drake.studies.exports.pointnetvlad_files import (
+from cns_drake.studies import ExportOptions, export_pairs, pair_export
+from cns_drake.studies.pair_export import (
     ExportedDrive,
     evaluation_sets,
     training_tuples,

@@ -27,9 +27,8 @@ from cns_drake.base import Cluster, InputError
 from cns_drake.city import generate_city
 from cns_drake.scenarios import load_scenario
 from cns_drake.simulation import simulate
-from cns_drake.studies import is_recorded, record_all
+from cns_drake.studies import is_recorded, record_all, recording
 from cns_drake.studies.maps import map_step
-from cns_drake.studies.recordings import recording
 from evaluation.change import read_map
 from evaluation.drives import open_drive
 

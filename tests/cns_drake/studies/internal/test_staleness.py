@@ -10,7 +10,7 @@ import pytest
 
 from cns_drake.base import Cluster
 from cns_drake.base.jobs import fingerprint
-from cns_drake.studies.recordings import reproduction
+from cns_drake.studies import reproduction
 from evaluation.recognition import FAIR_PROTOCOL
 from evaluation.study import engine
 

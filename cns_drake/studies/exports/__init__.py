@@ -1,1 +1,0 @@
-"""Writes data sets of simulated drives, from which networks can learn."""

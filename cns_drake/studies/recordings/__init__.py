@@ -1,1 +1,0 @@
-"""Records the drives of maps as jobs, and reports on the recordings."""
