@@ -16,7 +16,7 @@ from cns_drake.city.growth.building_sites import building_site
 from cns_drake.city.growth.lot_uses import lot_objects, use_by_size
 from cns_drake.city.growth.lowering import lowered
 from cns_drake.city.plan.stages import Stages
-from cns_drake.city.plants.plant_sizes import younger_plant
+from cns_drake.city.plants.trees import younger_plant
 
 
 class GrowingCity:

@@ -12,7 +12,7 @@ from cns_drake.imports import (
     lane_bands,
     read_roads,
 )
-from cns_drake.imports.opendrive.kerb_tapers import kerb_tapers
+from cns_drake.imports.opendrive.imported_streets import kerb_tapers
 from cns_drake.imports.opendrive.lanes import lane_polygon
 
 LANES = (lane(1, "driving", 3.5), lane(-1, "driving", 3.5))
