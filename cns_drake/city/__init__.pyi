@@ -56,8 +56,8 @@ from cns_drake.city.geometry.models import SphereShape as SphereShape
 from cns_drake.city.geometry.models import part_mesh as part_mesh
 from cns_drake.city.geometry.models import part_triangles as part_triangles
 from cns_drake.city.geometry.models import triple as triple
-from cns_drake.city.geometry.object_meshes import OBJECT_MESHES as OBJECT_MESHES
 from cns_drake.city.geometry.object_models import HEADROOM as HEADROOM
+from cns_drake.city.geometry.object_models import OBJECT_MESHES as OBJECT_MESHES
 from cns_drake.city.geometry.object_models import ROOT_DEPTH as ROOT_DEPTH
 from cns_drake.city.geometry.object_models import assemble as assemble
 from cns_drake.city.geometry.object_models import bar as bar
