@@ -13,7 +13,7 @@ from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.models import BoxShape, MeshShape, Part, Shape
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.growth.stage_structures import GrowingCity
-from cns_drake.city.plan.stages import Stages, load_stages
+from cns_drake.city.stages import Stages, load_stages
 from cns_drake.scene import (
     CLASS_RGB,
     MAX_INSTANCE,

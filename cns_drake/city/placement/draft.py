@@ -11,6 +11,7 @@ from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
+from cns_drake.city.city_plan import CityPlan
 from cns_drake.city.geometry import (
     MeshShape,
     Model,
@@ -21,8 +22,7 @@ from cns_drake.city.geometry import (
 )
 from cns_drake.city.ground.elevation import Ground, LevelGround
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.city.plan.city_plan import CityPlan
-from cns_drake.city.plants.trees import SPECIES
+from cns_drake.city.plants import SPECIES
 from cns_drake.roads import Areas
 
 # An object stands upright if the ground below it falls by at most this much;

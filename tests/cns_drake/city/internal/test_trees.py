@@ -7,7 +7,7 @@ import pytest
 
 from cns_drake.city import OBJECTS, SPECIES, MeshShape
 from cns_drake.city.geometry.object_models import object_mesh
-from cns_drake.city.plants.trees import mesh_names
+from cns_drake.city.plants import mesh_names
 
 VARIANTS = [
     (name, variant)
