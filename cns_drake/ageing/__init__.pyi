@@ -1,4 +1,5 @@
 from cns_drake.ageing.aged_map import HISTORY_NAME as HISTORY_NAME
+from cns_drake.ageing.aged_map import LAST_YEAR as LAST_YEAR
 from cns_drake.ageing.aged_map import age_map as age_map
 from cns_drake.ageing.aged_pictures import air_view as air_view
 from cns_drake.ageing.aged_pictures import draw_pictures as draw_pictures
@@ -7,4 +8,3 @@ from cns_drake.ageing.events import TAKEN_DOWN as TAKEN_DOWN
 from cns_drake.ageing.rates import DEFAULT_RATES as DEFAULT_RATES
 from cns_drake.ageing.rates import check_rates as check_rates
 from cns_drake.ageing.rates import read_rates as read_rates
-from cns_drake.ageing.years import LAST_YEAR as LAST_YEAR

@@ -271,7 +271,7 @@ def _read_visuals(path: Path) -> dict[str, list[str]]:
     """Returns the SDF texts of each structure's visuals, by its name."""
     root = read_elements(path)
     visuals = root.findall("world/model/link/visual")
-    if len(root.findall("world/model")) != 1 or not all(
+    if len(root.findall("world//model")) != 1 or not all(
         "/" in one.get("name", "") for one in visuals
     ):
         raise InputError(_not_one_model(path))

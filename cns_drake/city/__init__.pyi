@@ -1,5 +1,16 @@
 from cns_drake.city.buildings import ARCHETYPES as ARCHETYPES
 from cns_drake.city.buildings import sample as sample
+from cns_drake.city.city_plan import BuildingPlan as BuildingPlan
+from cns_drake.city.city_plan import CityPlan as CityPlan
+from cns_drake.city.city_plan import DistrictPlan as DistrictPlan
+from cns_drake.city.city_plan import LinePlan as LinePlan
+from cns_drake.city.city_plan import ObjectPlan as ObjectPlan
+from cns_drake.city.city_plan import ParkingPlan as ParkingPlan
+from cns_drake.city.city_plan import PatchPlan as PatchPlan
+from cns_drake.city.city_plan import RowPlan as RowPlan
+from cns_drake.city.city_plan import ScatterPlan as ScatterPlan
+from cns_drake.city.city_plan import StreetPlan as StreetPlan
+from cns_drake.city.city_plan import load_plan as load_plan
 from cns_drake.city.dice import Dice as Dice
 from cns_drake.city.dice import Rgb as Rgb
 from cns_drake.city.facades.assembly import Assembly as Assembly
@@ -31,18 +42,18 @@ from cns_drake.city.generation.generate import (
     differing_files as differing_files,
 )
 from cns_drake.city.generation.generate import generate_city as generate_city
-from cns_drake.city.generation.rendering import meshes_of as meshes_of
-from cns_drake.city.generation.rendering import render_stages as render_stages
-from cns_drake.city.generation.rendering import structures_csv as structures_csv
-from cns_drake.city.generation.stage_sizes import (
+from cns_drake.city.generation.rendering import (
     count_triangles as count_triangles,
 )
-from cns_drake.city.generation.stage_sizes import stage_size as stage_size
-from cns_drake.city.generation.stage_sizes import triangles_in as triangles_in
+from cns_drake.city.generation.rendering import meshes_of as meshes_of
+from cns_drake.city.generation.rendering import render_stages as render_stages
+from cns_drake.city.generation.rendering import stage_size as stage_size
+from cns_drake.city.generation.rendering import structures_csv as structures_csv
+from cns_drake.city.generation.rendering import triangles_in as triangles_in
+from cns_drake.city.generation.rendering import world_sdf as world_sdf
 from cns_drake.city.generation.starter import start_city as start_city
 from cns_drake.city.generation.starter import starter_plan as starter_plan
 from cns_drake.city.generation.starter import starter_stages as starter_stages
-from cns_drake.city.generation.world_sdf import world_sdf as world_sdf
 from cns_drake.city.geometry.mesh import Mesh as Mesh
 from cns_drake.city.geometry.mesh import read_mesh as read_mesh
 from cns_drake.city.geometry.models import BoxShape as BoxShape
@@ -56,8 +67,8 @@ from cns_drake.city.geometry.models import SphereShape as SphereShape
 from cns_drake.city.geometry.models import part_mesh as part_mesh
 from cns_drake.city.geometry.models import part_triangles as part_triangles
 from cns_drake.city.geometry.models import triple as triple
-from cns_drake.city.geometry.object_meshes import OBJECT_MESHES as OBJECT_MESHES
 from cns_drake.city.geometry.object_models import HEADROOM as HEADROOM
+from cns_drake.city.geometry.object_models import OBJECT_MESHES as OBJECT_MESHES
 from cns_drake.city.geometry.object_models import ROOT_DEPTH as ROOT_DEPTH
 from cns_drake.city.geometry.object_models import assemble as assemble
 from cns_drake.city.geometry.object_models import bar as bar
@@ -103,29 +114,18 @@ from cns_drake.city.growth.lowering import STOREY as STOREY
 from cns_drake.city.growth.lowering import lowered as lowered
 from cns_drake.city.growth.lowering import top_of as top_of
 from cns_drake.city.placement.draft import Draft as Draft
+from cns_drake.city.placement.draft import name_stem as name_stem
 from cns_drake.city.placement.frontage import lines_along as lines_along
 from cns_drake.city.placement.frontage import lot_at as lot_at
 from cns_drake.city.placement.frontage import station_at as station_at
-from cns_drake.city.placement.naming import name_stem as name_stem
 from cns_drake.city.placement.objects import OBJECTS as OBJECTS
 from cns_drake.city.placement.objects import pick_key as pick_key
 from cns_drake.city.placement.parking import place_car as place_car
-from cns_drake.city.plan.city_plan import BuildingPlan as BuildingPlan
-from cns_drake.city.plan.city_plan import CityPlan as CityPlan
-from cns_drake.city.plan.city_plan import DistrictPlan as DistrictPlan
-from cns_drake.city.plan.city_plan import LinePlan as LinePlan
-from cns_drake.city.plan.city_plan import ObjectPlan as ObjectPlan
-from cns_drake.city.plan.city_plan import ParkingPlan as ParkingPlan
-from cns_drake.city.plan.city_plan import PatchPlan as PatchPlan
-from cns_drake.city.plan.city_plan import RowPlan as RowPlan
-from cns_drake.city.plan.city_plan import ScatterPlan as ScatterPlan
-from cns_drake.city.plan.city_plan import StreetPlan as StreetPlan
-from cns_drake.city.plan.city_plan import load_plan as load_plan
-from cns_drake.city.plan.stages import Growth as Growth
-from cns_drake.city.plan.stages import Stage as Stage
-from cns_drake.city.plan.stages import Stages as Stages
-from cns_drake.city.plan.stages import load_stages as load_stages
-from cns_drake.city.plants.plant_sizes import scaled_plant as scaled_plant
-from cns_drake.city.plants.plant_sizes import younger_plant as younger_plant
-from cns_drake.city.plants.trees import SPECIES as SPECIES
-from cns_drake.city.plants.trees import tree as tree
+from cns_drake.city.plants import SPECIES as SPECIES
+from cns_drake.city.plants import scaled_plant as scaled_plant
+from cns_drake.city.plants import tree as tree
+from cns_drake.city.plants import younger_plant as younger_plant
+from cns_drake.city.stages import Growth as Growth
+from cns_drake.city.stages import Stage as Stage
+from cns_drake.city.stages import Stages as Stages
+from cns_drake.city.stages import load_stages as load_stages

@@ -1,4 +1,8 @@
-"""Imports real cities and road networks as maps with drives."""
+"""Imports of real cities and road networks: a family, one folder a format.
+
+The result is a map with drives. This package is also a wall: it alone needs
+osmium, pyproj and the readers of formats, and it does without Drake.
+"""
 
 from cns_drake.base import attach
 

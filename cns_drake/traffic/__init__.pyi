@@ -1,7 +1,7 @@
 from cns_drake.traffic.ego_car import EgoBox as EgoBox
 from cns_drake.traffic.ego_car import EgoPath as EgoPath
-from cns_drake.traffic.fcd_trace import read_fcd as read_fcd
 from cns_drake.traffic.fcd_traffic import play_trace as play_trace
+from cns_drake.traffic.fcd_traffic import read_fcd as read_fcd
 from cns_drake.traffic.lane_file import LaneFile as LaneFile
 from cns_drake.traffic.lane_file import lane_text as lane_text
 from cns_drake.traffic.lane_file import read_lanes as read_lanes
@@ -18,7 +18,7 @@ from cns_drake.traffic.polylines import SPACING as SPACING
 from cns_drake.traffic.polylines import resampled as resampled
 from cns_drake.traffic.queues import plan_queues as plan_queues
 from cns_drake.traffic.road_lanes import make_lane_graph as make_lane_graph
-from cns_drake.traffic.road_walkways import make_walkways as make_walkways
+from cns_drake.traffic.road_lanes import make_walkways as make_walkways
 from cns_drake.traffic.traffic_motion import WALKER_SIZE as WALKER_SIZE
 from cns_drake.traffic.traffic_motion import TrafficMotion as TrafficMotion
 from cns_drake.traffic.traffic_motion import add_traffic as add_traffic
@@ -28,11 +28,11 @@ from cns_drake.traffic.traffic_motion import (
 )
 from cns_drake.traffic.traffic_plan import TrafficPlan as TrafficPlan
 from cns_drake.traffic.traffic_planning import plan_traffic as plan_traffic
+from cns_drake.traffic.traffic_planning import (
+    room_for_vehicles as room_for_vehicles,
+)
 from cns_drake.traffic.unmarked_crossings import (
     with_unmarked_crossings as with_unmarked_crossings,
-)
-from cns_drake.traffic.vehicle_placement import (
-    room_for_vehicles as room_for_vehicles,
 )
 from cns_drake.traffic.vehicle_records import CURRENT as CURRENT
 from cns_drake.traffic.vehicle_records import VEHICLE as VEHICLE

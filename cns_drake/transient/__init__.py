@@ -1,6 +1,7 @@
-"""Changes between drives: parked cars, leaves, snow, roadworks, height limits.
+"""Changes between drives: a family, one file a cause of change.
 
-The changes are made in a loaded world, before it becomes part of a diagram.
+Parked cars, leaves, snow, roadworks, furniture, scaffolds and height limits are
+changed in a loaded world, before it becomes part of a diagram.
 """
 
 from cns_drake.base import attach

@@ -39,7 +39,7 @@ from helpers import (
 )
 from helpers.fuzz_mutations import mutate_osm
 from helpers.fuzzing import Target
-from helpers.opendrive_fuzzing import read_opendrive, write_opendrive
+from helpers.internal.opendrive_fuzzing import read_opendrive, write_opendrive
 from helpers.small_city import PLAN, ROADS, STAGES
 from helpers.small_cityjson import CityWriter
 from helpers.small_map import box_visual, world_text

@@ -11,6 +11,7 @@ from shapely.ops import unary_union
 
 from cns_drake.base import InputError, value_errors
 from cns_drake.city.buildings import ARCHETYPES
+from cns_drake.city.city_plan import CityPlan, load_plan
 from cns_drake.city.geometry import (
     Structure,
     UpperSides,
@@ -31,7 +32,6 @@ from cns_drake.city.placement.junctions import furnish_junctions
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.placement.open_ground import furnish_district
 from cns_drake.city.placement.parking import park_along_streets
-from cns_drake.city.plan.city_plan import CityPlan, load_plan
 from cns_drake.roads import (
     Areas,
     KerbMap,

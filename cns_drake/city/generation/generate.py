@@ -1,12 +1,29 @@
 """Writes the generated files of a city, or compares them with the folder."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
+import re
+from typing import NamedTuple
 
-from cns_drake.base import InputError, doing, user_errors, write_text
+import numpy as np
+from scipy.spatial import cKDTree
+import yaml
+
+from cns_drake.base import (
+    InputError,
+    MarkedYamlLoader,
+    doing,
+    read_bytes,
+    read_records,
+    read_yaml,
+    to_number,
+    user_errors,
+    write_text,
+)
 from cns_drake.city.generation.city_structures import City, make_city
-from cns_drake.city.generation.renaming import find_renaming, renamed_text
 from cns_drake.city.generation.rendering import render_city
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.scene import (
     MESH_FOLDER,
     STAGES_NAME,
@@ -77,7 +94,7 @@ def _stages_text(
     if not table.exists() and not repair:
         return None
     try:
-        found = find_renaming(stages, table, city.structures)
+        found = _find_renaming(stages, table, city.structures)
     except InputError:
         if repair:
             raise
@@ -103,7 +120,7 @@ def _stages_text(
             f"{stages}: {len(found.lost)} structure(s) have no counterpart, "
             f"such as {found.lost[0]}; take them out, then repair again"
         )
-    return renamed_text(stages, found.renamed) if found.renamed else None
+    return _renamed_text(stages, found.renamed) if found.renamed else None
 
 
 def differing_files(
@@ -135,3 +152,221 @@ def _generated_files(world: Path) -> set[Path]:
         *(world / MESH_FOLDER).glob("*.obj"),
         *world.glob(STRUCTURES_NAME),
     }
+
+
+# A structure that has moved farther than this counts as a new one [m].
+_SAME_PLACE = 0.3
+_COLUMNS = ("name", "class", "x", "y", "tags")
+
+
+class _Renaming(NamedTuple):
+    """How the names in `stages.yaml` must change after a change of the city.
+
+    Attributes:
+        renamed: old name -> new name, for each structure that is still at the
+            same place but has another name now.
+        lost: names of structures that no longer exist at their place, even if
+            another structure now has this name.
+        unclear: patterns that match different structures than before.
+    """
+
+    renamed: dict[str, str]
+    lost: list[str]
+    unclear: list[str]
+
+
+class _Row(NamedTuple):
+    name: str
+    semantic_class: str
+    xy: tuple[float, float]
+    tags: str
+
+    @property
+    def stem(self) -> str:
+        return re.sub(r"_\d+$", "", self.name)
+
+
+def _find_renaming(
+    stages: Path, table: Path, structures: Sequence[Structure]
+) -> _Renaming:
+    """Returns how names in `stages.yaml` must change for the current city.
+
+    A structure of the earlier city and a structure of the current city count as
+    the same structure if both are of the same kind and at the same place.
+
+    Args:
+        stages: the file `stages.yaml`.
+        table: the file `structures.csv` of the earlier city, for which `stages`
+            was written.
+        structures: the structures of the current city.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
+    before = {row.name: row for row in _read_rows(table)}
+    today = [
+        _Row(one.name, one.semantic_class, one.xyz[:2], " ".join(one.tags))
+        for one in structures
+    ]
+    successor = _successors(list(before.values()), today)
+    names = {row.name for row in today}
+    renamed: dict[str, str] = {}
+    lost: list[str] = []
+    unclear: list[str] = []
+    for name in dict.fromkeys(node.value for node in _name_nodes(stages)):
+        if "*" in name or "?" in name:
+            if _has_changed(name, before, names, successor):
+                unclear.append(name)
+        elif name not in before:
+            # The name is new or misspelt. Generating the stages reports
+            # misspelt names.
+            continue
+        elif name not in successor:
+            lost.append(name)
+        elif successor[name] != name:
+            renamed[name] = successor[name]
+    return _Renaming(renamed, lost, unclear)
+
+
+def _renamed_text(stages: Path, renamed: Mapping[str, str]) -> str:
+    """Returns the text of `stages.yaml` with structures renamed.
+
+    Comments and order stay unchanged. `renamed` maps old names to new names.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    text = _read_text(stages)
+    nodes = _name_nodes(stages)
+    for node in sorted(nodes, key=lambda node: -node.start_mark.index):
+        if node.value in renamed:
+            start, end = node.start_mark.index, node.end_mark.index
+            # The scalar may have an anchor in front of it.
+            head, _, tail = text[start:end].rpartition(node.value)
+            new = head + renamed[node.value] + tail
+            text = text[:start] + new + text[end:]
+    return text
+
+
+def _read_text(path: Path) -> str:
+    try:
+        return read_bytes(path).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8") from error
+
+
+def _name_nodes(path: Path) -> list[yaml.ScalarNode]:
+    """Returns the YAML scalars in a file of stages that name structures."""
+    read_yaml(path)  # Errors in one line.
+    # Only this slower loader records where in the text a node is.
+    root = yaml.compose(_read_text(path), MarkedYamlLoader)
+    lists = [
+        node
+        for _, stage in _items(root, "stages")
+        for node in (
+            *(group for _, group in _items(stage, "absent")),
+            *(
+                part
+                for kind in ("lower", "sites")
+                for _, growth in _items(stage, kind)
+                for key, part in _pairs(growth)
+                if key in ("structures", "but")
+            ),
+        )
+    ]
+    lists += [node for _, node in _items(root, "lots")]
+    # A node that aliases refer to several times is replaced only once.
+    scalars = {
+        id(node): node
+        for group in lists
+        if isinstance(group, yaml.SequenceNode)
+        for node in group.value
+        if isinstance(node, yaml.ScalarNode)
+    }
+    return list(scalars.values())
+
+
+def _items(node: yaml.Node | None, key: str) -> list[tuple[str, yaml.Node]]:
+    """Returns key and value of each pair in the mapping under a key."""
+    return [
+        pair
+        for name, value in _pairs(node)
+        if name == key
+        for pair in _pairs(value)
+    ]
+
+
+def _pairs(node: yaml.Node | None) -> list[tuple[str, yaml.Node]]:
+    """Returns the pairs of a mapping, and pairs that `<<` merges into it."""
+    if not isinstance(node, yaml.MappingNode):
+        return []
+    pairs = []
+    for key, value in node.value:
+        if key.value == "<<":
+            merged = (
+                value.value if isinstance(value, yaml.SequenceNode) else [value]
+            )
+            pairs += [pair for part in merged for pair in _pairs(part)]
+        else:
+            pairs.append((key.value, value))
+    return pairs
+
+
+def _has_changed(
+    pattern: str,
+    before: Iterable[str],
+    today: Iterable[str],
+    successor: Mapping[str, str],
+) -> bool:
+    """Returns whether a pattern now matches other structures than before.
+
+    Structures that are new or lost do not count.
+    """
+    meant = {
+        successor[name]
+        for name in before
+        if name in successor and fnmatchcase(name, pattern)
+    }
+    known = set(successor.values())
+    return meant != {
+        name for name in today if name in known and fnmatchcase(name, pattern)
+    }
+
+
+def _read_rows(table: Path) -> list[_Row]:
+    rows = []
+    for line, row in read_records(table, _COLUMNS):
+        xy = to_number(row["x"]), to_number(row["y"])
+        if not np.isfinite(xy).all():
+            raise InputError(f"{table}: line {line}: no finite x and y")
+        rows.append(_Row(row["name"], row["class"], xy, row["tags"]))
+    return rows
+
+
+def _successors(
+    before: Sequence[_Row], today: Sequence[_Row]
+) -> dict[str, str]:
+    """Maps old names to new names of structures that have not moved."""
+    if not before or not today:
+        return {}
+    tree = cKDTree([row.xy for row in today])
+    pairs = []
+    for row in before:
+        for k in tree.query_ball_point(row.xy, _SAME_PLACE):
+            other = today[k]
+            # Usually there is one structure of a kind at a place. If there are
+            # two, such as the grounds of two districts, their names decide.
+            if (
+                row.stem == other.stem
+                and row.semantic_class == other.semantic_class
+            ):
+                gap = float(np.hypot(*np.subtract(row.xy, other.xy)))
+                unlike = (row.name != other.name, row.tags != other.tags)
+                pairs.append((gap > 0.01, unlike, gap, row.name, other.name))
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for *_, old, new in sorted(pairs):
+        if old not in found and new not in taken:
+            found[old] = new
+            taken.add(new)
+    return found

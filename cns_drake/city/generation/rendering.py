@@ -1,19 +1,21 @@
 """Renders the stages, meshes and table of structures of a city as texts."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
 
 from cns_drake.base import InputError, csv_text, doing
 from cns_drake.city.generation.city_structures import City
-from cns_drake.city.generation.stage_sizes import stage_size, triangles_in
-from cns_drake.city.generation.world_sdf import world_sdf
 from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.models import MeshShape
+from cns_drake.city.geometry.models import BoxShape, MeshShape, Part, Shape
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.growth.stage_structures import GrowingCity
-from cns_drake.city.plan.stages import Stages, load_stages
+from cns_drake.city.stages import Stages, load_stages
 from cns_drake.scene import (
+    CLASS_RGB,
     MAX_INSTANCE,
     MESH_FOLDER,
     STAGES_NAME,
@@ -171,3 +173,129 @@ def _mesh_texts(structures: Sequence[Structure]) -> dict[str, str]:
     shapes = [part.shape for one in structures for part in one.model.parts]
     names = {shape.mesh for shape in shapes if isinstance(shape, MeshShape)}
     return {name: meshes[name].to_obj() for name in sorted(names)}
+
+
+# Triangles of a box.
+_OF_BOX = 12
+
+
+def triangles_in(obj: str) -> int:
+    """Returns the number of triangles in the text of an OBJ file."""
+    faces = obj[obj.find("\nf ") :]
+    # A face with three corners has three spaces; each further corner adds one.
+    return faces.count(" ") - 2 * faces.count("f")
+
+
+def count_triangles(
+    shapes: Iterable[Shape], triangles: Mapping[str, int]
+) -> int:
+    """Returns how many triangles LiDARs see in shapes.
+
+    Cylinders and spheres have no triangles.
+
+    Args:
+        shapes: the shapes.
+        triangles: name of a mesh -> number of triangles in its file.
+    """
+    return sum(
+        triangles[shape.mesh]
+        if isinstance(shape, MeshShape)
+        else _OF_BOX * isinstance(shape, BoxShape)
+        for shape in shapes
+    )
+
+
+def stage_size(
+    structures: Iterable[Structure], triangles: Mapping[str, int]
+) -> tuple[int, int]:
+    """Returns the numbers of structures and of triangles in a stage.
+
+    Only structures with a surface count. `triangles` is as for
+    `count_triangles`.
+    """
+    parts = [one.model.parts for one in structures if one.model.parts]
+    shapes = (part.shape for some in parts for part in some)
+    return len(parts), count_triangles(shapes, triangles)
+
+
+# Paths of meshes are relative to the SDF file. A stage therefore needs no
+# package map, wherever the world's folder is.
+def world_sdf(
+    world: str,
+    structures: Iterable[Structure],
+    *,
+    comment: str,
+    before: Iterable[str] = (),
+) -> str:
+    """Returns the SDF of a world: all structures as visuals of one static link.
+
+    Drake parses a static scene fastest in this form. A visual is named
+    `<structure>/<part>`. There is no collision geometry.
+
+    Args:
+        world: name of the world.
+        structures: the structures.
+        comment: a line about the world for readers of the file.
+        before: SDF texts of further visuals, which come first.
+    """
+    lines = [
+        '<?xml version="1.0"?>',
+        f"<!-- {comment.replace('--', '-')} -->",
+        '<sdf version="1.9">',
+        f"<world name={quoteattr(world)}>",
+        f"<model name={quoteattr(world)}>",
+        "<static>true</static>",
+        '<link name="city">',
+        *before,
+    ]
+    for structure in structures:
+        lines.extend(_visual(structure, part) for part in structure.model.parts)
+    lines += ["</link>", "</model>", "</world>", "</sdf>", ""]
+    return "\n".join(lines)
+
+
+def _visual(structure: Structure, part: Part) -> str:
+    rgb = part.rgb or CLASS_RGB[structure.semantic_class]
+    diffuse = " ".join(_number_text(value, 3) for value in (*rgb, 1.0))
+    return (
+        f"<visual name={quoteattr(f'{structure.name}/{part.name}')}>"
+        f"<pose>{_pose(structure, part)}</pose>"
+        f"<geometry>{_geometry(part.shape)}</geometry>"
+        f"<material><diffuse>{diffuse}</diffuse></material>"
+        "</visual>"
+    )
+
+
+def _pose(structure: Structure, part: Part) -> str:
+    """Returns the pose X_WP of a part as SDF text: `x y z roll pitch yaw`.
+
+    SDF's roll-pitch-yaw is Rz(yaw) Ry(pitch) Rx(roll). A structure only turns
+    about z, so R_WP = R_WS R_SP only adds the structure's yaw.
+    """
+    roll, pitch, yaw = part.rpy
+    angles = (roll, pitch, yaw + structure.yaw)
+    return " ".join(
+        [_number_text(v, 3) for v in structure.p_WP(part.xyz)]
+        + [_number_text(v, 5) for v in angles]
+    )
+
+
+def _geometry(shape: Shape) -> str:
+    if isinstance(shape, MeshShape):
+        uri = f"<uri>{MESH_FOLDER}/{shape.mesh}.obj</uri>"
+        if shape.scale == (1.0, 1.0, 1.0):
+            return f"<mesh>{uri}</mesh>"
+        scale = " ".join(_number_text(value, 5) for value in shape.scale)
+        return f"<mesh>{uri}<scale>{scale}</scale></mesh>"
+    tag = type(shape).__name__.removesuffix("Shape").lower()
+    sizes = [
+        (name, " ".join(_number_text(v, 3) for v in np.atleast_1d(value)))
+        for name, value in vars(shape).items()
+    ]
+    inner = "".join(f"<{name}>{size}</{name}>" for name, size in sizes)
+    return f"<{tag}>{inner}</{tag}>"
+
+
+def _number_text(value: float, decimals: int) -> str:
+    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text

@@ -17,9 +17,9 @@ from shapely.ops import unary_union
 import yaml
 
 from cns_drake.base import complete_part, parse_yaml, write_part
+from cns_drake.city.city_plan import CityPlan, load_plan
 from cns_drake.city.generation.city_structures import City, lay_out
 from cns_drake.city.geometry.polygons import polygons_of, snap
-from cns_drake.city.plan.city_plan import CityPlan, load_plan
 from cns_drake.roads import Areas, RoadNetwork, draw_route, load_road_network
 from cns_drake.scene import STAGES_NAME, MapFolder
 
@@ -112,7 +112,7 @@ def starter_plan(areas: Areas, seed: int) -> dict:
     """Returns a plan with a kind of district for each block between roads.
 
     Districts such as an old town or offices are assigned at random. The result
-    has the fields of `cns_drake.city.plan.city_plan.CityPlan`.
+    has the fields of `cns_drake.city.city_plan.CityPlan`.
 
     Args:
         areas: areas of the streets, in W [m].
@@ -160,7 +160,7 @@ def starter_plan(areas: Areas, seed: int) -> dict:
 def starter_stages(city: City, missing: float = _MISSING) -> dict:
     """Returns two stages; the first lacks buildings and trees in the east.
 
-    The result has the fields of `cns_drake.city.plan.stages.Stages`.
+    The result has the fields of `cns_drake.city.stages.Stages`.
 
     Args:
         city: the whole city.

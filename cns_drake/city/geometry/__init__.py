@@ -14,14 +14,15 @@ from cns_drake.city.geometry.models import (
     part_triangles,
     triple,
 )
-from cns_drake.city.geometry.object_meshes import OBJECT_MESHES, object_mesh
 from cns_drake.city.geometry.object_models import (
+    OBJECT_MESHES,
     Builder,
     assemble,
     bar,
     block,
     in_a_row,
     mesh_part,
+    object_mesh,
     pillar,
     post,
 )

@@ -3,13 +3,14 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import inspect
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from shapely.geometry import Polygon
 
-from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.mesh import Mesh, read_mesh
 from cns_drake.city.geometry.models import (
     BoxShape,
     CylinderShape,
@@ -19,7 +20,6 @@ from cns_drake.city.geometry.models import (
     part_mesh,
     triple,
 )
-from cns_drake.city.geometry.object_meshes import object_mesh
 from cns_drake.city.geometry.polygons import hull_of
 
 # Posts and trunks reach this far into the ground, so that no gap shows where
@@ -245,3 +245,15 @@ def ground_footprint(
     # machines.
     hull = hull_of(np.round(np.concatenate(corners), 3))
     return hull.buffer(_FOOTPRINT_MARGIN, join_style="mitre")
+
+
+OBJECT_MESHES = Path(__file__).parents[1] / "object_meshes"
+
+
+def object_mesh(name: str) -> Mesh:
+    """Returns a mesh of the folder `object_meshes`, by its name.
+
+    Raises:
+        FileNotFoundError: there is no such mesh.
+    """
+    return read_mesh(OBJECT_MESHES / f"{name}.obj")

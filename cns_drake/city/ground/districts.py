@@ -8,9 +8,9 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from cns_drake.base import InputError
+from cns_drake.city.city_plan import CityPlan, DistrictPlan, PatchPlan
 from cns_drake.city.geometry.polygons import polygons_of, snap
 from cns_drake.city.ground.elevation import Pad
-from cns_drake.city.plan.city_plan import CityPlan, DistrictPlan, PatchPlan
 
 
 class District(NamedTuple):

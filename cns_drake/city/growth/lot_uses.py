@@ -11,7 +11,7 @@ from cns_drake.base import parse_yaml
 from cns_drake.city.geometry import Occupancy, Structure
 from cns_drake.city.geometry.rectangles import largest_rectangle
 from cns_drake.city.placement.objects import OBJECTS, pick_key
-from cns_drake.city.plan.stages import LotUse
+from cns_drake.city.stages import LotUse
 
 # Distance of objects from the edges of the lot, where the neighbours stand [m].
 _MARGIN = 0.8

@@ -15,8 +15,8 @@ from cns_drake.city.geometry import Structure
 from cns_drake.city.growth.building_sites import building_site
 from cns_drake.city.growth.lot_uses import lot_objects, use_by_size
 from cns_drake.city.growth.lowering import lowered
-from cns_drake.city.plan.stages import Stages
-from cns_drake.city.plants.plant_sizes import younger_plant
+from cns_drake.city.plants import younger_plant
+from cns_drake.city.stages import Stages
 
 
 class GrowingCity:

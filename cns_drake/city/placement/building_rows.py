@@ -10,12 +10,12 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base import InputError, value_errors
 from cns_drake.city.buildings import ARCHETYPES, sample
+from cns_drake.city.city_plan import BuildingPlan, RowPlan
 from cns_drake.city.facades.site import Site
 from cns_drake.city.geometry import Structure, placed
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Lot, lines_along, lot_at
-from cns_drake.city.plan.city_plan import BuildingPlan, RowPlan
 
 # Neighbours closer than this get blank walls on the sides that face each other.
 # It leaves room for the eaves and balconies of both [m].

@@ -15,7 +15,7 @@ from cns_drake.city.furniture.street_lights import STREET_LIGHTS
 from cns_drake.city.furniture.traffic_signals import TRAFFIC_SIGNALS
 from cns_drake.city.furniture.traffic_signs import TRAFFIC_SIGNS
 from cns_drake.city.geometry.object_models import Builder
-from cns_drake.city.plants.trees import TREES
+from cns_drake.city.plants import TREES
 
 
 def pick_key(weights: Mapping[str, float], rng: np.random.Generator) -> str:

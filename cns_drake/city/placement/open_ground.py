@@ -10,16 +10,16 @@ from shapely.geometry import LineString, Polygon
 from shapely.ops import unary_union
 
 from cns_drake.base import InputError
+from cns_drake.city.city_plan import (
+    LinePlan,
+    ObjectPlan,
+    ScatterPlan,
+)
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import station_at
 from cns_drake.city.placement.objects import OBJECTS, pick_key
 from cns_drake.city.placement.parking import park_in_bays
-from cns_drake.city.plan.city_plan import (
-    LinePlan,
-    ObjectPlan,
-    ScatterPlan,
-)
 
 # Least distance between two objects [m].
 _CLEARANCE = 0.15

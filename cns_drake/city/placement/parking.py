@@ -7,9 +7,9 @@ import numpy as np
 from numpy.random import Generator
 import shapely
 
+from cns_drake.city.city_plan import ParkingPlan
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.objects import OBJECTS, pick_key
-from cns_drake.city.plan.city_plan import ParkingPlan
 from cns_drake.roads import RoadNetwork
 
 # Length of a parking bay along the street, least and greatest [m].

@@ -9,11 +9,11 @@ import shapely
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.city.city_plan import StreetPlan
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Station, lines_along, station_at
 from cns_drake.city.placement.objects import OBJECTS, pick_key
-from cns_drake.city.plan.city_plan import StreetPlan
 
 # Distance from the kerb to an object's nearest point [m].
 _FROM_KERB_OF = {"lamp": 0.45, "tree": 0.9, "furniture": 0.6}

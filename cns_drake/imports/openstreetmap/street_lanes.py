@@ -1,4 +1,7 @@
-"""Lanes for traffic on OpenStreetMap streets, and ways through junctions."""
+"""Lanes for traffic on OpenStreetMap streets, and ways through junctions.
+
+Tags: https://wiki.openstreetmap.org/wiki/Key:lanes
+"""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,7 +17,9 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base import length_of, wrapped
-from cns_drake.imports.openstreetmap import lane_tags, speed_tags
+from cns_drake.imports.openstreetmap import speed_tags
+from cns_drake.imports.openstreetmap.tags import count, tag_value
+from cns_drake.imports.openstreetmap.way_tags import driven_directions
 from cns_drake.imports.streets import SHARPEST_TURN_DEG, Street, cut_at_nodes
 from cns_drake.roads import STRAIGHT_LIMIT_DEG, blend
 from cns_drake.traffic import SPACING, DirectedLane
@@ -45,6 +50,86 @@ _LEAST_SINE = 0.1
 _Arm = tuple[int, int]
 
 
+# Least width of a lane that carries vehicles [m].
+_LEAST_LANE_WIDTH = 2.75
+# Greatest width that drivers use per lane if the file gives no number of lanes
+# [m].
+_USED_LANE_WIDTH = 3.25
+# Width of street per lane if the file gives no number of lanes [m].
+_USUAL_LANE_WIDTH = 3.5
+_MOST_LANES = 8
+
+
+class _LaneLayout(NamedTuple):
+    """The lanes of a street.
+
+    Attributes:
+        forward: number of lanes in the direction of the street's line.
+        backward: number of lanes in the opposite direction.
+        width: width of each lane [m].
+        total: number of all lanes, including the empty lanes in the middle
+            that belong to neither direction.
+    """
+
+    forward: int
+    backward: int
+    width: float
+    total: int
+
+    def offset(self, is_forward: bool, number: int) -> float:
+        """Returns the distance of a lane from the middle of the street [m].
+
+        Seen in the lane's direction, the distance is positive to the right if
+        traffic drives on the right, and to the left if it drives on the left.
+
+        Args:
+            is_forward: whether the lane is in the direction of the street's
+                line.
+            number: number of the lane in this direction; 0 is the innermost
+                lane.
+        """
+        same = self.forward if is_forward else self.backward
+        return self.width * (number + (1 + self.total) / 2.0 - same)
+
+
+def lane_layout(tags: Mapping[str, str], width: float) -> _LaneLayout:
+    """Returns the lanes of a street, from its tags.
+
+    There are no lanes if cars may not use the street, or if it is too narrow.
+    `width` is the width of the carriageway [m].
+    """
+    is_along, is_against = driven_directions(tags)
+    directions = is_along + is_against
+    most = int(width / _LEAST_LANE_WIDTH)
+    if directions == 0 or most < directions:
+        return _LaneLayout(0, 0, 0.0, 0)
+
+    def number(key: str) -> int | None:
+        value = tag_value(tags, key, count, _MOST_LANES, None, 1.0)
+        return None if value is None else int(value)
+
+    tagged = number("lanes")
+    total = tagged or directions * int(
+        max(1.0, width / directions / _USUAL_LANE_WIDTH)
+    )
+    if directions == 1:
+        forward = min(total, most) * is_along
+        backward = min(total, most) * is_against
+    else:
+        # A middle lane for both directions stays empty.
+        there, back = number("lanes:forward"), number("lanes:backward")
+        forward = there or max(1, total - back if back else total // 2)
+        backward = back or max(1, total - there if there else total // 2)
+        while forward + backward > most:
+            if forward >= backward:
+                forward -= 1
+            else:
+                backward -= 1
+    total = max(forward + backward, min(tagged or 0, most))
+    most_used = width if tagged == total else _USED_LANE_WIDTH
+    return _LaneLayout(forward, backward, min(most_used, width / total), total)
+
+
 @dataclass(frozen=True)
 class Stretch:
     """A street between two junctions, with its lanes.
@@ -60,7 +145,7 @@ class Stretch:
     street: Street
     line: np.ndarray
     nodes: tuple[int, int]
-    layout: lane_tags.LaneLayout
+    layout: _LaneLayout
 
     @cached_property
     def length(self) -> float:
@@ -237,11 +322,11 @@ class _MeetingStreets:
         """Yields the lanes of all stretches."""
         for number, stretch in enumerate(self.stretches):
             middle, tangent = self._between_setbacks(number)
-            for is_forward, count in (
+            for is_forward, num_lanes in (
                 (True, stretch.layout.forward),
                 (False, stretch.layout.backward),
             ):
-                for nth in range(count):
+                for nth in range(num_lanes):
                     offset = stretch.layout.offset(is_forward, nth)
                     offset *= self.side * (1.0 if is_forward else -1.0)
                     points = _line_beside(middle, tangent, offset)
@@ -350,7 +435,7 @@ def _stretches(
         street
         for street in streets
         if street.tags.get("highway") != "track"
-        and lane_tags.lane_layout(street.tags, street.width).width
+        and lane_layout(street.tags, street.width).width
     ]
     for piece in cut_at_nodes(used, crossed):
         street = piece.street
@@ -360,7 +445,7 @@ def _stretches(
                 street,
                 _rounded_line(line, _ROUNDED_OVER),
                 piece.nodes,
-                lane_tags.lane_layout(street.tags, street.width),
+                lane_layout(street.tags, street.width),
             )
 
 
@@ -394,12 +479,12 @@ def _rounded_line(line: shapely.LineString, window_length: float) -> np.ndarray:
 
     `window_length` is the length of the running mean that rounds corners [m].
     """
-    count = max(3, round(line.length / SPACING) + 1)
-    places = np.linspace(0.0, 1.0, count)
+    num_points = max(3, round(line.length / SPACING) + 1)
+    places = np.linspace(0.0, 1.0, num_points)
     points = shapely.get_coordinates(
         shapely.line_interpolate_point(line, places, normalized=True)
     )
-    window = min(int(window_length / SPACING), count // 3) // 2 * 2 + 1
+    window = min(int(window_length / SPACING), num_points // 3) // 2 * 2 + 1
     reach = window // 2
     # Mirrored at both ends, so that these stay in place.
     longer = np.concatenate(
@@ -410,7 +495,7 @@ def _rounded_line(line: shapely.LineString, window_length: float) -> np.ndarray:
         ]
     )
     smooth = uniform_filter1d(longer, window, axis=0)
-    return smooth[reach : reach + count]
+    return smooth[reach : reach + num_points]
 
 
 def _outer_neighbours(lanes: Sequence[_Lane]) -> Mapping[int, int]:

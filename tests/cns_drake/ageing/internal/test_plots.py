@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.ageing.new_buildings import new_building
+from cns_drake.ageing.buildings import new_building
 from cns_drake.ageing.plots import Plot
 
 

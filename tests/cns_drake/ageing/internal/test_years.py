@@ -3,7 +3,7 @@
 import pytest
 
 from cns_drake.ageing import LAST_YEAR
-from cns_drake.ageing.years import check_years
+from cns_drake.ageing.aged_map import check_years
 from cns_drake.base import InputError
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from cns_drake.city import OBJECTS, MeshShape
 from cns_drake.city.furniture.fences import FENCE_KINDS
-from cns_drake.city.geometry.object_meshes import object_mesh
+from cns_drake.city.geometry.object_models import object_mesh
 
 LENGTHS = (1.3, 5.0, 12.4, 37.0)
 

@@ -29,7 +29,7 @@ from cns_drake.city import (
 from cns_drake.city.geometry.mesh import box_mesh
 from cns_drake.city.growth.lowering import cut_at, enclosed
 from cns_drake.city.growth.stage_structures import GrowingCity
-from cns_drake.city.plan.stages import LotUse
+from cns_drake.city.stages import LotUse
 
 # Height of the walls that the edge of the roof covers [m].
 BAND = 0.51

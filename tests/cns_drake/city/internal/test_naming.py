@@ -1,5 +1,5 @@
 from cns_drake.city import name_stem
-from cns_drake.city.placement.naming import NameCounter
+from cns_drake.city.placement.draft import NameCounter
 
 
 def test_each_kind_has_numbers_of_its_own():

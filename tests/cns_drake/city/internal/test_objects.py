@@ -14,7 +14,7 @@ from cns_drake.city import (
     part_mesh,
 )
 from cns_drake.city.furniture.fences import FENCE_KINDS
-from cns_drake.city.geometry.object_meshes import object_mesh
+from cns_drake.city.geometry.object_models import object_mesh
 from cns_drake.scene import CLASS_IDS
 
 SEEDS = range(6)

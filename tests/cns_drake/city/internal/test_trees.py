@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cns_drake.city import OBJECTS, SPECIES, MeshShape
-from cns_drake.city.geometry.object_meshes import object_mesh
-from cns_drake.city.plants.trees import mesh_names
+from cns_drake.city.geometry.object_models import object_mesh
+from cns_drake.city.plants import mesh_names
 
 VARIANTS = [
     (name, variant)

@@ -16,7 +16,6 @@ import yaml
 from cns_drake.city import Assembly, Finish, Site, UpperSides, part_triangles
 from cns_drake.command_line import app
 from cns_drake.imports import (
-    ImportFaults,
     ImportOptions,
     import_cityjson,
     import_openstreetmap,
@@ -31,6 +30,7 @@ from cns_drake.imports.dressing.styles import (
 )
 from cns_drake.imports.dressing.wall_panels import find_panels, is_upright
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.ground import ground_of
 from cns_drake.imports.grown_city import grow
 from cns_drake.imports.solids import extruded

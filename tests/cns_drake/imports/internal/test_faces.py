@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.imports import ImportFaults
 from cns_drake.imports.faces import face_triangles
+from cns_drake.imports.faults import ImportFaults
 
 # An L with a square hole, counter-clockwise; 12 - 1 = 11 m^2.
 OUTER = [(0, 0), (4, 0), (4, 2), (2, 2), (2, 4), (0, 4)]

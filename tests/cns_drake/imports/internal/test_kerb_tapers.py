@@ -6,14 +6,13 @@ import pytest
 import shapely
 from shapely.geometry import LineString, Polygon, box
 
-from cns_drake.imports import (
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive.imported_streets import (
     ImportedStreets,
-    ImportFaults,
-    lane_bands,
-    read_roads,
+    kerb_tapers,
 )
-from cns_drake.imports.opendrive.kerb_tapers import kerb_tapers
-from cns_drake.imports.opendrive.lanes import lane_polygon
+from cns_drake.imports.opendrive.lanes import lane_bands, lane_polygon
+from cns_drake.imports.opendrive.road_reader import read_roads
 
 LANES = (lane(1, "driving", 3.5), lane(-1, "driving", 3.5))
 WITH_SHOULDERS = (

@@ -20,14 +20,12 @@ from scipy.special import fresnel
 import shapely
 from shapely.geometry import LineString, Polygon
 
-from cns_drake.imports import (
-    ImportedStreets,
-    ImportFaults,
-    lane_bands,
-    read_roads,
-)
+from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.curves import Arc, Cubic, Spiral
+from cns_drake.imports.opendrive.imported_streets import ImportedStreets
+from cns_drake.imports.opendrive.lanes import lane_bands
 from cns_drake.imports.opendrive.road_heights import RoadHeights
+from cns_drake.imports.opendrive.road_reader import read_roads
 
 # All kinds of curves, one after the other.
 SHAPES = [

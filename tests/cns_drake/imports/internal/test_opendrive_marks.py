@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.imports import (
-    ImportFaults,
-    ImportOptions,
-    lane_bands,
-    read_roads,
-)
+from cns_drake.imports import ImportOptions
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive.lanes import lane_bands
 from cns_drake.imports.opendrive.road_marks import road_marks
+from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town
 
 RADIUS = 50.0

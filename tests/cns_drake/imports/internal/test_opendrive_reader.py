@@ -16,12 +16,10 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.imports import (
-    ImportFaults,
-    ImportOptions,
-    lane_bands,
-    read_roads,
-)
+from cns_drake.imports import ImportOptions
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive.lanes import lane_bands
+from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town
 
 LINE = geometry(0.0, 0.0, 0.0, 0.0, 50.0, "<line/>")

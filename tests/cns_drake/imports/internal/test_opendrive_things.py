@@ -9,15 +9,12 @@ import shapely
 from shapely.geometry import LineString, box
 
 from cns_drake.base import InputError
-from cns_drake.imports import (
-    ImportFaults,
-    ImportOptions,
-    lane_bands,
-    read_roads,
-    split_levels,
-    thing_structures,
-)
-from cns_drake.imports.opendrive.town import build_town
+from cns_drake.imports import ImportOptions
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive.lanes import lane_bands
+from cns_drake.imports.opendrive.road_reader import read_roads
+from cns_drake.imports.opendrive.things import thing_structures
+from cns_drake.imports.opendrive.town import build_town, split_levels
 
 SIGNS = """<signals>
 <signal id="1" s="20" t="-6" zOffset="2" type="206" dynamic="no"

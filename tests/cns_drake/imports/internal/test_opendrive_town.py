@@ -23,19 +23,15 @@ import yaml
 from cns_drake.base import InputError
 from cns_drake.city import UpperSides, ground_triangles
 from cns_drake.command_line import app
-from cns_drake.imports import (
-    REPORT_NAME,
-    BandGraph,
-    ImportedStreets,
-    ImportFaults,
-    ImportOptions,
-    find_drives,
-    lane_bands,
-    read_roads,
-)
+from cns_drake.imports import REPORT_NAME, ImportOptions
+from cns_drake.imports.drives.search import find_drives
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
-from cns_drake.imports.opendrive.lanes import lane_polygon
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive.band_graph import BandGraph
+from cns_drake.imports.opendrive.imported_streets import ImportedStreets
+from cns_drake.imports.opendrive.lanes import lane_bands, lane_polygon
 from cns_drake.imports.opendrive.road_heights import KerbHeights, RoadHeights
+from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town, lane_text_of_bands
 from cns_drake.imports.opendrive.town_files import write_town
 from cns_drake.scenarios import load_scenario, plan_drive, write_table

@@ -10,12 +10,8 @@ import pytest
 from shapely.geometry import Polygon
 
 from cns_drake.base import InputError
-from cns_drake.imports import (
-    ImportFaults,
-    ImportOptions,
-    import_city,
-    import_openstreetmap,
-)
+from cns_drake.imports import ImportOptions, import_city, import_openstreetmap
+from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.solids import extruded
 

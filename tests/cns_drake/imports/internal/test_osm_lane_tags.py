@@ -2,8 +2,8 @@
 
 import pytest
 
-from cns_drake.imports.openstreetmap.lane_tags import lane_layout
 from cns_drake.imports.openstreetmap.speed_tags import speed_limit
+from cns_drake.imports.openstreetmap.street_lanes import lane_layout
 
 
 def tags(**values):

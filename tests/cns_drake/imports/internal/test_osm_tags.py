@@ -4,7 +4,7 @@ from helpers.imported_osm import import_osm
 from helpers.small_osm import OsmWriter
 import pytest
 
-from cns_drake.imports import ImportFaults
+from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.building_tags import heights, why_absent
 from cns_drake.imports.openstreetmap.tags import count, length
 from cns_drake.imports.openstreetmap.way_tags import (

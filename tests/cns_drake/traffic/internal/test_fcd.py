@@ -11,7 +11,7 @@ from cns_drake.traffic import (
     EgoBox,
     LaneGraph,
     Piece,
-    fcd_trace,
+    fcd_traffic,
     play_trace,
     read_fcd,
 )
@@ -288,7 +288,7 @@ def test_what_jumps_is_absent_meanwhile(tmp_path, tag, kind, fastest, dt):
 
 
 def test_a_trace_of_jumps_has_other_units(tmp_path, monkeypatch):
-    monkeypatch.setattr(fcd_trace, "_MOST_JUMPS", 3)
+    monkeypatch.setattr(fcd_traffic, "_MOST_JUMPS", 3)
     for number in (4, 5):
         xs = [1000.0 * k for k in range(number)]
         path = write_moves(tmp_path / "a.xml", "vehicle", "", 1.0, xs)

@@ -9,8 +9,8 @@ from cns_drake.traffic.lane_changes import change_lanes
 from cns_drake.traffic.occupants import find_ahead, find_occupants
 from cns_drake.traffic.random_numbers import uniform
 from cns_drake.traffic.streets import make_streets
+from cns_drake.traffic.traffic_planning import place_vehicles
 from cns_drake.traffic.vehicle_kinds import KINDS, STANDSTILL_GAP
-from cns_drake.traffic.vehicle_placement import place_vehicles
 from cns_drake.traffic.vehicle_records import CROSSING, begin_traffic
 from cns_drake.traffic.vehicle_steps import choose_way
 

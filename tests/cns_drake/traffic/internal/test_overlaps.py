@@ -5,7 +5,7 @@ import shapely
 
 from cns_drake.traffic import find_overlaps
 from cns_drake.traffic.overlaps import boxes_overlap
-from cns_drake.traffic.traffic_trial import whom_to_leave_out
+from cns_drake.traffic.traffic_planning import whom_to_leave_out
 
 
 def _polygon(pose, half):

@@ -9,7 +9,7 @@ from cns_drake.roads import load_road_network
 from cns_drake.scenarios import shipped_maps
 from cns_drake.traffic import LaneGraph, Piece, make_lane_graph
 from cns_drake.traffic.conflicts import find_conflicts
-from cns_drake.traffic.signals import make_signals
+from cns_drake.traffic.streets import make_signals
 from cns_drake.traffic.traffic_flow import way_shares
 
 AHEAD = np.array([0.8, 0.6, 0.0])

@@ -25,7 +25,7 @@ from cns_drake.traffic import (
     traffic_planning,
 )
 from cns_drake.traffic.conflicts import find_conflicts
-from cns_drake.traffic.traffic_trial import Trial
+from cns_drake.traffic.traffic_planning import Trial
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
 from cns_drake.traffic.vehicle_records import make_crossings
 from cns_drake.traffic.walkers import Crowd

@@ -10,7 +10,7 @@ from cns_drake.traffic.car_following import (
     interaction,
 )
 from cns_drake.traffic.streets import PIECE, Streets
-from cns_drake.traffic.traffic_trial import vehicle_poses
+from cns_drake.traffic.traffic_planning import vehicle_poses
 from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
 
 # Wanted speed [m/s], headway [s], acceleration and deceleration [m/s^2].

@@ -3,16 +3,14 @@
 from pathlib import Path
 
 from cns_drake.base import InputError
-from cns_drake.imports import (
-    BandGraph,
-    ImportedStreets,
-    ImportFaults,
-    find_drives,
-    lane_bands,
-    read_roads,
-    split_levels,
-    thing_structures,
-)
+from cns_drake.imports.drives.search import find_drives
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive.band_graph import BandGraph
+from cns_drake.imports.opendrive.imported_streets import ImportedStreets
+from cns_drake.imports.opendrive.lanes import lane_bands
+from cns_drake.imports.opendrive.road_reader import read_roads
+from cns_drake.imports.opendrive.things import thing_structures
+from cns_drake.imports.opendrive.town import split_levels
 from helpers.small_opendrive import (
     TWO_LANES,
     cubic,

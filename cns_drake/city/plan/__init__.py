@@ -1,1 +1,0 @@
-"""The inputs of a city: its districts and its stages."""
