@@ -37,6 +37,7 @@ from evaluation.results import (
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine, made_tasks
+from evaluation.study.place_measurements import PlaceComparison
 from evaluation.study.recorded_city import ShownCity, add_city
 from evaluation.study.recordings import STAGES_FILE
 from evaluation.study.recordings.map_drives import (
@@ -205,7 +206,11 @@ def recorded_sections(
 def _conditions(
     protocols: Mapping[str, RetrievalProtocol],
 ) -> list[RecordedCondition]:
-    """Returns the conditions of the experiment, the baseline first."""
+    """Returns the conditions of the experiment, the baseline first.
+
+    Only the main protocol has the control.
+    """
+    main = next(iter(protocols))
     return [
         RecordedCondition(
             {
@@ -218,6 +223,7 @@ def _conditions(
         )
         for stage in (LAST, OWN)
         for name, protocol in protocols.items()
+        if stage == OWN or name == main
     ]
 
 
@@ -263,14 +269,19 @@ def _cost_job(
     files = StudyFiles(engine.output)
     methods = tuple(choice for choice, _ in engine.methods.values())
     places, queries = (files.features(one.name) for one in pair)
-    described = tuple(
-        tuple(found.described(one.key) for one in methods)
-        for found in (places, queries)
+    compared = PlaceComparison(
+        *(
+            (found.scans, *(found.described(one.key) for one in methods))
+            for found in (places, queries)
+        ),
+        methods,
+        protocol,
+        (protocol.radius,),
     )
     step = MakePart(
         files.part("costs", "costs"),
         measure_method_costs,
-        (pair[1].source, queries.drive, methods, described, protocol),
+        (pair[1].source, queries.drive, compared),
     )
     return Job("costs of the methods", step, tuple(engine.jobs), _COSTS_COST)
 
@@ -279,9 +290,7 @@ def measure_method_costs(
     reporter: Reporter,
     source: DriveSource,
     summary: Part,
-    methods: tuple[MethodChoice, ...],
-    described: tuple[tuple[Part, ...], tuple[Part, ...]],
-    protocol: RetrievalProtocol,
+    compared: PlaceComparison,
 ) -> list[Cost]:
     """Returns the time and memory that each method needs on one core.
 
@@ -293,18 +302,16 @@ def measure_method_costs(
         source: opens the query drive.
         summary: file with the `DriveSummary` of the query drive, from which
             the drive's poses are read.
-        methods: the methods.
-        described: files with the descriptors of a database, and of the
-            queries, one for each method.
-        protocol: protocol of the comparison.
+        compared: the drives, which are in files, and the methods to measure.
     """
-    searches = measure_costs(reporter, *described, (), 0, methods)
+    protocol = compared.protocol
+    searches = measure_costs(reporter, compared)
     drive = source()
     known = summary.read()
     # A recording would be unpacked as a whole for its poses.
     drive = MovedDrive(drive, known.X_WS, drive.world_frame, drive.datum)
     costs = []
-    for choice in methods:
+    for choice in compared.methods:
         method = choice.make()
         number = protocol.scans(method)
         last = max(len(drive) - number, 0)
