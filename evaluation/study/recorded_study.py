@@ -37,6 +37,7 @@ from evaluation.results import (
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine, made_tasks
+from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import PlaceComparison
 from evaluation.study.recorded_city import ShownCity, add_city
 from evaluation.study.recordings import STAGES_FILE
@@ -50,8 +51,7 @@ from evaluation.study.recordings.recorded_pairs import (
     recorded_pairs,
 )
 from evaluation.study.sources import DriveSource
-from evaluation.study.storage.parts import MakePart, Part
-from evaluation.study.storage.study_files import StudyFiles
+from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.place import PlaceTask, PoseTask, measure_costs
 from evaluation.study.tasks.task import Task

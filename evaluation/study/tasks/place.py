@@ -14,12 +14,12 @@ from evaluation.recognition import (
     place_numbers,
     pose_numbers,
 )
+from evaluation.study.parts import MakePart
 from evaluation.study.place_measurements import (
     PlaceComparison,
     measure_places,
     shown_overlaps,
 )
-from evaluation.study.storage.parts import MakePart
 from evaluation.study.tasks.jobs import Jobs, num_described
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Answered, Task
