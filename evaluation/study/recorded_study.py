@@ -92,7 +92,8 @@ def study_recordings(
         cluster: runs the jobs.
         methods: the methods.
         protocols: name -> protocol of place recognition; the first is the main
-            one. Each protocol has a baseline of its own.
+            one, and the only one with the control: each further protocol
+            is measured on pairs with a change of the city alone.
         source: where the recordings come from, for errors.
         with_costs: whether times and memory are measured, after all other jobs.
         further_jobs: jobs that make recordings, or belong beside the study.
@@ -150,6 +151,7 @@ def study_recordings(
         experiment_text=_experiment_text(experiment, methods, protocols),
         notes=[
             *(f"{name}: {one.to_text()}" for name, one in protocols.items()),
+            *_without_control(protocols),
             *alone,
         ],
         sections=[
@@ -208,9 +210,10 @@ def _conditions(
 ) -> list[RecordedCondition]:
     """Returns the conditions of the experiment, the baseline first.
 
-    Only the main protocol has the control.
+    Only the main protocol has the control, which would double the cost of a
+    further protocol.
     """
-    main = next(iter(protocols))
+    main, *_ = protocols
     return [
         RecordedCondition(
             {
@@ -224,6 +227,17 @@ def _conditions(
         for stage in (LAST, OWN)
         for name, protocol in protocols.items()
         if stage == OWN or name == main
+    ]
+
+
+def _without_control(protocols: Iterable[str]) -> list[str]:
+    """Returns a note on the protocols that have no control, if any."""
+    main, *further = protocols
+    if not further:
+        return []
+    return [
+        f"The control ({STAGE}: {LAST}) is measured by the protocol {main}"
+        " only."
     ]
 
 
