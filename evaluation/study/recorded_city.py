@@ -161,6 +161,8 @@ class _ExtractionJobs(Jobs):
         for drive, role in (*pair.roles, *beside):
             self._roles.setdefault(drive.name, set()).add(role)
             for choice in self.methods:
+                if not pair.has_method(choice.name):
+                    continue
                 key = self._key(choice, role, pair.protocol)
                 if key != choice.key:
                     further = self._further[drive.name]

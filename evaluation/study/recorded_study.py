@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import (
+    Callable,
+    Collection,
+    Iterable,
+    Mapping,
+    Sequence,
+)
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +17,10 @@ import yaml
 
 from cns_drake.base import Cluster, InputError, Job, Reporter, Space, read_yaml
 from evaluation.drives import MovedDrive, cloud_at
-from evaluation.paper import paper_section
+from evaluation.paper import paper, paper_section
 from evaluation.recognition import (
     NUM_TRIALS,
+    PAPER_PROTOCOL,
     PROTOCOLS,
     Cost,
     RetrievalProtocol,
@@ -92,8 +99,8 @@ def study_recordings(
         cluster: runs the jobs.
         methods: the methods.
         protocols: name -> protocol of place recognition; the first is the main
-            one, and the only one with the control: each further protocol
-            is measured on pairs with a change of the city alone.
+            one, and the only one with the control. As a further protocol,
+            `paper` measures the paper's methods alone.
         source: where the recordings come from, for errors.
         with_costs: whether times and memory are measured, after all other jobs.
         further_jobs: jobs that make recordings, or belong beside the study.
@@ -223,6 +230,7 @@ def _conditions(
             stage,
             stage == LAST,
             protocol,
+            methods=None if name == main else _further_methods(name),
         )
         for stage in (LAST, OWN)
         for name, protocol in protocols.items()
@@ -230,14 +238,29 @@ def _conditions(
     ]
 
 
+def _further_methods(protocol: str) -> Collection[str] | None:
+    """Returns the methods that a further protocol measures; None for all.
+
+    The protocol `paper` serves to compare results with the paper's tables.
+    """
+    if protocol != PAPER_PROTOCOL.name:
+        return None
+    return frozenset(paper().modes)
+
+
 def _without_control(protocols: Iterable[str]) -> list[str]:
-    """Returns a note on the protocols that have no control, if any."""
+    """Returns notes on what further protocols leave out, if there are any."""
     main, *further = protocols
     if not further:
         return []
     return [
         f"The control ({STAGE}: {LAST}) is measured by the protocol {main}"
-        " only."
+        " only.",
+        *(
+            f"By the protocol {name}, only the paper's methods are measured."
+            for name in further
+            if _further_methods(name) is not None
+        ),
     ]
 
 

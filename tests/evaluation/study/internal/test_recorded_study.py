@@ -309,6 +309,8 @@ def test_the_main_protocol_alone_has_the_control(report):
     further = results.where(protocol="paper")
     assert further.distinct("both.stage") == ["own"]
     assert further.where(metric="kept").rows == ()
+    # Layered overlap is none of the paper's methods.
+    assert further.distinct("method") == ["btc", "scan-context++", "solid"]
     assert "is measured by the protocol fair only" in (
         report / "index.html"
     ).read_text("utf-8")
