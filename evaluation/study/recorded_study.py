@@ -306,14 +306,16 @@ def _cost_job(
     files = StudyFiles(engine.output)
     methods = tuple(choice for choice, _ in engine.methods.values())
     places, queries = (files.features(one.name) for one in pair)
+    stored = [
+        (found.scans, *(found.described(one.key) for one in methods))
+        for found in (places, queries)
+    ]
     compared = PlaceComparison(
-        *(
-            (found.scans, *(found.described(one.key) for one in methods))
-            for found in (places, queries)
-        ),
-        methods,
-        protocol,
-        (protocol.radius,),
+        database=stored[0],
+        query=stored[1],
+        methods=methods,
+        protocol=protocol,
+        radii=(protocol.radius,),
     )
     step = MakePart(
         files.part("costs", "costs"),
