@@ -1,8 +1,8 @@
-"""Alignment of drives with poses in different worlds.
+"""Alignment of drives with poses in different worlds: a public noun.
 
-`align` aligns two drives: `pose_guesses` guesses a pose, `loop_search` finds
-loops by the `registration` of `submaps`, and `pose_graph` fits poses to the
-loops. `trajectory_errors` compares an estimated trajectory with ground truth.
+`align` aligns two drives: guesses of the pose, loops between submaps, and a
+pose graph fitted to the loops. `trajectory_errors` compares an estimated
+trajectory with ground truth.
 """
 
 from cns_drake.base import attach

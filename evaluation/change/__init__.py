@@ -1,8 +1,7 @@
-"""Structural change between two drives or maps.
+"""Structural change between two drives or maps: a public noun.
 
-`tcr` computes the temporal change ratio of two clouds; `convex_hull` determines
-which points of these clouds count. `drive_maps` makes the clouds from drives or
-from files, and `drive_change` reports the change.
+The temporal change ratio (TCR) of two clouds, and the maps of drives and files
+from which it is computed.
 """
 
 from cns_drake.base import attach

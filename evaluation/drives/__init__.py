@@ -1,4 +1,8 @@
-"""Readers of recorded drives, one for each format, and views of drives."""
+"""Recorded drives of public data sets: a family, one module for each.
+
+`open_drive` finds the reader of a folder. Views of drives, and tables of poses,
+serve all readers.
+"""
 
 from cns_drake.base import attach
 

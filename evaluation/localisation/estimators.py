@@ -20,16 +20,16 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 import small_gicp
 
 from cns_drake.base import InputError, did_you_mean, poses
-from evaluation.alignment import covariances
+from evaluation.alignment import Surface, covariances
 from evaluation.localisation.localisation_map import (
     FEWEST_POINTS,
     LocalisationMap,
     voxel_shift,
 )
-from evaluation.localisation.robust_icp import align_robustly
 from evaluation.localisation.settings import (
     KISS_MATCHER,
     MAX_RANGE,
@@ -286,3 +286,157 @@ def _function_of_file(path: Path) -> Callable:
             f"{path}: has {len(own)} functions, none of which is `localise`"
         )
     return function
+
+
+# Sum of two points' variances across the plane in small_gicp's covariances;
+# along the plane the variance is a thousand times as large.
+_ACROSS = 2e-3
+# The search width is this many times s, see above.
+_WIDTH_PER_MOTION = 3.0
+# The search width is this many times the kernel's k, because k is s / 3.
+_WIDTH_PER_KERNEL = 9.0
+# An alignment has at most this share of the previous alignment's width.
+_SHRINKING = 0.5
+# Added to the diagonal of the Hessian, so that it can be inverted where pairs
+# do not determine a motion.
+_DAMPING = 1e-6
+# An alignment ends if there are fewer pairs, which do not determine a pose.
+_FEWEST_PAIRS = 6
+
+
+def align_robustly(
+    surface: Surface,
+    scan: np.ndarray,
+    start: np.ndarray,
+    widths: tuple[float, float],
+    iterations: int,
+    still: tuple[float, float],
+    covariances: np.ndarray | None = None,
+) -> tuple[np.ndarray, int]:
+    """Registers a scan to a map by ICP or GICP with a Geman-McClure kernel.
+
+    Several alignments follow one another. Each alignment begins at the result
+    of the previous alignment, and pairs points over shorter distances than the
+    previous alignment.
+
+    Args:
+        surface: the map.
+        scan: (N, 3) in S [m].
+        start: initial pose X_WS (4, 4).
+        widths: greatest distance between a scan point and the map point with
+            which it is paired, in the first and in the last alignment [m].
+        iterations: greatest number of steps of each alignment.
+        still: translation and rotation below which a step ends an alignment [m,
+            rad].
+        covariances: (N, 3, 3) covariances of the scan's points in S, for GICP;
+            None for point-to-plane ICP.
+
+    Returns:
+        The estimated X_WS, and the number of steps.
+    """
+    X = start
+    width, last_width = widths
+    total = 0
+    while True:
+        begin = X
+        X, number = _align(
+            surface, scan, begin, width, iterations, still, covariances
+        )
+        total += number
+        if width <= last_width:
+            return X, total
+        wanted = _WIDTH_PER_MOTION * _greatest_motion(begin, X)
+        width = max(last_width, min(wanted, _SHRINKING * width))
+
+
+def _align(
+    surface: Surface,
+    scan: np.ndarray,
+    start: np.ndarray,
+    width: float,
+    iterations: int,
+    still: tuple[float, float],
+    covariances: np.ndarray | None,
+) -> tuple[np.ndarray, int]:
+    """Registers a scan with one search width.
+
+    Args:
+        width: greatest distance between paired points [m].
+        surface, scan, start, iterations, still, covariances: see
+            `align_robustly`.
+
+    Returns:
+        The estimated X_WS, and the number of steps.
+    """
+    X = start
+    least_move, least_turn = still
+    for number in range(1, iterations + 1):
+        step = _gauss_newton_step(surface, scan, X, width, covariances)
+        R = Rotation.from_rotvec(step[:3]).as_matrix() @ X[:3, :3]
+        X = poses.make_pose(R, X[:3, 3] + step[3:])
+        move, turn = np.linalg.norm(step[3:]), np.linalg.norm(step[:3])
+        if move < least_move and turn < least_turn:
+            return X, number
+    return X, iterations
+
+
+def _greatest_motion(X_WA: np.ndarray, X_WB: np.ndarray) -> float:
+    """Returns how far a point of a scan moves at most from pose A to B [m].
+
+    A rotation counts by how far it moves a point at the greatest range.
+    """
+    X_AB = poses.inverse(X_WA) @ X_WB
+    turn = Rotation.from_matrix(X_AB[:3, :3]).magnitude()
+    by_turn = 2.0 * MAX_RANGE * math.sin(turn / 2.0)
+    return by_turn + float(np.linalg.norm(X_AB[:3, 3]))
+
+
+def _gauss_newton_step(
+    surface: Surface,
+    scan: np.ndarray,
+    X_WS: np.ndarray,
+    width: float,
+    covariances: np.ndarray | None,
+) -> np.ndarray:
+    """Returns a Gauss-Newton step (6,) in W.
+
+    The step is a rotation vector about the LiDAR [rad], then a translation [m].
+    It is 0 with too few pairs.
+
+    Args:
+        surface: the map.
+        scan: (N, 3) in S [m].
+        X_WS: (4, 4) pose before the step.
+        width: greatest distance between paired points [m].
+        covariances: (N, 3, 3) covariances of the scan's points in S, for GICP;
+            None for point-to-plane ICP.
+    """
+    arms = scan @ X_WS[:3, :3].T
+    found, squares = surface.tree.batch_nearest_neighbor_search(
+        arms + X_WS[:3, 3]
+    )
+    near = np.asarray(squares) < width**2
+    nearest = np.asarray(found, dtype=np.int64)[near]
+    if len(nearest) < _FEWEST_PAIRS:
+        return np.zeros(6)
+    arms = arms[near]
+    off = arms + X_WS[:3, 3] - surface.points[nearest]
+    if covariances is None:
+        n = surface.normals[nearest]
+        omega = n[:, :, None] * n[:, None]
+    else:
+        R = X_WS[:3, :3]
+        spread = surface.covariances[nearest] + R @ covariances[near] @ R.T
+        omega = _ACROSS * np.linalg.inv(spread)
+    pull = np.einsum("nij,nj->ni", omega, off)
+    kernel = width / _WIDTH_PER_KERNEL
+    squares = np.einsum("ni,ni->n", off, pull)
+    weights = (kernel / (kernel + squares)) ** 2
+    # A small turn w moves a point by w x arm.
+    J = np.zeros((len(arms), 3, 6))
+    J[:, :, :3] = np.cross(np.eye(3), arms[:, None]).transpose(0, 2, 1)
+    J[:, :, 3:] = np.eye(3)
+    weighted = (J.transpose(0, 2, 1) @ omega) * weights[:, None, None]
+    H = np.einsum("nij,njk->ik", weighted, J) + _DAMPING * np.eye(6)
+    g = np.einsum("nij,nj->i", weighted, off)
+    return np.linalg.solve(H, -g)

@@ -1,10 +1,7 @@
-"""Labels of old maps: what is gone, what is new, what was not observed.
+"""Labels of old maps (gone, new, not observed): a public noun.
 
-`map_builder` makes the map of a drive. `sessions` reads and writes the maps of
-a pair of drives, with the `labels` of the points. `baselines` and `free_space`
-predict labels; `scores` and `structures` compare predicted labels with the
-ground truth. `upkeep` updates a map by several drives, and `upkept_drive` shows
-the updated map in scans.
+Baselines predict labels; `score` compares predicted labels with the ground
+truth. An `UpkeptMap` is updated by several drives.
 """
 
 from cns_drake.base import attach

@@ -8,21 +8,23 @@
   and 0.1 m. A point is unobserved if one of the maps has too few points around
   this point to compute the distance. All other points are kept.
 - `free-space`: the scans of the other drive decide, see
-  `evaluation.map_update.free_space`.
+  `by_free_space`.
 """
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 import importlib
 import logging
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base import InputError, track
-from evaluation.map_update.free_space import by_free_space
+from cns_drake.base import InputError, num_cores, track
+from evaluation.drives import sample_frames
 from evaluation.map_update.labels import SIDES, PairLabels
 from evaluation.map_update.nearest_points import nearest_distances
 from evaluation.map_update.sessions import Session, SessionPair
+from evaluation.recognition import SeenSurfaces
 
 # Threshold of the baseline `distance` [m].
 _APART = 0.5
@@ -101,6 +103,201 @@ def by_m3c2(mine: Session, theirs: Session) -> np.ndarray:
     labels = np.where(np.abs(distances) > least, changed, kept)
     labels[np.isnan(distances)] = unobserved
     return labels.astype(np.uint8)
+
+
+# Side of a cell [m].
+_CELL = 0.2
+# A cell is kept if a point of the other map is within this distance [m].
+_KEPT_WITHIN = 0.2
+# A scan sees past a cell if the surface lies at least this far behind it [m].
+_PAST = 0.5
+# A scan shows a cell if the surface is within this distance [m].
+_SHOWN_WITHIN = 0.2
+# Distance driven between two scans [m].
+_SPACING = 2.0
+# At least this many scans, spread over the drive, show the field of view.
+_FIELD_SCANS = 20
+# Number of the lowest, highest and farthest returns that do not count for the
+# field of view, since a few may come from a bird or a reflection. A ring of
+# beams has many more returns.
+_STRAYS = 10
+# A kept cell must be shown by at least this number of scans, as a share of the
+# scans from which it is hidden.
+_SHOWN_SHARE = 0.05
+# This number of scans is always enough.
+_ENOUGH = 2
+# Side of a cube in which changes are counted [m].
+_CUBE = 1.0
+# Share of changed points above which the whole cube counts as changed.
+_CHANGED_SHARE = 0.2
+# A point of such a cube is still kept if a point of the other map is within
+# this distance [m].
+_STILL_KEPT_WITHIN = 0.12
+# Least horizontal distance from which a slope is computed [m].
+_TINY = 1e-9
+
+
+class _Views(NamedTuple):
+    """How many scans see past N points, show them, or hide them.
+
+    The module's docstring says when a scan sees past a point, and when it shows
+    a point. A scan hides a point if a surface lies in front of it.
+
+    Attributes:
+        past: (N,) number of scans that see past each point.
+        shown: (N,) number of scans that show it.
+        hidden: (N,) number of scans that hide it.
+    """
+
+    past: np.ndarray
+    shown: np.ndarray
+    hidden: np.ndarray
+
+
+def by_free_space(mine: Session, theirs: Session) -> np.ndarray:
+    """Returns a label for each point of a map, by the baseline `free-space`.
+
+    The labels state whether the other drive finds the point unchanged or
+    changed, or does not observe it.
+
+    Args:
+        mine: the drive whose map of N points is labelled.
+        theirs: the other drive, with its map and scans.
+
+    Returns:
+        (N,) uint8, values of `evaluation.map_update.labels.Label`.
+    """
+    _, kept, changed = SIDES[mine.side]
+    _check_scans(theirs)
+    labels = np.full(len(mine.points), kept, np.uint8)
+    distances = nearest_distances(mine.points, theirs.points, _KEPT_WITHIN)
+    far = np.isinf(distances)
+    labels[far] = _label_by_scans(mine.points[far], mine.side, theirs)
+    # A new object may pass near to one that is gone.
+    known = np.flatnonzero((labels == changed) | (labels == kept))
+    shares = _changed_shares(mine.points[known], labels[known] == changed)
+    is_beside = (shares > _CHANGED_SHARE) & (
+        distances[known] > _STILL_KEPT_WITHIN
+    )
+    labels[known[is_beside]] = changed
+    return labels
+
+
+def _label_by_scans(
+    points: np.ndarray, side: str, theirs: Session
+) -> np.ndarray:
+    """Returns the labels of points by the scans of the other drive, (N,).
+
+    All points of a cell have the label of the cell's first point.
+
+    Args:
+        points: (N, 3) points of a map in W [m].
+        side: side of this map, `A` or `B`.
+        theirs: the other drive.
+    """
+    unobserved, kept, changed = SIDES[side]
+    cells = np.floor(points / _CELL).astype(np.int64)
+    _, first, cell_of = np.unique(
+        cells, axis=0, return_index=True, return_inverse=True
+    )
+    views = _count_views(points[first], theirs)
+    needed = np.minimum(_SHOWN_SHARE * views.hidden, _ENOUGH)
+    is_shown = (views.shown > 0) & (views.shown >= needed)
+    found = np.where(is_shown, kept, unobserved)
+    found = np.where(views.past > 0, changed, found)
+    return found[cell_of.ravel()]
+
+
+def _changed_shares(points: np.ndarray, is_changed: np.ndarray) -> np.ndarray:
+    """Returns the share of changed points in each point's cube, (N,).
+
+    Args:
+        points: (N, 3) points [m].
+        is_changed: (N,) bool, which points have changed.
+    """
+    cubes = np.floor(points / _CUBE).astype(np.int64)
+    cubes -= cubes.min(axis=0, initial=0)
+    sizes = cubes.max(axis=0, initial=0) + 1
+    _, cube_of = np.unique(
+        np.ravel_multi_index(tuple(cubes.T), tuple(sizes)), return_inverse=True
+    )
+    return (np.bincount(cube_of, is_changed) / np.bincount(cube_of))[cube_of]
+
+
+def _count_views(points: np.ndarray, other: Session) -> _Views:
+    """Returns how many scans see past each point, show it, or hide it.
+
+    Args:
+        points: (N, 3) points in W [m].
+        other: the drive with the scans.
+    """
+    counts = np.zeros((3, len(points)), np.int32)
+    chosen = sample_frames(other.X_WS[:, :3, 3], _SPACING).tolist()
+    sampled = chosen[:: max(len(chosen) // _FIELD_SCANS, 1)]
+    scans = [other.scan(number) for number in sampled]
+    returns = np.concatenate([np.zeros((0, 3)), *scans])
+    if len(returns) == 0:
+        return _Views(*counts)
+    low, high, reach = _field_of_view(returns)
+
+    def look(number: int) -> list[np.ndarray]:
+        """Returns which points a scan sees past, shows and hides."""
+        X_WS = other.X_WS[number]
+        offsets = points - X_WS[:3, 3]
+        squares = np.einsum("ij,ij->i", offsets, offsets)
+        rows = np.flatnonzero(squares <= reach**2)
+        p_S = offsets[rows] @ X_WS[:3, :3]
+        slopes = _slopes(p_S)
+        inside = (slopes >= low) & (slopes <= high)
+        rows, p_S = rows[inside], p_S[inside]
+        found = SeenSurfaces.of(other.scan(number)).clearances(p_S)
+        return [
+            rows[found > _PAST],
+            rows[np.abs(found) <= _SHOWN_WITHIN],
+            rows[found < -_SHOWN_WITHIN],
+        ]
+
+    with ThreadPoolExecutor(num_cores()) as threads:
+        found = threads.map(look, chosen)
+        what = f"free space of {other.side}"
+        for kinds in track(found, what, len(chosen), "views"):
+            for count, rows in zip(counts, kinds, strict=True):
+                count[rows] += 1
+    return _Views(*counts)
+
+
+def _field_of_view(p_S: np.ndarray) -> tuple[float, float, float]:
+    """Returns the limits of a field of view, from its returns (N, 3) [m].
+
+    The field of view reaches from the lowest to the highest return, and as far
+    as the farthest return. On each side, the `_STRAYS` outermost returns do not
+    count.
+
+    Returns:
+        Least and greatest slope; greatest distance [m].
+    """
+    slopes = np.sort(_slopes(p_S))
+    strays = min(_STRAYS, (len(p_S) - 1) // 2)
+    low, high = slopes[[strays, -1 - strays]]
+    return low, high, np.sort(np.linalg.norm(p_S, axis=1))[-1 - strays]
+
+
+def _slopes(p_S: np.ndarray) -> np.ndarray:
+    """Returns height over horizontal distance of points (N, 3), (N,)."""
+    return p_S[:, 2] / np.maximum(np.hypot(p_S[:, 0], p_S[:, 1]), _TINY)
+
+
+def _check_scans(session: Session) -> None:
+    """Checks that a session has scans with poses.
+
+    Raises:
+        InputError: it has none.
+    """
+    if len(session.X_WS) == 0:
+        raise InputError(
+            f"{session.folder}: no poses.txt and Scans; this baseline needs "
+            "them"
+        )
 
 
 # Name of a detector -> function that labels the first map by the second.

@@ -1,9 +1,4 @@
-"""Scans and poses as voxel maps.
-
-`voxel_maps` makes maps of drives and clouds, by means of the hash table in
-`voxel_table`. `thumbnails` reduces single scans to small pictures, and
-`grid_cells` numbers the cells of grids.
-"""
+"""Scans and poses as voxel maps, a public noun: `VoxelMap`, `map_drive`."""
 
 from cns_drake.base import attach
 

@@ -1,18 +1,22 @@
-from evaluation.methods.btc_verification import align as align
+from evaluation.methods.btc import align as align
 from evaluation.methods.layered_overlap import LayeredOverlap as LayeredOverlap
 from evaluation.methods.layered_overlap import (
     LayeredOverlapConfig as LayeredOverlapConfig,
 )
+from evaluation.methods.learned import CHANNELS as CHANNELS
 from evaluation.methods.learned import FEATURES as FEATURES
 from evaluation.methods.learned import FREQUENCIES as FREQUENCIES
 from evaluation.methods.learned import HEADINGS as HEADINGS
 from evaluation.methods.learned import LAYERS as LAYERS
+from evaluation.methods.learned import RINGS as RINGS
+from evaluation.methods.learned import SECTORS as SECTORS
 from evaluation.methods.learned import SEEN_SHARES as SEEN_SHARES
 from evaluation.methods.learned import TURNS as TURNS
 from evaluation.methods.learned import WEIGHTS_VERSION as WEIGHTS_VERSION
 from evaluation.methods.learned import Learned as Learned
 from evaluation.methods.learned import LearnedConfig as LearnedConfig
 from evaluation.methods.learned import LearnedScan as LearnedScan
+from evaluation.methods.learned import polar_image as polar_image
 from evaluation.methods.method import Method as Method
 from evaluation.methods.method import MethodConfig as MethodConfig
 from evaluation.methods.method import PlaceScan as PlaceScan
@@ -20,10 +24,6 @@ from evaluation.methods.method import check_number as check_number
 from evaluation.methods.own_files import load_method as load_method
 from evaluation.methods.own_files import run_module as run_module
 from evaluation.methods.own_files import with_named_faults as with_named_faults
-from evaluation.methods.polar_images import CHANNELS as CHANNELS
-from evaluation.methods.polar_images import RINGS as RINGS
-from evaluation.methods.polar_images import SECTORS as SECTORS
-from evaluation.methods.polar_images import polar_image as polar_image
 from evaluation.methods.published_networks import NetworkConfig as NetworkConfig
 from evaluation.methods.registry import known_methods as known_methods
 from evaluation.methods.registry import make_method as make_method

@@ -3,7 +3,7 @@
 Part of BTC (see `evaluation.methods.btc`). All keypoints depend on the largest
 plane, which is the ground. The order in which patches are compared decides
 which patches are merged into this plane. That order is the order of the voxels
-in the public program, see `evaluation.methods.btc_voxel_order`.
+in the public program.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.base import compiled
-from evaluation.methods.btc_voxel_order import voxel_order
 
 
 @dataclass(frozen=True)
@@ -280,3 +279,67 @@ def _planes_of_moments(
     """
     variances, axes = np.linalg.eigh(covariances)
     return Planes(centers, axes[:, :, 0], covariances, counts), variances[:, 0]
+
+
+# The hash of a voxel's index, in the public program.
+_FACTOR = 116101
+_MODULUS = 10_000_000_000
+# Numbers of buckets of a std::unordered_map of libstdc++ that grows by one
+# element at a time. When there are as many elements as buckets, it takes the
+# next prime of its table that is at least twice as large.
+_NUM_BUCKETS = (
+    13, 29, 59, 127, 257, 541, 1109, 2357, 5087, 10273, 20753, 42043, 85229,
+    172933, 351061, 712697, 1447153, 2938679, 5967347, 12117689, 24607243,
+    49969847, 101473717, 206062531,
+)  # fmt: skip
+
+
+def voxel_order(index: np.ndarray) -> np.ndarray:
+    """Returns the order in which the authors' program of BTC visits voxels.
+
+    Args:
+        index: (V, 3) int64 indices of distinct voxels along x, y and z, in the
+            order in which the voxels first occur in the cloud.
+
+    Returns:
+        (V,) row numbers of `index`, in the order of the program.
+    """
+    x, y, z = np.asarray(index, dtype=np.int64).T
+    # fmod: a remainder with the sign of the dividend, as in C++.
+    code = np.fmod(z * _FACTOR, _MODULUS) + y
+    code = np.fmod(code * _FACTOR, _MODULUS) + x
+    return hash_table_order(code.astype(np.uint64))
+
+
+def hash_table_order(codes: np.ndarray) -> np.ndarray:
+    """Returns the order (N,) in which a std::unordered_map is iterated.
+
+    All elements form one list, in which the elements of a bucket follow each
+    other. A new element goes to the front of its bucket, and a new bucket to
+    the front of the list. When the number of buckets grows, all elements are
+    inserted again, in the order of the list.
+
+    Args:
+        codes: (N,) uint64 hashes of the elements, in the order in which they
+            were put in, one by one.
+
+    Raises:
+        ValueError: there are too many elements.
+    """
+    if len(codes) > _NUM_BUCKETS[-1]:
+        raise ValueError(f"{len(codes)} elements")
+    order = np.zeros(0, dtype=np.int64)
+    for num_buckets in _NUM_BUCKETS:
+        added = np.arange(len(order), min(num_buckets, len(codes)))
+        order = np.concatenate([order, added])
+        buckets = codes[order] % np.uint64(num_buckets)
+        # Index of each bucket's first element: among equal indices, the first
+        # is assigned last.
+        first = np.empty(num_buckets, dtype=np.int64)
+        first[buckets[::-1]] = np.arange(len(order))[::-1]
+        # The newest bucket comes first, and in each bucket the newest element.
+        ranks = first[buckets] * len(order) + np.arange(len(order))
+        order = order[np.argsort(ranks)[::-1]]
+        if len(order) == len(codes):
+            break
+    return order

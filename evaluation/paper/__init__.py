@@ -1,8 +1,7 @@
-"""The paper "The City that Never Settles", beside which results are shown.
+"""The paper "The City that Never Settles", beside results: a wall.
 
-`paper_values` contains the paper's numbers. `findings` and `aims` compare the
-shipped cities with them, `best_methods` says which methods are best, and
-`section` makes the section of a study's page.
+The rest of the evaluation does not know the paper. The section of a study's
+page compares the shipped cities with the paper's numbers and claims.
 """
 
 from cns_drake.base import attach

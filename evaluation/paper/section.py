@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping
 
-from evaluation.paper.aims import aims
-from evaluation.paper.findings import findings
+from evaluation.paper.findings import aims, findings
 from evaluation.paper.paper_values import (
     TITLE,
     Measured,

@@ -1,7 +1,7 @@
-"""Public real scans, measured as a study measures simulated scans.
+"""Public real scans, measured as a study measures them: a wall.
 
-`data_sets` opens the scans, `real_study` measures methods on them, and `judge`
-trains a classifier to distinguish real from simulated scans.
+Data sets of few scans have rules of their own, which no other package knows. A
+classifier judges whether simulated scans can be told from real scans.
 """
 
 from cns_drake.base import attach

@@ -9,13 +9,14 @@ is trained to distinguish each data set from simulated scans of the same model
 of LiDAR (see `evaluation.real.judge`).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 import importlib.util
+import math
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Cluster, InputError
+from cns_drake.base import Cluster, InputError, Reporter
 from evaluation.clouds import OnNote
 from evaluation.localisation import METHODS
 from evaluation.methods import MethodConfig, run_module, shipped_methods
@@ -29,13 +30,14 @@ from evaluation.real.image_sequences import (
     RADIUS,
     UNIT,
     ImageSequence,
+    ImageSource,
     open_images,
     open_sequences,
 )
-from evaluation.real.judge_task import JudgeTask
 from evaluation.recognition import (
     FAIR_PROTOCOL,
     RECORDED_PROTOCOL,
+    Number,
     RetrievalProtocol,
     Role,
 )
@@ -43,6 +45,7 @@ from evaluation.results import QueryRows, Results
 from evaluation.study import (
     SHIPPED,
     DescribedSource,
+    DriveSource,
     Engine,
     Jobs,
     LocaliseTask,
@@ -51,6 +54,7 @@ from evaluation.study import (
     Pair,
     PlaceTask,
     PoseTask,
+    Result,
     Task,
     choose_methods,
 )
@@ -116,7 +120,7 @@ def measure_real(
     tasks: list[Task] = [PlaceTask({}, _NAME), PoseTask({}, _NAME)]
     if aligning:
         tasks.append(LocaliseTask({"methods": aligning}, _NAME))
-    tasks.append(JudgeTask({}, _NAME))
+    tasks.append(_JudgeTask({}, _NAME))
     engine = Engine(
         _NAME,
         {task.name: task for task in tasks},
@@ -210,7 +214,7 @@ def _add_images(
                 database=NamedDrive("simulated", made[0].source),
                 query=sequence.places,
             )
-            engine.add([simulated], (), judged, [JudgeTask.name])
+            engine.add([simulated], (), judged, [_JudgeTask.name])
 
 
 def _add_unit(
@@ -241,7 +245,7 @@ def _add_unit(
         for choice, given in zip(methods, choices, strict=True):
             # The height is in the protocol's digest.
             engine.methods[choice.key] = choice, given.columns
-    tasks = [name for name in engine.tasks if name != JudgeTask.name]
+    tasks = [name for name in engine.tasks if name != _JudgeTask.name]
     if not methods:
         tasks = [name for name in tasks if name == LocaliseTask.name]
     for scans in sets:
@@ -345,3 +349,67 @@ class _RealJobs(Jobs):
             protocol = _SIMULATED
         # Several pairs need the same places.
         return super().described(drive, role, protocol, needs, kept=True)
+
+
+# Number of random samples of patches for the classifier; their AUCs differ by
+# up to 0.04.
+_DRAWS = 1
+
+
+class _JudgeTask(Task):
+    """Measures how well a classifier tells real scans from simulated scans.
+
+    The simulated scans are the scans of the jobs' distractors.
+    """
+
+    name = "judge"
+
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
+        part = jobs.files.part("judge", pair.key)
+        made = tuple(drive.source for drive in jobs.distractors)
+        return (jobs.add(part, judge_scans, (pair.query.source, made)),)
+
+    def numbers(
+        self, found: dict[str, Any] | None, before: Any | None
+    ) -> Iterator[Number]:
+        if found is None:
+            return
+        num_real, _ = found["patches"]
+        for group, auc in found["auc"].items():
+            values = {"auc": auc, "auc_control": found["control"][group]}
+            for name, value in values.items():
+                if not math.isnan(value):
+                    yield Number(group, False, name, value, n=num_real)
+
+
+def judge_scans(
+    reporter: Reporter, source: DriveSource, made: tuple[DriveSource, ...]
+) -> dict[str, Any] | None:
+    """Returns how well a classifier tells a data set from simulated scans.
+
+    Real images are compared with images that are made of the simulated scans.
+
+    Args:
+        reporter: reports notes.
+        source: the data set, or a sequence of images.
+        made: the simulated drives.
+
+    Returns:
+        The result of `evaluation.real.judge.judge_draws`; None for a data set
+        of a single place.
+    """
+    # Imported here: the module needs the optional packages of the extra
+    # `judge`. Studies without this task must work without these packages.
+    from evaluation.real import judge
+
+    drive = source()
+    is_of_images = isinstance(source, ImageSource)
+    table = judge.image_table if is_of_images else judge.scan_table
+    places = judge.places_of([drive], table, reporter.note)
+    if len(places) < 2:
+        reporter.note(f"{drive.name}: one place, not judged")
+        return None
+    simulated = judge.places_of(
+        (recording() for recording in made), table, reporter.note
+    )
+    return judge.judge_draws(places, simulated, _DRAWS)

@@ -90,6 +90,7 @@ from evaluation.recognition.protocol_options import (
     with_protocols as with_protocols,
 )
 from evaluation.recognition.query_outcomes import QueryOutcomes as QueryOutcomes
+from evaluation.recognition.query_outcomes import auroc as auroc
 from evaluation.recognition.query_outcomes import judge as judge
 from evaluation.recognition.result_number import Number as Number
 from evaluation.recognition.retrieval import Retrieval as Retrieval
@@ -100,7 +101,6 @@ from evaluation.recognition.retrieval import (
     matches_within_radius as matches_within_radius,
 )
 from evaluation.recognition.retrieval import retrieve as retrieve
-from evaluation.recognition.roc import auroc as auroc
 from evaluation.recognition.scan_folders import write_scores as write_scores
 from evaluation.recognition.scoring import score_places as score_places
 from evaluation.recognition.seen_surfaces import TOLERANCE as TOLERANCE

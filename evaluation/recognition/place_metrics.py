@@ -16,11 +16,6 @@ from evaluation.recognition.faults import FAULTS
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.pose_errors import is_accepted
 from evaluation.recognition.result_number import Number
-from evaluation.recognition.visible_change import (
-    ENOUGH_OVERLAP,
-    mean_visible_change,
-    visible_change_added,
-)
 
 
 def place_numbers(
@@ -44,7 +39,7 @@ def place_numbers(
         baseline. `lost` is the number of queries that are right only in the
         baseline; `found` is the number of queries that are right only in the
         condition. The last result comes from the function
-        `visible_change_added`.
+        `_visible_change_added`.
     """
     outcomes = now.outcomes
     values = now.by_mode["all"].main_metrics
@@ -62,9 +57,9 @@ def place_numbers(
     overlaps = now.columns["overlap"]
     for name in FAULTS:
         yield now.number(name, float(np.sum(now.columns["why"] == name)))
-    is_little_shown = (overlaps < ENOUGH_OVERLAP) & ~outcomes.is_right
+    is_little_shown = (overlaps < _ENOUGH_OVERLAP) & ~outcomes.is_right
     yield now.number("hidden", float(is_little_shown.sum()))
-    if not math.isnan(shown := mean_visible_change(overlaps)[0]):
+    if not math.isnan(shown := _mean_visible_change(overlaps)[0]):
         yield now.number("visible_change", shown)
 
 
@@ -97,7 +92,7 @@ def _compared_numbers(
         was = before.outcomes.is_right
         yield now.number("lost", float((was & ~right).sum()))
         yield now.number("found", float((right & ~was).sum()))
-        added = visible_change_added(
+        added = _visible_change_added(
             now.columns["overlap"], before.columns["overlap"]
         )
         if not math.isnan(added):
@@ -143,3 +138,48 @@ def kept_share(
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.divide(changed, unchanged)
     return np.where(np.asarray(unchanged) > 0.0, share, math.nan)
+
+
+# Overlap below which two scans show different surroundings.
+_ENOUGH_OVERLAP = 0.5
+
+
+def _visible_change_added(now: np.ndarray, before: np.ndarray | None) -> float:
+    """Returns the mean visible change minus the mean in a baseline.
+
+    The visible change also contains parts of a scan that are occluded only
+    because the viewpoints differ (parallax). Subtracting the baseline removes
+    this share.
+
+    Args:
+        now: (Q,) overlaps, see `PlaceOutcome.of`.
+        before: (Q,) overlaps of the same queries in the baseline.
+
+    Returns:
+        The difference; NaN if no query has both values, or the queries differ.
+    """
+    if before is None or len(before) != len(now):
+        return math.nan
+    added = before - now
+    known = added[~np.isnan(added)]
+    return float(known.mean()) if len(known) else math.nan
+
+
+def _mean_visible_change(overlaps: np.ndarray) -> tuple[float, int]:
+    """Returns the mean visible change, and the number of queries.
+
+    The visible change of a query is the share of its scan that the best of its
+    matches does not show.
+
+    Args:
+        overlaps: (Q,) see `PlaceOutcome.of`; NaN for queries that have no
+            match, which do not count.
+
+    Returns:
+        The mean and the number of queries with a match; NaN and 0 if there are
+        none.
+    """
+    known = overlaps[~np.isnan(overlaps)]
+    if len(known) == 0:
+        return math.nan, 0
+    return float(1.0 - known.mean()), len(known)

@@ -7,8 +7,6 @@ import math
 
 import numpy as np
 
-from evaluation.recognition.roc import auroc
-
 
 @dataclass(frozen=True, eq=False)
 class QueryOutcomes:
@@ -186,3 +184,25 @@ def _first_right_rank(scores: np.ndarray, is_match: np.ndarray) -> float:
 def _mean_or_nan(values: np.ndarray) -> float:
     """Returns the mean of values (N,); NaN without a value."""
     return float(values.mean()) if len(values) else math.nan
+
+
+def auroc(scores: np.ndarray, is_positive: np.ndarray) -> float:
+    """Returns the area under the receiver operating characteristic.
+
+    The area is the probability that a positive has a higher score than a
+    negative; equal scores count half. The result is NaN if all items or no
+    items are positive.
+
+    Args:
+        scores: (N,) scores; NaN is the lowest.
+        is_positive: (N,) bool.
+    """
+    # Imported here: it is slow to load.
+    from scipy.stats import mannwhitneyu
+
+    values = np.where(np.isnan(scores), -np.inf, scores)
+    positive, negative = values[is_positive], values[~is_positive]
+    if not (len(positive) and len(negative)):
+        return math.nan
+    test = mannwhitneyu(positive, negative, method="asymptotic")
+    return float(test.statistic / (len(positive) * len(negative)))

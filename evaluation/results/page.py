@@ -8,6 +8,7 @@ import tempfile
 from typing import Any
 
 from markupsafe import Markup
+from matplotlib.markers import MarkerStyle
 import numpy as np
 
 from cns_drake.base import (
@@ -19,7 +20,6 @@ from cns_drake.base import (
 )
 from evaluation.results.charts.chart import NARROW, WIDE
 from evaluation.results.charts.kinds import DrawnChart, draw_chart
-from evaluation.results.charts.markers import marker_corners
 from evaluation.results.charts.words import in_words, value_words
 from evaluation.results.figure_files import save_figure
 from evaluation.results.keys import (
@@ -372,3 +372,18 @@ def _are_counts(values: Iterable[object]) -> bool:
 
 def _is_finite(value: object) -> bool:
     return isinstance(value, float) and math.isfinite(value)
+
+
+def marker_corners(marker: str) -> str:
+    """Returns the points of an SVG polygon that shows a marker of a chart.
+
+    The polygon is 8 px wide around (18, 6), the middle of a line in a legend.
+
+    Args:
+        marker: the marker, in the terms of Matplotlib.
+    """
+    style = MarkerStyle(marker)
+    path = style.get_path().transformed(style.get_transform())
+    # SVG's y points down.
+    corners = np.array(path.to_polygons()[0]) * (8, -8) + (18, 6)
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)

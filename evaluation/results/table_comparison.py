@@ -7,24 +7,36 @@ import itertools
 from pathlib import Path
 import re
 from typing import Any, NamedTuple
+import warnings
+
+import numpy as np
+from scipy.stats import kendalltau
 
 from cns_drake.base import InputError, json_values
-from evaluation.recognition import PROTOCOL_NAMES, Difference
-from evaluation.results.common_conditions import (
-    common_conditions,
-    reduced_to,
-    without_controls,
+from evaluation.recognition import (
+    PROTOCOL_NAMES,
+    Difference,
+    Interval,
+    percentile_interval,
+    resampled_metrics,
+    weights_by_drive,
 )
-from evaluation.results.compared_answers import compared_answers
+from evaluation.results.compared_answers import (
+    check_same_queries,
+    compared_answers,
+    drive_number,
+)
+from evaluation.results.keys import KEYS, LAST, STAGE
 from evaluation.results.metric_tables import (
+    RESAMPLED_METRICS,
+    SHIPPED,
     Condition,
     MetricTable,
     read_metric_table,
     shipped_table,
     table_name,
 )
-from evaluation.results.rank_agreement import Agreement, rank_agreement
-from evaluation.results.ranking import Ranked, rank_methods
+from evaluation.results.ranking import LEAST_UNITS, Ranked, rank_methods
 from evaluation.results.table import Answers, Results, Row
 
 # Metrics for which less is better.
@@ -56,6 +68,119 @@ class Compared(NamedTuple):
     p_value: float
 
 
+class _Agreement(NamedTuple):
+    """How similarly two tables rank the methods that are in both tables.
+
+    Attributes:
+        first, second: names of the two tables.
+        methods: names of the methods that are in both tables.
+        tau: Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if the two tables
+            rank the methods in the same order, -1 if they rank them in opposite
+            orders; NaN if all values of a table are equal.
+        interval: 95 % interval of `tau`.
+    """
+
+    first: str
+    second: str
+    methods: tuple[str, ...]
+    tau: float
+    interval: Interval
+
+
+def _rank_agreement(
+    first: MetricTable, second: MetricTable, metric: str
+) -> _Agreement:
+    """Compares the rankings of two tables, each over its own conditions.
+
+    The interval is by bootstrap. For a table with four or more maps, maps are
+    sampled, because a ranking should hold on other maps, too. For a table with
+    fewer maps, blocks of the routes are sampled if the answers to all queries
+    are known, and otherwise the units of `rank_methods`.
+
+    Raises:
+        InputError: fewer than two methods have results in all conditions of
+            both tables.
+    """
+    whole = [
+        {
+            method
+            for method in table.methods
+            if all(
+                (method, condition) in table.rows
+                for condition in table.conditions
+            )
+        }
+        for table in (first, second)
+    ]
+    methods = tuple(sorted(set.intersection(*whole)))
+    if len(methods) < 2:
+        raise InputError(
+            f"{first.name}, {second.name}: fewer than two methods are on all"
+            f" conditions of both ({', '.join(methods) or 'none'})"
+        )
+    one, one_samples = _means_and_samples(first, methods, metric)
+    other, other_samples = _means_and_samples(second, methods, metric)
+    samples = zip(one_samples, other_samples, strict=True)
+    taus = np.array([_kendall_tau(*pair) for pair in samples])
+    return _Agreement(
+        first.name,
+        second.name,
+        methods,
+        _kendall_tau(one, other),
+        percentile_interval(taus),
+    )
+
+
+def _means_and_samples(
+    table: MetricTable, methods: Sequence[str], metric: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns means (M,) of methods, and their bootstrap samples (B, M).
+
+    `_rank_agreement` says what is sampled.
+    """
+    ranked, samples = rank_methods(
+        row for (method, _), row in table.rows.items() if method in methods
+    )
+    order = [[mean.method for mean in ranked].index(name) for name in methods]
+    means = np.array([mean.value for mean in ranked])[order]
+    measured = list(itertools.product(table.conditions, methods))
+    if (
+        len({row.map for row in table.rows.values()}) >= LEAST_UNITS
+        or metric not in RESAMPLED_METRICS
+        or any(
+            (method, condition) not in table.answers
+            for condition, method in measured
+        )
+    ):
+        return means, samples[:, order]
+    asked = [
+        [table.answers[method, condition] for method in methods]
+        for condition in table.conditions
+    ]
+    for of_condition in asked:
+        for answers in of_condition:
+            check_same_queries(of_condition[0], answers)
+    drawn = weights_by_drive(
+        [of_condition[0].outcomes.own_blocks for of_condition in asked],
+        [drive_number(of_condition[0]) for of_condition in asked],
+    )
+    samples_of_asked = [
+        [
+            getattr(resampled_metrics(answers.outcomes, weights), metric)
+            for answers in of_condition
+        ]
+        for of_condition, (_, weights) in zip(asked, drawn, strict=True)
+    ]
+    return means, np.mean(samples_of_asked, axis=0).T
+
+
+def _kendall_tau(first: np.ndarray, second: np.ndarray) -> float:
+    with warnings.catch_warnings():
+        # SciPy warns if all values are equal; the result is then NaN.
+        warnings.simplefilter("ignore")
+        return float(kendalltau(first, second).statistic)
+
+
 @dataclass(frozen=True)
 class Comparison:
     """The result of comparing tables.
@@ -81,7 +206,7 @@ class Comparison:
     conditions: int
     ranked: Sequence[Ranked]
     differences: Sequence[Compared]
-    agreements: Sequence[Agreement]
+    agreements: Sequence[_Agreement]
     notes: Sequence[str]
 
     def to_json(self) -> dict[str, Any]:
@@ -199,11 +324,11 @@ def _compared_rankings(own: Sequence[MetricTable], metric: str) -> Comparison:
         raise InputError("--rankings: two tables are needed")
     tables, notes = [], []
     for table in own:
-        changed, left_out = without_controls(table.conditions)
-        tables.append(reduced_to(table, changed))
+        changed, left_out = _without_controls(table.conditions)
+        tables.append(_reduced_to(table, changed))
         notes += [f"{table.name}: {note}" for note in left_out]
     agreements = [
-        rank_agreement(*pair, metric)
+        _rank_agreement(*pair, metric)
         for pair in itertools.combinations(tables, 2)
     ]
     ranked = [
@@ -221,9 +346,9 @@ def _compared_values(
     paths: Sequence[Path],
 ) -> Comparison:
     """Compares the values of all tables in the conditions that all have."""
-    common, notes = common_conditions(own, shipped, paths)
-    common, left_out = without_controls(common)
-    tables = [reduced_to(table, common) for table in (shipped, *own)]
+    common, notes = _common_conditions(own, shipped, paths)
+    common, left_out = _without_controls(common)
+    tables = [_reduced_to(table, common) for table in (shipped, *own)]
     entries, incomplete = _ranked_entries(tables, common)
     notes += [*left_out, *incomplete, *_mismatch_notes(entries, common)]
     rows = [
@@ -232,7 +357,7 @@ def _compared_values(
         for condition in common
     ]
     agreements = [
-        rank_agreement(*pair, metric)
+        _rank_agreement(*pair, metric)
         for pair in itertools.combinations(tables, 2)
         if len({*pair[0].methods} & {*pair[1].methods}) > 1
     ]
@@ -390,3 +515,135 @@ def _differences(
             asked[name] = [table.answers[key] for key in keys]
     compared = compared_answers(asked)
     return [Compared(*two, *found) for two, found in compared.items()]
+
+
+def _common_conditions(
+    own: Sequence[MetricTable],
+    shipped: MetricTable,
+    paths: Sequence[Path],
+) -> tuple[list[Condition], list[str]]:
+    """Returns the conditions that all tables have, and notes for the user.
+
+    If the shipped table has none of the conditions that two or more tables of
+    the user have in common, only the user's tables count.
+
+    Args:
+        own: the user's tables.
+        shipped: the shipped table.
+        paths: paths of the user's tables, for errors.
+
+    Raises:
+        InputError: the tables have no condition in common.
+    """
+    common = own[0].conditions
+    for table in own[1:]:
+        common = [
+            condition
+            for condition in common
+            if condition in set(table.conditions)
+        ]
+    with_shipped = [
+        condition
+        for condition in common
+        if condition in set(shipped.conditions)
+    ]
+    if with_shipped:
+        others = (*own, shipped)
+        return with_shipped, _notes_on_left_out(own, others, with_shipped)
+    if len(own) > 1 and common:
+        notes = _notes_on_left_out(own, own, common)
+        return common, [
+            *notes,
+            "the shipped tables have none of these conditions",
+        ]
+    names = ", ".join(map(str, paths))
+    others = (*own[1:], *([] if own[1:] else [shipped]))
+    beside = "" if len(own) > 1 else " with the shipped tables"
+    why = _why_nothing_is_common(own[0], others[0])
+    raise InputError(f"{names}: no condition in common{beside} ({why})")
+
+
+def _notes_on_left_out(
+    own: Sequence[MetricTable],
+    tables: Sequence[MetricTable],
+    common: Iterable[Condition],
+) -> list[str]:
+    """Returns notes on the conditions that only some of the tables have."""
+    kept = set(common)
+    notes: Counter[str] = Counter()
+    for table in own:
+        left = {c: r for (_, c), r in table.rows.items() if c not in kept}
+        for condition, row in left.items():
+            other = next(
+                lacking
+                for lacking in tables
+                if lacking is not table
+                and condition not in set(lacking.conditions)
+            )
+            wanted = row.without("method", "protocol")
+            alike = [
+                candidate
+                for candidate in other.rows.values()
+                if candidate.without("method", "protocol") == wanted
+            ]
+            name = "the shipped tables" if other.name == SHIPPED else other.name
+            lack = "lack" if other.name == SHIPPED else "lacks"
+            why = f"as {name} {lack} them"
+            if alike:
+                why = (
+                    f"by protocol {_protocol_text(row)}, not"
+                    f" {_protocol_text(alike[0])} in {name}"
+                )
+            notes[f"{table.name}: left out, {why}"] += 1
+    return [f"{why}: {count} conditions" for why, count in notes.items()]
+
+
+def _protocol_text(row: Row) -> str:
+    return f"{row.protocol} ({row.protocol_digest or 'unknown'})"
+
+
+def _without_controls(
+    conditions: list[Condition],
+) -> tuple[list[Condition], list[str]]:
+    """Returns the conditions with a change, and a note on the others.
+
+    If no condition has a change, the result contains all conditions.
+    """
+    changed = [
+        condition for condition in conditions if (STAGE, LAST) not in condition
+    ]
+    left = len(conditions) - len(changed)
+    if not left or not changed:
+        return conditions, []
+    return changed, [
+        f"left out, as nothing changes in them ({STAGE} {LAST}): {left}"
+        " conditions"
+    ]
+
+
+def _why_nothing_is_common(table: MetricTable, other: MetricTable) -> str:
+    """Returns as text why two tables have no condition in common."""
+    rows = [list(compared.rows.values()) for compared in (table, other)]
+    factors = {
+        name: None
+        for of_table in rows
+        for row in of_table
+        for name in row.factors
+    }
+    for column in (*(name for name in KEYS if name != "version"), *factors):
+        first, second = (
+            sorted({str(row[column]) for row in of_table}) for of_table in rows
+        )
+        if column != "method" and not {*first} & {*second}:
+            return (
+                f"{column}: {', '.join(first[:3])} in {table.name}, but"
+                f" {', '.join(second[:3])} in {other.name}"
+            )
+    return "each value is in both, but no row has the same ones in all columns"
+
+
+def _reduced_to(table: MetricTable, common: Iterable[Condition]) -> MetricTable:
+    """Returns a table reduced to some of its conditions."""
+    kept = set(common)
+    rows = {key: row for key, row in table.rows.items() if key[1] in kept}
+    return replace(table, rows=rows)

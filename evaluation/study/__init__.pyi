@@ -13,6 +13,8 @@ from evaluation.study.one_pair import measure_pairs as measure_pairs
 from evaluation.study.one_pair import pair_of as pair_of
 from evaluation.study.one_pair import pair_of_drive_maps as pair_of_drive_maps
 from evaluation.study.one_pair import pair_of_maps as pair_of_maps
+from evaluation.study.parts import MakePart as MakePart
+from evaluation.study.parts import Part as Part
 from evaluation.study.place_measurements import (
     DescribedSource as DescribedSource,
 )
@@ -44,9 +46,7 @@ from evaluation.study.recordings.recording_search import (
 )
 from evaluation.study.sources import DriveSource as DriveSource
 from evaluation.study.sources import RecordingSource as RecordingSource
-from evaluation.study.storage.parts import MakePart as MakePart
-from evaluation.study.storage.parts import Part as Part
-from evaluation.study.storage.study_files import StudyFiles as StudyFiles
+from evaluation.study.study_files import StudyFiles as StudyFiles
 from evaluation.study.tasks.change import ChangeTask as ChangeTask
 from evaluation.study.tasks.jobs import OPENING_COST as OPENING_COST
 from evaluation.study.tasks.jobs import SCAN_COST as SCAN_COST

@@ -3,6 +3,7 @@
 from collections.abc import (
     Callable,
     Collection,
+    Iterable,
     Mapping,
     MutableMapping,
     Sequence,
@@ -16,10 +17,12 @@ from cns_drake.base import (
     InputError,
     Job,
     Space,
+    Steps,
     did_you_mean,
     doing,
     forecast,
     make_folder,
+    nothing_left,
     run_jobs,
 )
 from evaluation.results import (
@@ -32,11 +35,9 @@ from evaluation.results import (
     made_by,
 )
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.removed_descriptors import (
-    remove_descriptors,
-    renew_removed_descriptors,
-)
-from evaluation.study.storage.study_files import StudyFiles
+from evaluation.study.feature_extraction import FeatureExtraction
+from evaluation.study.parts import MakePart, Part
+from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import NamedDrive, Pair
 from evaluation.study.tasks.task import Task
@@ -130,7 +131,7 @@ class Engine:
             self.on_note(text)
         make_folder(self.output)
         jobs = list(self.jobs.values())
-        renew_removed_descriptors(jobs)
+        _renew_removed_descriptors(jobs)
         told = forecast(jobs, cluster, space, least=_LONG)
         if told is not None:
             self.on_note(
@@ -145,7 +146,7 @@ class Engine:
                 " why"
             )
         self._write(*tables)
-        remove_descriptors(jobs)
+        _remove_descriptors(jobs)
         return tables
 
     def write_tables(self) -> tuple[Results, QueryRows]:
@@ -261,3 +262,54 @@ def made_tasks(
             )
         tasks[name] = known[name](settings, source)
     return tasks
+
+
+def _remove_descriptors(jobs: Iterable[Job]) -> None:
+    """Removes the descriptors that jobs keep only until the study is done.
+
+    The steps of these jobs have `FeatureExtraction.removes_descriptors`. All
+    jobs must be done.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    for job in jobs:
+        if (
+            isinstance(job.step, FeatureExtraction)
+            and job.step.removes_descriptors
+        ):
+            job.step.files.remove_descriptors()
+
+
+def _renew_removed_descriptors(jobs: Collection[Job]) -> None:
+    """Lets jobs compute removed descriptors again if new results need them.
+
+    Args:
+        jobs: all jobs of a study, each after the jobs that it needs.
+    """
+    if not any(
+        isinstance(one.step, FeatureExtraction) and one.step.removes_descriptors
+        for one in jobs
+    ):
+        return
+    names = {job.name for job in jobs}
+    # Files that will be written, and folders of features of new recordings.
+    stale: set[Path] = set()
+    needed: list[Part] = []
+    for job in jobs:
+        if isinstance(job.step, FeatureExtraction):
+            stale.update(part.path for part in job.step.missing())
+            if not names.issuperset(job.needs):
+                stale.add(job.step.files.folder)
+            continue
+        steps = job.step.steps if isinstance(job.step, Steps) else [job.step]
+        for step in steps:
+            if isinstance(step, MakePart):
+                inputs = list(step.parts())
+                read = {one.path for one in inputs}
+                read |= {one.path.parent for one in inputs}
+                if not stale.isdisjoint(read) or not nothing_left(step):
+                    stale.add(step.part.path)
+                    needed += inputs
+    for part in needed:
+        part.discard_if_value_removed()

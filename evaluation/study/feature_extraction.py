@@ -31,9 +31,9 @@ from evaluation.study.features import (
     described_key,
     kept_points,
 )
+from evaluation.study.parts import Part
 from evaluation.study.sources import DriveSource
-from evaluation.study.storage.parts import Part
-from evaluation.study.storage.study_files import FeatureFiles
+from evaluation.study.study_files import FeatureFiles
 
 # A method, and what it describes of a drive by a second protocol.
 Further: TypeAlias = "tuple[MethodChoice, frozenset[Role], RetrievalProtocol]"

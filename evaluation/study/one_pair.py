@@ -15,8 +15,8 @@ from evaluation.change import DriveMap
 from evaluation.recognition import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine
-from evaluation.study.storage.parts import Part
-from evaluation.study.storage.study_files import StudyFiles
+from evaluation.study.parts import Part
+from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.jobs import Jobs, job_name
 from evaluation.study.tasks.pair import Held, NamedDrive, Pair, Result
 from evaluation.study.tasks.task import Task

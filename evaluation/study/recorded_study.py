@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import (
+    Callable,
+    Collection,
+    Iterable,
+    Mapping,
+    Sequence,
+)
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +17,10 @@ import yaml
 
 from cns_drake.base import Cluster, InputError, Job, Reporter, Space, read_yaml
 from evaluation.drives import MovedDrive, cloud_at
-from evaluation.paper import paper_section
+from evaluation.paper import paper, paper_section
 from evaluation.recognition import (
     NUM_TRIALS,
+    PAPER_PROTOCOL,
     PROTOCOLS,
     Cost,
     RetrievalProtocol,
@@ -37,6 +44,8 @@ from evaluation.results import (
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine, made_tasks
+from evaluation.study.parts import MakePart, Part
+from evaluation.study.place_measurements import PlaceComparison
 from evaluation.study.recorded_city import ShownCity, add_city
 from evaluation.study.recordings import STAGES_FILE
 from evaluation.study.recordings.map_drives import (
@@ -49,8 +58,7 @@ from evaluation.study.recordings.recorded_pairs import (
     recorded_pairs,
 )
 from evaluation.study.sources import DriveSource
-from evaluation.study.storage.parts import MakePart, Part
-from evaluation.study.storage.study_files import StudyFiles
+from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.place import PlaceTask, PoseTask, measure_costs
 from evaluation.study.tasks.task import Task
@@ -91,7 +99,8 @@ def study_recordings(
         cluster: runs the jobs.
         methods: the methods.
         protocols: name -> protocol of place recognition; the first is the main
-            one. Each protocol has a baseline of its own.
+            one, and the only one with the control. As a further protocol,
+            `paper` measures the paper's methods alone.
         source: where the recordings come from, for errors.
         with_costs: whether times and memory are measured, after all other jobs.
         further_jobs: jobs that make recordings, or belong beside the study.
@@ -149,6 +158,7 @@ def study_recordings(
         experiment_text=_experiment_text(experiment, methods, protocols),
         notes=[
             *(f"{name}: {one.to_text()}" for name, one in protocols.items()),
+            *_without_control(protocols),
             *alone,
         ],
         sections=[
@@ -205,7 +215,12 @@ def recorded_sections(
 def _conditions(
     protocols: Mapping[str, RetrievalProtocol],
 ) -> list[RecordedCondition]:
-    """Returns the conditions of the experiment, the baseline first."""
+    """Returns the conditions of the experiment, the baseline first.
+
+    Only the main protocol has the control, which would double the cost of a
+    further protocol.
+    """
+    main, *_ = protocols
     return [
         RecordedCondition(
             {
@@ -215,9 +230,37 @@ def _conditions(
             stage,
             stage == LAST,
             protocol,
+            methods=None if name == main else _further_methods(name),
         )
         for stage in (LAST, OWN)
         for name, protocol in protocols.items()
+        if stage == OWN or name == main
+    ]
+
+
+def _further_methods(protocol: str) -> Collection[str] | None:
+    """Returns the methods that a further protocol measures; None for all.
+
+    The protocol `paper` serves to compare results with the paper's tables.
+    """
+    if protocol != PAPER_PROTOCOL.name:
+        return None
+    return frozenset(paper().modes)
+
+
+def _without_control(protocols: Iterable[str]) -> list[str]:
+    """Returns notes on what further protocols leave out, if there are any."""
+    main, *further = protocols
+    if not further:
+        return []
+    return [
+        f"The control ({STAGE}: {LAST}) is measured by the protocol {main}"
+        " only.",
+        *(
+            f"By the protocol {name}, only the paper's methods are measured."
+            for name in further
+            if _further_methods(name) is not None
+        ),
     ]
 
 
@@ -263,14 +306,21 @@ def _cost_job(
     files = StudyFiles(engine.output)
     methods = tuple(choice for choice, _ in engine.methods.values())
     places, queries = (files.features(one.name) for one in pair)
-    described = tuple(
-        tuple(found.described(one.key) for one in methods)
+    stored = [
+        (found.scans, *(found.described(one.key) for one in methods))
         for found in (places, queries)
+    ]
+    compared = PlaceComparison(
+        database=stored[0],
+        query=stored[1],
+        methods=methods,
+        protocol=protocol,
+        radii=(protocol.radius,),
     )
     step = MakePart(
         files.part("costs", "costs"),
         measure_method_costs,
-        (pair[1].source, queries.drive, methods, described, protocol),
+        (pair[1].source, queries.drive, compared),
     )
     return Job("costs of the methods", step, tuple(engine.jobs), _COSTS_COST)
 
@@ -279,9 +329,7 @@ def measure_method_costs(
     reporter: Reporter,
     source: DriveSource,
     summary: Part,
-    methods: tuple[MethodChoice, ...],
-    described: tuple[tuple[Part, ...], tuple[Part, ...]],
-    protocol: RetrievalProtocol,
+    compared: PlaceComparison,
 ) -> list[Cost]:
     """Returns the time and memory that each method needs on one core.
 
@@ -293,18 +341,16 @@ def measure_method_costs(
         source: opens the query drive.
         summary: file with the `DriveSummary` of the query drive, from which
             the drive's poses are read.
-        methods: the methods.
-        described: files with the descriptors of a database, and of the
-            queries, one for each method.
-        protocol: protocol of the comparison.
+        compared: the drives, which are in files, and the methods to measure.
     """
-    searches = measure_costs(reporter, *described, (), 0, methods)
+    protocol = compared.protocol
+    searches = measure_costs(reporter, compared)
     drive = source()
     known = summary.read()
     # A recording would be unpacked as a whole for its poses.
     drive = MovedDrive(drive, known.X_WS, drive.world_frame, drive.datum)
     costs = []
-    for choice in methods:
+    for choice in compared.methods:
         method = choice.make()
         number = protocol.scans(method)
         last = max(len(drive) - number, 0)

@@ -52,7 +52,7 @@ class TrainingScans:
 
     Attributes:
         images: (N, RINGS, SECTORS, CHANNELS) uint8 polar images, see
-            `evaluation.methods.polar_images.polar_image`.
+            `evaluation.methods.polar_image`.
         xy: (N, 2) positions of the sensors [m].
         cities: (N,) number of the city.
         drives: (N,) number of the drive in its city.

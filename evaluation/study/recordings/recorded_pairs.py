@@ -1,6 +1,13 @@
 """Pairs of recordings, which a study compares as they were recorded."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import (
+    Callable,
+    Collection,
+    Iterable,
+    Iterator,
+    Mapping,
+    Sequence,
+)
 from typing import Any, NamedTuple
 
 from cns_drake.base import (
@@ -34,6 +41,8 @@ class RecordedCondition(NamedTuple):
         database: the recordings of the database, if there are several.
         keep: which places of these recordings are kept, see
             `evaluation.recognition.place_selection.kept_places`.
+        methods: names of the methods that are measured; None for all methods
+            of the study.
     """
 
     factors: Mapping[str, Any]
@@ -42,6 +51,7 @@ class RecordedCondition(NamedTuple):
     protocol: RetrievalProtocol
     database: tuple[RecordingInfo, ...] = ()
     keep: str | int = KEEP_ALL
+    methods: Collection[str] | None = None
 
 
 def recorded_pairs(
@@ -98,6 +108,7 @@ def recorded_pairs(
                 query=query,
                 way=database,
                 protocol=condition.protocol,
+                methods=condition.methods,
             )
 
 

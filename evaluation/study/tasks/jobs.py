@@ -8,9 +8,9 @@ from cns_drake.base import Job, fingerprint
 from evaluation.recognition import RetrievalProtocol, Role
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import FeatureExtraction, map_source
+from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import DescribedSource
-from evaluation.study.storage.parts import MakePart, Part
-from evaluation.study.storage.study_files import StudyFiles
+from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 
 # Expected time to start a job and to open a drive [s].

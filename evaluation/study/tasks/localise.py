@@ -47,11 +47,11 @@ from evaluation.localisation import (
 )
 from evaluation.maps import map_drive
 from evaluation.recognition import KEEP_ALL, Number, kept_share
+from evaluation.study.parts import MakePart, Part
 from evaluation.study.sources import (
     DriveSource,
     JoinedSource,
 )
-from evaluation.study.storage.parts import MakePart, Part
 from evaluation.study.tasks.jobs import OPENING_COST, Jobs
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Answered, Task, check_positive

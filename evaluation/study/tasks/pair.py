@@ -1,6 +1,6 @@
 """A pair of drives, as tasks measure it under a condition of an experiment."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 import math
 from typing import Any, Protocol
@@ -105,6 +105,8 @@ class Pair:
             methods' default.
         overlaps: (Q, D) overlap of each query with each place, if the protocol
             says that matches are by overlap; otherwise None.
+        methods: names of the methods that are measured; None for all methods
+            of the study.
         parts: task -> its results, as files or in memory, for the tasks that
             measure the pair.
     """
@@ -128,7 +130,12 @@ class Pair:
     may_repeat: bool = False
     settings: Mapping[str, Any] = field(default_factory=dict)
     overlaps: np.ndarray | None = None
+    methods: Collection[str] | None = None
     parts: dict[str, tuple[Result, ...]] = field(default_factory=dict)
+
+    def has_method(self, name: str) -> bool:
+        """Returns whether a method of the study is measured, by its name."""
+        return self.methods is None or name in self.methods
 
     @property
     def place(self) -> tuple[object, ...]:

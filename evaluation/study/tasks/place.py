@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import compress
 from typing import Any
 
 from cns_drake.base import Job, Reporter, Steps, track
@@ -14,12 +15,13 @@ from evaluation.recognition import (
     place_numbers,
     pose_numbers,
 )
+from evaluation.study.parts import MakePart
 from evaluation.study.place_measurements import (
+    DescribedSource,
     PlaceComparison,
     measure_places,
     shown_overlaps,
 )
-from evaluation.study.storage.parts import MakePart
 from evaluation.study.tasks.jobs import Jobs, num_described
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Answered, Task
@@ -47,6 +49,8 @@ class PoseTask(Task):
     _numbers = staticmethod(pose_numbers)
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
+        if not any(pair.has_method(one.name) for one in jobs.methods):
+            return ()
         needs: list[str] = []
         compared = _comparison(pair, jobs, needs, kept=pair.is_composed)
         num_queries = num_described(pair.query, "queries", pair.protocol)
@@ -70,7 +74,7 @@ class PoseTask(Task):
                 measure_places,
                 (compared.by_method(k),),
             )
-            for k, choice in enumerate(jobs.methods)
+            for k, choice in enumerate(compared.methods)
         ]
         name = f"place {pair.key}"
         whole = Steps(shown.part.path, (shown, *steps))
@@ -138,20 +142,34 @@ def _comparison(
         needs: list to which the names of the added jobs are appended.
         kept: whether both drives must be in files.
     """
+    is_chosen = [pair.has_method(one.name) for one in jobs.methods]
+
+    def of_chosen(described: DescribedSource) -> DescribedSource:
+        if not isinstance(described, tuple):
+            return described
+        scans, *of_methods = described
+        return scans, *compress(of_methods, is_chosen)
+
     database, query = (
-        jobs.described(drive, role, pair.protocol, needs, kept=kept)
+        of_chosen(jobs.described(drive, role, pair.protocol, needs, kept=kept))
         for drive, role in pair.roles
     )
     radii = tuple(sorted(jobs.radii[pair.key]))
     return PlaceComparison(
         database,
         query,
-        jobs.methods,
+        tuple(compress(jobs.methods, is_chosen)),
         replace(pair.protocol, radius=radii[0]),
         radii,
-        jobs.distractor_places(pair, needs),
+        tuple(
+            tuple(compress(one, is_chosen))
+            for one in jobs.distractor_places(pair, needs)
+        ),
         pair.distractors,
-        tuple(jobs.beside(pair, needs)),
+        tuple(
+            (scans, *compress(of_methods, is_chosen))
+            for scans, *of_methods in jobs.beside(pair, needs)
+        ),
         pair.keep,
         pair.leaves_out_itself,
         pair.overlaps,
@@ -166,7 +184,8 @@ def _search_cost(pair: Pair, jobs: Jobs, num_queries: float) -> float:
         for drives in ((pair.database, *pair.beside), jobs.distractors)
     )
     num_places = own + min(pair.distractors, others)
-    each = len(jobs.methods) * (_QUERY_COST + _PLACE_COST * num_places)
+    num_methods = sum(pair.has_method(one.name) for one in jobs.methods)
+    each = num_methods * (_QUERY_COST + _PLACE_COST * num_places)
     return _STARTING_COST + num_queries * each
 
 

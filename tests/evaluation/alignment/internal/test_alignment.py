@@ -24,7 +24,8 @@ import pytest
 
 from cns_drake.base import InputError, poses, xyz
 from cns_drake.drives import Drive
-from evaluation.alignment import align, in_one_world
+from evaluation.alignment import in_one_world
+from evaluation.alignment.align import align
 from evaluation.change import maps_in_one_world, temporal_change
 from evaluation.drives import MulranDrive
 from evaluation.maps import map_drive

@@ -28,6 +28,7 @@ from evaluation.localisation import (
     Settings,
     Starts,
     default_settings,
+    estimators,
     is_right,
     localisation_summary,
     localise,
@@ -38,11 +39,9 @@ from evaluation.localisation import (
     note_sparse,
     path_axes,
     read_queries,
-    robust_icp,
 )
-from evaluation.localisation.estimators import Estimate
-from evaluation.localisation.fit import fit_at
-from evaluation.localisation.robust_icp import _gauss_newton_step
+from evaluation.localisation.estimators import Estimate, _gauss_newton_step
+from evaluation.localisation.localiser import fit_at
 from evaluation.recognition import auroc
 
 SHIPPED = [name for name in METHODS if name != "kiss-matcher"]
@@ -216,10 +215,10 @@ def test_the_search_is_narrowed_to_the_last_width(monkeypatch):
         widths.append(width)
         return np.array([0, 0, 0, 0.3, 0, 0]) * (len(widths) == 1)
 
-    monkeypatch.setattr(robust_icp, "_gauss_newton_step", still)
+    monkeypatch.setattr(estimators, "_gauss_newton_step", still)
     surface = make_surface(street())
     start = np.eye(4)
-    end, steps = robust_icp.align_robustly(
+    end, steps = estimators.align_robustly(
         surface, street(), start, (6.0, 0.5), 50, (1e-4, 1e-5)
     )
     # Three times a deviation of 0.3 m, then of none.

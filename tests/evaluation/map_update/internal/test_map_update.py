@@ -24,8 +24,7 @@ from evaluation.map_update import (
     write_labels,
     write_structures,
 )
-from evaluation.map_update.baselines import by_distance
-from evaluation.map_update.free_space import by_free_space
+from evaluation.map_update.baselines import by_distance, by_free_space
 from evaluation.map_update.map_builder import CELL, MapBuilder
 from evaluation.map_update.structures import verdicts
 

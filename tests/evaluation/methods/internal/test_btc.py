@@ -5,7 +5,7 @@ import pytest
 
 from cns_drake.base import InputError, poses
 from evaluation.methods import make_method
-from evaluation.methods.btc_triangles import match
+from evaluation.methods.btc import match
 from evaluation.recognition import write_scores
 
 GROUND = -1.6

@@ -4,13 +4,8 @@ import math
 import numpy as np
 import pytest
 
+from evaluation.methods.btc import Triangles, make_table, make_triangles, match
 from evaluation.methods.btc_keypoints import Keypoints
-from evaluation.methods.btc_triangles import (
-    Triangles,
-    make_table,
-    make_triangles,
-    match,
-)
 
 
 def keypoints(*positions):

@@ -5,8 +5,8 @@ import pytest
 
 from cns_drake.base import poses
 from evaluation.methods import align
+from evaluation.methods.btc import find_motion, plane_overlap
 from evaluation.methods.btc_planes import Planes
-from evaluation.methods.btc_verification import find_motion, plane_overlap
 
 
 def random_motion(rng, reach=20.0):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from evaluation.methods.btc_voxel_order import (
+from evaluation.methods.btc_planes import (
     _NUM_BUCKETS,
     hash_table_order,
     voxel_order,

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from evaluation.methods import LayeredOverlap, make_method
-from evaluation.methods.layered_overlap import LayeredScan
+from evaluation.methods.layered_overlap import LayeredScan, climb, turns
 from evaluation.methods.overlap_layers import layer_cells
-from evaluation.methods.overlap_maps import climb, turns
 
 
 def method(**parameters) -> LayeredOverlap:

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from evaluation.methods.local_features import local_features
+from evaluation.methods.ringpp import local_features
 
 
 def features_of(points):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from evaluation.methods.local_features import nearest_neighbours
+from evaluation.methods.ringpp import nearest_neighbours
 
 
 def rings(seed):

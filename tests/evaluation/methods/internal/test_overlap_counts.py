@@ -4,7 +4,7 @@ from helpers.layered_scans import image, shifted, some_cells
 import numpy as np
 import pytest
 
-from evaluation.methods.overlap_maps import (
+from evaluation.methods.layered_overlap import (
     best_overlaps,
     climb,
     coarse_maps,

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from evaluation.methods.radon import radon
+from evaluation.methods.ringpp import radon
 
 
 def dot(size, row, column, value=1.0):

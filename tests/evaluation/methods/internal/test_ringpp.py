@@ -5,8 +5,7 @@ import pytest
 
 from cns_drake.base import InputError
 from evaluation.methods import make_method
-from evaluation.methods.radon import radon
-from evaluation.methods.ringpp import RingPlusPlus, _normalise
+from evaluation.methods.ringpp import RingPlusPlus, _normalise, radon
 
 CELL = 140.0 / 120.0
 # Least possible distance of a pair, see `test_no_pair_is_nearer`.

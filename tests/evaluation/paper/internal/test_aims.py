@@ -2,7 +2,7 @@
 
 import pytest
 
-from evaluation.paper.aims import MET, MISSED, aims
+from evaluation.paper.findings import MET, MISSED, aims
 from evaluation.paper.paper_values import Measured, Numbers, paper
 from evaluation.recognition import MODES
 

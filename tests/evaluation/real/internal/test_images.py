@@ -19,7 +19,7 @@ from evaluation.real.image_sequences import (
     open_images,
     open_sequences,
 )
-from evaluation.real.judge_task import judge_scans
+from evaluation.real.real_study import judge_scans
 from evaluation.results import QueryRows, Results
 
 # Heading, x and y of each image: the second half passes the places of the first
@@ -284,10 +284,9 @@ class Scanned:
 @pytest.mark.night
 def test_images_are_told_from_images_of_scans(tmp_path, monkeypatch):
     judge = pytest.importorskip("evaluation.real.judge")
-    from evaluation.real import patch_features
 
     monkeypatch.setattr(judge, "_TREES", 10)
-    monkeypatch.setattr(patch_features, "_NEIGHBOURHOODS", 40)
+    monkeypatch.setattr(judge, "_NEIGHBOURHOODS", 40)
     folder = tmp_path / "imgs"
     folder.mkdir()
     rows = []

@@ -15,11 +15,11 @@ PLACES = 6
 
 @pytest.fixture(scope="module")
 def judge():
-    from evaluation.real import judge, patch_features
+    from evaluation.real import judge
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(judge, "_TREES", 10)
-        patch.setattr(patch_features, "_NEIGHBOURHOODS", 40)
+        patch.setattr(judge, "_NEIGHBOURHOODS", 40)
         yield judge
 
 
@@ -114,11 +114,9 @@ def test_it_finds_the_difference(
 
 
 def test_a_result_is_the_mean_of_draws(judge, program, tmp_path, monkeypatch):
-    from evaluation.real import patch_features
-
     # Means need neither a classifier nor many patches.
     for name in ("_PATCHES", "_NEIGHBOURHOODS"):
-        monkeypatch.setattr(patch_features, name, 5)
+        monkeypatch.setattr(judge, name, 5)
     monkeypatch.setattr(
         judge,
         "tell_apart",

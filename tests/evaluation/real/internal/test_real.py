@@ -301,11 +301,11 @@ def test_other_formats_without_poses(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_the_judge_tells_boxes_from_noise(tmp_path, monkeypatch):
-    from evaluation.real import judge, patch_features
+    from evaluation.real import judge
 
     monkeypatch.setattr(judge, "_TREES", 5)
     for name in ("_PATCHES", "_NEIGHBOURHOODS"):
-        monkeypatch.setattr(patch_features, name, 5)
+        monkeypatch.setattr(judge, name, 5)
     folder = tmp_path / "scans" / "nuscenes_1072"
     (folder / "velodyne").mkdir(parents=True)
     rng = np.random.default_rng(3)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evaluation import make_method, open_drive, retrieve
-from evaluation.recognition.sequence_matching import sequence_scores
+from evaluation.recognition.retrieval import sequence_scores
 
 
 def on_a_line(*places):

@@ -23,8 +23,8 @@ from evaluation.results import (
     write_page,
 )
 from evaluation.results.charts.chart import NARROW, ROW, WIDE
-from evaluation.results.charts.markers import marker_corners
 from evaluation.results.charts.words import value_words
+from evaluation.results.page import marker_corners
 
 YEARS = "database.years"
 PARTS = {"ring++": 0.9, "solid": 0.5, "mine": 0.7}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evaluation.results.smoothing import curves, smooth
+from evaluation.results.charts.scatter import curves, smooth
 
 
 def test_no_curve_crosses_a_gap():

@@ -22,7 +22,7 @@ from evaluation.study import (
 )
 from evaluation.study.feature_extraction import FeatureExtraction
 from evaluation.study.place_measurements import PlaceComparison, measure_places
-from evaluation.study.storage.study_files import FeatureFiles
+from evaluation.study.study_files import FeatureFiles
 
 pytestmark = pytest.mark.slow
 

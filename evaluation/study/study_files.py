@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cns_drake.base import file_name
-from evaluation.study.storage.parts import Part
+from evaluation.study.parts import Part
 
 
 @dataclass(frozen=True)

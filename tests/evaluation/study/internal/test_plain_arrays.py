@@ -6,7 +6,7 @@ import struct
 import numpy as np
 import pytest
 
-from evaluation.study.storage.value_encoding import decode, encode
+from evaluation.study.parts import decode, encode
 
 
 def arrays():

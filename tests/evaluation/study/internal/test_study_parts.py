@@ -13,9 +13,8 @@ import pytest
 import zstandard
 
 from cns_drake.base import InputError, Reporter, fingerprint, nothing_left
-from evaluation.study import MakePart, Part
-from evaluation.study.storage import parts
-from evaluation.study.storage.value_encoding import decode, encode
+from evaluation.study import MakePart, Part, parts
+from evaluation.study.parts import decode, encode
 
 INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
 
