@@ -411,8 +411,8 @@ class _Reader:
         made = Element("model", name=_free_name(model, target))
         if model.get("placement_frame"):
             made.set("placement_frame", model.get("placement_frame", ""))
-        if target.tag == "world":
-            SubElement(made, "static").text = "true"
+        # Drake does not weld an inner model because the outer one is static.
+        SubElement(made, "static").text = "true"
         self._copy_pose(model, made)
         self._add_children(model, made, folder, depth + 1)
         if any(part.tag in ("link", "model", "frame") for part in made):

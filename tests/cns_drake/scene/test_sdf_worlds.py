@@ -658,3 +658,19 @@ def test_a_colour_that_is_none_is_refused(tmp_path):
     path = write(tmp_path, f"<model name='m'>{link(extra=extra)}</model>")
     with pytest.raises(InputError, match="diffuse: 255 0 0 1: not within"):
         load_world(path)
+
+
+def test_models_inside_of_models_stand_still(tmp_path):
+    inner = f"<model name='inner'><pose>3 0 0 0 0 0</pose>{link()}</model>"
+    outer = (
+        "<model name='outer'><pose>1 2 0 0 0 0.3</pose>"
+        f"{link(name='own')}{inner}</model>"
+    )
+    world = load_world(write(tmp_path, outer))
+    found = world.scene_graph.model_inspector()
+    frames = {
+        found.GetFrameId(one)
+        for one in found.GetAllGeometryIds(Role.kPerception)
+    }
+    assert len(frames) == 2
+    assert frames <= set(world.anchored_frames())
