@@ -110,6 +110,13 @@ def _in_site(path: str) -> str:
     return own if own != path else f"{_PROJECT}/{path}"
 
 
+def _offers(module: str, home: str, name: str) -> bool:
+    """Returns whether the package above a module offers a name of it."""
+    top = module.partition(".")[0]
+    stub = (ROOT / top / "__init__.pyi").read_text(encoding="utf-8")
+    return f"from {home} import {name} as {name}\n" in stub
+
+
 def _reference(package: str) -> dict[str, str]:
     """Returns the pages that explain the public names, one for each module.
 
@@ -133,7 +140,7 @@ def _reference(package: str) -> dict[str, str]:
         module = ".".join(home.split(".")[:2])
         path = module.replace(".", "/") + ".md"
         rows.append(f"| [{name}]({path}#{home}.{name}) | `{module}` |")
-        if module.startswith(package):
+        if module.startswith(package) or not _offers(module, home, name):
             # A name has one place in the site.
             pages.setdefault(path, f"# {module}\n")
             pages[path] += f"\n::: {home}.{name}\n"

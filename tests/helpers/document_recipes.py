@@ -361,9 +361,9 @@ RECIPES = {
     ),
     "help: report": Recipe(
         "cns-eval report drives",
-        changes=(("report drives", "report cns"),),
-        after=("exports",),
-        prints=("report/report.",),
+        changes=(("report drives", "report output"),),
+        after=("own city",),
+        prints=("report/index.html",),
     ),
     "named poses": Recipe(
         "# number x y z qx qy qz qw",

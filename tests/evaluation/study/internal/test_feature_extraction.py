@@ -243,7 +243,6 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
         (solid,),
         PAPER_PROTOCOL,
         (7.5,),
-        shows_overlaps=False,
     )
     step = MakePart(part, measure_places, (compared,))
     with pytest.raises(InputError, match="poses in frame 'utm'"):

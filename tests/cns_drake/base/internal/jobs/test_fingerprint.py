@@ -238,7 +238,7 @@ def test_of_our_own_code_the_right_modules_count(packages):
         pytest.param(
             "cns_drake.simulation.simulated_drive", marks=pytest.mark.night
         ),
-        "cns_drake.studies.recordings.recording",
+        "cns_drake.studies.recording",
     ],
 )
 def test_what_python_imports_is_found_in_the_sources(module, monkeypatch):

@@ -208,6 +208,11 @@ def test_slider_and_keys(reader):
 def test_keys_leave_other_sections_alone(browser, address):
     browser.open(address, *PHONE)
     shown(browser, 0, 1, 0, 0)
+    # The browser is out of sight, below other sections.
+    browser.evaluate(
+        'document.body.insertAdjacentHTML("afterbegin",'
+        ' "<div style=height:3000px></div>")'
+    )
     browser.press("ArrowRight")
     assert browser.evaluate("state.query") == 0
     browser.evaluate('byId("browser").scrollIntoView({behavior: "instant"})')
