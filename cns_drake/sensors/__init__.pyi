@@ -60,11 +60,11 @@ from cns_drake.sensors.lidar.ray_queries import RayHits as RayHits
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE as POINT_DTYPE
 from cns_drake.sensors.noise_draws import noise_generator as noise_generator
 from cns_drake.sensors.odometry import Odometry as Odometry
-from cns_drake.sensors.odometry import (
-    OdometrySection as OdometrySection,
-)
 from cns_drake.sensors.odometry import OdometrySensor as OdometrySensor
 from cns_drake.sensors.odometry import add_odometry as add_odometry
+from cns_drake.sensors.odometry_config import (
+    OdometrySection as OdometrySection,
+)
 from cns_drake.sensors.returns.calibrated import (
     CalibratedReturns as CalibratedReturns,
 )

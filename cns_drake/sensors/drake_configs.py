@@ -39,7 +39,7 @@ from cns_drake.sensors.lidar.adding import add_described_lidar
 from cns_drake.sensors.lidar.config import LidarDescription, LidarSection
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
-from cns_drake.sensors.odometry import OdometrySection
+from cns_drake.sensors.odometry_config import OdometrySection
 from cns_drake.sensors.sensor_config import HIGHEST_RATE, Section
 from cns_drake.sensors.system_names import check_unused_names
 

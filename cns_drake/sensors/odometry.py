@@ -17,7 +17,6 @@ from cns_drake.sensors.carriers import (
     body_and_pose,
     connect_motion,
 )
-from cns_drake.sensors.sensor_config import Section
 from cns_drake.sensors.system_names import check_new_sensor
 
 
@@ -167,16 +166,3 @@ def add_odometry(
     inputs = {port: sensor.GetInputPort(port) for port in ports}
     connect_motion(builder, motion, carrier, inputs)
     return sensor
-
-
-class OdometrySection(Section):
-    """How often the vehicle's ground-truth motion is recorded.
-
-    Attributes:
-        rate: messages per second [Hz], such as 100. The rate must be a multiple
-            of the fastest LiDAR's rate and at most 1000, and the time between
-            two messages must be a whole number of nanoseconds. By default one
-            message per scan.
-    """
-
-    rate: int | None = None

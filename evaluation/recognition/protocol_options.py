@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from enum import Enum
 import functools
 import inspect
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
-import click
 import typer
 
 from evaluation.recognition.protocol import (
@@ -31,13 +31,21 @@ _NAMED: _Options = {
         "fair",
     )
 }
+
+
+class _OneOfSeveral(str, Enum):
+    """The name of a protocol. Typer knows lists of these, not of literals."""
+
+    FAIR = "fair"
+    PAPER = "paper"
+    RECORDED = "recorded"
+
+
 _SeveralNames = Annotated[
-    list[str],
+    list[_OneOfSeveral],
     typer.Option(
         "--protocol",
-        # Typer knows no list of literals, and would name no choices.
-        click_type=click.Choice(get_args(_Name)),
-        metavar="|".join(get_args(_Name)),
+        metavar="|".join(one.value for one in _OneOfSeveral),
         help=f"{_WHAT} May be repeated to measure by several protocols. The "
         "page compares results by the protocol paper with the paper's tables.",
     ),
@@ -190,11 +198,14 @@ def with_protocols(
     """
 
     def all_named(
-        named_protocols: list[str], **fields: Any
+        named_protocols: list[_OneOfSeveral], **fields: Any
     ) -> dict[str, RetrievalProtocol]:
         return {
-            name: replace(PROTOCOLS[name], **fields) for name in named_protocols
+            one.value: replace(PROTOCOLS[one.value], **fields)
+            for one in named_protocols
         }
 
-    names: _Options = {"named_protocols": (_SeveralNames, list(default))}
+    names: _Options = {
+        "named_protocols": (_SeveralNames, [*map(_OneOfSeveral, default)])
+    }
     return _with_options("protocols", {**names, **_FIELDS}, all_named)

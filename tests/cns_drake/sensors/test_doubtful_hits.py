@@ -26,10 +26,14 @@ from scipy.spatial import ConvexHull
 from cns_drake.sensors import DirectionPattern, add_lidar
 
 SLOPE = RollPitchYaw(0.3, 0.4, 0.5)
-# What docs/drake.md promises: error of a range, distance of a point from its
-# triangle, and distance from an edge at which a beam, and a ray of `CastRays`,
-# may pass on either side [m].
-ERROR, GAP, BESIDE, BESIDE_SINGLE = 2e-3, 1e-3, 1e-4, 1e-9
+# What docs/drake.md promises: error of a range [m].
+ERROR = 2e-3
+# Distance of a point from its triangle [m].
+GAP = 1e-3
+# Distance from an edge at which a beam may pass on either side [m].
+BESIDE = 1e-4
+# The same for a ray of `CastRays` [m].
+BESIDE_SINGLE = 1e-9
 
 
 class Scene:
