@@ -14,6 +14,7 @@ from evaluation.localisation import (
     localise,
     make_estimator,
     make_map,
+    read_queries,
 )
 from evaluation.study import LocaliseTask, RecordingSource, measure_localisation
 
@@ -35,7 +36,8 @@ def test_a_pair_is_localised_as_each_scan_alone(towns, found):
     settings = default_settings("gicp")
     place = make_map(mapped, settings)
     found_alone = Localiser(place, make_estimator("gicp", settings), settings)
-    (alone,) = localise([found_alone], asked, range(8), STARTS[1:])
+    queries = read_queries(asked, range(8))
+    (alone,) = localise([found_alone], queries, STARTS[1:], asked.name, 8)
     for name in COLUMNS:
         if name != "seconds":
             assert np.array_equal(found[3][name], alone[name])
