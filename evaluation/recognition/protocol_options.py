@@ -5,7 +5,7 @@ from dataclasses import replace
 from enum import Enum
 import functools
 import inspect
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
 
@@ -18,7 +18,15 @@ from evaluation.recognition.protocol import (
 # Parameter name -> its type, annotated with the option, and its default.
 _Options = Mapping[str, tuple[Any, Any]]
 
-_Name = Literal["fair", "paper", "recorded"]
+
+class _Name(str, Enum):
+    """The name of a protocol. Typer knows lists of these, not of literals."""
+
+    FAIR = "fair"
+    PAPER = "paper"
+    RECORDED = "recorded"
+
+
 _WHAT = (
     "Protocol, which says how the scans of the query drive become queries. "
     "fair rotates each scan by a random yaw and tilt, so that no method "
@@ -31,21 +39,11 @@ _NAMED: _Options = {
         "fair",
     )
 }
-
-
-class _OneOfSeveral(str, Enum):
-    """The name of a protocol. Typer knows lists of these, not of literals."""
-
-    FAIR = "fair"
-    PAPER = "paper"
-    RECORDED = "recorded"
-
-
 _SeveralNames = Annotated[
-    list[_OneOfSeveral],
+    list[_Name],
     typer.Option(
         "--protocol",
-        metavar="|".join(one.value for one in _OneOfSeveral),
+        metavar="|".join(one.value for one in _Name),
         help=f"{_WHAT} May be repeated to measure by several protocols. The "
         "page compares results by the protocol paper with the paper's tables.",
     ),
@@ -198,7 +196,7 @@ def with_protocols(
     """
 
     def all_named(
-        named_protocols: list[_OneOfSeveral], **fields: Any
+        named_protocols: list[_Name], **fields: Any
     ) -> dict[str, RetrievalProtocol]:
         return {
             one.value: replace(PROTOCOLS[one.value], **fields)
@@ -206,6 +204,6 @@ def with_protocols(
         }
 
     names: _Options = {
-        "named_protocols": (_SeveralNames, [*map(_OneOfSeveral, default)])
+        "named_protocols": (_SeveralNames, [*map(_Name, default)])
     }
     return _with_options("protocols", {**names, **_FIELDS}, all_named)
