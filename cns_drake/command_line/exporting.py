@@ -64,7 +64,7 @@ _FORMATS: Mapping[str, tuple[Format, ...]] = {
     "held_out": (Format.POINTNETVLAD, Format.OVERLAP),
     "spacing": (*_PAIRS, *_MAPS),
     "scans": (Format.POINTNETVLAD,),
-    "max_range": _PAIRS,
+    "half_extent": _PAIRS,
     "jobs": _PAIRS,
     "scheduler": _PAIRS,
     "seconds": (Format.FILM,),
@@ -102,7 +102,7 @@ def export(
     vary: options.Vary = None,
     held_out: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
     scans: Annotated[int, typer.Option(min=1, metavar="N")] = 1,
-    max_range: Annotated[
+    half_extent: Annotated[
         float | None,
         typer.Option(min=1.0, max=10_000.0, metavar="METRES"),
     ] = None,
@@ -177,7 +177,7 @@ def export(
             with --format pointnetvlad or overlap.
         scans: Number of consecutive scans that are merged into each cloud (a
             submap). Only with --format pointnetvlad.
-        max_range: Largest absolute x, y and z of a point of training data in
+        half_extent: Largest absolute x, y and z of a point of training data in
             the LiDAR's frame [m]. Points beyond this limit are left out. By
             default 50, or 100 for overlap-table.
         seconds: Length of the whole film, with all of its shots [s].
@@ -202,7 +202,7 @@ def export(
         if layout == Format.OVERLAP_TABLE:
             named = [*words, *(["--vary", vary] if vary else [])]
             protocol = RetrievalProtocol(
-                query_spacing=spacing, max_range=max_range or _OVERLAP_RANGE
+                query_spacing=spacing, half_extent=half_extent or _OVERLAP_RANGE
             )
             _write_overlap_table(learned, named, output, protocol, json=json)
             return
@@ -213,7 +213,7 @@ def export(
             "overlap" if layout == Format.OVERLAP else "pointnetvlad",
             spacing,
             scans,
-            max_range or _CLOUD_RANGE,
+            half_extent or _CLOUD_RANGE,
         )
         _write_training_data(
             learned, held_out or (), output, settings, cluster, json=json

@@ -100,8 +100,8 @@ def suggest_recognition(
     given: list[object] = []
     if protocol.query_spacing != usual.query_spacing:
         given += ["--query-spacing", protocol.query_spacing]
-    if protocol.max_range != usual.max_range:
-        given += ["--max-range", protocol.max_range]
+    if protocol.half_extent != usual.half_extent:
+        given += ["--half-extent", protocol.half_extent]
     next_command(
         "cns-eval",
         "pr",

@@ -65,14 +65,14 @@ class ExportOptions:
             OverlapNet and similar programs.
         spacing: distance between two clouds, along the path [m].
         scans: number of consecutive scans that are merged into a cloud.
-        max_range: largest absolute x, y and z of a point [m]; points beyond
+        half_extent: largest absolute x, y and z of a point [m]; points beyond
             this limit are left out.
     """
 
     format: Format = "pointnetvlad"
     spacing: float = 10.0
     scans: int = 1
-    max_range: float = 50.0
+    half_extent: float = 50.0
 
 
 def write_overlap_table(
@@ -210,11 +210,11 @@ def export_run(
                 drive,
                 int(frame),
                 options.scans,
-                options.max_range,
+                options.half_extent,
                 ("label",),
                 before,
             )
-            data = _training_cloud(cloud, options.max_range, number).tobytes()
+            data = _training_cloud(cloud, options.half_extent, number).tobytes()
         with user_errors(folder):
             (folder / f"{number:06d}.bin").write_bytes(data)
     X_WS = drive.X_WS[frames]
@@ -224,7 +224,7 @@ def export_run(
 
 
 def _training_cloud(
-    points: np.ndarray, max_range: float, seed: int
+    points: np.ndarray, half_extent: float, seed: int
 ) -> np.ndarray:
     """Returns 4096 points in [-1, 1], without ground, of mean 0; float64."""
     kept = points[~np.isin(points["label"], _GROUND)]
@@ -235,7 +235,7 @@ def _training_cloud(
     rng = np.random.default_rng(seed)
     few = len(xyz) < _POINTS
     chosen = xyz[rng.choice(len(xyz), _POINTS, replace=few)]
-    return (chosen - chosen.mean(axis=0)) / (2.0 * max_range)
+    return (chosen - chosen.mean(axis=0)) / (2.0 * half_extent)
 
 
 def compare_runs(
@@ -258,7 +258,7 @@ def compare_runs(
     protocol = RetrievalProtocol(
         query_spacing=options.spacing,
         place_spacing=options.spacing,
-        max_range=options.max_range,
+        half_extent=options.half_extent,
     )
     return exact_overlaps(database(), query(), protocol)
 

@@ -21,7 +21,7 @@ from evaluation.drives.scan_clouds import cropped as cropped
 from evaluation.drives.scan_clouds import (
     cropped_with_fields as cropped_with_fields,
 )
-from evaluation.drives.scan_clouds import within_range as within_range
+from evaluation.drives.scan_clouds import within_cube as within_cube
 from evaluation.drives.scan_files import BinDrive as BinDrive
 from evaluation.drives.scan_files import FileDrive as FileDrive
 from evaluation.drives.text_tables import parse_seconds as parse_seconds

@@ -14,24 +14,24 @@ from cns_drake.drives import Drive
 from evaluation.drives.query_sensor import QuerySensor
 
 
-def within_range(points: np.ndarray, max_range: float) -> np.ndarray:
+def within_cube(points: np.ndarray, half_extent: float) -> np.ndarray:
     """Returns which points (N, 3) are finite and within a range, (N,) bool.
 
     Args:
         points: (N, 3) points in the frame of the sensor [m].
-        max_range: greatest absolute value of each coordinate [m].
+        half_extent: greatest absolute value of each coordinate [m].
     """
     # One column at a time, because NumPy reduces slowly along a short axis. A
     # comparison with NaN is false, so NaN is out of range.
     x, y, z = np.abs(points.T)
-    return (x <= max_range) & (y <= max_range) & (z <= max_range)
+    return (x <= half_extent) & (y <= half_extent) & (z <= half_extent)
 
 
 def cloud_at(
     drive: Drive,
     frame: int,
     num_scans: int,
-    max_range: float,
+    half_extent: float,
     fields: tuple[str, ...] = (),
     num_before: int = 0,
     sensor: QuerySensor | None = None,
@@ -43,8 +43,8 @@ def cloud_at(
         frame: number of the frame.
         num_scans: number of consecutive scans that are merged. At the ends of
             the drive, fewer scans are merged.
-        max_range: greatest absolute x, y and z of a point in the sensor's frame
-            [m].
+        half_extent: greatest absolute x, y and z of a point in the sensor's
+            frame [m].
         fields: names of further fields of the points, besides x, y and z.
         num_before: how many of the scans come before the frame.
         sensor: rotation and occluded sector that are applied to the sensor;
@@ -76,9 +76,9 @@ def cloud_at(
             if X_FS0 is not None:
                 X_FS = X_FS0 @ X_FS
         if not fields:
-            return cropped(scan, max_range, X_FS)
+            return cropped(scan, half_extent, X_FS)
         return cropped_with_fields(
-            scan, max_range, fields, X_FS, source=drive.name
+            scan, half_extent, fields, X_FS, source=drive.name
         )
 
     return clouds.read_only(
@@ -87,13 +87,13 @@ def cloud_at(
 
 
 def cropped(
-    scan: np.ndarray, max_range: float, X_FS: np.ndarray | None = None
+    scan: np.ndarray, half_extent: float, X_FS: np.ndarray | None = None
 ) -> np.ndarray:
     """Returns the points of a scan that are finite and within range.
 
     Args:
         scan: structured array (N,) in the frame S of a sensor.
-        max_range: greatest absolute x, y and z of a point in F [m].
+        half_extent: greatest absolute x, y and z of a point in F [m].
         X_FS: (4, 4) pose of the sensor in the frame F of the result; by default
             F is S.
 
@@ -101,12 +101,12 @@ def cropped(
         (K, 3) float64 in F [m].
     """
     p_F = _coordinates(scan, X_FS)
-    return p_F.compress(within_range(p_F, max_range), axis=0)
+    return p_F.compress(within_cube(p_F, half_extent), axis=0)
 
 
 def cropped_with_fields(
     scan: np.ndarray,
-    max_range: float,
+    half_extent: float,
     fields: tuple[str, ...],
     X_FS: np.ndarray | None = None,
     *,
@@ -116,7 +116,7 @@ def cropped_with_fields(
 
     Args:
         scan: structured array (N,) in the frame S of a sensor.
-        max_range: greatest absolute x, y and z of a point in F [m].
+        half_extent: greatest absolute x, y and z of a point in F [m].
         fields: names of further fields of the points, besides x, y and z.
         X_FS: (4, 4) pose of the sensor in the frame F of the result; by default
             F is S.
@@ -136,7 +136,7 @@ def cropped_with_fields(
                 f" {', '.join(known)})"
             )
     p_F = _coordinates(scan, X_FS)
-    kept = within_range(p_F, max_range)
+    kept = within_cube(p_F, half_extent)
     p_F = p_F.compress(kept, axis=0)
     cloud = np.empty(
         len(p_F),

@@ -31,8 +31,8 @@ from evaluation.localisation.localisation_map import (
     voxel_shift,
 )
 from evaluation.localisation.settings import (
+    HALF_EXTENT,
     KISS_MATCHER,
-    MAX_RANGE,
     METHODS,
     ROBUST_KINDS,
     SMALL_GICP_KINDS,
@@ -169,7 +169,7 @@ def _by_kiss_matcher(
     """
     # Its numbers are float32: far coordinates would lose decimals.
     p_WS = start[:3, 3]
-    target = surroundings.around(p_WS, MAX_RANGE) - p_WS
+    target = surroundings.around(p_WS, HALF_EXTENT) - p_WS
     if len(target) < FEWEST_POINTS:
         return Estimate(None, -math.inf)
     matcher = package.KISSMatcher(
@@ -206,7 +206,7 @@ def _by_own(
     Raises:
         InputError: the function does not return a pose and a score.
     """
-    nearby = surroundings.around(start[:3, 3], MAX_RANGE)
+    nearby = surroundings.around(start[:3, 3], HALF_EXTENT)
     answer = function(nearby, measured.copy(), start.copy())
     try:
         X, score = answer
@@ -387,7 +387,7 @@ def _greatest_motion(X_WA: np.ndarray, X_WB: np.ndarray) -> float:
     """
     X_AB = poses.inverse(X_WA) @ X_WB
     turn = Rotation.from_matrix(X_AB[:3, :3]).magnitude()
-    by_turn = 2.0 * MAX_RANGE * math.sin(turn / 2.0)
+    by_turn = 2.0 * HALF_EXTENT * math.sin(turn / 2.0)
     return by_turn + float(np.linalg.norm(X_AB[:3, 3]))
 
 

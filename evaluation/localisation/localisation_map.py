@@ -13,9 +13,9 @@ from cns_drake.base import points as clouds
 from cns_drake.drives import Drive
 from evaluation.alignment import Surface, make_surface
 from evaluation.clouds import OnNote, no_note, read_blocks
-from evaluation.drives import JoinedDrive, sample_frames, within_range
+from evaluation.drives import JoinedDrive, sample_frames, within_cube
 from evaluation.localisation.settings import (
-    MAX_RANGE,
+    HALF_EXTENT,
     Settings,
 )
 from evaluation.maps import VoxelAccumulator
@@ -69,7 +69,7 @@ class LocalisationMap:
             distance: half the side of the box [m].
         """
         offsets = self.surface.points - p_W
-        return self.surface.points[within_range(offsets, distance)]
+        return self.surface.points[within_cube(offsets, distance)]
 
     def distances(self, points_W: np.ndarray) -> np.ndarray:
         """Returns the distances (N,) of points from the nearest map point [m].
@@ -136,7 +136,7 @@ def _scans_of_map(
     frames = map_frames(drive, keep).tolist()
     for frame in track(frames, f"mapping {drive.name}", len(frames), "scans"):
         scan = drive.scan(frame)
-        near = within_range(clouds.xyz(scan), MAX_RANGE)
+        near = within_cube(clouds.xyz(scan), HALF_EXTENT)
         yield scan[near], drive.X_WS[frame]
 
 

@@ -25,7 +25,7 @@ from evaluation.localisation.localisation_map import (
     LocalisationMap,
 )
 from evaluation.localisation.results import MEASURED, QUERY
-from evaluation.localisation.settings import MAX_RANGE, Settings
+from evaluation.localisation.settings import HALF_EXTENT, Settings
 from evaluation.maps import downsample
 from evaluation.recognition import pose_error
 
@@ -162,7 +162,7 @@ class Localiser:
             scan with too few points has no pose.
         """
         X_WS, R_WT = asked.X_WS, asked.R_WT
-        measured = cropped(asked.scan, MAX_RANGE)
+        measured = cropped(asked.scan, HALF_EXTENT)
         points = downsample(measured, self.settings.scan_voxel)
         row = _record_of_start(asked.frame, asked.stamp_ns, initial)
         if len(points) < FEWEST_POINTS:

@@ -8,7 +8,7 @@ from typing import Any
 from cns_drake.base import InputError
 
 # Greatest coordinate of a point that is used, along each axis of the LiDAR [m].
-MAX_RANGE = 100.0
+HALF_EXTENT = 100.0
 
 
 @dataclass(frozen=True)

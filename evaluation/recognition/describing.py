@@ -92,14 +92,14 @@ def describe_drive(
         if visit is not None and frame in visited:
             of_query = "places" not in roles
             shown = seen.sensor(protocol) if of_query else None
-            cloud = seen.cloud(shown, _SINGLE_SCAN, protocol.max_range)
+            cloud = seen.cloud(shown, _SINGLE_SCAN, protocol.half_extent)
             visit(frame, cloud)
         for describer in describing:
             describer.add(seen)
         num_points += seen.most_points
     if num_points == 0:
         raise InputError(
-            f"{drive.name}: no finite point within {protocol.max_range:g} m"
+            f"{drive.name}: no finite point within {protocol.half_extent:g} m"
             f" of the LiDAR in any of {len(wanted)} scans"
         )
     return [describer.finish() for describer in describing]
@@ -125,7 +125,7 @@ class _FrameClouds:
         return self._sensors[protocol]
 
     def cloud(
-        self, sensor: QuerySensor | None, kind: _CloudKind, max_range: float
+        self, sensor: QuerySensor | None, kind: _CloudKind, half_extent: float
     ) -> np.ndarray:
         """Returns the point cloud (N, 3) at the frame, in the sensor's frame.
 
@@ -136,15 +136,15 @@ class _FrameClouds:
             sensor: sensor that replaces the recorded sensor in a query, rotated
                 or with an occluded sector; None for the sensor as recorded.
             kind: how the cloud is made.
-            max_range: greatest absolute x, y and z of a point [m].
+            half_extent: greatest absolute x, y and z of a point [m].
         """
-        key = sensor, kind, max_range
+        key = sensor, kind, half_extent
         if key not in self._clouds:
             self._clouds[key] = cloud_at(
                 self._drive,
                 self.frame,
                 kind.num_scans,
-                max_range,
+                half_extent,
                 kind.fields,
                 kind.num_before,
                 sensor,
@@ -219,7 +219,7 @@ class _DriveDescriber:
             role: seen.cloud(
                 seen.sensor(self._protocol) if role == "queries" else None,
                 self._cloud_kind,
-                self._protocol.max_range,
+                self._protocol.half_extent,
             )
             for role, members in self._members.items()
             if seen.frame in members

@@ -71,7 +71,9 @@ def overlap_matrix(
     """
 
     def see_scan(frame: int) -> Seen:
-        return SeenSurfaces.of(cloud_at(database, frame, 1, protocol.max_range))
+        return SeenSurfaces.of(
+            cloud_at(database, frame, 1, protocol.half_extent)
+        )
 
     query_frames, placed = compared_frames(database, query, protocol)
     clouds = [

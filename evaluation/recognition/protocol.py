@@ -22,7 +22,7 @@ _POSITIVE = (
     "radius",
     "query_spacing",
     "place_spacing",
-    "max_range",
+    "half_extent",
     "scans_per_place",
     "exclude_recent",
     "overlap",
@@ -64,8 +64,8 @@ class RetrievalProtocol:
             dimensions [m].
         query_spacing: distance driven between two queries [m].
         place_spacing: distance driven between two places of the database [m].
-        max_range: greatest absolute x, y and z of a point in the sensor's frame
-            [m]; points beyond this limit are left out.
+        half_extent: greatest absolute x, y and z of a point in the sensor's
+            frame [m]; points beyond this limit are left out.
         scans_per_place: number of consecutive scans that are merged into the
             described cloud; by default, each method uses its own number.
         place: which of the merged scans determines the pose of the place:
@@ -103,7 +103,7 @@ class RetrievalProtocol:
     radius: float = 7.5
     query_spacing: float = 10.0
     place_spacing: float = 5.0
-    max_range: float = 100.0
+    half_extent: float = 100.0
     scans_per_place: int | None = None
     place: PlaceScan | None = "middle"
     exclude_recent: float | None = None
@@ -189,7 +189,7 @@ class RetrievalProtocol:
         from evaluation.drives import cloud_at
 
         sensor = self.query_sensor(frame)
-        return cloud_at(drive, frame, 1, self.max_range, sensor=sensor)
+        return cloud_at(drive, frame, 1, self.half_extent, sensor=sensor)
 
     def query_poses(self, X_WS: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Returns the poses (Q, 4, 4) of the queries' sensors in the world.
@@ -258,6 +258,8 @@ class RetrievalProtocol:
         del values["gate"]
         if not self._changes_queries:
             values["seed"] = 0  # Nothing is random.
+        # Digests in published tables were made with this name.
+        values["max_range"] = values.pop("half_extent")
         return {
             name: float(value) if type(value) is int else value
             for name, value in values.items()
@@ -323,7 +325,7 @@ class RetrievalProtocol:
         parts = [
             f"A query every {self.query_spacing:g} m, a place every"
             f" {self.place_spacing:g} m, {match},"
-            f" points within {self.max_range:g} m"
+            f" points within {self.half_extent:g} m"
         ]
         if self.scans_per_place is not None:
             number = self.scans_per_place

@@ -75,9 +75,9 @@ _FIELDS: _Options = {
             None,
         ),
         (
-            "max_range",
+            "half_extent",
             float,
-            RECORDED_PROTOCOL.max_range,
+            RECORDED_PROTOCOL.half_extent,
             "Largest absolute x, y and z of a point in the LiDAR's frame [m]. "
             "Points beyond this limit are left out.",
             None,

@@ -175,13 +175,13 @@ class _CloudReader:
         scan = read_cloud(path, columns, self._on_note)
         is_finite = np.isfinite(point_arrays.xyz(scan)).all(axis=1)
         self.num_ignored += int(np.count_nonzero(~is_finite))
-        max_range = RetrievalProtocol.max_range
+        half_extent = RetrievalProtocol.half_extent
         if fields := self._method.point_fields:
             cloud = cropped_with_fields(
-                scan, max_range, fields, source=str(path)
+                scan, half_extent, fields, source=str(path)
             )
         else:
-            cloud = cropped(scan, max_range)
+            cloud = cropped(scan, half_extent)
         if len(cloud) == 0:
             raise InputError(f"{path}: no finite point within range")
         return point_arrays.read_only(cloud)

@@ -75,9 +75,9 @@ def extract_features(
         frames.append(frame)
         scan = mapped.scan(frame)
         if with_scans:
-            kept[frame] = kept_points(scan, protocol.max_range)
+            kept[frame] = kept_points(scan, protocol.half_extent)
         height = MethodConfig().sensor_height
-        shown = cropped(scan, protocol.max_range)
+        shown = cropped(scan, protocol.half_extent)
         thumbnails.append(thumbnail(shown, height, seed=frame))
 
     described = {}

@@ -10,7 +10,7 @@ from numpy.lib.recfunctions import repack_fields
 from cns_drake.base import fingerprint, xyz
 from cns_drake.drives import DriveNames
 from evaluation.change import DriveMap
-from evaluation.drives import within_range
+from evaluation.drives import within_cube
 from evaluation.maps import VoxelMap
 from evaluation.recognition import DriveDescriptors, RetrievalProtocol
 
@@ -83,12 +83,12 @@ class KeptScans:
         return self.scans[index]
 
 
-def kept_points(scan: np.ndarray, max_range: float) -> np.ndarray:
+def kept_points(scan: np.ndarray, half_extent: float) -> np.ndarray:
     """Returns the points of a scan that any rotation of the sensor may need.
 
     Args:
         scan: structured array (M,) in the sensor's frame.
-        max_range: limit of the coordinates in the frame of the rotated sensor
+        half_extent: limit of the coordinates in the frame of the rotated sensor
             [m]. A point is kept if some rotation of the sensor can bring all
             its coordinates within this limit.
 
@@ -96,9 +96,9 @@ def kept_points(scan: np.ndarray, max_range: float) -> np.ndarray:
         Structured array (K,) of x, y, z and, if the scan has it, the instance.
     """
     # A corner of the cube may lie on an axis of a rotated sensor.
-    max_range *= math.sqrt(3.0)
+    half_extent *= math.sqrt(3.0)
     names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
-    kept = within_range(xyz(scan), max_range)
+    kept = within_cube(xyz(scan), half_extent)
     # A view would hold all fields.
     return repack_fields(scan[names][kept])
 

@@ -272,7 +272,9 @@ def shown_overlaps(
             first += len(kept)
         else:
             chosen = [
-                cloud_at(kept, frame, 1, protocol.max_range).astype(np.float32)
+                cloud_at(kept, frame, 1, protocol.half_extent).astype(
+                    np.float32
+                )
                 for frame in database.places.frames[of].tolist()
             ]
         for radius in radii:

@@ -359,7 +359,7 @@ def measure_method_costs(
                 drive,
                 frame,
                 number,
-                protocol.max_range,
+                protocol.half_extent,
                 method.point_fields,
                 protocol.scans_before(method),
             )

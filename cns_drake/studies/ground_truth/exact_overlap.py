@@ -25,7 +25,7 @@ from cns_drake.drives import Drive, check_same_world
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.sensors import BeamCoverage, BeamPattern
 from cns_drake.simulation import SimulatedDrive
-from evaluation.drives import within_range
+from evaluation.drives import within_cube
 from evaluation.recognition import TOLERANCE, RetrievalProtocol, overlap_matrix
 
 
@@ -96,18 +96,18 @@ def sights_of(drive: SimulatedDrive) -> Callable[[int], Sight]:
 class VisibleSurfaces:
     """The surfaces that a LiDAR sees from a place.
 
-    Points with a coordinate beyond `max_range` [m] in the LiDAR's frame do not
-    count as seen.
+    Points with a coordinate beyond `half_extent` [m] in the LiDAR's frame do
+    not count as seen.
     """
 
     sight: Sight
-    max_range: float
+    half_extent: float
 
     @property
     def reach(self) -> float:
         """Distance of the farthest visible surface [m]."""
         farthest = self.sight.pattern.max_range
-        return min(farthest, math.sqrt(3.0) * self.max_range)
+        return min(farthest, math.sqrt(3.0) * self.half_extent)
 
     def share_of(self, points: np.ndarray) -> float:
         """Returns the share of points that the LiDAR sees; NaN without points.
@@ -117,7 +117,7 @@ class VisibleSurfaces:
         """
         if len(points) == 0:
             return math.nan
-        kept = points[within_range(points, self.max_range)]
+        kept = points[within_cube(points, self.half_extent)]
         _, d_Sset, distances = self.sight.reached(kept)
         X_WS = self.sight.X_WS
         hits = self.sight.scene.cast_rays(
@@ -154,5 +154,5 @@ def exact_overlaps(
         database,
         query,
         protocol,
-        lambda frame: VisibleSurfaces(look(frame), protocol.max_range),
+        lambda frame: VisibleSurfaces(look(frame), protocol.half_extent),
     )

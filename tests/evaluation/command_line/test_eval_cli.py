@@ -19,7 +19,7 @@ def test_the_protocol_is_the_users(capsys, towns):
         "radius": 7.5,
         "query_spacing": 10.0,
         "place_spacing": 5.0,
-        "max_range": 100.0,
+        "half_extent": 100.0,
         "scans_per_place": 1,
         "place": None,
         "exclude_recent": None,
@@ -31,7 +31,7 @@ def test_the_protocol_is_the_users(capsys, towns):
         "seed": 0,
     }
     options = ["--protocol", "recorded"]
-    options += ["--radius", "2", "--query-spacing", "20", "--max-range", "30"]
+    options += ["--radius", "2", "--query-spacing", "20", "--half-extent", "30"]
     options += ["--scans-per-place", "2", "--place-spacing", "10"]
     status, out, _ = run(capsys, *both, *options, "--json")
     assert status == 0
@@ -42,7 +42,7 @@ def test_the_protocol_is_the_users(capsys, towns):
         "radius": 2.0,
         "query_spacing": 20.0,
         "place_spacing": 10.0,
-        "max_range": 30.0,
+        "half_extent": 30.0,
         "scans_per_place": 2,
         "place": "middle",
         "exclude_recent": None,

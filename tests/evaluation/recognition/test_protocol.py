@@ -69,8 +69,8 @@ def test_radius_includes_its_limit(drives, radius, number):
 
 
 def test_range_limits_points(drives):
-    for max_range, number in ((59.9, 1), (60.0, 2)):
-        protocol = RetrievalProtocol(max_range=max_range)
+    for half_extent, number in ((59.9, 1), (60.0, 2)):
+        protocol = RetrievalProtocol(half_extent=half_extent)
         seen = []
 
         class Counting(Means):
@@ -133,7 +133,7 @@ def test_others_are_asked_all_they_know(drives):
         "radius",
         "query_spacing",
         "place_spacing",
-        "max_range",
+        "half_extent",
         "scans_per_place",
         "exclude_recent",
     ],

@@ -229,7 +229,7 @@ def test_protocols_have_names():
     for changed in (
         {"radius": 12.0},
         {"query_spacing": 9.9},
-        {"max_range": 80.0},
+        {"half_extent": 80.0},
         {"scans_per_place": 1},
         {"exclude_recent": 30.0},
         {"seed": 1},

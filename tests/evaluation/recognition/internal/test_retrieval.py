@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.drives import cloud_at, open_drive, sample_frames, within_range
+from evaluation.drives import cloud_at, open_drive, sample_frames, within_cube
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition import (
     DescribedScans,
@@ -78,10 +78,10 @@ def test_crop_is_a_box_with_its_faces():
             [1.0, 2.0, 3.0],
         ]
     )
-    kept = within_range(points, 100.0)
+    kept = within_cube(points, 100.0)
     assert np.flatnonzero(kept).tolist() == [0, 5]
-    assert within_range(points, 2.0).sum() == 0
-    assert within_range(points, 3.0).sum() == 1
+    assert within_cube(points, 2.0).sum() == 0
+    assert within_cube(points, 3.0).sum() == 1
 
 
 class OddOneOut(Method):

@@ -11,7 +11,7 @@ import pytest
 from cns_drake.base import InputError, Reporter, xyz
 from cns_drake.drives import Drive
 from evaluation.change import read_map
-from evaluation.drives import open_drive, within_range
+from evaluation.drives import open_drive, within_cube
 from evaluation.recognition import PAPER_PROTOCOL, describe_drive
 from evaluation.study import (
     MakePart,
@@ -158,7 +158,7 @@ def test_scans_of_places_and_queries_are_kept(recorded, source, files):
     for frame in frames.tolist():
         scan, found = recorded.scan(frame), kept.scan(frame)
         assert found.dtype.names == ("x", "y", "z", "instance")
-        scan = scan[within_range(xyz(scan), PAPER_PROTOCOL.max_range)]
+        scan = scan[within_cube(xyz(scan), PAPER_PROTOCOL.half_extent)]
         for name in found.dtype.names:
             np.testing.assert_array_equal(found[name], scan[name])
 
