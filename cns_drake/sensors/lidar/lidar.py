@@ -226,8 +226,14 @@ class Lidar(LeafSystem):
             )
 
     def _declare_caches(self, view: GeometryView) -> None:
-        """Declares the scenes for ray casting, and the measured scan."""
-        inputs = {self.all_input_ports_ticket()}
+        """Declares the scenes for ray casting, the returns, and the scan."""
+        self._pose_inputs = {
+            port.ticket()
+            for port in (self._geometry_query, self._sweep, self._frame_poses)
+        }
+        self._poses_inputs = self._pose_inputs | (
+            {self._velocities.ticket()} if self._velocities else set()
+        )
         # Kept until the SceneGraph changes. Beams of a scan cannot hit geometry
         # beyond their range, so the scene of scans may leave such geometry at
         # an old pose.
@@ -242,49 +248,49 @@ class Lidar(LeafSystem):
                         )
                     ),
                 ),
-                prerequisites_of_calc=inputs,
+                prerequisites_of_calc=self._poses_inputs
+                | {self._geometry.ticket()},
             )
             for what, calc_ball in (
                 ("within reach of the beams", self._calc_ball),
                 ("complete", lambda context: EVERYWHERE),
             )
         )
-        if self._scanner.varies:
-            inputs = inputs | {self.time_ticket()}
+        seen = {self._seen_in_reach.ticket()}
+        times = {self.time_ticket()} if self._scanner.varies else set()
         self._measured = self.DeclareCacheEntry(
-            description="scan, with the geometry of each point",
+            description="returns, with their geometry",
             value_producer=ValueProducer(
                 allocate=lambda: Value(object()), calc=self._calc_measured
             ),
-            prerequisites_of_calc=inputs,
+            prerequisites_of_calc=seen | self._poses_inputs | times,
+        )
+        # Apart from the returns: which structures move changes labels only.
+        self._points = self.DeclareCacheEntry(
+            description="points of the scan",
+            value_producer=ValueProducer(
+                allocate=lambda: Value(object()), calc=self._calc_points
+            ),
+            prerequisites_of_calc=seen
+            | {self._measured.ticket(), self._moving.ticket()},
         )
 
     def _declare_outputs(self) -> None:
         """Declares the output ports, in the order of their indices."""
-        inputs = {self.all_input_ports_ticket()}
-        scan = {self.cache_entry_ticket(self._measured.cache_index())}
+        scan = {self._points.ticket()}
         self.DeclareAbstractOutputPort(
             "scan",
             alloc=lambda: Value(np.empty(0, POINT_DTYPE)),
             calc=lambda context, output: output.set_value(
-                self._measured.Eval(context).points
+                self._points.Eval(context)
             ),
             prerequisites_of_calc=scan,
         )
+        in_world = scan | self._poses_inputs
         for name, calc, prerequisites, fields in (
             ("point_cloud_S", self._calc_point_cloud_S, scan, _WITH_GREY),
-            (
-                "point_cloud_W",
-                self._calc_point_cloud_W,
-                scan | inputs,
-                _WITH_GREY,
-            ),
-            (
-                "positions_W",
-                self._calc_point_cloud_W,
-                scan | inputs,
-                _WITHOUT_GREY,
-            ),
+            ("point_cloud_W", self._calc_point_cloud_W, in_world, _WITH_GREY),
+            ("positions_W", self._calc_point_cloud_W, in_world, _WITHOUT_GREY),
         ):
             self.DeclareAbstractOutputPort(
                 name,
@@ -296,7 +302,7 @@ class Lidar(LeafSystem):
             "X_WS",
             alloc=lambda: Value(RigidTransform()),
             calc=self._calc_X_WS,
-            prerequisites_of_calc=inputs,
+            prerequisites_of_calc=self._pose_inputs,
         )
 
     def query_object_input_port(self) -> InputPort:
@@ -346,8 +352,8 @@ class Lidar(LeafSystem):
             RuntimeError: the Context does not belong to this LiDAR.
         """
         self._check_context(context)
-        _, geometry, geometries = self._measured.Eval(context)
-        return geometry_ids(geometries, geometry)
+        measured = self._measured.Eval(context)
+        return geometry_ids(measured.geometries, measured.geometry)
 
     def EvalInstances(
         self, context: Context
@@ -488,17 +494,22 @@ class Lidar(LeafSystem):
         return {f: m for f, m in motions.items() if m.w.any() or m.v.any()}
 
     def _calc_measured(self, context: Context, output: AbstractValue) -> None:
-        seen = _eval_seen(self._seen_in_reach, context)
-        moving = optional_value(self._moving, context)
-        labels = seen.label if moving is None else seen.labels(moving)
         revolution = round(context.get_time() / self.pattern.period)
         output.set_value(
-            self._scanner.scan(
-                seen,
-                labels,
+            self._scanner.measure(
+                _eval_seen(self._seen_in_reach, context),
                 *self._calc_poses(context),
                 frame=revolution - self.causal,
             )
+        )
+
+    def _calc_points(self, context: Context, output: AbstractValue) -> None:
+        seen = _eval_seen(self._seen_in_reach, context)
+        moving = optional_value(self._moving, context)
+        labels = seen.label if moving is None else seen.labels(moving)
+        measured = self._measured.Eval(context)
+        output.set_value(
+            self._scanner.assemble(measured, labels, seen.instance)
         )
 
     def _calc_pose(self, context: Context) -> RigidTransform:
@@ -546,7 +557,7 @@ class Lidar(LeafSystem):
     def _calc_point_cloud_S(
         self, context: Context, output: AbstractValue
     ) -> None:
-        scan = self._measured.Eval(context).points
+        scan = self._points.Eval(context)
         p_SRset = np.stack([scan["x"], scan["y"], scan["z"]])
         greys = self._scanner.greys(scan["intensity"])
         set_points(output.get_mutable_value(), p_SRset, greys)
@@ -554,7 +565,7 @@ class Lidar(LeafSystem):
     def _calc_point_cloud_W(
         self, context: Context, output: AbstractValue
     ) -> None:
-        scan = self._measured.Eval(context).points
+        scan = self._points.Eval(context)
         p_WSset, R_WSset = self._calc_poses(context)
         # The pose of S when each point was measured: one, or each column's.
         columns = self._scanner.column_t_ns

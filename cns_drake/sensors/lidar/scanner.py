@@ -25,21 +25,23 @@ if TYPE_CHECKING:
     from cns_drake.sensors.returns.calibrated import CalibratedReturns
 
 
-class MeasuredScan(NamedTuple):
-    """A scan of N points, and the geometry that each point lies on.
+class MeasuredReturns(NamedTuple):
+    """The N returns of a revolution, and the geometry that each comes from.
 
     Attributes:
-        points: (N,) array of `POINT_DTYPE`, read-only.
-        geometry: (N,) index of each point's geometry in `geometries`; negative
-            for a point without a surface, such as rain.
+        revolution: the beams of the revolution.
+        returns: the returns.
+        geometry: (N,) index of each return's geometry in `geometries`; negative
+            for a return without a surface, such as rain.
         geometries: the geometry that the LiDAR sees.
     """
 
-    points: np.ndarray
+    revolution: Revolution
+    returns: Returns
     geometry: np.ndarray
     geometries: tuple[PerceptionGeometry, ...]
 
-    def __deepcopy__(self, memo: dict) -> MeasuredScan:
+    def __deepcopy__(self, memo: dict) -> MeasuredReturns:
         # A Context is cloned together with this value. It never changes, and
         # geometry ids cannot be copied.
         return self
@@ -97,19 +99,17 @@ class Scanner:
         """
         return 255.0 * intensity if self._returns is None else intensity
 
-    def scan(
+    def measure(
         self,
         seen: SeenGeometry,
-        labels: np.ndarray,
         p_WSset: np.ndarray,
         R_WSset: np.ndarray,
         frame: int,
-    ) -> MeasuredScan:
-        """Returns the scan of a revolution.
+    ) -> MeasuredReturns:
+        """Casts the beams of a revolution, and measures what returns.
 
         Args:
             seen: the geometry, with a scene.
-            labels: (num_geometries,) uint16 present class of each geometry.
             p_WSset: (K, 3) positions of S in the world: one, or one for each
                 column [m].
             R_WSset: (K, 3, 3) orientations of S in the world.
@@ -125,20 +125,32 @@ class Scanner:
         geometry, returns = self._measure(
             seen, revolution, p_WSset, R_WSset, times, frame
         )
+        return MeasuredReturns(revolution, returns, geometry, seen.built)
+
+    def assemble(
+        self, measured: MeasuredReturns, labels: np.ndarray, ids: np.ndarray
+    ) -> np.ndarray:
+        """Returns the points of a scan: (N,) of `POINT_DTYPE`, read-only.
+
+        Args:
+            measured: the returns.
+            labels: (num_geometries,) uint16 present class of each geometry.
+            ids: (num_geometries,) uint16 instance id of each geometry.
+        """
         # Zeros, so that the padding between fields is defined, too.
-        points = np.zeros(len(returns.beams), POINT_DTYPE)
+        points = np.zeros(len(measured.returns.beams), POINT_DTYPE)
         assemble_points(
             points,
-            revolution.table,
-            returns,
-            geometry,
+            measured.revolution.table,
+            measured.returns,
+            measured.geometry,
             labels,
-            seen.instance,
+            ids,
             np.float32(self._measurement.resolution),
         )
         # Ports and methods of the LiDAR share the points.
         points.flags.writeable = False
-        return MeasuredScan(points, geometry, seen.built)
+        return points
 
     def _revolution(self, frame: int) -> Revolution:
         """Returns the beams of the revolution with a number."""
