@@ -5,7 +5,9 @@ import contextlib
 import fcntl
 import functools
 import hashlib
+import os
 from pathlib import Path
+import stat
 import tempfile
 from typing import TypeVar
 
@@ -91,20 +93,28 @@ class _ByContent:
     Numba's own locators name the cache folder by the path of the source. This
     class has the methods that Numba calls; see NUMBA_CACHE_LOCATOR_CLASSES in
     Numba's manual.
+
+    Numba unpickles what it finds in the folder. Another user must therefore not
+    be able to write there.
     """
 
-    def __init__(self, function: Callable, folder: Path) -> None:
+    def __init__(self, function: Callable, folder: Path, root: Path) -> None:
         self._line = function.__code__.co_firstlineno
         self._content = _content_hash(folder)
-        root = Path(numba.config.CACHE_DIR or cache_folder() / "compiled")
         self._place = root / self._content
 
     @classmethod
     def from_function(
         cls, function: Callable, file: str
     ) -> "_ByContent | None":
-        """Returns a function's locator; None if it cannot write its cache."""
-        place = cls(function, Path(file).parent)
+        """Returns a function's locator; None if there is no safe folder."""
+        root: str | None = numba.config.CACHE_DIR
+        if not root:
+            own = cache_folder()
+            if own is None:
+                return None
+            root = str(own / "compiled")
+        place = cls(function, Path(file).parent, Path(root))
         try:
             place.ensure_cache_path()
         except OSError:
@@ -112,7 +122,11 @@ class _ByContent:
         return place
 
     def ensure_cache_path(self) -> None:
-        self._place.mkdir(parents=True, exist_ok=True)
+        self._place.parent.mkdir(parents=True, exist_ok=True)
+        self._place.mkdir(mode=0o700, exist_ok=True)
+        state = self._place.stat()
+        if state.st_uid != os.geteuid() or state.st_mode & stat.S_IWOTH:
+            raise PermissionError(f"{self._place}: others can write there")
         tempfile.TemporaryFile(dir=self._place).close()
 
     def get_cache_path(self) -> str:

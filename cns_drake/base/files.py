@@ -117,14 +117,17 @@ def make_folder(path: Path) -> None:
             raise InputError(f"{path}: not a folder") from None
 
 
-def cache_folder() -> Path:
+def cache_folder() -> Path | None:
     """Returns cns-drake's folder in the cache of the user.
 
     Source: the XDG base directory specification. The folder may not exist.
+    Without an absolute path, as for a user without a home, there is no cache:
+    anybody could have written files in the working directory.
     """
     base = os.environ.get("XDG_CACHE_HOME", "")
-    folder = Path(base) if os.path.isabs(base) else Path("~/.cache")
-    return Path(os.path.expanduser(folder)) / "cns-drake"
+    if not os.path.isabs(base):
+        base = os.path.expanduser("~/.cache")
+    return Path(base) / "cns-drake" if os.path.isabs(base) else None
 
 
 def natural_key(text: str) -> tuple:

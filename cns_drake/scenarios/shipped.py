@@ -24,7 +24,7 @@ def worlds_folder() -> Path:
     contains the maps as an archive, which is unpacked to the user's cache.
 
     Raises:
-        InputError: if the cache cannot be written.
+        InputError: there is no cache, or it cannot be written.
     """
     package = Path(__file__).resolve().parents[1]
     archive = package / "worlds.tar.xz"
@@ -123,8 +123,14 @@ def unpacked(archive: Path) -> Path:
     Raises:
         InputError: if the cache cannot be written.
     """
+    cache = cache_folder()
+    if cache is None:
+        raise InputError(
+            "XDG_CACHE_HOME: name a folder, in which the shipped worlds are "
+            "unpacked; you have no home folder"
+        )
     digest = hashlib.sha256(archive.read_bytes()).hexdigest()[:16]
-    folder = cache_folder() / f"{archive.name.partition('.')[0]}-{digest}"
+    folder = cache / f"{archive.name.partition('.')[0]}-{digest}"
     if not folder.is_dir():
         try:
             _unpack(archive, folder)

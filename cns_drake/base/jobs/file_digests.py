@@ -32,7 +32,10 @@ def file_digests(files: Sequence[Path]) -> list[str]:
     """
     paths = [os.path.realpath(file) for file in files]
     name = hashlib.sha256("\0".join(paths).encode(errors="surrogateescape"))
-    kept = cache_folder() / "digests" / f"{name.hexdigest()[:32]}.json"
+    cache = cache_folder()
+    if cache is None:
+        return [_state_and_digest(path, None)[1] for path in paths]
+    kept = cache / "digests" / f"{name.hexdigest()[:32]}.json"
     known: dict[str, list] = {}
     # A cache that cannot be read or written only costs time.
     with contextlib.suppress(Exception):

@@ -59,6 +59,47 @@ def test_nothing_is_kept_beside_the_code(tmp_path, is_there):
     assert all(path.is_relative_to(inside) for path in kept)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("place", ["no home", "writable by all", "another's"])
+def test_no_machine_code_where_others_can_write(tmp_path, place):
+    """Numba unpickles what it finds, so it must find nothing there."""
+    cache = tmp_path / "cache"
+    environment = {
+        k: v
+        for k, v in os.environ.items()
+        if not k.startswith(("NUMBA", "HOME", "XDG"))
+    }
+    who = []
+    if place == "no home":
+        if os.geteuid():
+            pytest.skip("only root can take a uid without a name")
+        tmp_path.chmod(0o777)
+        who = ["setpriv", "--reuid", "54321", "--regid", "54321"]
+        who += ["--clear-groups"]
+    else:
+        environment["XDG_CACHE_HOME"] = str(cache)
+        methods = documents.ROOT / "evaluation/methods"
+        name = compilation._content_hash(methods)
+        folder = cache / "cns-drake/compiled" / name
+        folder.mkdir(parents=True)
+        if place == "writable by all":
+            folder.chmod(0o777)
+        elif os.geteuid():
+            pytest.skip("only root can give a folder away")
+        else:
+            os.chown(folder, 54321, 54321)
+    result = subprocess.run(
+        [*who, sys.executable, "-B", "-c", _SCRIPT],
+        env=environment | {"PYTHONPATH": str(documents.ROOT)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (result.stdout, result.returncode) == ("1\n", 0), result.stderr
+    assert not [*tmp_path.rglob("*.nb?")]
+
+
 _TWICE = """
 import fcntl
 import os
