@@ -2,10 +2,14 @@
 
 from collections.abc import Mapping
 import itertools
+import math
 from typing import Any, NamedTuple
 
 from cns_drake.studies.experiments.factors import split_values, table_value
 from cns_drake.studies.experiments.nested_fields import Changes
+
+# A study of more variants would not end.
+_MOST_VARIANTS = 1000
 
 
 class MethodVariant(NamedTuple):
@@ -33,12 +37,20 @@ def method_variants(
             values is varied.
 
     Raises:
-        ValueError: a setting has no values, or the same value twice.
+        ValueError: a setting has no values, or the same value twice, or there
+            are too many combinations.
     """
     found = []
     for name, settings in methods.items():
         place = f"methods.{name}"
         fixed, varied = split_values(settings, (place,))
+        # Counted before any is made: a short file can ask for millions.
+        number = len(found) + math.prod(map(len, varied.values()))
+        if number > _MOST_VARIANTS:
+            raise ValueError(
+                f"{place}: {number} variants of methods, more than"
+                f" {_MOST_VARIANTS}"
+            )
         for some in itertools.product(*varied.values()):
             chosen = {**fixed, **dict(zip(varied, some, strict=True))}
             found.append(
