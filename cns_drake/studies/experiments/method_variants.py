@@ -40,7 +40,7 @@ def method_variants(
         ValueError: a setting has no values, or the same value twice, or there
             are too many combinations.
     """
-    found = []
+    found: list[MethodVariant] = []
     for name, settings in methods.items():
         place = f"methods.{name}"
         fixed, varied = split_values(settings, (place,))
