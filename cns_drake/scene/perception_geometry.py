@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
+import warnings
 
 import numpy as np
 from pydrake import geometry as shapes
@@ -12,6 +13,8 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import (
     FrameId,
     GeometryId,
+    GeometryProperties,
+    RenderLabel,
     Role,
     SceneGraph,
     SceneGraphInspector,
@@ -186,7 +189,11 @@ class GeometryList(tuple[_GeometryRecord, ...]):
 
 
 def list_geometry(inspector: SceneGraphInspector, role: Role) -> GeometryList:
-    """Returns the records of all geometry with a role."""
+    """Returns the records of all geometry with a role.
+
+    Geometry with the render label `kDoNotRender` is left out, as in images of
+    Drake's cameras.
+    """
     return GeometryList(
         _GeometryRecord(
             geometry_id,
@@ -199,6 +206,14 @@ def list_geometry(inspector: SceneGraphInspector, role: Role) -> GeometryList:
             *_appearance(inspector, geometry_id, role),
         )
         for geometry_id in inspector.GetAllGeometryIds(role)
+        if not _is_hidden(inspector.GetProperties(geometry_id, role))
+    )
+
+
+def _is_hidden(properties: GeometryProperties) -> bool:
+    return bool(
+        properties.HasProperty("label", "id")
+        and properties.GetProperty("label", "id") == RenderLabel.kDoNotRender
     )
 
 
@@ -258,6 +273,7 @@ class GeometryReader:
 
     def __init__(self) -> None:
         """Makes a reader; nothing is read yet."""
+        self._left_out: set[GeometryId] = set()
         self._known: dict[GeometryId, tuple[tuple, PerceptionGeometry]] = {}
 
     def read(
@@ -266,15 +282,18 @@ class GeometryReader:
         """Returns recorded geometry, in the order of the records.
 
         For a geometry that has not changed since the last call, the same object
-        is returned.
+        is returned. Deformable geometry is left out.
 
         Args:
             records: records of the geometry; see `list_geometry`.
 
         Raises:
-            InputError: a geometry is deformable, its reflectivity is not within
-                0 to 1, a mesh file is missing or cannot be read, or a size is
-                too large; the message names the geometry.
+            InputError: the reflectivity of a geometry is not within 0 to 1, a
+                mesh file is missing or cannot be read, or a size is too large;
+                the message names the geometry.
+
+        Warns:
+            UserWarning: a deformable geometry is left out, told once.
         """
         known, self._known = self._known, {}
         with ForeignMeshes() as foreign:
@@ -282,6 +301,9 @@ class GeometryReader:
             for record in records:
                 name, X_FG, shape = record.name, record.X_FG, record.shape
                 appearance = record.rgb, record.reflectivity
+                if record.is_deformable:
+                    self._leave_out(record)
+                    continue
                 _check_record(record)
                 pose = X_FG.GetAsMatrix34().tobytes()
                 key = name, record.frame_id, pose, _shape_key(shape), appearance
@@ -302,15 +324,19 @@ class GeometryReader:
                 self._known[record.geometry_id] = entry
         return tuple(geometry for _, geometry in self._known.values())
 
+    def _leave_out(self, record: _GeometryRecord) -> None:
+        if record.geometry_id not in self._left_out:
+            self._left_out.add(record.geometry_id)
+            warnings.warn(
+                f"geometry '{record.name}': left out, because a LiDAR cannot "
+                "see deformable geometry",
+                stacklevel=2,
+            )
+
 
 def _check_record(record: _GeometryRecord) -> None:
     where = f"geometry '{record.name}'"
     reflectivity = record.reflectivity
-    if record.is_deformable:
-        raise InputError(
-            f"{where}: a LiDAR cannot see deformable geometry; hide it, or "
-            "remove its role"
-        )
     if reflectivity is not None and not 0.0 <= reflectivity <= 1.0:
         raise InputError(
             f"{where}: lidar/reflectivity: {reflectivity} is not within 0 to 1"

@@ -33,6 +33,7 @@ from pydrake.geometry import (
     RenderCameraCore,
     RenderEngineVtkParams,
     RenderLabel,
+    Rgba,
     Role,
     Sphere,
 )
@@ -40,7 +41,6 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.scene import read_perception_geometry
 from cns_drake.sensors import Lidar, SpinningPattern, connect_lidar
@@ -276,7 +276,7 @@ def test_a_half_space_and_a_box_that_move():
         assert ahead(stage.eval()) == pytest.approx(expected, rel=1e-5)
 
 
-def test_deformable_geometry_is_refused_by_name():
+def test_deformable_geometry_is_left_out():
     def add_jelly():
         instance = GeometryInstance(RigidTransform(), Sphere(1.0), "jelly")
         instance.set_perception_properties(PerceptionProperties())
@@ -290,11 +290,32 @@ def test_deformable_geometry_is_refused_by_name():
 
     stage, _ = add_jelly()
     stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
-    with pytest.raises(InputError, match=r"geometry 'jelly': .*deformable"):
-        stage.eval()
+    with pytest.warns(UserWarning, match=r"geometry 'jelly': .*deformable"):
+        assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
+    stage.add_to_context(
+        stage.scene_graph.world_frame_id(), Box(12.0, 9.0, 9.0)
+    )
+    # Told once.
+    assert ahead(stage.eval()) == pytest.approx(6.0, abs=1e-5)
     stage, jelly = add_jelly()
     stage.finish(X_PS=RigidTransform(), pattern=FORWARD, unseen=[jelly])
     assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("alpha", [0.0, 1.0])
+def test_what_is_not_rendered_is_not_seen(alpha):
+    """Alpha hides nothing, as in Drake's depth images."""
+    stage = Stage()
+    for x, label in ((5.5, RenderLabel.kDoNotRender), (9.5, RenderLabel(7))):
+        properties = PerceptionProperties()
+        properties.AddProperty("label", "id", label)
+        properties.AddProperty("phong", "diffuse", Rgba(1, 1, 1, alpha))
+        pose = RigidTransform([x, 0.0, 0.0])
+        instance = GeometryInstance(pose, Box(1.0, 9.0, 9.0), f"wall_{x}")
+        instance.set_perception_properties(properties)
+        stage.scene_graph.RegisterAnchoredGeometry(stage.source, instance)
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
+    assert ahead(stage.eval()) == pytest.approx(9.0, abs=1e-5)
 
 
 def test_it_sees_the_chosen_role():
