@@ -7,12 +7,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 import warnings
 
+import numpy as np
 from pydrake import geometry
 from pydrake.geometry import FrameId, GeometryId, Rgba, Role, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder, System
+from pydrake.systems.primitives import LinearSystem
 
 from cns_drake.scene import anchored_frames as find_anchored_frames
 from cns_drake.scene import geometry_port
@@ -36,6 +38,10 @@ if TYPE_CHECKING:
 
 _VIEW_COLOR = Rgba(0.9, 0.2, 0.1, 1.0)
 _CLEAR = WeatherConfig()
+# Ending of the name of the system that chooses a LiDAR's random numbers.
+_DRAW = "noise_draw"
+# Period of a system that never changes its state [s].
+_NEVER = 1e9
 
 
 def add_lidar(
@@ -93,7 +99,8 @@ def add_lidar(
             for calibrated returns, which have range errors of their own.
         dropout: probability that a return is lost; 0 for calibrated returns.
         seed: seed of noise, dropout and returns that are `calibrated`. Random
-            numbers depend on the seed, the name and the number of the frame. A
+            numbers depend on the seed, the name and the number of the frame,
+            and differ after each `SetRandomContext` of the Diagram. A
             model of noise or returns with a `sensor_name` uses the
             `sensor_name` instead of the name.
         measurement: model of the noise, instead of `range_noise`, `dropout` and
@@ -143,7 +150,7 @@ def add_lidar(
         )
     if not isinstance(X_PB, RigidTransform):
         raise TypeError(f"X_PB: {X_PB!r} is not a RigidTransform")
-    check_new_sensor(builder, name)
+    check_new_sensor(builder, name, parts=(_DRAW,))
     if not isinstance(body, FrameId):
         body, X_PB = body_and_pose(body, X_PB)
     preset = pattern if isinstance(pattern, str) else None
@@ -198,10 +205,32 @@ def add_lidar(
     )
     _warn_of_no_geometry(scene_graph, role)
     connect_lidar(builder, scene_graph, lidar)
+    if lidar.is_random:
+        draw = builder.AddNamedSystem(f"{name}_{_DRAW}", _make_noise_draw())
+        builder.Connect(
+            draw.get_output_port(), lidar.GetInputPort("noise_draw")
+        )
     if motion_distortion and isinstance(body, RigidBody):
         port = "body_spatial_velocities"
         connect_motion(builder, motion, body, {port: lidar.GetInputPort(port)})
     return lidar
+
+
+def _make_noise_draw() -> LinearSystem:
+    """Returns a system whose output is 0, or random by `SetRandomContext`.
+
+    Drake lets no system that is written in Python take part in
+    `SetRandomContext`.
+    """
+    constant = LinearSystem(
+        A=np.eye(1),
+        B=np.zeros((1, 0)),
+        C=np.eye(1),
+        D=np.zeros((1, 0)),
+        time_period=_NEVER,
+    )
+    constant.configure_random_state(np.eye(1))
+    return constant
 
 
 def add_described_lidar(

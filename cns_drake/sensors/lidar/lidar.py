@@ -65,6 +65,7 @@ class Lidar(LeafSystem):
         - moving_instances (optional)
         - sweep (optional)
         - frame_poses (optional)
+        - noise_draw (optional)
         - body_spatial_velocities (with `moving_bodies`)
         output_ports:
         - scan
@@ -112,6 +113,11 @@ class Lidar(LeafSystem):
 
     `moving_instances` (abstract) lists the instance ids of the structures that
     are moving: their points get the label of the moving class.
+
+    `noise_draw` (one number) chooses the random numbers: each value other than
+    0 stands for other noise. Without it, and with 0, they follow from the seed
+    alone. `add_lidar` connects the port to a system whose state is 0 by default
+    and random after `SetRandomContext`.
 
     `frame_poses` (abstract, `KnownPoses`) repeats poses X_WF of the SceneGraph
     in one array. Many poses are read faster from this array than from the
@@ -218,6 +224,7 @@ class Lidar(LeafSystem):
         )
         self._sweep = declare("sweep", Value(object()))
         self._frame_poses = declare("frame_poses", Value(object()))
+        self._noise_draw = self.DeclareVectorInputPort("noise_draw", 1)
         self._velocities: InputPort | None = None
         if has_velocities:
             self._velocities = declare(
@@ -257,13 +264,15 @@ class Lidar(LeafSystem):
             )
         )
         seen = {self._seen_in_reach.ticket()}
-        times = {self.time_ticket()} if self._scanner.varies else set()
+        varying = {self.time_ticket()} if self._scanner.varies else set()
+        if self._scanner.is_random:
+            varying.add(self._noise_draw.ticket())
         self._measured = self.DeclareCacheEntry(
             description="returns, with their geometry",
             value_producer=ValueProducer(
                 allocate=lambda: Value(object()), calc=self._calc_measured
             ),
-            prerequisites_of_calc=seen | self._poses_inputs | times,
+            prerequisites_of_calc=seen | self._poses_inputs | varying,
         )
         # Apart from the returns: which structures move changes labels only.
         self._points = self.DeclareCacheEntry(
@@ -304,6 +313,11 @@ class Lidar(LeafSystem):
             calc=self._calc_X_WS,
             prerequisites_of_calc=self._pose_inputs,
         )
+
+    @property
+    def is_random(self) -> bool:
+        """Whether scans depend on a seed."""
+        return self._scanner.is_random
 
     def query_object_input_port(self) -> InputPort:
         """Returns the port `geometry_query`, to connect to a SceneGraph."""
@@ -495,11 +509,16 @@ class Lidar(LeafSystem):
 
     def _calc_measured(self, context: Context, output: AbstractValue) -> None:
         revolution = round(context.get_time() / self.pattern.period)
+        draw = 0.0
+        if self._noise_draw.HasValue(context):
+            draw = self._noise_draw.Eval(context)[0]
         output.set_value(
             self._scanner.measure(
                 _eval_seen(self._seen_in_reach, context),
                 *self._calc_poses(context),
                 frame=revolution - self.causal,
+                # Its bits; minus 0 is 0, too.
+                draw=int(np.float64(draw + 0.0).view(np.uint64)),
             )
         )
 

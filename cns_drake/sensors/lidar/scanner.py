@@ -5,6 +5,7 @@ A `Scanner` knows no Diagram and no Context; `Lidar` is the Drake system.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -74,18 +75,21 @@ class Scanner:
         self.pattern = pattern
         self._measurement = measurement
         self._returns = returns
+        # The models of the latest draw.
+        self._drawn = 0, measurement, returns
         self._first = shared_revolution(pattern.beams(0), returns)
         self.column_t_ns = self._first.beams.column_t_ns
         self.column_times = self.column_t_ns / (pattern.period * 1e9)
 
     @property
+    def is_random(self) -> bool:
+        """Whether scans depend on a seed."""
+        return self._measurement.is_random or self._returns is not None
+
+    @property
     def varies(self) -> bool:
         """Whether scans of the same geometry from one pose differ."""
-        return (
-            self._measurement.is_random
-            or self._returns is not None
-            or not self.pattern.repeats
-        )
+        return self.is_random or not self.pattern.repeats
 
     def reach(self) -> float:
         """Returns how far beams must be cast [m]."""
@@ -105,6 +109,7 @@ class Scanner:
         p_WSset: np.ndarray,
         R_WSset: np.ndarray,
         frame: int,
+        draw: int = 0,
     ) -> MeasuredReturns:
         """Casts the beams of a revolution, and measures what returns.
 
@@ -114,6 +119,8 @@ class Scanner:
                 column [m].
             R_WSset: (K, 3, 3) orientations of S in the world.
             frame: number of the revolution.
+            draw: number of a draw of all random numbers; 0 for the seed with
+                which the LiDAR was made.
         """
         revolution = self._revolution(frame)
         columns = revolution.beams.cast_columns
@@ -123,7 +130,7 @@ class Scanner:
             if len(p_WSset) > 1:
                 p_WSset, R_WSset = p_WSset[columns], R_WSset[columns]
         geometry, returns = self._measure(
-            seen, revolution, p_WSset, R_WSset, times, frame
+            seen, revolution, p_WSset, R_WSset, times, frame, draw
         )
         return MeasuredReturns(revolution, returns, geometry, seen.built)
 
@@ -166,12 +173,15 @@ class Scanner:
         R_WSset: np.ndarray,
         times: np.ndarray,
         frame: int,
+        draw: int,
     ) -> tuple[np.ndarray, Returns]:
         """Returns the index of the geometry of each return, and the returns."""
         assert seen.scene is not None
+        measurement, returns_model = self._models(draw)
         if self._returns is not None:
             assert revolution.unit_beams is not None
-            reported = self._returns.measure(
+            assert returns_model is not None
+            reported = returns_model.measure(
                 seen.scene,
                 seen.materials(self._returns),
                 self.pattern,
@@ -190,10 +200,32 @@ class Scanner:
             times=times,
         )
         place = revolution.table.place
-        returns = self._measurement.measure(
+        returns = measurement.measure(
             hits.ranges.take(place),
             self.pattern.min_range,
             self.pattern.max_range,
             frame,
         )
         return hits.geometry.take(place.take(returns.beams)), returns
+
+    def _models(
+        self, draw: int
+    ) -> tuple[MeasurementModel, CalibratedReturns | None]:
+        """Returns the models of measurements and of returns of a draw."""
+        # Read once: threads share the scanner.
+        latest, measurement, returns = self._drawn
+        if latest != draw:
+            measurement, returns = self._measurement, self._returns
+            if draw:
+                measurement = replace(
+                    measurement, seed=_drawn_seed(measurement.seed, draw)
+                )
+            if draw and returns is not None:
+                returns = replace(returns, seed=_drawn_seed(returns.seed, draw))
+            self._drawn = draw, measurement, returns
+        return measurement, returns
+
+
+def _drawn_seed(seed: int, draw: int) -> int:
+    words = np.random.SeedSequence([seed, draw]).generate_state(1, np.uint64)
+    return int(words[0])

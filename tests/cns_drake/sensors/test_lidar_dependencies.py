@@ -15,6 +15,7 @@ from cns_drake.sensors import MeasurementModel
 
 POSE = {"geometry_query", "sweep", "frame_poses"}
 ALL = POSE | {"geometry", "moving_instances"}
+NOISE = {"noise_draw"}
 SCANS = ("scan", "point_cloud_S", "point_cloud_W", "positions_W")
 
 
@@ -53,13 +54,16 @@ def stage(**kwargs):
 
 
 @pytest.mark.parametrize("moves", [False, True])
-def test_outputs_depend_on_what_they_read(moves):
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_outputs_depend_on_what_they_read(moves, noise):
     made, arguments = stage()
+    arguments["measurement"] = MeasurementModel(range_noise=noise)
     if moves:
         arguments["moving_bodies"] = {made.frame: 0}
     lidar = made.finish(**arguments).lidar
     velocities = {"body_spatial_velocities"} if moves else set()
-    expected = {"X_WS": POSE} | dict.fromkeys(SCANS, ALL | velocities)
+    scans = ALL | velocities | (NOISE if noise else set())
+    expected = {"X_WS": POSE} | dict.fromkeys(SCANS, scans)
     found = {
         name: {
             lidar.get_input_port(i).get_name()
