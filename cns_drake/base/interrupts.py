@@ -16,8 +16,10 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _Handler = Callable[[int, FrameType | None], object]
 
 
-def interrupt_on_termination(once: bool = False) -> None:
+def interrupt_on_termination(once: bool = False) -> Callable[[], bool]:
     """Makes SIGTERM raise KeyboardInterrupt, so that open files are closed.
+
+    SIGINT raises it anyway, unless the process was started to ignore SIGINT.
 
     Args:
         once: whether further SIGTERM signals are ignored after the first. With
@@ -25,14 +27,23 @@ def interrupt_on_termination(once: bool = False) -> None:
             only if a parent process can send SIGKILL. By default, a second
             SIGTERM also raises KeyboardInterrupt, and so interrupts the closing
             of files.
+
+    Returns:
+        A function that returns whether a signal has raised KeyboardInterrupt. A
+        library can turn the KeyboardInterrupt into an error of another type.
     """
+    raised: list[int] = []
 
     def interrupt(signal_number: int, frame: FrameType | None) -> None:
-        if once:
+        raised.append(signal_number)
+        if once and signal_number == signal.SIGTERM:
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
         raise KeyboardInterrupt
 
     signal.signal(signal.SIGTERM, interrupt)
+    if callable(signal.getsignal(signal.SIGINT)):
+        signal.signal(signal.SIGINT, interrupt)
+    return lambda: bool(raised)
 
 
 @contextlib.contextmanager

@@ -148,8 +148,8 @@ def run(
     if not has_utf8():
         # Drake would print a traceback of its own.
         logging.getLogger("drake").disabled = True
+    was_interrupted = interrupts.interrupt_on_termination()
     try:
-        interrupts.interrupt_on_termination()
         _check_arguments()
         status = _run_commands(app, program, display)
         if status == interrupts.INTERRUPTED:  # Typer has caught it already.
@@ -157,6 +157,9 @@ def run(
         sys.stdout.flush()
     except BaseException as error:
         failure = _failure_of(error)
+        if was_interrupted():
+            # Libraries report some interrupts as faults of other kinds.
+            failure = "interrupted", interrupts.INTERRUPTED
         if failure is None:
             raise
         message, status = failure

@@ -38,7 +38,7 @@ def test_faults_are_one_line(monkeypatch, capsys, error, status, line):
 
     # Signal handlers stay as the tests set them.
     monkeypatch.setattr(
-        program.interrupts, "interrupt_on_termination", lambda: None
+        program.interrupts, "interrupt_on_termination", lambda: lambda: False
     )
     monkeypatch.setattr(program.interrupts, "ignore_interrupts", lambda: None)
     monkeypatch.setattr("sys.argv", ["program"])
@@ -46,6 +46,37 @@ def test_faults_are_one_line(monkeypatch, capsys, error, status, line):
         program.run(app, "program", contextlib.nullcontext())
     assert raised.value.code == status
     assert capsys.readouterr().err == (line and f"program: {line}\n")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_an_interrupt_that_a_library_disguises(number):
+    """An extension module that is interrupted fails with an ImportError."""
+    script = f"""
+import contextlib, signal
+from cns_drake.base import program
+app = program.plain_app()
+
+@app.command()
+def load():
+    try:
+        signal.raise_signal(signal.{number})
+    except KeyboardInterrupt:
+        raise ImportError("initialization failed")
+
+program.run(app, "program", contextlib.nullcontext())
+"""
+    result = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (result.returncode, result.stdout, result.stderr) == (
+        130,
+        "",
+        "program: interrupted\n",
+    )
 
 
 @pytest.mark.parametrize("rest", [[], ["--help"], ["a", "--jobs", "2"]])
