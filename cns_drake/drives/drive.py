@@ -214,10 +214,11 @@ class Drive(abc.ABC):
     @property
     def lidar_field(self) -> LidarField | None:
         """Rings and field of view of the LiDAR; None for an unknown model."""
-        unit = self.lidar_section.get("preset")
+        section = self.lidar_section
         if self.scenario and "lidars" not in self.scenario:
-            unit = _DEFAULT_UNIT
-        return lidar_field(unit)
+            section = {"preset": _DEFAULT_UNIT}
+        unit = section.get("unit") or section.get("preset")
+        return lidar_field(unit, section.get("rings"))
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:

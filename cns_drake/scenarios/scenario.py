@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 import operator
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import (
@@ -98,14 +98,6 @@ _ALTERNATIVES: tuple[tuple[str, str, Any, str], ...] = (
         "back on its road",
     ),
 )
-# Field -> fields that are removed when it is set.
-_REPLACED: dict[str, tuple[str, ...]] = {
-    "world": ("map", "stage", "route", "aside"),
-    "map": ("world",),
-    "route": ("waypoints", "u_turns"),
-    "waypoints": ("route", "aside"),
-}
-
 
 # More vehicles or pedestrians than any map can hold.
 _MOST_TRAFFIC = 2000
@@ -351,7 +343,7 @@ class Scenario(Section):
     Example:
         from cns_drake import load_scenario
 
-        scenario = load_scenario("downtown_01").with_lidar_preset("vlp-16")
+        scenario = load_scenario("downtown_01").with_lidar("vlp-16")
     """
 
     name: Name
@@ -381,6 +373,14 @@ class Scenario(Section):
     odometry: OdometrySection = field_off_by_default(OdometrySection())
     frames: int | None = Field(default=None, ge=1)
     seed: int = Field(default=0, ge=0)
+
+    # A field -> the fields that a change of it removes.
+    replaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "world": ("map", "stage", "route", "aside"),
+        "map": ("world",),
+        "route": ("waypoints", "u_turns"),
+        "waypoints": ("route", "aside"),
+    }
 
     # The file of the scenario, and those of its bases.
     _files: tuple[Path, ...] = PrivateAttr(())
@@ -579,15 +579,14 @@ class Scenario(Section):
                 section. Setting `world` removes `map`, `stage`, `route` and
                 `aside`, setting `map` removes `world`, setting `route` removes
                 `waypoints` and `u_turns`, and setting `waypoints` removes
-                `route` and `aside`.
+                `route` and `aside`. Of a LiDAR, setting `unit` removes
+                `preset`, and setting `preset` removes `unit`.
             source: the file or argument that error messages name.
 
         Raises:
             InputError: a field is unknown, or its value is not usable.
         """
-        replaced = [n for field in changes for n in _REPLACED.get(field, ())]
-        values = _merged(self, {**dict.fromkeys(replaced), **changes})
-        scenario = validated(Scenario, values, source)
+        scenario = validated(Scenario, _merged(self, changes), source)
         scenario._files = self._files
         return scenario
 
@@ -627,20 +626,21 @@ class Scenario(Section):
             chosen = chosen.replaced(lane_changes=0.0)
         return self.replaced(driver=chosen)
 
-    def with_lidar_preset(self, preset: str) -> Scenario:
+    def with_lidar(self, unit: str) -> Scenario:
         """Returns the scenario with every LiDAR replaced by another model.
 
         The LiDARs keep their poses and all settings of the measurement.
 
         Args:
-            preset: name of the model's preset, such as `vlp-16`.
+            unit: name of the model's preset, such as `vlp-16`, or the file of
+                its data sheet.
 
         Raises:
-            InputError: there is no such preset.
+            InputError: there is no such preset, or the file is no data sheet.
         """
-        units = self.lidars.items()
+        lidars = self.lidars.items()
         return self.replaced(
-            lidars={name: lidar.with_preset(preset) for name, lidar in units}
+            lidars={name: lidar.with_lidar(unit) for name, lidar in lidars}
         )
 
 
@@ -649,7 +649,9 @@ def _merged(
 ) -> dict[str, Any]:
     """Returns fields with changes; see `Scenario.with_fields`."""
     merged = dict(values)
-    for field, change in changes.items():
+    replaces = getattr(values, "replaces", {})
+    removed = [other for field in changes for other in replaces.get(field, ())]
+    for field, change in {**dict.fromkeys(removed), **changes}.items():
         if change is None:
             merged.pop(field, None)
         elif isinstance(change, Mapping):

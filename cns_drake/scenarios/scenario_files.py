@@ -166,6 +166,11 @@ def make_paths_absolute(values: dict, path: Path) -> None:
     for section, field in (("imu", "kalibr"), ("traffic", "fcd")):
         if isinstance(values.get(section), dict):
             values[section] = absolute(values[section], field)
+    if isinstance(lidars := values.get("lidars"), dict):
+        values["lidars"] = {
+            name: absolute(lidar, "unit") if isinstance(lidar, dict) else lidar
+            for name, lidar in lidars.items()
+        }
 
 
 def check_files(scenario: Scenario, source: object = None) -> None:

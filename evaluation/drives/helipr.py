@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base import InputError
+from cns_drake.drives import LidarField
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
@@ -62,7 +63,12 @@ _RECORDS = {
 }
 # Records of Aeva up to this time have no intensity [ns].
 _AEVA_CHANGE_NS = 1691936557946849179
-_UNITS = {"Ouster": "os2-128", "Velodyne": "vlp-16", "Avia": "avia"}
+# The Ouster is an OS2 with 128 channels over 22.5 deg (its data sheet).
+_UNITS = {
+    "Ouster": LidarField(128, -11.25, 11.25),
+    "Velodyne": "vlp-16",
+    "Avia": "avia",
+}
 _NUM_RINGS = {"Ouster": 128, "Velodyne": 16}
 
 

@@ -37,7 +37,7 @@ class FileDrive(Drive):
         notes: tuple[str, ...] = (),
         datum: str | None = None,
         scenario: Mapping | None = None,
-        unit: str | None = None,
+        unit: str | LidarField | None = None,
         session: str | None = None,
     ):
         """Describes a drive of N >= 1 scans.
@@ -57,7 +57,8 @@ class FileDrive(Drive):
             datum: name of the survey grid in which W lies; None if there is
                 none.
             scenario: see `evaluation.drives.Drive.scenario`.
-            unit: name of the LiDAR's unit, if the data set has only one.
+            unit: the LiDAR, if the data set has only one, as in
+                `cns_drake.drives.lidar_field`.
             session: see `evaluation.drives.Drive.session`; by default the name.
         """
         self.name = name

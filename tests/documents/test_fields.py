@@ -5,7 +5,7 @@ import pytest
 
 from cns_drake.city import ARCHETYPES, OBJECTS
 from cns_drake.scenarios import Scenario
-from cns_drake.sensors import LIDAR_PRESETS
+from cns_drake.units import LIDAR_PRESETS
 from docs import reference_pages
 from docs.reference_pages import CITY, EXPERIMENT, METHODS, SCENARIO
 

@@ -9,7 +9,13 @@ from pydantic import Field
 
 from cns_drake.base import InputError, errors_at, read_records, validated
 from cns_drake.roads import RoadNetwork, Route, draw_route, load_road_network
-from cns_drake.scenarios import Scenario, check_files, count_frames, plan_drive
+from cns_drake.scenarios import (
+    Scenario,
+    check_files,
+    count_frames,
+    make_paths_absolute,
+    plan_drive,
+)
 from cns_drake.scene import MapFolder, load_world, structures_in
 from cns_drake.sensors import Section, WeatherConfig
 from cns_drake.simulation import load_ways
@@ -23,6 +29,7 @@ from cns_drake.studies.drives.viewpoints import (
 )
 from cns_drake.studies.experiments.nested_fields import Changes
 from cns_drake.traffic import room_for_vehicles
+from cns_drake.units import is_sheet_file
 from evaluation.results import LAST, OWN
 
 # Fields of a drive that do not change the drive itself.
@@ -136,8 +143,11 @@ class DriveChanger:
     ) -> Scenario:
         """Returns a drive with another LiDAR, or another model of returns."""
         if "lidar" in left:
+            unit = left.pop("lidar")
+            if isinstance(unit, str) and is_sheet_file(unit):
+                unit = str(Path(self._source).parent / unit)
             with errors_at(f"{self._source}: {place}.lidar", "--lidar: "):
-                drive = drive.with_lidar_preset(left.pop("lidar"))
+                drive = drive.with_lidar(unit)
         if "returns" not in left:
             return drive
         returns, weather = left.pop("returns"), left.pop("weather", None)
@@ -306,6 +316,11 @@ class DriveChanger:
     def _with_scenario_fields(
         self, drive: Scenario, place: str, left: Changes
     ) -> Scenario:
+        if "lidars" in left:
+            # Data sheets lie beside the experiment.
+            lidars = {"lidars": left["lidars"]}
+            make_paths_absolute(lidars, Path(self._source))
+            left = {**left, **lidars}
         if left:
             drive = drive.with_fields(left, f"{self._source}: {place}")
             self._check_map(place, drive, left)

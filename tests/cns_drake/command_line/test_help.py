@@ -9,7 +9,7 @@ import typer
 import cns_drake
 from cns_drake import command_line as cli
 from cns_drake.base import Command
-from cns_drake.sensors import LIDAR_PRESETS
+from cns_drake.units import LIDAR_PRESETS
 from evaluation import command_line as evaluation_cli
 
 PROGRAMS = {
