@@ -60,6 +60,16 @@ from cns_drake.sensors import (
     WeatherConfig,
 )
 from cns_drake.studies import DrawnRoute, Experiment, Fleet, Losses, MadeMap
+from cns_drake.units import (
+    LIDAR_PRESETS,
+    Head,
+    LidarSheet,
+    NoddingSheet,
+    Response,
+    ReturnsSheet,
+    RosetteSheet,
+    SpinningSheet,
+)
 from evaluation import command_line as evaluation_cli
 from evaluation.methods import (
     MethodConfig,
@@ -84,6 +94,15 @@ SCENARIO: Sections = {
     "IMU": ImuSection,
     "Weather": WeatherConfig,
     "Odometry": OdometrySection,
+}
+LIDAR: Sections = {
+    "A data sheet": LidarSheet,
+    "A spinning LiDAR": SpinningSheet,
+    "A LiDAR with prisms": RosetteSheet,
+    "A nodding LiDAR": NoddingSheet,
+    "Returns": ReturnsSheet,
+    "Response": Response,
+    "Head": Head,
 }
 CITY: Sections = {
     "roads.yaml": RoadsFile,
@@ -119,6 +138,8 @@ METHODS: Sections = {
     },
     "svt-net, dpa-net and bevplace": NetworkConfig,
 }
+# Where the page of the fields of a drive finds those of a data sheet.
+_OF_LIDARS = "lidars.md"
 # What stands for the default where the model's own does not say it.
 _FILLED_IN = {
     (Scenario, "name"): "the file's name",
@@ -129,6 +150,10 @@ _FILLED_IN = {
     (Experiment, "protocol"): "`fair`",
     (Experiment, "baseline"): "the first values",
     (Fleet, "seed"): "the condition's seed",
+    (LidarSheet, "pattern"): "`spinning`",
+    (LidarSheet, "period"): "`0.05` or `0.1`",
+    (ReturnsSheet, "rows"): "one row",
+    (Response, "far"): "any range",
 }
 
 
@@ -141,6 +166,7 @@ def pages() -> dict[str, str]:
             "Relative paths start at the folder of the file.",
             SCENARIO,
         ),
+        "lidars.md": _lidars_page(),
         "city.md": _fields_page(
             "Fields of a city",
             "[Files of a city](../city.md) says what each file is for, and "
@@ -151,7 +177,8 @@ def pages() -> dict[str, str]:
             "Fields of an experiment",
             "[Studies](../studies.md) explains these fields with examples. It "
             "also lists what can vary, and the settings of tasks. Relative "
-            "paths start at the working folder.",
+            "paths start at the working folder, but those of data sheets of "
+            "LiDARs at the folder of the experiment.",
             EXPERIMENT,
         ),
         "methods.md": _fields_page(
@@ -165,6 +192,8 @@ def pages() -> dict[str, str]:
 
 def _fields_page(title: str, introduction: str, sections: Sections) -> str:
     links = {model: heading for heading, model in sections.items()}
+    if sections is not LIDAR:
+        links |= {LidarSheet: _OF_LIDARS}
     parts = [_heading(title), introduction]
     for heading, model in sections.items():
         description, meanings = explain_fields(model)
@@ -185,14 +214,44 @@ def _fields_page(title: str, introduction: str, sections: Sections) -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def _lidars_page() -> str:
+    fields = _fields_page(
+        "LiDARs and their data sheets",
+        "[Your own LiDAR](../how-to/own_lidar.md) shows how to write and use a "
+        "data sheet. A preset is a data sheet that ships with the program. "
+        "[LiDAR presets](../scenarios.md#lidar-presets) explains rates, angles "
+        "and the order of firing.",
+        LIDAR,
+    )
+    rows = [
+        (f"`{name}`", *_beams_of(sheet), sheet.source)
+        for name, sheet in LIDAR_PRESETS.items()
+    ]
+    columns = "preset", "rings", "elevations [deg]", "columns", "ranges [m]"
+    presets = _table((*columns, "source"), rows)
+    return f"{fields}\n## Presets\n\n{presets}\n"
+
+
+def _beams_of(sheet: LidarSheet) -> tuple[str, ...]:
+    """Returns what the table of presets says of a LiDAR's beams."""
+    lowest, highest = sheet.field_deg
+    columns = sheet.columns if isinstance(sheet, SpinningSheet) else "-"
+    return (
+        str(sheet.num_rings),
+        f"{highest:g} to {lowest:g}" if lowest < highest else f"{lowest:g}",
+        str(columns),
+        f"{sheet.ranges[0]:g} to {sheet.ranges[1]:g}",
+    )
+
+
 def own_fields(model: type[BaseModel]) -> dict[str, FieldInfo]:
     """Returns the fields that have a row in the model's table.
 
     What a road shares with the style of all roads, and a method with all
-    methods, is in the tables of those.
+    methods, and a kind of LiDAR with all LiDARs, is in the tables of those.
     """
     shared: dict[str, FieldInfo] = {}
-    for base in (RoadStyle, MethodConfig):
+    for base in (RoadStyle, MethodConfig, LidarSheet):
         if issubclass(model, base) and model is not base:
             shared |= base.model_fields
     fields = model.model_fields
@@ -308,7 +367,12 @@ def _links(annotation: Any, headings: dict[type[BaseModel], str]) -> str:
     found = [headings[model] for model in models_in(annotation)]
     if not found:
         return ""
-    links = (f"[{each}](#{_anchor(each)})" for each in dict.fromkeys(found))
+    links = (
+        f"[data sheet]({each})"
+        if each == _OF_LIDARS
+        else f"[{each}](#{_anchor(each)})"
+        for each in dict.fromkeys(found)
+    )
     return f" See {', '.join(links)}."
 
 

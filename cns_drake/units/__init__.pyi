@@ -1,5 +1,6 @@
 from cns_drake.units.data_sheet import MOST_BEAMS as MOST_BEAMS
 from cns_drake.units.data_sheet import MOST_RINGS as MOST_RINGS
+from cns_drake.units.data_sheet import Head as Head
 from cns_drake.units.data_sheet import LidarSheet as LidarSheet
 from cns_drake.units.data_sheet import NoddingSheet as NoddingSheet
 from cns_drake.units.data_sheet import Response as Response

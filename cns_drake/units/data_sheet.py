@@ -227,14 +227,17 @@ class ReturnsSheet(_Part):
 
 
 class LidarSheet(_Part, ABC):
-    """The data sheet of a LiDAR: what all kinds of LiDAR have.
+    """The data sheet of a LiDAR: the fields of every kind of LiDAR.
 
     Attributes:
-        pattern: kind of LiDAR.
+        pattern: kind of LiDAR: `spinning` (the default), `rosette` or
+            `nodding`. Each kind has further fields.
         ranges: nearest and farthest measured range [m].
-        period: duration of a revolution [s].
-        source: where the numbers come from.
-        returns: the beams, noise and returns, see `ReturnsSheet`.
+        period: duration of a revolution, or of a frame of a LiDAR that does not
+            spin [s]; by default 0.05 s for a spinning LiDAR, and 0.1 s for
+            others. In a drive, the field `rate` sets the duration.
+        source: where the numbers come from, in words.
+        returns: width of the beams, noise, and strength of the returns.
     """
 
     pattern: str
@@ -277,6 +280,10 @@ class LidarSheet(_Part, ABC):
     def field_deg(self) -> tuple[float, float]:
         """Lowest and highest elevation of a beam [deg]."""
 
+    def to_fields(self) -> dict[str, Any]:
+        """Returns the fields that differ from their defaults, for JSON."""
+        return self.model_dump(mode="json", exclude_defaults=True)
+
     def with_rings(self, number: int) -> LidarSheet:
         """Returns a sheet with evenly spaced rings between the same limits.
 
@@ -288,13 +295,12 @@ class LidarSheet(_Part, ABC):
 
 
 class SpinningSheet(LidarSheet):
-    """The data sheet of a LiDAR that spins: `pattern: spinning`, or no pattern.
+    """A LiDAR that spins: `pattern: spinning`, or no pattern.
 
-    All lasers of a column fire at once. Column 0 points to the rear; the LiDAR
-    turns clockwise, seen from above.
+    All lasers of a column fire at once. Column 0 points to the rear, and the
+    LiDAR turns clockwise, seen from above; `azimuths_deg` changes both.
 
     Attributes:
-        pattern: `spinning`.
         rings_deg: elevations of the rings from ring 0, the highest, downwards.
             Each entry is a block of evenly spaced rings, `[first, last,
             number]`, or a single elevation [deg].
@@ -306,7 +312,6 @@ class SpinningSheet(LidarSheet):
             order of the two also says which way the LiDAR turns [deg].
         fires_steadily: whether the lasers fire at a fixed rate, so that a
             slower revolution has more columns.
-        period: duration of a revolution [s].
     """
 
     pattern: Literal["spinning"] = "spinning"
@@ -403,13 +408,7 @@ class SpinningSheet(LidarSheet):
 
 
 class _TimedSheet(LidarSheet):
-    """The data sheet of a LiDAR whose pattern does not repeat.
-
-    Attributes:
-        num_lines: number of beams (lines) that fire together.
-        points_per_second: number of beams per second.
-        period: duration of a frame [s].
-    """
+    """The data sheet of a LiDAR whose pattern does not repeat."""
 
     num_lines: int = Field(default=1, ge=1, le=MOST_RINGS)
     points_per_second: float = Field(gt=0.0, le=1e8)
@@ -428,10 +427,11 @@ class _TimedSheet(LidarSheet):
 
 
 class RosetteSheet(_TimedSheet):
-    """The data sheet of a LiDAR with two prisms: `pattern: rosette`.
+    """A LiDAR with two rotating prisms, such as Livox's: `pattern: rosette`.
 
     Attributes:
-        pattern: `rosette`.
+        num_lines: number of lasers, which fire together.
+        points_per_second: number of beams per second.
         fov_deg: full opening angle of the disc that a laser scans [deg].
         height_deg: angle between the highest and the lowest laser [deg].
     """
@@ -447,10 +447,11 @@ class RosetteSheet(_TimedSheet):
 
 
 class NoddingSheet(_TimedSheet):
-    """The data sheet of a LiDAR that rotates and nods: `pattern: nodding`.
+    """A LiDAR whose beams rotate and slowly nod: `pattern: nodding`.
 
     Attributes:
-        pattern: `nodding`.
+        num_lines: number of lasers, which fire together.
+        points_per_second: number of beams per second.
         elevations_deg: lowest and highest elevation [deg].
     """
 

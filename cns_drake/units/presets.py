@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 
 _FILES = {
     path.stem: path
-    for path in sorted(Path(__file__).with_name("sheets").glob("*.yaml"))
+    for path in sorted(
+        Path(__file__).with_name("sheets").glob("*.yaml"),
+        key=lambda path: path.stem,
+    )
 }
 # Endings of the names of a user's own sheets.
 _ENDINGS = (".yaml", ".yml")

@@ -546,22 +546,28 @@ RECIPES = {
         after=("own city",),
         all_methods=True,
     ),
+    "data sheet": Recipe(
+        "rings_deg: [[10.0, -10.0, 48]]\ncolumns: 512", file="unit.yaml"
+    ),
     "another unit": Recipe(
-        ".venv/bin/cns-drake simulate riverside_01 --lidar os1-128",
+        ".venv/bin/cns-drake simulate riverside_01 --lidar unit.yaml",
         changes=(
             ("--frames 100", "--frames 2"),
             ("riverside_01", "town/sequence_01.yaml"),
         ),
-        after=("start a city",),
-        prints=("sensors/town_01: 2 frames",),
+        after=("start a city", "data sheet"),
+        prints=("mine/town_01: 2 frames",),
     ),
     "two units": Recipe(
         "world: town/stage_02.sdf\nwaypoints: tour.csv\nspeeds: {cruise: 8}\n",
         file="sensors.yaml",
         command=".venv/bin/cns-drake simulate sensors.yaml --frames 2 "
         "--output sensors",
-        after=("waypoints", "start a city"),
+        after=("waypoints", "start a city", "data sheet"),
         prints=("sensors/sensors: 2 frames",),
+    ),
+    "units as a factor": Recipe(
+        "maps: [riverside]\nquery:\n  lidars:", file="units.yaml"
     ),
     "own beams": Recipe(
         "import numpy as np\n\nfrom cns_drake import SpinningPattern",

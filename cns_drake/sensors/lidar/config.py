@@ -143,19 +143,12 @@ def _find_unit(given: Any) -> Any:
     return given
 
 
-def _sheet_fields(sheet: LidarSheet | None) -> dict[str, Any] | None:
-    """Returns the fields that a data sheet sets."""
-    if sheet is None:
-        return None
-    return sheet.model_dump(mode="json", exclude_defaults=True)
-
-
 class LidarSection(LidarDescription, Mount):
     """A LiDAR on the vehicle.
 
     Attributes:
-        unit: file with the [data sheet](lidar.md) of a LiDAR of your own, or
-            the fields of a data sheet, instead of a preset.
+        unit: file with the data sheet of a LiDAR of your own, or the fields of
+            the data sheet, instead of a preset.
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
         resolution: step to which recorded coordinates are rounded [m]; the
@@ -175,7 +168,7 @@ class LidarSection(LidarDescription, Mount):
     unit: Annotated[
         LidarSheet | None,
         BeforeValidator(_find_unit, json_schema_input_type=str | None),
-        PlainSerializer(_sheet_fields, return_type=dict | None),
+        PlainSerializer(lambda sheet: sheet and sheet.to_fields()),
     ] = field_off_by_default(None)
     rings: int | None = field_off_by_default(None, ge=2, le=MOST_RINGS)
     columns: int | None = Field(default=None, ge=4, le=8192)

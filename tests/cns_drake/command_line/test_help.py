@@ -26,7 +26,7 @@ WIDTH = 60
 
 def test_all_presets_are_listed():
     options = {one.name: one for one in find("cns-drake", "simulate").params}
-    words = re.findall(r"[a-z0-9-]+", options["lidar"].help.split(":")[1])
+    words = re.findall(r"[a-z0-9-]+", options["lidar"].help.split(": ")[2])
     assert set(words) - {"or"} == set(LIDAR_PRESETS)
 
 
