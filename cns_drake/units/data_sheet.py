@@ -316,13 +316,10 @@ class SpinningSheet(LidarSheet):
 
     pattern: Literal["spinning"] = "spinning"
     rings_deg: tuple[_Rings, ...] | None = Field(
-        default=None, min_length=1, max_length=MOST_RINGS
+        default=None, max_length=MOST_RINGS
     )
     elevations_deg: tuple[_Elevation, ...] | None = Field(
-        default=None,
-        min_length=1,
-        max_length=MOST_RINGS,
-        validate_default=True,
+        default=None, max_length=MOST_RINGS, validate_default=True
     )
     columns: _Columns
     azimuths_deg: (
@@ -340,6 +337,8 @@ class SpinningSheet(LidarSheet):
     def _check_rings(cls, given: tuple | None) -> tuple | None:
         if given is not None:
             number = sum(count for _, _, count in given)
+            if number == 0:
+                raise ValueError("there is no ring")
             if number > MOST_RINGS:
                 raise ValueError(f"{number} rings, more than {MOST_RINGS}")
             _check_descending(_spread(given))
@@ -357,6 +356,8 @@ class SpinningSheet(LidarSheet):
                 raise ValueError("give either these or rings_deg")
             if not has_rings and given is None:
                 raise ValueError("missing; give these or rings_deg")
+        if given == ():
+            raise ValueError("there is no ring")
         _check_descending(given or ())
         return given
 
@@ -412,7 +413,7 @@ class _TimedSheet(LidarSheet):
 
     num_lines: int = Field(default=1, ge=1, le=MOST_RINGS)
     points_per_second: float = Field(gt=0.0, le=1e8)
-    period: float = Field(default=0.1, gt=0.0, le=4.0)
+    period: float = Field(default=0.1, gt=0.0, le=4.0, validate_default=True)
 
     @field_validator("period")
     @classmethod
