@@ -413,14 +413,13 @@ class _TimedSheet(LidarSheet):
 
     num_lines: int = Field(default=1, ge=1, le=MOST_RINGS)
     points_per_second: float = Field(gt=0.0, le=1e8)
-    period: float = Field(default=0.1, gt=0.0, le=4.0, validate_default=True)
+    period: float = Field(default=0.1, gt=0.0, le=4.0)
 
-    @field_validator("period")
+    @field_validator("points_per_second")
     @classmethod
-    def _check_beams(cls, period: float, info: ValidationInfo) -> float:
-        rate = info.data.get("points_per_second", 0.0)
-        _check_num_beams(rate * period, f"{rate:g} points a second")
-        return period
+    def _check_beams(cls, rate: float, info: ValidationInfo) -> float:
+        _check_num_beams(rate * info.data.get("period", 0.0), f"{rate:g}")
+        return rate
 
     @property
     def num_rings(self) -> int:

@@ -113,7 +113,7 @@ def test_faults_are_one_line_with_file_and_field(tmp_path, changes, fault):
     [
         (ROSETTE, {"fov_deg": GONE}, "fov_deg: Field required"),
         (ROSETTE, {"columns": 512}, "columns: Extra"),
-        (ROSETTE, {"points_per_second": 1e8}, "period: .*beams"),
+        (ROSETTE, {"points_per_second": 1e8}, "points_per_second: .*beams"),
         (ROSETTE, {"num_lines": 0}, "num_lines: "),
         (NODDING, {"elevations_deg": [10.0, -5.0]}, "elevations_deg: not the"),
         (NODDING, {"fov_deg": 10.0}, "fov_deg: Extra"),
