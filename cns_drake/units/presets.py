@@ -63,10 +63,10 @@ def check_preset(name: str) -> None:
         )
 
 
-def is_sheet_file(unit: str | Path) -> bool:
+def is_sheet_file(unit: object) -> bool:
     """Returns whether a LiDAR is given by a data sheet's file, not a preset."""
-    if isinstance(unit, Path):
-        return True
+    if not isinstance(unit, str):
+        return isinstance(unit, Path)
     return unit not in LIDAR_PRESETS and (
         unit.endswith(_ENDINGS) or os.path.isfile(unit)
     )

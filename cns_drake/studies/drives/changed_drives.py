@@ -144,7 +144,7 @@ class DriveChanger:
         """Returns a drive with another LiDAR, or another model of returns."""
         if "lidar" in left:
             unit = left.pop("lidar")
-            if isinstance(unit, str) and is_sheet_file(unit):
+            if is_sheet_file(unit):
                 unit = str(Path(self._source).parent / unit)
             with errors_at(f"{self._source}: {place}.lidar", "--lidar: "):
                 drive = drive.with_lidar(unit)

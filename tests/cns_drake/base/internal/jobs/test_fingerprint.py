@@ -217,8 +217,10 @@ def test_of_our_own_code_the_right_modules_count(packages):
             ignore=shutil.ignore_patterns("__pycache__"),
         )
     for path, counts, module in (
-        ("cns_drake/sensors/lidar/presets.py", True, SIMULATION),
-        ("cns_drake/sensors/lidar/presets.py", False, EXTRACTION),
+        ("cns_drake/sensors/lidar/patterns.py", True, SIMULATION),
+        ("cns_drake/sensors/lidar/patterns.py", False, EXTRACTION),
+        ("cns_drake/units/sheets/cns.yaml", True, SIMULATION),
+        ("cns_drake/units/sheets/cns.yaml", True, EXTRACTION),
         ("evaluation/methods/btc.py", True, EXTRACTION),
         ("evaluation/methods/btc.py", False, SIMULATION),
         ("evaluation/results/page_template/frame.css", False, EXTRACTION),
