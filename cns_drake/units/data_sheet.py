@@ -248,7 +248,7 @@ class LidarSheet(_Part, ABC):
     period: float = Field(gt=0.0, le=4.0)
     source: str = Field(min_length=1, max_length=2000)
     returns: ReturnsSheet = Field(
-        default_factory=dict,  # type: ignore[assignment]  # Validated.
+        default_factory=dict,
         validate_default=True,
     )
 
