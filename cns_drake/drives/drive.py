@@ -11,6 +11,7 @@ import numpy as np
 
 from cns_drake.base import InputError
 from cns_drake.drives.lidar_fields import LidarField, lidar_field
+from cns_drake.units import DEFAULT_PRESET
 
 # W is the world, B the vehicle on the ground, I the IMU. The pose is X_WB. Both
 # velocities are velocities of B in W, expressed in B [m/s, rad/s].
@@ -33,8 +34,6 @@ IMU_DTYPE = np.dtype(
         ("specific_force", "<f8", 3),
     ]
 )
-# The LiDAR of a scenario that names none.
-_DEFAULT_UNIT = "cns"
 
 
 class ImuSamples(NamedTuple):
@@ -216,7 +215,7 @@ class Drive(abc.ABC):
         """Rings and field of view of the LiDAR; None for an unknown model."""
         section = self.lidar_section
         if self.scenario and "lidars" not in self.scenario:
-            section = {"preset": _DEFAULT_UNIT}
+            section = {"preset": DEFAULT_PRESET}
         unit = section.get("unit") or section.get("preset")
         return lidar_field(unit, section.get("rings"))
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 import re
 
-from cns_drake.base import InputError, is_there, read_yaml, value_errors
+from cns_drake.base import InputError, errors_at, is_there, read_yaml
 from cns_drake.units import read_sheet
 
 # Name of the file with the scenario, in the folder of an exported drive.
@@ -62,7 +62,7 @@ def read_scenario(folder: Path) -> Mapping | None:
     lidars = scenario.get("lidars")
     for section in lidars.values() if isinstance(lidars, dict) else ():
         if isinstance(section, dict) and isinstance(section.get("unit"), str):
-            with value_errors(path):
-                file = folder / section["unit"]
-                section["unit"] = read_sheet(file).to_fields()
+            with errors_at(f"{path}: lidars"):
+                sheet = read_sheet(folder / section["unit"])
+            section["unit"] = sheet.to_fields()
     return scenario

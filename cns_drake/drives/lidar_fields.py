@@ -3,12 +3,15 @@
 from typing import NamedTuple
 
 from cns_drake.base import InputError
-from cns_drake.units import LIDAR_PRESETS, SpinningSheet, make_sheet
+from cns_drake.units import (
+    DEFAULT_PRESET,
+    LIDAR_PRESETS,
+    SpinningSheet,
+    make_sheet,
+)
 
 # Ending of the name of a unit that hangs upside down, such as NCLT's.
 _UPSIDE_DOWN = "-upside-down"
-# The preset whose number of rings stands in for LiDARs without rings.
-_STANDS_IN = "cns"
 
 
 class LidarField(NamedTuple):
@@ -45,11 +48,11 @@ def lidar_field(unit: object, rings: object = None) -> LidarField | None:
         sheet = LIDAR_PRESETS.get(name.removesuffix(_UPSIDE_DOWN))
         if isinstance(unit, dict):
             sheet = make_sheet(unit, "unit")
-        if sheet is not None and isinstance(rings, int):
+        if sheet is None:
+            return None
+        if isinstance(rings, int) and rings > 0:
             sheet = sheet.with_rings(rings)
     except (InputError, ValueError):
-        return None
-    if sheet is None:
         return None
     lowest, highest = sheet.field_deg
     if lowest == highest:
@@ -57,5 +60,6 @@ def lidar_field(unit: object, rings: object = None) -> LidarField | None:
     if name.endswith(_UPSIDE_DOWN):
         lowest, highest = -highest, -lowest
     if not isinstance(sheet, SpinningSheet):
-        return LidarField(LIDAR_PRESETS[_STANDS_IN].num_rings, lowest, highest)
+        # It has no rings: the number of the default preset stands in.
+        sheet = LIDAR_PRESETS[DEFAULT_PRESET]
     return LidarField(sheet.num_rings, lowest, highest)

@@ -10,6 +10,7 @@ from cns_drake.units.data_sheet import SheetRow as SheetRow
 from cns_drake.units.data_sheet import SpinningSheet as SpinningSheet
 from cns_drake.units.data_sheet import make_sheet as make_sheet
 from cns_drake.units.data_sheet import read_sheet as read_sheet
+from cns_drake.units.presets import DEFAULT_PRESET as DEFAULT_PRESET
 from cns_drake.units.presets import LIDAR_PRESETS as LIDAR_PRESETS
 from cns_drake.units.presets import check_preset as check_preset
 from cns_drake.units.presets import find_sheet as find_sheet

@@ -48,6 +48,8 @@ class _Presets(Mapping[str, "LidarSheet"]):
 
 
 LIDAR_PRESETS: Mapping[str, LidarSheet] = _Presets()
+# The LiDAR of a drive that names none.
+DEFAULT_PRESET = "cns"
 
 
 def check_preset(name: str) -> None:

@@ -64,7 +64,7 @@ _RECORDS = {
 # Records of Aeva up to this time have no intensity [ns].
 _AEVA_CHANGE_NS = 1691936557946849179
 # The Ouster is an OS2 with 128 channels over 22.5 deg (its data sheet).
-_UNITS = {
+_UNITS: dict[str, str | LidarField] = {
     "Ouster": LidarField(128, -11.25, 11.25),
     "Velodyne": "vlp-16",
     "Avia": "avia",

@@ -31,6 +31,7 @@ from cns_drake.sensors.sensor_config import (
     field_off_by_default,
 )
 from cns_drake.units import (
+    DEFAULT_PRESET,
     LIDAR_PRESETS,
     MOST_BEAMS,
     MOST_RINGS,
@@ -43,10 +44,6 @@ from cns_drake.units import (
 
 if TYPE_CHECKING:
     from cns_drake.sensors.returns.calibrated import CalibratedReturns
-
-
-# The LiDAR of a section that names none.
-DEFAULT_PRESET = "cns"
 
 
 class WeatherConfig(Section):
@@ -165,7 +162,7 @@ class LidarSection(LidarDescription, Mount):
     # Fields of the description, with their limits.
     preset: str | None = DEFAULT_PRESET
     # The content of the file, so that a recording states all of it.
-    unit: Annotated[
+    unit: Annotated[  # type: ignore[assignment]  # Read from the file.
         LidarSheet | None,
         BeforeValidator(_find_unit, json_schema_input_type=str | None),
         PlainSerializer(lambda sheet: sheet and sheet.to_fields()),

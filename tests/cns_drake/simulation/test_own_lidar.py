@@ -318,5 +318,5 @@ def test_scans_of_a_real_lidar_name_its_sheet(tmp_path):
     found = read_scenario(tmp_path)["lidars"]["lidar"]["unit"]
     assert (found["columns"], found["source"]) == (40, "mine")
     write_sheet(tmp_path, ranges="far")
-    with pytest.raises(InputError, match=r"unit.yaml: ranges: "):
+    with pytest.raises(InputError, match=r"lidars: .*unit.yaml: ranges: "):
         read_scenario(tmp_path)

@@ -42,6 +42,10 @@ def test_fields_are_those_of_the_presets():
             assert field is None
     assert lidar_field("os9") is None
     assert lidar_field(["cns"]) is None
+    assert lidar_field({"columns": 3}) is None
+    assert lidar_field("cns", 10**9) is None
+    assert lidar_field("cns", 48) == LidarField(48, -22.5, 22.5)
+    assert lidar_field("hdl-32e-upside-down") == LidarField(32, -10.67, 30.67)
 
 
 def descriptors(method):
