@@ -41,6 +41,7 @@ from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.odometry_config import OdometrySection
 from cns_drake.sensors.sensor_config import HIGHEST_RATE, Section
 from cns_drake.sensors.system_names import check_unused_names
+from cns_drake.units import DEFAULT_PRESET
 
 # Fields of a section that no config has: `X_PB` replaces the mount, and only
 # recordings have a layout.
@@ -505,6 +506,8 @@ def _checked_section(
         for name in kind.model_fields
         if name not in (*_LEFT_OUT, *left_out)
     }
+    if given.get("unit") is not None and given["preset"] == DEFAULT_PRESET:
+        given["preset"] = None  # Nobody has given it.
     try:
         return kind.model_validate(given)
     except ValidationError as error:

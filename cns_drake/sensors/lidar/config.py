@@ -73,7 +73,7 @@ class LidarDescription:
 
     Attributes:
         preset: name of the LiDAR model, from the table of presets in the
-            documentation; `cns` if there is no `unit`.
+            documentation; none if there is a `unit`.
         unit: file with the data sheet of a LiDAR of your own, instead of a
             preset.
         rings: number of rings, evenly spaced from the highest to the lowest
@@ -109,7 +109,7 @@ class LidarDescription:
             same unit. Only with calibrated returns.
     """
 
-    preset: str | None = None
+    preset: str | None = DEFAULT_PRESET
     unit: str | None = None
     rings: int | None = None
     columns: int | None = None
@@ -160,13 +160,12 @@ class LidarSection(LidarDescription, Mount):
 
     xyz: Triple = (0.0, 0.0, 1.6)
     # Fields of the description, with their limits.
-    preset: str | None = DEFAULT_PRESET
     # The content of the file, so that a recording states all of it.
-    unit: Annotated[  # type: ignore[assignment]  # Read from the file.
+    unit: Annotated[
         LidarSheet | None,
         BeforeValidator(_find_unit, json_schema_input_type=str | None),
         PlainSerializer(lambda sheet: sheet and sheet.to_fields()),
-    ] = field_off_by_default(None)
+    ] = field_off_by_default(None)  # type: ignore[assignment]  # Narrower.
     rings: int | None = field_off_by_default(None, ge=2, le=MOST_RINGS)
     columns: int | None = Field(default=None, ge=4, le=8192)
     min_range: float | None = Field(default=None, ge=0.0)

@@ -190,7 +190,7 @@ def test_a_lidar_of_a_diagram(tmp_path):
     added = add_lidar(builder, scene_graph, world, RigidTransform(), str(sheet))
     np.testing.assert_array_equal(scan_of(added, builder), scan)
     builder, plant, scene_graph = make_floor()
-    both = dataclasses.replace(config, preset="cns")
+    both = dataclasses.replace(config, preset="vlp-16")
     with pytest.raises(ValueError, match="roof: unit: give either"):
         ApplyLidarConfig(both, builder, plant, scene_graph)
     write_sheet(tmp_path, ranges=[9, 1])
