@@ -21,9 +21,9 @@ from evaluation.methods.method import Method as Method
 from evaluation.methods.method import MethodConfig as MethodConfig
 from evaluation.methods.method import PlaceScan as PlaceScan
 from evaluation.methods.method import check_number as check_number
+from evaluation.methods.own_files import as_users_code as as_users_code
 from evaluation.methods.own_files import load_method as load_method
 from evaluation.methods.own_files import run_module as run_module
-from evaluation.methods.own_files import with_named_faults as with_named_faults
 from evaluation.methods.published_networks import NetworkConfig as NetworkConfig
 from evaluation.methods.registry import known_methods as known_methods
 from evaluation.methods.registry import make_method as make_method

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from cns_drake.base import InputError, did_you_mean
 from evaluation.methods.method import Method
-from evaluation.methods.own_files import named_faults
+from evaluation.methods.own_files import users_code
 
 _METHODS: dict[str, type[Method]] = {}
 # Methods that run by default.
@@ -120,7 +120,7 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
                 f"{did_you_mean(key, fields)}"
             )
     naming = (
-        named_faults(method._file) if method._file else contextlib.nullcontext()
+        users_code(method._file) if method._file else contextlib.nullcontext()
     )
     with naming:
         try:

@@ -207,7 +207,6 @@ def choose_methods(
             invalid value.
     """
     chosen: list[MethodChoice] = []
-    stems = set()
     for name in expanded_names(map(str, names)) or shipped_methods():
         if name in (*shipped_methods(), *optional_methods()):
             chosen.append(MethodChoice(name))
@@ -219,10 +218,8 @@ def choose_methods(
                 f"--method: {name}: neither a Python file nor one of"
                 f" {', '.join(known)}{did_you_mean(name, known)}"
             )
-        # Two modules with one name would replace each other.
-        if path.stem in stems:
+        if path in {one.file for one in chosen}:
             raise InputError(f"--method: {path.name} is there twice")
-        stems.add(path.stem)
         choice = MethodChoice(load_method(path).name, path)
         if choice.name in {one.name for one in chosen}:
             raise InputError(f"{path}: another method is named {choice.name!r}")
