@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Iterator, Mapping
+import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -227,6 +228,15 @@ class Drive(abc.ABC):
         points of the scans carry the same instance ids and labels.
         """
         return None
+
+
+def as_given(path: Path) -> Path:
+    """Returns the absolute path of a drive, whose links are not resolved.
+
+    A drive has the name that its user gave it, and its tables lie beside this
+    name, wherever a link leads.
+    """
+    return Path(os.path.abspath(path))
 
 
 def index_instances(table: Any, source: str) -> dict[int, Mapping]:

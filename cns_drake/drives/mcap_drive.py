@@ -11,7 +11,12 @@ import numpy as np
 from cns_drake.base import InputError, listed, parse_json, value_errors
 from cns_drake.base import points as point_arrays
 from cns_drake.drives import mcap_messages, ros_types
-from cns_drake.drives.drive import ODOMETRY_DTYPE, Drive, index_instances
+from cns_drake.drives.drive import (
+    ODOMETRY_DTYPE,
+    Drive,
+    as_given,
+    index_instances,
+)
 from cns_drake.drives.mcap_file import LOCATION, McapFile
 from cns_drake.drives.mcap_messages import StaticTransforms, checked_poses
 from cns_drake.drives.message_rows import (
@@ -623,11 +628,9 @@ def _mcap_path(path: Path) -> Path:
 
 
 def _drive_name(path: Path) -> str:
-    resolved = path.resolve()
+    place = as_given(path)
     # rosbag2 numbers the files of a recording: <name>_0.mcap.
-    return (
-        resolved.name if resolved.is_dir() else resolved.stem.removesuffix("_0")
-    )
+    return place.name if place.is_dir() else place.stem.removesuffix("_0")
 
 
 _LIDAR_TOPIC = "/lidar/points"

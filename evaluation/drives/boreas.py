@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cns_drake.drives import as_given
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
@@ -65,7 +66,7 @@ class BoreasDrive(FileDrive):
         X_WS, spanned = trajectory.interpolate(stamps_ns)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         super().__init__(
-            name=path.resolve().name,
+            name=as_given(path).name,
             world_frame=f"boreas/{'enu' if local else 'utm-17n'}",
             files=kept,
             stamps_ns=stamps_ns[spanned],

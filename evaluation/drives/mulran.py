@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base import InputError
-from cns_drake.drives import SCENARIO, X_BS, read_scenario
+from cns_drake.drives import SCENARIO, X_BS, as_given, read_scenario
 from evaluation.drives.scan_files import (
     BinDrive,
     first_existing,
@@ -68,7 +68,7 @@ class MulranDrive(BinDrive):
         X_UB, spanned = trajectory.interpolate(stamps_ns)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         notes = (*chosen, *notes)
-        name = path.resolve().name
+        name = as_given(path).name
         local = is_local(trajectory.X_WB)
         if local:
             notes += (

@@ -149,10 +149,10 @@ def test_every_function_of_the_interface_is_wrapped(tmp_path):
 def test_a_property_runs_as_the_users_code(tmp_path):
     path = write(tmp_path, "listed")
     path.write_text(
-        path.read_text()
-        + "    @property\n    def num_shortlisted(self):\n        return 1 // 0\n"
+        path.read_text() + "    @property\n    def num_shortlisted(self):\n"
+        "        return 1 // 0\n"
     )
-    with pytest.raises(Exception, match="mine.py: line .*ZeroDivision"):
+    with pytest.raises(Exception, match=r"mine.py: line .*ZeroDivision"):
         _ = load_method(path)().num_shortlisted
 
 
