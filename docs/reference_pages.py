@@ -63,10 +63,11 @@ from cns_drake.studies import DrawnRoute, Experiment, Fleet, Losses, MadeMap
 from evaluation import command_line as evaluation_cli
 from evaluation.methods import (
     MethodConfig,
-    NetworkConfig,
-    make_method,
+    find_method,
+    optional_methods,
     shipped_methods,
 )
+from evaluation.results import listed
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 Sections = dict[str, type[BaseModel]]
@@ -111,13 +112,19 @@ EXPERIMENT: Sections = {
     "A route at random": DrawnRoute,
     "A fleet": Fleet,
 }
+
+
+def _sections_of_methods() -> Sections:
+    """Returns the classes of settings, by the names of their methods."""
+    names: dict[type[MethodConfig], list[str]] = {}
+    for name in (*shipped_methods(), *optional_methods()):
+        names.setdefault(find_method(name).Config, []).append(name)
+    return {listed(some): config for config, some in names.items()}
+
+
 METHODS: Sections = {
     "All methods": MethodConfig,
-    **{
-        name: make_method(name, {}).Config
-        for name in (*shipped_methods(), "probe")
-    },
-    "svt-net, dpa-net and bevplace": NetworkConfig,
+    **_sections_of_methods(),
 }
 # What stands for the default where the model's own does not say it.
 _FILLED_IN = {

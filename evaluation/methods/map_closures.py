@@ -86,6 +86,9 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
     LiDAR, and as much behind it.
     """
 
+    title = "MapClosures"
+    source = "Gupta et al.: ICRA 2024"
+    order = 10
     Config = MapClosuresConfig
     skips_places = True
     config: MapClosuresConfig

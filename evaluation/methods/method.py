@@ -59,6 +59,14 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
     Attributes:
         name: name of the method on the command line.
+        title: name of the method in tables and charts, as its authors write it;
+            by default `name`.
+        style: colour (`#RRGGBB`), line style and marker in charts, in the terms
+            of Matplotlib; by default one of several that no other method has.
+        source: publication of the method; empty for one that is not published.
+        standard: whether a shipped method runs by default.
+        order: place of the method in tables, counted upwards; methods with the
+            same number are sorted by name.
         Config: type of its parameters.
         scans_per_place: number of consecutive scans that are merged into the
             described cloud. The cloud is in the frame of the scan that stands
@@ -93,6 +101,11 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     """
 
     name: ClassVar[str]
+    title: ClassVar[str] = ""
+    style: ClassVar[tuple[str, str, str] | None] = None
+    source: ClassVar[str] = ""
+    standard: ClassVar[bool] = False
+    order: ClassVar[int] = 100
     Config: ClassVar[type[MethodConfig]] = MethodConfig
     scans_per_place: ClassVar[int] = 1
     point_fields: ClassVar[tuple[str, ...]] = ()
@@ -155,6 +168,15 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     def describes_alike(self) -> bool:
         """Whether the method describes places and queries in the same way."""
         return type(self).describe_place is Method.describe_place
+
+    @property
+    def estimates_poses(self) -> bool:
+        """Whether the method estimates the pose of a query at a place."""
+        own = type(self)
+        return (
+            own.relative_pose is not Method.relative_pose
+            or own.relative_poses is not Method.relative_poses
+        )
 
     @abc.abstractmethod
     def build_database(self, places: Sequence[Descriptor]) -> Database:

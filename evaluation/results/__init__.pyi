@@ -44,9 +44,9 @@ from evaluation.results.sections.routes import (
 from evaluation.results.sections.routes import routes_section as routes_section
 from evaluation.results.styles import GONE as GONE
 from evaluation.results.styles import INK as INK
-from evaluation.results.styles import METHOD_STYLES as METHOD_STYLES
 from evaluation.results.styles import NEW as NEW
 from evaluation.results.styles import PALE as PALE
+from evaluation.results.styles import method_style as method_style
 from evaluation.results.styles import method_styles as method_styles
 from evaluation.results.styles import unit_rgb as unit_rgb
 from evaluation.results.summaries import LEAST_POINTS as LEAST_POINTS

@@ -20,7 +20,7 @@ from evaluation.results.charts.matrix import draw_matrix
 from evaluation.results.charts.scatter import draw_scatter
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import SETTINGS
-from evaluation.results.method_names import in_table_order
+from evaluation.results.method_names import in_table_order, title
 from evaluation.results.styles import MethodStyle, method_styles
 from evaluation.results.table import Answers, QueryRows, Results, Row
 
@@ -73,7 +73,10 @@ def draw_chart(
         if queries is not None:
             queries = QueryRows.of(_renamed(queries.answers, names_of))
     rows = _selected_rows(chart, keys, results)
-    styles = method_styles(in_table_order(row.label for row in rows))
+    # All charts of a table show a method in the same style.
+    of_table = method_styles(in_table_order(row.label for row in results.rows))
+    shown = {title(row.label) for row in rows}
+    styles = {name: one for name, one in of_table.items() if name in shown}
     kind = chart["kind"]
     with rc_context({"font.size": FONT, "axes.titlesize": "medium"}):
         message, figure = _KINDS[kind].draw(
