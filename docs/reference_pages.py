@@ -59,7 +59,14 @@ from cns_drake.sensors import (
     OdometrySection,
     WeatherConfig,
 )
-from cns_drake.studies import DrawnRoute, Experiment, Fleet, Losses, MadeMap
+from cns_drake.studies import (
+    DrawnRoute,
+    Experiment,
+    Fleet,
+    Losses,
+    MadeMap,
+    shipped_causes,
+)
 from evaluation import command_line as evaluation_cli
 from evaluation.methods import (
     MethodConfig,
@@ -166,8 +173,52 @@ def pages() -> dict[str, str]:
             "[Methods](../methods.md) shows how to change these settings.",
             METHODS,
         ),
+        "causes.md": _causes_page(),
         "commands.md": _commands_page(),
     }
+
+
+def _causes_page() -> str:
+    rows = [
+        (
+            f"`{cause.name}`",
+            cause.title,
+            "query scans" if cause.scans_only else " and ".join(cause.sides),
+            " ".join(cause.about.split())
+            + ("" if cause.combined else " (not part of `all`)"),
+            _values_of_levels(cause.strengths.get("levels")),
+        )
+        for cause in shipped_causes().values()
+    ]
+    parts = [
+        _heading("Causes of change"),
+        "The experiment [`ladder`](../ladder.md) measures each cause by itself,"
+        " at up to four levels, and all of them together. The"
+        " [levels](../levels.md) combine weaker causes.",
+        _table(
+            (
+                "cause",
+                "in words",
+                "changes",
+                "levels 1 to 4 of the ladder",
+                "in the levels",
+            ),
+            rows,
+        ),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _values_of_levels(fields: Any, path: str = "") -> str:
+    """Returns the values at each level of the fields of drives."""
+    if fields is None:
+        return "-"
+    if not isinstance(fields, dict):
+        return f"`{path}` {_plain(fields)}"
+    return "; ".join(
+        _values_of_levels(value, f"{path}.{name}".lstrip("."))
+        for name, value in fields.items()
+    )
 
 
 def _fields_page(title: str, introduction: str, sections: Sections) -> str:

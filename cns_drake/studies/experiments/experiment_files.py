@@ -2,7 +2,10 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+import re
 from typing import Any
+
+import yaml
 
 from cns_drake.base import (
     InputError,
@@ -13,6 +16,7 @@ from cns_drake.base import (
     validated,
     value_errors,
 )
+from cns_drake.studies.experiments.cause_files import with_cases
 from cns_drake.studies.experiments.experiment import Experiment, in_long_form
 from cns_drake.studies.experiments.nested_fields import Changes, merged, nested
 from evaluation.study import STAGES_FILE
@@ -24,6 +28,29 @@ def shipped_experiments() -> dict[str, Path]:
     """Returns name -> file of the shipped experiments."""
     files = [*_FOLDER.glob("*.yaml"), STAGES_FILE]
     return {path.stem: path for path in sorted(files, key=lambda p: p.stem)}
+
+
+def experiment_text(name_or_file: str | Path) -> str:
+    """Returns an experiment's file, with the cases for which its causes stand.
+
+    Raises:
+        InputError: there is no such experiment, or it cannot be used.
+    """
+    load_experiment(name_or_file)
+    path = _experiment_file(name_or_file)
+    text = path.read_text("utf-8")
+    values = read_yaml(path)
+    if "causes" not in values:
+        return text
+    cases = yaml.safe_dump(
+        {"cases": with_cases(values, path)["cases"]},
+        sort_keys=False,
+        default_flow_style=None,
+        allow_unicode=True,
+        width=79,
+    )
+    line = re.compile(r"^causes:.*\n(?:[ #].*\n)*", re.MULTILINE)
+    return line.sub(lambda _: cases, text)
 
 
 def load_experiment(
@@ -55,6 +82,7 @@ def load_experiment(
     values = read_yaml(path)
     if not isinstance(values, dict):
         raise InputError(f"{path}: not a mapping of an experiment's fields")
+    values = with_cases(values, path)
     values = in_long_form({"name": path.stem, **values})
     short = values.get("quick")
     overrides = list(overrides)

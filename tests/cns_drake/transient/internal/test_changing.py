@@ -317,3 +317,10 @@ def test_what_a_world_lacks_is_said(tmp_path):
     )
     noted = [note.split(":")[:2] for note in world.notes]
     assert noted == [["transient", f" {name}"] for name in names]
+
+
+def test_every_field_has_one_effect():
+    fields = [effect.field for effect in changing.effects()]
+    assert sorted(fields) == sorted({*TransientConfig.model_fields} - {"seed"})
+    first, *_, last = fields
+    assert (first, last) == ("roadsides", "snow")
