@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.drives import as_given
+from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
@@ -91,3 +92,6 @@ def _read_scan(path: Path, stamp_ns: int) -> np.ndarray:
 def holds_boreas(path: Path) -> bool:
     """Returns whether a folder looks like a drive of Boreas."""
     return (path / _POSES).is_file()
+
+
+DATA_SET = DataSet("Boreas", holds_boreas, BoreasDrive)

@@ -29,6 +29,7 @@ from cns_drake.base import (
 )
 from cns_drake.drives import IMU_DTYPE, SCENARIO, as_given, read_scenario
 from evaluation.clouds import read_cloud
+from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import FileDrive, first_existing, list_stamped
 from evaluation.drives.text_tables import read_stamped_rows
 from evaluation.drives.trajectories import pose_matrices, read_quaternions
@@ -142,6 +143,9 @@ class CnsFolderDrive(FileDrive):
 def holds_cns(path: Path) -> bool:
     """Returns whether a folder looks like a drive in CNS' layout."""
     return (path / _POSES).is_file() or (path / _FOLDERS[0]).is_dir()
+
+
+DATA_SET = DataSet("CNS", holds_cns, CnsFolderDrive, is_nested=True)
 
 
 def _find_mount(path: Path, notes: list[str]) -> Path | None:

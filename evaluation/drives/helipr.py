@@ -14,6 +14,7 @@ import numpy as np
 
 from cns_drake.base import InputError
 from cns_drake.drives import as_given
+from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
@@ -147,6 +148,9 @@ def read_helipr_scan(
 def holds_helipr(path: Path) -> bool:
     """Returns whether a folder is a drive of HeLiPR, or one LiDAR of it."""
     return _lidar_folder(path) is not None or bool(_lidars(path))
+
+
+DATA_SET = DataSet("HeLiPR", holds_helipr, HeliprDrive, has_lidars=True)
 
 
 def _lidar_folder(path: Path) -> Path | None:

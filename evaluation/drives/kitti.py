@@ -42,6 +42,7 @@ from cns_drake.base import (
     value_errors,
 )
 from cns_drake.drives import SCENARIO, as_given, index_instances, read_scenario
+from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import BinDrive, first_existing, read_packed
 from evaluation.drives.text_tables import (
     check_increasing,
@@ -190,6 +191,15 @@ def _label_path(labels: Path, scan: Path) -> Path:
 def holds_kitti(path: Path) -> bool:
     """Returns whether a folder looks like a drive in KITTI's layout."""
     return (path / _SCANS).is_dir()
+
+
+DATA_SET = DataSet(
+    "KITTI odometry",
+    holds_kitti,
+    KittiDrive,
+    is_nested=True,
+    needs_scenario=True,
+)
 
 
 def _numbered_files(path: Path) -> tuple[list[Path], list[int]]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from cns_drake.base import InputError
 from cns_drake.drives import SCENARIO, X_BS, as_given, read_scenario
+from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     BinDrive,
     first_existing,
@@ -109,6 +110,9 @@ class MulranDrive(BinDrive):
 def holds_mulran(path: Path) -> bool:
     """Returns whether a folder looks like a drive of MulRan."""
     return (path / _POSES).is_file() or _scan_folder(path, []) is not None
+
+
+DATA_SET = DataSet("MulRan", holds_mulran, MulranDrive)
 
 
 def _scan_folder(path: Path, notes: list[str]) -> Path | None:

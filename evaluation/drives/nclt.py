@@ -16,6 +16,7 @@ import numpy as np
 
 from cns_drake.base import InputError, poses
 from cns_drake.drives import as_given
+from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
@@ -99,6 +100,9 @@ class NcltDrive(FileDrive):
 def holds_nclt(path: Path) -> bool:
     """Returns whether a folder looks like a session of NCLT."""
     return (path / _SCANS).is_dir() or (path / _HITS).is_file()
+
+
+DATA_SET = DataSet("NCLT", holds_nclt, NcltDrive)
 
 
 def read_nclt_scan(path: Path) -> np.ndarray:

@@ -2,13 +2,14 @@
 
 import abc
 from collections.abc import Sequence
+import contextlib
 from pathlib import Path
 from typing import ClassVar, Generic, Literal, TypeVar
 
 import numpy as np
 from pydantic import ConfigDict, NonNegativeFloat
 
-from cns_drake.base import InputError, InputModel
+from cns_drake.base import InputError, InputModel, poses
 from cns_drake.drives import LidarField
 
 Descriptor = TypeVar("Descriptor")
@@ -325,3 +326,57 @@ def check_number(
             f"{method.name}: {function} returned {type(found).__name__} of"
             f" length {count} instead of {number}"
         )
+
+
+def checked_scores(
+    method: Method, function: str, scores: object, number: int
+) -> np.ndarray:
+    """Returns the scores of a method as a float64 array of shape (number,).
+
+    Raises:
+        InputError: the scores have another shape or are no numbers, or they are
+            complex or masked: a conversion would drop the imaginary part or the
+            mask.
+    """
+    fault = ""
+    try:
+        values = np.asarray(scores)
+    except ValueError:  # Rows of different lengths.
+        values = np.empty(0)
+    if isinstance(scores, np.ma.MaskedArray):
+        fault = " with a mask (NaN says that a place is no candidate)"
+    elif values.dtype.kind in "cSU":
+        fault = f" and type {values.dtype}"
+    elif values.shape == (number,):
+        with contextlib.suppress(TypeError, ValueError):
+            return values.astype(np.float64)
+    raise InputError(
+        f"{method.name}: {function} returned {type(scores).__name__} of shape"
+        f" {values.shape}{fault} instead of {number} numbers"
+    )
+
+
+def checked_pose(method: Method, X_PQ: object) -> np.ndarray | None:
+    """Returns a method's estimate after checking that it is a pose, or None.
+
+    Args:
+        method: the method, for the error message.
+        X_PQ: result of `Method.relative_pose`: a pose (4, 4) or None.
+
+    Raises:
+        InputError: `X_PQ` is neither a pose nor None.
+    """
+    if X_PQ is None:
+        return None
+    pose = np.asarray(X_PQ)
+    if pose.shape != (4, 4) or pose.dtype.kind != "f":
+        raise InputError(
+            f"{method.name}: relative_pose returned {type(X_PQ).__name__} of"
+            f" shape {pose.shape} instead of (4, 4) floats or None"
+        )
+    if not poses.is_pose(pose):
+        raise InputError(
+            f"{method.name}: relative_pose returned no pose: a rotation, and a"
+            " last row 0 0 0 1"
+        )
+    return pose

@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 import contextlib
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PlainValidator, model_validator
 import yaml
 
 from cns_drake.base import InputError, check_once, validated
+from cns_drake.imports import map_sources
 from cns_drake.scenarios import Name
 from cns_drake.sensors import Section
 from cns_drake.studies.experiments.conditions import Condition, conditions
@@ -120,11 +122,13 @@ class MadeMap(Section):
         for name in ("sha256", "grow", "plain"):
             if self.age is not None and name in self.model_fields_set:
                 raise ValueError(f"{name}: it belongs to import; leave it out")
-        if self.grow is not None and str(self.import_file).endswith(".xodr"):
-            raise ValueError(
-                "grow: a road network (.xodr) has two stages anyway; leave it"
-                " out"
-            )
+        ending = Path(str(self.import_file)).suffix
+        for source in map_sources() if self.grow is not None else ():
+            if ending in source.suffixes and source.has_stages:
+                raise ValueError(
+                    f"grow: a map from {source.title} has two stages anyway;"
+                    " leave it out"
+                )
         return self
 
 

@@ -17,7 +17,7 @@ from cns_drake.scenarios import TransientConfig
 from cns_drake.scene import load_world
 from cns_drake.sensors import make_beam_pattern
 from cns_drake.simulation import scan_world
-from cns_drake.transient import change_world, geometry_by_structure
+from cns_drake.transient import change_world, changing, geometry_by_structure
 from cns_drake.transient.parked_cars import make_bays
 from cns_drake.transient.surroundings import Surroundings
 
