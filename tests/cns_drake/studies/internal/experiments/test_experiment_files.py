@@ -238,7 +238,7 @@ FAULTS = [
     ("seeds: one", "seeds.0: "),
     (
         "maps: [{name: a, import: a.xodr, seed: 1, grow: 0.3}]",
-        r"maps\.0: .*grow: a road network \(\.xodr\) .*; leave it out",
+        r"maps\.0: .*grow: a map from OpenDRIVE .*; leave it out",
     ),
     *(
         (
