@@ -150,13 +150,13 @@ def export(
         drives: Drives to export. With --format pointnetvlad or overlap, you can
             leave them out: then the drives of the experiment that --vary names
             are exported, or all shipped drives if --vary is not given.
-        layout: str to write: cns (the CNS data set), kitti (KITTI odometry),
-            mulran (MulRan), tum (only the trajectory), pointnetvlad (clouds and
-            pickle files for PointNetVLAD), overlap (scans and the exact overlap
-            of each pair), overlap-table (only the overlaps between a database
-            and a query drive, for cns-eval pr --exact-overlaps), map-truth (two
-            maps with labels of what changed), map-sessions (two maps without
-            labels), bev-images (bird's-eye images with poses) or film.
+        layout: Format to write: one of CONVERTED (tum has only the
+            trajectory), pointnetvlad (clouds and pickle files for
+            PointNetVLAD), overlap (scans and the exact overlap of each pair),
+            overlap-table (only the overlaps between a database and a query
+            drive, for cns-eval pr --exact-overlaps), map-truth (two maps with
+            labels of what changed), map-sessions (two maps without labels),
+            bev-images (bird's-eye images with poses) or film.
         output: Folder to write; created if it does not exist. With map-truth,
             map-sessions and bev-images, the folder must be new or empty. With
             film, the output is a file instead, and an existing file is

@@ -818,6 +818,12 @@ RECIPES = {
         after=("method", "Python", "own diagram", "own beams"),
         prints=("All checks passed!", "already formatted"),
     ),
+    "own method, check": Recipe(
+        "from evaluation import check_method",
+        after=("method",),
+        file="check_heights.py",
+        command=".venv/bin/python check_heights.py",
+    ),
     "own method": Recipe(
         ".venv/bin/cns-eval pr output/metropolis_01",
         changes=(_FIRST, _LAST),
@@ -941,6 +947,12 @@ RECIPES = {
         file="convert.py",
         command=".venv/bin/python convert.py",
         makes=("mine/sequences/0[12]/velodyne/000039.bin",),
+    ),
+    "own scans, check": Recipe(
+        "from evaluation import check_data_set",
+        after=("own scans and poses",),
+        file="check_drives.py",
+        command=".venv/bin/python check_drives.py",
     ),
     "own scans, pairs": Recipe(
         ".venv/bin/cns-eval tcr mine/sequences/01 mine",

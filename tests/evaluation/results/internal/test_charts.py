@@ -597,6 +597,27 @@ def test_a_page_shows_the_markers_of_its_charts():
     assert len({*map(tuple, cross.tolist())}) == 12
 
 
+def test_a_method_has_one_style_in_all_charts():
+    """Also a method of the user, in a chart that shows some of the methods."""
+    names = {"solid": "yours"}
+    rows = [
+        replace(row, method=names.get(row.method, row.method))
+        for row in aged().rows
+    ]
+    results = Results.of(rows)
+    chart = {"kind": "lines", "over": YEARS, "metric": "auc"}
+    everything = draw_chart(chart, results).legend
+    for name in ("mine", "yours"):
+        (alone,) = draw_chart({**chart, "method": name}, results).legend.items()
+        assert alone == (name, everything[name])
+    assert len(set(everything.values())) == len(everything)
+
+
+def test_many_methods_have_different_styles():
+    styles = method_styles([f"mine_{number}" for number in range(20)])
+    assert len(set(styles.values())) == 20
+
+
 def test_a_page_stands_alone(tmp_path):
     chart = {"kind": "lines", "over": YEARS, "metric": "auc"}
     told = []
