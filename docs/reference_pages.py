@@ -74,7 +74,7 @@ from evaluation.methods import (
     optional_methods,
     shipped_methods,
 )
-from evaluation.results import listed
+from evaluation.results import in_table_order, listed
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 Sections = dict[str, type[BaseModel]]
@@ -170,12 +170,39 @@ def pages() -> dict[str, str]:
         ),
         "methods.md": _fields_page(
             "Settings of the methods",
-            "[Methods](../methods.md) shows how to change these settings.",
+            "[Methods](../methods.md) shows how to change these settings.\n\n"
+            + _table_of_methods(),
             METHODS,
         ),
         "causes.md": _causes_page(),
         "commands.md": _commands_page(),
     }
+
+
+def _table_of_methods() -> str:
+    names = in_table_order((*shipped_methods(), *optional_methods()))
+    rows = []
+    for name in names:
+        method = find_method(name)
+        rows.append(
+            (
+                f"`{name}`",
+                method.title,
+                method.source or "this project",
+                "yes" if method.standard else "no",
+                str(method.scans_per_place),
+                "yes" if method.estimates_poses() else "no",
+            )
+        )
+    heading = (
+        "`--method`",
+        "method",
+        "publication",
+        "standard",
+        "scans of a place",
+        "estimates poses",
+    )
+    return _table(heading, rows)
 
 
 def _causes_page() -> str:

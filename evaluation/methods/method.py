@@ -170,13 +170,12 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         """Whether the method describes places and queries in the same way."""
         return type(self).describe_place is Method.describe_place
 
-    @property
-    def estimates_poses(self) -> bool:
-        """Whether the method estimates the pose of a query at a place."""
-        own = type(self)
+    @classmethod
+    def estimates_poses(cls) -> bool:
+        """Returns whether the method estimates a query's pose at a place."""
         return (
-            own.relative_pose is not Method.relative_pose
-            or own.relative_poses is not Method.relative_poses
+            cls.relative_pose is not Method.relative_pose
+            or cls.relative_poses is not Method.relative_poses
         )
 
     @abc.abstractmethod

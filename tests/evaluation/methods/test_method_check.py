@@ -194,4 +194,4 @@ def test_fields_of_points_are_given():
 @pytest.mark.parametrize("kind", [True, False])
 def test_a_method_says_whether_it_estimates_poses(kind):
     own = {"relative_pose": lambda self, *_: np.eye(4)} if kind else {}
-    assert replaced(**own).estimates_poses is kind
+    assert replaced(**own).estimates_poses() is kind
