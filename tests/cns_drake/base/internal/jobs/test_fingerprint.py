@@ -113,6 +113,23 @@ def test_every_kind_of_import_counts(packages):
     )
 
 
+def test_a_family_counts_with_all_its_members(packages):
+    """Members that are found by name are imported by no statement."""
+    family = packages / "evaluation" / "family"
+    family.mkdir(parents=True)
+    (packages / "evaluation" / "__init__.py").write_text("")
+    for name in ("__init__", "member", "helper"):
+        (family / f"{name}.py").write_text("")
+    text = "from cns_drake.base import family_members\n"
+    (family / "registry.py").write_text(text)
+    (packages / "evaluation" / "other.py").write_text("")
+    module = "evaluation.family.registry"
+    assert differs(family / "member.py", module)
+    assert not differs(packages / "evaluation" / "other.py", module)
+    (family / "registry.py").write_text("")
+    assert not differs(family / "member.py", module)
+
+
 @pytest.mark.parametrize(
     "end",
     [
