@@ -36,6 +36,8 @@ from cns_drake.city import (
     Stages,
     StreetPlan,
 )
+from cns_drake.export import export_formats
+from cns_drake.imports import map_sources
 from cns_drake.roads import (
     JunctionEntry,
     RoadEntry,
@@ -68,6 +70,7 @@ from cns_drake.studies import (
     shipped_causes,
 )
 from evaluation import command_line as evaluation_cli
+from evaluation.drives import data_sets
 from evaluation.methods import (
     MethodConfig,
     find_method,
@@ -175,8 +178,29 @@ def pages() -> dict[str, str]:
             METHODS,
         ),
         "causes.md": _causes_page(),
+        "data.md": _data_page(),
         "commands.md": _commands_page(),
     }
+
+
+def _data_page() -> str:
+    drives = [(one.title, one.files) for one in data_sets().values()]
+    maps = [
+        (one.title, ", ".join(f"`{ending}`" for ending in one.suffixes))
+        for one in map_sources()
+    ]
+    parts = [
+        _heading("Data"),
+        "`cns-eval` reads these drives ([evaluation](../evaluation.md#data)):",
+        _table(("drives of", "path that you give"), drives),
+        "`cns-drake import` makes maps from these files"
+        " ([your own city](../how-to/own_city.md)):",
+        _table(("format", "files"), maps),
+        "`cns-drake export` writes recordings in the formats"
+        f" {listed(f'`{name}`' for name in export_formats())}"
+        " ([exports](../recordings.md#exports)).",
+    ]
+    return "\n\n".join(parts) + "\n"
 
 
 def _table_of_methods() -> str:

@@ -94,4 +94,9 @@ def holds_boreas(path: Path) -> bool:
     return (path / _POSES).is_file()
 
 
-DATA_SET = DataSet("Boreas", holds_boreas, BoreasDrive)
+DATA_SET = DataSet(
+    "Boreas",
+    holds_boreas,
+    BoreasDrive,
+    ("the folder with `lidar` and `applanix`"),
+)

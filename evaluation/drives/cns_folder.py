@@ -145,7 +145,13 @@ def holds_cns(path: Path) -> bool:
     return (path / _POSES).is_file() or (path / _FOLDERS[0]).is_dir()
 
 
-DATA_SET = DataSet("CNS", holds_cns, CnsFolderDrive, is_nested=True)
+DATA_SET = DataSet(
+    "CNS",
+    holds_cns,
+    CnsFolderDrive,
+    ("`<Map>/<NN>`, as published or exported"),
+    is_nested=True,
+)
 
 
 def _find_mount(path: Path, notes: list[str]) -> Path | None:

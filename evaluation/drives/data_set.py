@@ -22,6 +22,7 @@ class DataSet:
             name of a LiDAR (None for the usual one), if the layout
             `has_lidars`; otherwise the path and the number of values of a
             point in `.bin` files (None to guess it).
+        files: the path that the user gives, and what must be there.
         has_lidars: whether a drive can have several LiDARs.
         is_nested: whether the drives lie some folders below the folder of the
             data set.
@@ -35,6 +36,7 @@ class DataSet:
         Callable[[Path, str | None], Drive]
         | Callable[[Path, int | None], Drive]
     )
+    files: str
     has_lidars: bool = False
     is_nested: bool = False
     needs_scenario: bool = False

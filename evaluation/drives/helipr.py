@@ -150,7 +150,16 @@ def holds_helipr(path: Path) -> bool:
     return _lidar_folder(path) is not None or bool(_lidars(path))
 
 
-DATA_SET = DataSet("HeLiPR", holds_helipr, HeliprDrive, has_lidars=True)
+DATA_SET = DataSet(
+    "HeLiPR",
+    holds_helipr,
+    HeliprDrive,
+    (
+        "the folder with `LiDAR` and `LiDAR_GT`; to choose one of its "
+        "LiDARs, the LiDAR's folder, such as `LiDAR/Avia`"
+    ),
+    has_lidars=True,
+)
 
 
 def _lidar_folder(path: Path) -> Path | None:

@@ -197,6 +197,11 @@ DATA_SET = DataSet(
     "KITTI odometry",
     holds_kitti,
     KittiDrive,
+    (
+        "`sequences/NN` of KITTI odometry or SemanticKITTI; the poses must "
+        "be in `poses/NN.txt` next to `sequences`, or in `poses.txt` next "
+        "to `velodyne`"
+    ),
     is_nested=True,
     needs_scenario=True,
 )

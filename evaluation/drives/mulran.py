@@ -112,7 +112,15 @@ def holds_mulran(path: Path) -> bool:
     return (path / _POSES).is_file() or _scan_folder(path, []) is not None
 
 
-DATA_SET = DataSet("MulRan", holds_mulran, MulranDrive)
+DATA_SET = DataSet(
+    "MulRan",
+    holds_mulran,
+    MulranDrive,
+    (
+        "the folder with `global_pose.csv` (UTM or local coordinates) and "
+        "`Ouster`"
+    ),
+)
 
 
 def _scan_folder(path: Path, notes: list[str]) -> Path | None:

@@ -102,7 +102,16 @@ def holds_nclt(path: Path) -> bool:
     return (path / _SCANS).is_dir() or (path / _HITS).is_file()
 
 
-DATA_SET = DataSet("NCLT", holds_nclt, NcltDrive)
+DATA_SET = DataSet(
+    "NCLT",
+    holds_nclt,
+    NcltDrive,
+    (
+        "the folder with `velodyne_sync`, such as `2012-01-08`; "
+        "`groundtruth_2012-01-08.csv` must be in this folder, next to it, "
+        "or in `../ground_truth`"
+    ),
+)
 
 
 def read_nclt_scan(path: Path) -> np.ndarray:
