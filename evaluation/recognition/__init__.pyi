@@ -91,6 +91,7 @@ from evaluation.recognition.protocol_options import (
 )
 from evaluation.recognition.query_outcomes import QueryOutcomes as QueryOutcomes
 from evaluation.recognition.query_outcomes import auroc as auroc
+from evaluation.recognition.query_outcomes import common_blocks as common_blocks
 from evaluation.recognition.query_outcomes import judge as judge
 from evaluation.recognition.result_number import Number as Number
 from evaluation.recognition.retrieval import Retrieval as Retrieval

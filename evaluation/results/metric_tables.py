@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import functools
+import math
 from pathlib import Path
 from typing import Any
 
@@ -177,6 +178,16 @@ def read_metric_table(
     if is_alone and "protocol" not in selection:
         rows = _by_one_protocol(rows, path)
     notes = []
+    known, note = Results(results.factors, rows).defined()
+    if note:
+        left = next(row for row in rows if math.isnan(row.value))
+        notes.append(
+            f"{path}: {note}; the first is of {left.label}, {left.database} ->"
+            f" {left.query}"
+        )
+        rows = known.rows
+    if not rows:
+        raise InputError(f"{path}: no {selection['metric']} is defined")
     if any(not row.protocol_digest for row in rows):
         notes.append(
             f"{path}: rows do not say how they were made (column"
@@ -213,7 +224,9 @@ def _no_row_text(results: Results, selection: Mapping[str, object]) -> str:
 def shipped_table(selection: Mapping[str, object]) -> MetricTable:
     """Returns the selected rows of all shipped tables, see `Results.where`."""
     rows = [
-        row for table in _baselines() for row in table.where(selection).rows
+        row
+        for table in _baselines()
+        for row in table.where(selection).defined()[0].rows
     ]
     return MetricTable(SHIPPED, _by_method_and_condition(rows), {})
 

@@ -17,6 +17,7 @@ from evaluation.recognition import (
     PROTOCOL_NAMES,
     Difference,
     Interval,
+    common_blocks,
     percentile_interval,
     resampled_metrics,
     weights_by_drive,
@@ -158,10 +159,13 @@ def _means_and_samples(
         for condition in table.conditions
     ]
     for of_condition in asked:
-        for answers in of_condition:
-            check_same_queries(of_condition[0], answers)
+        for pair in itertools.combinations(of_condition, 2):
+            check_same_queries(*pair)
     drawn = weights_by_drive(
-        [of_condition[0].outcomes.own_blocks for of_condition in asked],
+        [
+            common_blocks([answers.outcomes for answers in of_condition])
+            for of_condition in asked
+        ],
         [drive_number(of_condition[0]) for of_condition in asked],
     )
     samples_of_asked = [

@@ -32,6 +32,7 @@ from evaluation.results import (
     QueryRows,
     Results,
     Row,
+    as_factor,
     made_by,
 )
 from evaluation.study.chosen_methods import MethodChoice
@@ -211,12 +212,12 @@ class Engine:
     def _key(
         self, one: Pair, task: str, method: str, gate: bool
     ) -> dict[str, Any]:
-        factors = dict(one.factors)
+        factors = {name: as_factor(v) for name, v in one.factors.items()}
         settings = {**self.tasks[task].changed_settings, **one.settings}
         if method in self.methods:
             choice, columns = self.methods[method]
             method = choice.name
-            factors |= columns
+            factors |= {name: as_factor(v) for name, v in columns.items()}
             # A text on the command line and a number in a file are the same.
             settings |= {
                 name: float(str(value))
