@@ -229,13 +229,14 @@ def _write_results(
     """Writes the tables and, of a tracked drive, the picture."""
     from evaluation.localisation import write_rows
 
+    write_rows(rows, output / "localisation.csv")
+    terminal.note(f"wrote {output / 'localisation.csv'}")
+    options.write_tables(engine)
+    # A picture that fails takes no number along.
     if track:
         from evaluation.results import draw_track
 
         draw_track(rows, output / "track")
-    write_rows(rows, output / "localisation.csv")
-    terminal.note(f"wrote {output / 'localisation.csv'}")
-    options.write_tables(engine)
 
 
 def _check_together(

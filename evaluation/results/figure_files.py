@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import Collection, PathCollection
@@ -13,7 +12,8 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import Bbox
 import numpy as np
 
-from cns_drake.base import completing
+from cns_drake.base import figure_style
+from cns_drake.base import save_figure as write_figure
 from evaluation.results.ranges import check_all
 
 # The formats of pictures, the one for the page last.
@@ -26,6 +26,7 @@ _PAGE_DPI = 130
 _WEBP_QUALITY = 82
 
 
+@figure_style()
 def save_figure(figure: Figure, stem: Path, kinds: Sequence[str]) -> None:
     """Writes a figure as one file for each of several formats.
 
@@ -59,29 +60,13 @@ def save_figure(figure: Figure, stem: Path, kinds: Sequence[str]) -> None:
         on_page = kind in ("svg", "webp")
         for legend in figure.legends:
             legend.set_visible(not on_page)
-        options: dict = {"dpi": _DPI}
-        if kind in ("pdf", "svg"):
-            dated = "CreationDate" if kind == "pdf" else "Date"
-            options["metadata"] = {dated: None}
+        options: dict = {}
         if kind == "webp":
-            options = {
-                "dpi": _PAGE_DPI,
-                "pil_kwargs": {"quality": _WEBP_QUALITY},
-            }
+            options = {"pil_kwargs": {"quality": _WEBP_QUALITY}}
         if on_page and figure.legends:
             options["bbox_inches"] = above
-        with (
-            completing(path) as part,
-            # TrueType fonts stay text in PDF; ids of SVG follow the salt.
-            matplotlib.rc_context(
-                {
-                    "pdf.fonttype": 42,
-                    "svg.hashsalt": "cns",
-                    "svg.fonttype": "path",
-                }
-            ),
-        ):
-            figure.savefig(part, format=kind, **options)
+        dpi = _PAGE_DPI if kind == "webp" else _DPI
+        write_figure(figure, path, dpi, **options)
 
 
 def _check_ranges(figure: Figure) -> None:

@@ -109,14 +109,14 @@ def write_page(
         InputError: a file cannot be written.
     """
     make_folder(folder)
-    shown, missing = _drawn_charts(results, queries, folder, charts)
-    for note in missing:
-        on_note(note)
     numbers = summarised(*_charted(results, queries, {}), charts)
     if numbers:
         for number in numbers:
             check_all(number.what, (number.value, number.low, number.high))
         write_csv(folder / _SUMMARIES, Summary._fields, numbers)
+    shown, missing = _drawn_charts(results, queries, folder, charts)
+    for note in missing:
+        on_note(note)
     protocols = ", ".join(filter(None, results.distinct("protocol")))
     about = f". {about}" if about else ""
     text = framed_page(

@@ -8,7 +8,7 @@ from collections.abc import (
     MutableMapping,
     Sequence,
 )
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +63,9 @@ class Engine:
         on_note: is called with notes on what is left out, and on how long the
             study takes.
         jobs: name -> job.
+        pictures: name -> job that draws from the files of other jobs. They run
+            after the tables are written, so that a picture that cannot be
+            drawn takes no number along.
         measured: all comparisons.
     """
 
@@ -72,6 +75,7 @@ class Engine:
     output: Path
     on_note: Callable[[str], None] = lambda text: None
     jobs: dict[str, Job] = field(default_factory=dict)
+    pictures: dict[str, Job] = field(default_factory=dict)
     measured: list[Pair] = field(default_factory=list)
     _notes: dict[str, None] = field(default_factory=dict)
 
@@ -133,13 +137,14 @@ class Engine:
         make_folder(self.output)
         jobs = list(self.jobs.values())
         _renew_removed_descriptors(jobs)
-        told = forecast(jobs, cluster, space, least=_LONG)
+        pictures = [replace(one, needs=()) for one in self.pictures.values()]
+        told = forecast([*jobs, *pictures], cluster, space, least=_LONG)
         if told is not None:
             self.on_note(
                 f"{told}; after an interruption, run the same command again"
             )
         run_jobs(jobs, cluster)
-        doing("writing the tables and the page")
+        doing("writing the tables")
         tables = self.tables()
         if not tables[0].rows:
             raise InputError(
@@ -148,6 +153,8 @@ class Engine:
             )
         self._write(*tables)
         _remove_descriptors(jobs)
+        run_jobs(pictures, cluster)
+        doing("writing the page")
         return tables
 
     def write_tables(self) -> tuple[Results, QueryRows]:

@@ -104,8 +104,8 @@ def add_city(
     assert isinstance(planned, _ExtractionJobs)
     shown = ShownCity(
         city,
-        _draw_drives(city, pairs, planned),
-        tuple(_draw_changes(city, pairs, planned)),
+        _draw_drives(city, pairs, planned, engine.pictures),
+        tuple(_draw_changes(city, pairs, planned, engine.pictures)),
         tuple(
             one.parts[PlaceTask.name]
             for one in pairs
@@ -249,7 +249,10 @@ class _ExtractionJobs(Jobs):
 
 
 def _draw_drives(
-    city: MapDrives, pairs: Sequence[Pair], planned: _ExtractionJobs
+    city: MapDrives,
+    pairs: Sequence[Pair],
+    planned: _ExtractionJobs,
+    pictures: dict[str, Job],
 ) -> Part:
     """Adds the job that makes pictures of drives; returns its file."""
     compared = {name for one in pairs for name in one.names}
@@ -272,12 +275,15 @@ def _draw_drives(
         ),
     )
     name = f"draw {city.name}"
-    planned.jobs[name] = Job(name, step, tuple(needs), _COST)
+    pictures[name] = Job(name, step, tuple(needs), _COST)
     return part
 
 
 def _draw_changes(
-    city: MapDrives, pairs: Sequence[Pair], planned: _ExtractionJobs
+    city: MapDrives,
+    pairs: Sequence[Pair],
+    planned: _ExtractionJobs,
+    jobs: dict[str, Job],
 ) -> list[ChangePictures]:
     """Adds jobs that draw changes between stages; returns the pictures."""
     found = []
@@ -312,7 +318,7 @@ def _draw_changes(
             pictures.files,
         )
         name = f"draw {city.name} {stages[0]} > {stages[1]}"
-        planned.jobs[name] = Job(name, step, tuple(needs), _COST)
+        jobs[name] = Job(name, step, tuple(needs), _COST)
         found.append(pictures)
     return found
 

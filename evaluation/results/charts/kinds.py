@@ -7,11 +7,10 @@ import re
 import textwrap
 from typing import Any, NamedTuple, TypeVar
 
-from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cns_drake.base import InputError
+from cns_drake.base import InputError, figure_style
 from evaluation.results.charts.chart import FONT, PX, ROW, WIDE, Chart
 from evaluation.results.charts.curves import draw_curves
 from evaluation.results.charts.dumbbell import draw_dumbbell
@@ -75,7 +74,7 @@ def draw_chart(
     rows = _selected_rows(chart, keys, results)
     styles = method_styles(in_table_order(row.label for row in rows))
     kind = chart["kind"]
-    with rc_context({"font.size": FONT, "axes.titlesize": "medium"}):
+    with figure_style({"font.size": FONT, "axes.titlesize": "medium"}):
         message, figure = _KINDS[kind].draw(
             Chart(keys, results, rows, styles, width, queries)
         )

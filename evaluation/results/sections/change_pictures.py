@@ -15,7 +15,7 @@ from matplotlib.patheffects import withStroke
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base import file_name
+from cns_drake.base import figure_style, file_name
 from evaluation.change import TemporalChange, judge_points
 from evaluation.maps import VoxelMap
 from evaluation.results.figure_files import PIXELS, save_figure
@@ -272,6 +272,7 @@ def _render_shaded(
     )
 
 
+@figure_style()
 def _draw_panels(
     titles: Sequence[str],
     pictures: Sequence[Picture],

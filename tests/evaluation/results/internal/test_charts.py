@@ -6,6 +6,7 @@ import math
 import re
 import warnings
 
+import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 import numpy as np
@@ -18,6 +19,7 @@ from evaluation.results import (
     Results,
     Row,
     draw_chart,
+    draw_track,
     method_styles,
     save_figure,
     write_page,
@@ -740,3 +742,53 @@ def test_curves_need_answers_of_one_condition():
     with pytest.raises(InputError, match="a → b: several conditions"):
         draw_chart({"kind": "curves"}, results, queries=queries)
     draw_chart({"kind": "curves", YEARS: 5}, results, queries=queries)
+
+
+# What the file matplotlibrc of a user can say.
+SETTINGS = {
+    "text.usetex": True,
+    "font.size": 31.0,
+    "axes.facecolor": "red",
+    "axes.formatter.use_locale": True,
+    "lines.linewidth": 9.0,
+    "savefig.bbox": "tight",
+    "svg.fonttype": "none",
+    "figure.autolayout": True,
+}
+
+
+def draw_all(folder):
+    """Writes a figure of each kind of chart, and of a tracked drive."""
+    rows = np.zeros(
+        9,
+        [
+            (name, "<f8")
+            for name in ("stretch", "way", "track_error", "unmapped")
+        ],
+    )
+    rows["way"] = np.arange(9.0)
+    draw_track(rows, folder / "track")
+    for chart, results in (
+        ({"kind": "lines", "over": YEARS, "metric": "auc"}, aged()),
+        ({"kind": "dumbbell", "over": YEARS, "metric": "auc"}, aged()),
+        ({"kind": "matrix", "over": "cause", "metric": "kept"}, caused()),
+        ({"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered()),
+    ):
+        drawn = draw_chart(chart, results, alone=True)
+        save_figure(drawn.figure, folder / chart["kind"], ("svg", "png"))
+
+
+@pytest.mark.slow
+def test_settings_of_the_user_do_not_reach_our_figures(tmp_path):
+    for name, settings in (("plain", {}), ("changed", SETTINGS)):
+        (tmp_path / name).mkdir()
+        with matplotlib.rc_context(settings):
+            draw_all(tmp_path / name)
+            assert matplotlib.rcParams["font.size"] == settings.get(
+                "font.size", 10.0
+            )
+    files = sorted((tmp_path / "plain").iterdir())
+    assert len(files) == 9
+    for file in files:
+        other = tmp_path / "changed" / file.name
+        assert file.read_bytes() == other.read_bytes(), file.name
