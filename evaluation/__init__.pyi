@@ -13,6 +13,7 @@ from evaluation.methods import MethodConfig as MethodConfig
 from evaluation.methods import known_methods as known_methods
 from evaluation.methods import make_method as make_method
 from evaluation.methods import register as register
+from evaluation.recognition import Metric as Metric
 from evaluation.recognition import (
     PlaceRecognitionMetrics as PlaceRecognitionMetrics,
 )
@@ -22,6 +23,7 @@ from evaluation.recognition import RetrievalProtocol as RetrievalProtocol
 from evaluation.recognition import compared_frames as compared_frames
 from evaluation.recognition import evaluate as evaluate
 from evaluation.recognition import judge as judge
+from evaluation.recognition import register_metric as register_metric
 from evaluation.recognition import retrieve as retrieve
 from evaluation.recognition import route_blocks as route_blocks
 from evaluation.results import QueryRows as QueryRows

@@ -162,7 +162,7 @@ def study(
     if not allow_code:
         # Others may have written the file; the words are the user's own.
         own = named_programs([method, *map(parse_override, override or ())])
-        for field in ("methods", "tasks"):
+        for field in ("methods", "metrics", "tasks"):
             for file in named_programs(getattr(experiment, field)):
                 if file not in own:
                     raise InputError(

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import csv_text, errors_at, write_text
-from evaluation.recognition import Number, QueryOutcomes
+from cns_drake.base import InputError, csv_text, errors_at, write_text
+from evaluation.recognition import Number, QueryOutcomes, metric_named
 from evaluation.results.cells import (
     FACTOR,
     NUMBER,
@@ -27,7 +27,6 @@ from evaluation.results.cells import (
     WHOLE,
 )
 from evaluation.results.keys import MEASURED, Key, key_columns
-from evaluation.results.ranges import Range, checked, range_of
 from evaluation.results.table_lines import TableLine, TableLines
 
 RESULTS = "results.csv"
@@ -56,17 +55,9 @@ _ANSWERS = {
 # Kinds of cells -> the type of an array of their values.
 _TYPES = {WHOLE: int, NUMBER: float, TRUTH: bool, TEXT: object}
 _NEEDED_ANSWERS = ("query_frame", "correct", "has_match", "score")
-# Metrics whose intervals come from resampled queries, and may miss the value
-# itself by a little.
-_RESAMPLED = ("auc", "auc_strict", "r1")
-# By so much, at most.
+# An interval of resampled queries misses the value by this share of the
+# metric's range, at most.
 _MOST_MISSED = 0.05
-# Rounding may lead beyond 0 and 1 by this.
-_ROUNDING = 1e-9
-# What a database costs; it grows with the number of places.
-COSTS = ("query_time", "build_time", "memory")
-# Metrics that are known for any set of queries.
-_ALWAYS_KNOWN = ("auc", "auc_strict")
 
 
 @dataclass(frozen=True)
@@ -347,8 +338,9 @@ def _key_cells(key: Key, factors: Sequence[str]) -> list[str]:
 
 
 def _measured_cells(row: Row) -> list[str]:
+    metric = metric_named(row.metric)
     values = [
-        checked(row.metric, float(number))
+        metric.checked(float(number))
         for number in (row.value, row.low, row.high)
     ]
     return [row.metric, *map(NUMBER.write, values), WHOLE.write(row.n)]
@@ -399,23 +391,26 @@ def _measured_values(line: TableLine) -> dict[str, Any]:
     value, low, high = (
         line.value(name, NUMBER) for name in ("value", "low", "high")
     )
-    if math.isnan(value) and metric in _ALWAYS_KNOWN:
+    known = metric_named(metric)
+    if math.isnan(value) and known.compute is not None and not known.undefined:
         raise line.fault("value", f"{metric} needs a number")
-    least, greatest, _ = range_of(metric) or Range()
-    if value < least or value > greatest:
-        limits = f"from {least:g} to {greatest:g}"
-        if math.isinf(greatest):
-            limits = f"{least:g} or more"
-        raise line.fault("value", f"{value:g}, but {metric} is {limits}")
+    for name, number in (("value", value), ("low", low), ("high", high)):
+        try:
+            known.checked(number)
+        except InputError:
+            raise line.fault(
+                name, f"{number:g}, but {metric} is {known.range_text}"
+            ) from None
     if math.isnan(low) != math.isnan(high):
         raise line.fault("low", "an interval has a low and a high end")
     if low > high:
         raise line.fault("low", f"{low:g} is more than high ({high:g})")
-    if metric in _RESAMPLED and not math.isnan(low):
-        if not (low >= -_ROUNDING and high <= 1.0 + _ROUNDING):
-            raise line.fault("low", "an interval from 0 to 1 at most")
-        if not low - _MOST_MISSED <= value <= high + _MOST_MISSED:
-            raise line.fault("value", f"{value:g} lies far off its interval")
+    missed = max(low - value, value - high)
+    # Of a metric without limits, nothing is far.
+    if known.is_resampled and missed > _MOST_MISSED * (
+        known.greatest - known.least
+    ):
+        raise line.fault("value", f"{value:g} lies far off its interval")
     n = line.value("n", WHOLE)
     return {
         "metric": metric,

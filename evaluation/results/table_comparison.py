@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 import itertools
 from pathlib import Path
-import re
 from typing import Any, NamedTuple
 import warnings
 
@@ -18,8 +17,8 @@ from evaluation.recognition import (
     Difference,
     Interval,
     common_blocks,
+    metric_named,
     percentile_interval,
-    resampled_metrics,
     weights_by_drive,
 )
 from evaluation.results.compared_answers import (
@@ -29,7 +28,6 @@ from evaluation.results.compared_answers import (
 )
 from evaluation.results.keys import KEYS, LAST, STAGE
 from evaluation.results.metric_tables import (
-    RESAMPLED_METRICS,
     SHIPPED,
     Condition,
     MetricTable,
@@ -39,12 +37,6 @@ from evaluation.results.metric_tables import (
 )
 from evaluation.results.ranking import LEAST_UNITS, Ranked, rank_methods
 from evaluation.results.table import Answers, Results, Row
-
-# Metrics for which less is better.
-_LESS = re.compile(
-    r"translation_\w+|rotation_\w+|\w+_ms|no_\w+|other_city|too_far|elsewhere"
-    r"|lost|memory|\w+_time"
-)
 
 # Values that differ by no more are the same result, with the digits that ship.
 _ALIKE = 1e-4
@@ -139,15 +131,14 @@ def _means_and_samples(
 
     `_rank_agreement` says what is sampled.
     """
-    ranked, samples = rank_methods(
-        row for (method, _), row in table.rows.items() if method in methods
-    )
+    rows = [row for (method, _), row in table.rows.items() if method in methods]
+    ranked, samples = rank_methods(rows)
     order = [[mean.method for mean in ranked].index(name) for name in methods]
     means = np.array([mean.value for mean in ranked])[order]
     measured = list(itertools.product(table.conditions, methods))
     if (
         len({row.map for row in table.rows.values()}) >= LEAST_UNITS
-        or metric not in RESAMPLED_METRICS
+        or not metric_named(metric).is_resampled
         or any(
             (method, condition) not in table.answers
             for condition, method in measured
@@ -170,7 +161,7 @@ def _means_and_samples(
     )
     samples_of_asked = [
         [
-            getattr(resampled_metrics(answers.outcomes, weights), metric)
+            metric_named(metric).samples(answers.outcomes, weights)
             for answers in of_condition
         ]
         for of_condition, (_, weights) in zip(asked, drawn, strict=True)
@@ -338,7 +329,7 @@ def _compared_rankings(own: Sequence[MetricTable], metric: str) -> Comparison:
     ranked = [
         mean._replace(method=f"{mean.method} ({table.name})")
         for table in tables
-        for mean in _ranked(table.rows.values(), metric)
+        for mean in rank_methods(table.rows.values())[0]
     ]
     return Comparison(metric, "", 0, ranked, (), agreements, notes)
 
@@ -369,16 +360,11 @@ def _compared_values(
         metric,
         "",
         len(common),
-        _ranked(rows, metric),
+        rank_methods(rows)[0],
         _differences(entries, common) if metric == "auc" else (),
         agreements,
         notes,
     )
-
-
-def _ranked(rows: Iterable[Row], metric: str) -> list[Ranked]:
-    is_less_better = bool(_LESS.fullmatch(metric))
-    return rank_methods(rows, least_first=is_less_better)[0]
 
 
 def _ranked_entries(

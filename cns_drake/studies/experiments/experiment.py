@@ -25,6 +25,7 @@ from cns_drake.studies.experiments.method_variants import (
 )
 from cns_drake.studies.experiments.nested_fields import SIDES, Case
 from cns_drake.studies.experiments.spread_values import expand_spread
+from evaluation.results import FROZEN_REDRAW
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -178,6 +179,9 @@ class Experiment(Section):
         methods: methods to run, as a list of names or Python files; to change
             settings, a mapping from each name to its settings. A setting with a
             list of values is a factor. By default all shipped methods.
+        metrics: metrics that the page shows, the most important first: names,
+            or Python files with metrics of your own. By default the main
+            metrics of each task. `results.csv` contains all metrics.
         seeds: seeds of all random numbers. Each condition is measured with each
             seed.
         protocol: protocol of place recognition: `fair`, `paper` or `recorded`;
@@ -228,6 +232,7 @@ class Experiment(Section):
     design: Literal["product", "one-at-a-time"] = "product"
     tasks: _Settings = Field(default={"place": {}}, min_length=1)
     methods: _Settings | None = Field(default=None, min_length=1)
+    metrics: Annotated[tuple[str, ...], BeforeValidator(_listed)] = ()
     seeds: Annotated[
         tuple[Annotated[int, Field(ge=0, lt=2**31, strict=True)], ...],
         BeforeValidator(_listed),
@@ -264,6 +269,22 @@ class Experiment(Section):
                 conditions.
         """
         return conditions(self)
+
+    @property
+    def factor_names(self) -> list[str]:
+        """The names of the factors, as in the columns of the tables.
+
+        A setting of a method in a Python file is named by the file, as long as
+        the file has not run.
+        """
+        names = dict.fromkeys(
+            name for one in self.conditions for name in one.factors
+        )
+        if self.frozen_redraws:
+            names[FROZEN_REDRAW] = None
+        for one in self.method_variants:
+            names |= dict.fromkeys(one.columns)
+        return list(names)
 
     @cached_property
     def method_variants(self) -> list[MethodVariant]:

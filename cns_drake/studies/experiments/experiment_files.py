@@ -1,6 +1,7 @@
 """Reads experiments from files, with changes to single fields."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,13 @@ from cns_drake.base import (
     validated,
     value_errors,
 )
-from cns_drake.studies.experiments.experiment import Experiment, in_long_form
+from cns_drake.studies.experiments.experiment import (
+    Experiment,
+    in_long_form,
+    named_programs,
+)
 from cns_drake.studies.experiments.nested_fields import Changes, merged, nested
+from evaluation.results import SETTINGS, chart_factors, check_factors
 from evaluation.study import STAGES_FILE
 
 _FOLDER = Path(__file__).parent
@@ -90,6 +96,7 @@ def _checked(
         overrides: see `load_experiment`.
         chosen: names of tasks and methods that replace those of the experiment.
     """
+    written = values
     for one in overrides:
         values = _overridden(values, one)
     values = in_long_form(dict(values))
@@ -100,8 +107,36 @@ def _checked(
             values[field] = {name: given.get(name, {}) for name in names}
     experiment = validated(Experiment, values, path)
     with value_errors(path):
-        _ = experiment.conditions, experiment.method_variants
+        factors = experiment.factor_names
+    if values != written:
+        # A factor whose values an option has fixed is still known.
+        with contextlib.suppress(InputError, ValueError):
+            factors += validated(Experiment, written, path).factor_names
+    _check_charts(experiment, factors, path)
     return experiment
+
+
+def _check_charts(
+    experiment: Experiment, factors: Collection[str], path: Path
+) -> None:
+    """Checks that charts name factors of an experiment.
+
+    Settings of methods, and metrics of the user, are known once their files
+    have run: `run_study` checks them.
+
+    Raises:
+        InputError: a chart names something else, or cannot be used.
+    """
+    has_own = bool(named_programs(experiment.metrics))
+    for chart in experiment.charts:
+        with errors_at(path):
+            names = [
+                name
+                for name in chart_factors(chart)
+                if not name.startswith(SETTINGS)
+                and not (has_own and name in (chart.get("x"), chart.get("y")))
+            ]
+            check_factors(chart, names, factors)
 
 
 def _experiment_file(name_or_file: str | Path) -> Path:

@@ -1,6 +1,6 @@
 """Checks the description of a chart, and draws a chart of any kind."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
 import re
@@ -10,7 +10,8 @@ from typing import Any, NamedTuple, TypeVar
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cns_drake.base import InputError, figure_style
+from cns_drake.base import InputError, did_you_mean, figure_style
+from evaluation.recognition import METRICS, metric_named
 from evaluation.results.charts.chart import FONT, PX, ROW, WIDE, Chart
 from evaluation.results.charts.curves import draw_curves
 from evaluation.results.charts.dumbbell import draw_dumbbell
@@ -18,7 +19,7 @@ from evaluation.results.charts.lines import draw_lines
 from evaluation.results.charts.matrix import draw_matrix
 from evaluation.results.charts.scatter import draw_scatter
 from evaluation.results.figure_text import escape_dollars
-from evaluation.results.keys import SETTINGS
+from evaluation.results.keys import RESERVED, SETTINGS
 from evaluation.results.method_names import in_table_order
 from evaluation.results.styles import MethodStyle, method_styles
 from evaluation.results.table import Answers, QueryRows, Results, Row
@@ -104,6 +105,8 @@ def _selected_rows(
     rows = tuple(row for row in rows if not math.isnan(row.value))
     if not rows:
         raise InputError(f"charts: {kind}: the table has no {metric} like that")
+    for row in rows:
+        metric_named(metric).checked(row.value)
     return rows
 
 
@@ -174,6 +177,42 @@ def _add_legend(
     lines = math.ceil(len(handles) / columns)
     figure.set_figheight(figure.get_figheight() + lines * ROW * PX)
     figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+
+
+def chart_factors(chart: Mapping[str, Any]) -> list[str]:
+    """Returns the names in a chart's description that must be factors.
+
+    Columns that every table has are left out, and so are metrics.
+    """
+    keys = check_chart(chart)
+    names = [n for n in chart if n != "kind" and n not in keys]
+    names += [keys[n] for n in ("over", "strips") if n in keys]
+    names += [
+        keys[n] for n in ("x", "y") if n in keys and keys[n] not in METRICS
+    ]
+    return [name for name in names if name not in RESERVED]
+
+
+def check_factors(
+    chart: Mapping[str, Any], names: Iterable[str], factors: Collection[str]
+) -> None:
+    """Checks that names in a chart's description are factors.
+
+    Args:
+        chart: the description.
+        names: the names, see `chart_factors`.
+        factors: names of the experiment's factors.
+
+    Raises:
+        InputError: the experiment has no such factor.
+    """
+    for name in names:
+        if name not in factors:
+            there = ", ".join(factors) or "none"
+            raise InputError(
+                f"charts: {chart['kind']}: no factor {name!r} (there are:"
+                f" {there}){did_you_mean(name, factors)}"
+            )
 
 
 def check_chart(chart: Mapping[str, Any]) -> dict[str, str]:
