@@ -401,6 +401,10 @@ def _shipped() -> Iterator[Metric]:
             undefined=f"there are no {of}",
             main_in=("map",) if of == "structures" else (),
         )
+    for name in ("gone", "new"):
+        yield _count(
+            name, f"points that are {name}", over_queries="number of points"
+        )
     # Structural change.
     for name, title, main in (
         ("tcr_sym", "TCR_sym", True),

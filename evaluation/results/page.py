@@ -50,6 +50,8 @@ _TASKS = {
     "cost": "Costs",
 }
 _SUMMARIES = "summaries.csv"
+# Files that only some pages have beside them.
+_OF_A_PAGE = re.compile(r"summaries\.csv|chart_\d+\.(pdf|png)")
 # Greatest number of columns of the table of conditions.
 _MOST_COLUMNS = 12
 # Line style of Matplotlib -> dashes of an SVG line.
@@ -74,7 +76,8 @@ def write_page(
 
     Next to the page, the function writes the charts for print and, if there are
     numbers behind the charts (see `evaluation.results.summaries.summarised`),
-    `summaries.csv`.
+    `summaries.csv`. Such files of an earlier page that this page does not have
+    are removed.
 
     Args:
         results: the table of results, written next to the page as
@@ -103,6 +106,9 @@ def write_page(
         InputError: a file cannot be written.
     """
     make_folder(folder)
+    for path in folder.iterdir():
+        if _OF_A_PAGE.fullmatch(path.name):
+            path.unlink()
     known, undefined = results.defined()
     numbers = summarised(*_charted(known, queries, {}), charts)
     if numbers:

@@ -13,10 +13,13 @@ from scipy.stats import kendalltau
 
 from cns_drake.base import InputError, json_values
 from evaluation.recognition import (
+    METRICS,
     PROTOCOL_NAMES,
     Difference,
     Interval,
+    Metric,
     common_blocks,
+    load_metrics,
     metric_named,
     percentile_interval,
     weights_by_drive,
@@ -258,8 +261,9 @@ def compare_tables(
     Args:
         paths: tables of results, or folders with a `results.csv`. The answers
             to queries in a `queries.csv` next to a table are used as well.
-        metric: the metric to compare. If several tasks have it, the results of
-            `place` are compared.
+        metric: name of the metric to compare, or a Python file that registers
+            it. If several tasks have it, the results of `place` are compared.
+            If the name is not known, more is taken for better, with a note.
         protocol: name of the protocol whose rows count. By default, rows of the
             same protocol are compared. With `rankings`, the default is `fair`
             or, in a table without this protocol, the table's only protocol.
@@ -278,6 +282,14 @@ def compare_tables(
     if protocol not in (None, *PROTOCOL_NAMES):
         names = ", ".join(PROTOCOL_NAMES)
         raise InputError(f"--protocol: {protocol!r} is none of {names}")
+    notes: list[str] = []
+    if metric.endswith(".py"):
+        metric = _only_metric(Path(metric)).name
+    elif metric not in METRICS:
+        notes.append(
+            f"{metric}: not known here; more is taken for better (with its"
+            " Python file as --metric, its own direction counts)"
+        )
     read = [Results.read(path) for path in paths]
     tasks = {
         row.task
@@ -293,7 +305,6 @@ def compare_tables(
     if protocol is not None:
         selection["protocol"] = protocol
     own: list[MetricTable] = []
-    notes: list[str] = []
     for path, results in zip(paths, read, strict=True):
         table, found = read_metric_table(
             path,
@@ -311,6 +322,19 @@ def compare_tables(
         compared = _compared_values(own, shipped, metric, paths)
     notes += compared.notes
     return replace(compared, task=task, notes=notes)
+
+
+def _only_metric(path: Path) -> Metric:
+    """Returns the metric that a user's file registers.
+
+    Raises:
+        InputError: the file cannot be used, or registers several metrics.
+    """
+    found = load_metrics(path)
+    if len(found) > 1:
+        names = ", ".join(one.name for one in found)
+        raise InputError(f"--metric: {path}: registers several ({names})")
+    return found[0]
 
 
 def _compared_rankings(own: Sequence[MetricTable], metric: str) -> Comparison:

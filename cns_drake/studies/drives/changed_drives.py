@@ -7,7 +7,13 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from cns_drake.base import InputError, errors_at, read_records, validated
+from cns_drake.base import (
+    InputError,
+    did_you_mean,
+    errors_at,
+    read_records,
+    validated,
+)
 from cns_drake.roads import RoadNetwork, Route, draw_route, load_road_network
 from cns_drake.scenarios import Scenario, check_files, count_frames, plan_drive
 from cns_drake.scene import MapFolder, load_world, structures_in
@@ -307,6 +313,7 @@ class DriveChanger:
         self, drive: Scenario, place: str, left: Changes
     ) -> Scenario:
         if left:
+            self._check_lidars(place, drive, left.get("lidars"))
             drive = drive.with_fields(left, f"{self._source}: {place}")
             self._check_map(place, drive, left)
         for name in set(_SEEDED) & set(left):
@@ -316,6 +323,26 @@ class DriveChanger:
             if getattr(drive, name).replaced(seed=plain.seed) == plain:
                 drive = drive.replaced(**{name: plain})
         return drive
+
+    def _check_lidars(self, place: str, drive: Scenario, given: object) -> None:
+        """Checks that a study changes LiDARs that the drive has.
+
+        A further LiDAR would be recorded, and read by no method. Another LiDAR
+        can replace those of the drive, whose values are then null.
+        """
+        if not isinstance(given, Mapping):
+            return
+        kept = [
+            name for name in drive.lidars if given.get(name, "") is not None
+        ]
+        for name in given:
+            if name not in drive.lidars and kept:
+                raise InputError(
+                    f"{self._source}: {place}.lidars: the drive has no LiDAR"
+                    f" {name!r} (it has: {', '.join(drive.lidars)})"
+                    f"{did_you_mean(str(name), drive.lidars)}; for a new one in"
+                    f" its place, set {kept[0]}: null"
+                )
 
     def _check_map(self, place: str, drive: Scenario, given: Changes) -> None:
         """Checks that the given fields of a drive fit its map."""

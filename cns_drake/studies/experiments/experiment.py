@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 import contextlib
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PlainValidator, model_validator
@@ -25,7 +26,7 @@ from cns_drake.studies.experiments.method_variants import (
 )
 from cns_drake.studies.experiments.nested_fields import SIDES, Case
 from cns_drake.studies.experiments.spread_values import expand_spread
-from evaluation.results import FROZEN_REDRAW
+from evaluation.results import FROZEN_REDRAW, SETTINGS
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -274,8 +275,8 @@ class Experiment(Section):
     def factor_names(self) -> list[str]:
         """The names of the factors, as in the columns of the tables.
 
-        A setting of a method in a Python file is named by the file, as long as
-        the file has not run.
+        A setting of a method in a Python file is named by the stem of the file,
+        as the file has not run yet.
         """
         names = dict.fromkeys(
             name for one in self.conditions for name in one.factors
@@ -283,7 +284,11 @@ class Experiment(Section):
         if self.frozen_redraws:
             names[FROZEN_REDRAW] = None
         for one in self.method_variants:
-            names |= dict.fromkeys(one.columns)
+            place, name = f"{SETTINGS}{one.name}.", Path(one.name)
+            stem = name.stem if name.suffix == ".py" else one.name
+            for column in one.columns:
+                setting = column.removeprefix(place)
+                names[f"{SETTINGS}{stem}.{setting}"] = None
         return list(names)
 
     @cached_property
