@@ -67,6 +67,7 @@ from evaluation.methods import (
     make_method,
     shipped_methods,
 )
+from evaluation.recognition import METRICS
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 Sections = dict[str, type[BaseModel]]
@@ -159,6 +160,7 @@ def pages() -> dict[str, str]:
             "[Methods](../methods.md) shows how to change these settings.",
             METHODS,
         ),
+        "metrics.md": _metrics_page(),
         "commands.md": _commands_page(),
     }
 
@@ -318,6 +320,32 @@ def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
         yield RouteLeg if annotation is Route else annotation
     for argument in typing.get_args(annotation):
         yield from models_in(argument)
+
+
+def _metrics_page() -> str:
+    rows = [
+        (
+            f"`{metric.name}`",
+            metric.label,
+            metric.range_text,
+            metric.better or "-",
+            metric.over_queries,
+            metric.undefined or "never",
+        )
+        for metric in METRICS.values()
+    ]
+    head = ("metric", "title", "values", "better", "what", "undefined if")
+    parts = (
+        _heading("Metrics"),
+        "The values of the column `metric` in [results.csv]"
+        "(../studies.md#the-table-of-results). Over conditions, a metric is"
+        " averaged by the arithmetic mean of its defined values; an undefined"
+        " value is an empty cell, and is left out with a note. [A metric of"
+        " your own](../how-to/own_method.md#a-metric-of-your-own) is a function"
+        " in a file.",
+        _table(head, rows),
+    )
+    return "\n\n".join(parts) + "\n"
 
 
 def _commands_page() -> str:

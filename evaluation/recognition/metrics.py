@@ -43,8 +43,8 @@ class Metric:
         least, greatest: limits of the values.
         is_whole: whether the values are whole numbers, such as counts.
         better: whether more or less is better; "" if neither is.
-        over_queries: how a value comes from the queries or points of a
-            condition.
+        over_queries: what a value says, and how it comes from the queries,
+            points or structures of a condition.
         undefined: when a value is undefined, an empty cell; "" if never.
         share_of: name of the metric of which this is the retained share, its
             value divided by its value in the baseline; "" for any other metric.
@@ -237,7 +237,8 @@ def _shipped() -> Iterator[Metric]:
     yield _share(
         "pose_success",
         "pose success",
-        over_queries="share of the queries with a match",
+        over_queries="share of the queries with a match whose pose is within"
+        " 2 m and 5 deg",
         undefined=f"{_NO_MATCH}, or {_NO_POSE}",
         main_in=("pose",),
     )
@@ -246,7 +247,10 @@ def _shipped() -> Iterator[Metric]:
         ("success_2m_5deg", "success within 2 m and 5 deg"),
     ):
         yield _share(
-            name, title, over_queries="share of queries", main_in=("localise",)
+            name,
+            title,
+            over_queries="share of the queries whose pose is so accurate",
+            main_in=("localise",),
         )
     yield _retained(
         "kept", "auc", "retained share", main_in=("place", "pose", "localise")
@@ -259,25 +263,30 @@ def _shipped() -> Iterator[Metric]:
     )
     yield _retained("kept_r1", "r1", "retained share of R@1")
     yield _count(
-        "lost", "answers lost", better="less", over_queries="number of queries"
+        "lost",
+        "answers lost",
+        better="less",
+        over_queries="number of queries that are right in the baseline and"
+        " wrong in the condition",
     )
     yield _count(
         "found",
         "answers gained",
         better="more",
-        over_queries="number of queries",
+        over_queries="number of queries that are wrong in the baseline and"
+        " right in the condition",
     )
     yield _count(
         "with_match",
         "queries with a match",
-        over_queries="number of queries",
+        over_queries="number of queries that have a true match",
         compute=lambda outcomes: float(outcomes.has_match.sum()),
         has_interval=False,
     )
     yield _count(
         "places",
         "places",
-        over_queries="number of places",
+        over_queries="number of places in the database",
         # 0 stands for unknown, where only the answers are known.
         compute=lambda outcomes: float(outcomes.num_places or math.nan),
         has_interval=False,
@@ -297,23 +306,33 @@ def _shipped() -> Iterator[Metric]:
         ("elsewhere", "answers elsewhere"),
     ):
         yield _count(
-            name, title, better="less", over_queries="number of queries"
+            name,
+            title,
+            better="less",
+            over_queries="number of queries whose top-ranked place is wrong for"
+            " this reason",
         )
     yield _count(
         "hidden",
         "wrong answers with little overlap",
-        over_queries="number of queries",
+        over_queries="number of wrong answers where no match shows half of the"
+        " query's scan",
     )
-    for name, title in (
-        ("visible_change", "visible change"),
-        ("visible_change_added", "visible change without parallax"),
+    for name, title, shown in (
+        ("visible_change", "visible change", ""),
+        (
+            "visible_change_added",
+            "visible change without parallax",
+            ", minus the mean in the baseline",
+        ),
     ):
         yield _metric(
             name,
             title,
             least=-1.0,
             greatest=1.0,
-            over_queries="mean over the queries with a match",
+            over_queries="mean share of a query's scan that the best of its"
+            f" matches does not show{shown}",
             undefined=_NO_MATCH,
         )
     # Poses.
@@ -321,7 +340,8 @@ def _shipped() -> Iterator[Metric]:
         "translation_median",
         "median error of the position",
         "m",
-        over_queries="median over the poses",
+        over_queries="median over the poses; in the task `pose`, over the right"
+        " answers that F1max counts",
         undefined="there is no pose",
         main_in=("pose",),
     )
@@ -336,7 +356,8 @@ def _shipped() -> Iterator[Metric]:
         "rotation_median_deg",
         "median error of the orientation",
         "deg",
-        over_queries="median over the poses",
+        over_queries="median over the poses; in the task `pose`, over the right"
+        " answers that F1max counts",
         undefined="there is no pose",
     )
     # Localisation.
@@ -385,7 +406,8 @@ def _shipped() -> Iterator[Metric]:
     yield _share(
         "right_structures",
         "structures with the right verdict",
-        over_queries="share of structures",
+        over_queries="share of the observed structures that get the right label"
+        " (kept, gone or new)",
         undefined="no structure changed",
         main_in=("map",),
     )
@@ -397,7 +419,7 @@ def _shipped() -> Iterator[Metric]:
             name,
             title,
             better="",
-            over_queries=f"share of {of}",
+            over_queries=f"share of the {of} that are called gone or new",
             undefined=f"there are no {of}",
             main_in=("map",) if of == "structures" else (),
         )
@@ -425,12 +447,14 @@ def _shipped() -> Iterator[Metric]:
         yield _count(
             f"changed{end}",
             f"changed structures{where}",
-            over_queries="number of structures",
+            over_queries="number of structures that were added or removed"
+            " between the first drive and the query",
         )
         yield _share(
             f"seen{end}",
             f"changes noticed{where}",
-            over_queries="share of structures",
+            over_queries="share of the changed structures that a drive of the"
+            " database notices",
             undefined="no structure changed",
         )
         for name, title in (
@@ -441,7 +465,8 @@ def _shipped() -> Iterator[Metric]:
                 f"{name}{end}",
                 f"{title}{where}",
                 "years",
-                over_queries="quantile over the structures",
+                over_queries="quantile of the time to the drive that notices a"
+                " change",
                 undefined="no change is noticed",
             )
     # Costs.

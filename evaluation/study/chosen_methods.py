@@ -163,8 +163,9 @@ def method_settings(
     """Returns the settings of each method, by the method's name.
 
     Args:
-        texts: `METHOD.NAME=VALUE` each. If there is only one method, its name
-            may be left out.
+        texts: `METHOD.NAME=VALUE` each, or `methods.METHOD.NAME=VALUE`, as in
+            the columns of tables. If there is only one method, its name may be
+            left out.
         names: names of the methods that run.
 
     Raises:
@@ -173,7 +174,8 @@ def method_settings(
     found: dict[str, dict[str, Setting]] = {name: {} for name in names}
     is_alone = len(names) == 1
     for text in texts:
-        key, value = parse_setting(text, "NAME=VALUE" if is_alone else _FORM)
+        form = "NAME=VALUE" if is_alone else _FORM
+        key, value = parse_setting(text.removeprefix(SETTINGS), form)
         method, dot, name = key.rpartition(".")
         if not dot:
             if not is_alone:

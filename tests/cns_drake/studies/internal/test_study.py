@@ -708,7 +708,10 @@ def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
             r"charts: lines: no factor 'methods.solid.range' \(there are:"
             r" methods.solid.ranges\)",
         ),
-        ({"metrics": ["auc", "r2"]}, "metrics: no metric 'r2' .there are: auc, "),
+        (
+            {"metrics": ["auc", "r2"]},
+            "metrics: no metric 'r2' .there are: auc, ",
+        ),
         ({"metrics": ["none.py"]}, "metrics: none.py: no such file"),
         (
             {"query": {"lidars": {"lidr": {"xyz": [[0, 0, 1], [0, 0, 2]]}}}},
