@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -164,31 +164,28 @@ class Metric:
         )
 
 
-def _metric(name: str, title: str, unit: str = "", **fields: object) -> Metric:
-    return Metric(name, title, unit, **fields)  # type: ignore[arg-type]
+def _metric(name: str, title: str, unit: str = "", **fields: Any) -> Metric:
+    return Metric(name, title, unit, **fields)
 
 
-def _share(name: str, title: str, **fields: object) -> Metric:
+def _share(name: str, title: str, **fields: Any) -> Metric:
     """Returns a metric from 0 to 1, of which more is better."""
-    return _metric(
-        name,
-        title,
-        **{"least": 0.0, "greatest": 1.0, "better": "more"} | fields,
-    )
+    usual: dict[str, Any] = {"least": 0.0, "greatest": 1.0, "better": "more"}
+    return _metric(name, title, **usual | fields)
 
 
-def _count(name: str, title: str, **fields: object) -> Metric:
-    return _metric(name, title, **{"least": 0.0, "is_whole": True} | fields)
+def _count(name: str, title: str, **fields: Any) -> Metric:
+    usual: dict[str, Any] = {"least": 0.0, "is_whole": True}
+    return _metric(name, title, **usual | fields)
 
 
-def _amount(name: str, title: str, unit: str, **fields: object) -> Metric:
+def _amount(name: str, title: str, unit: str, **fields: Any) -> Metric:
     """Returns a metric from 0 on, of which less is better."""
-    return _metric(
-        name, title, unit, **{"least": 0.0, "better": "less"} | fields
-    )
+    usual: dict[str, Any] = {"least": 0.0, "better": "less"}
+    return _metric(name, title, unit, **usual | fields)
 
 
-def _retained(name: str, of: str, title: str, **fields: object) -> Metric:
+def _retained(name: str, of: str, title: str, **fields: Any) -> Metric:
     """Returns the share of another metric that is left of its baseline."""
     fields = {"least": 0.0, "better": "more", "share_of": of} | fields
     return _metric(
@@ -508,7 +505,7 @@ def metric_named(name: str) -> Metric:
 
 
 def register_metric(
-    name: str, title: str = "", unit: str = "", **fields: object
+    name: str, title: str = "", unit: str = "", **fields: Any
 ) -> Callable[[Callable[[QueryOutcomes], float]], Metric]:
     """Returns a decorator that makes a function a metric of place recognition.
 

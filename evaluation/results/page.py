@@ -110,7 +110,7 @@ def write_page(
         if _OF_A_PAGE.fullmatch(path.name):
             path.unlink()
     known, undefined = results.defined()
-    numbers = summarised(*_charted(known, queries, {}), charts)
+    numbers = summarised(*_charted(results, queries, {}), charts)
     if numbers:
         write_csv(folder / _SUMMARIES, Summary._fields, numbers)
     shown, missing = _drawn_charts(known, queries, folder, charts)
@@ -173,7 +173,14 @@ def _drawn_charts(
             # What was measured does not depend on it.
             missing.append(f"Chart {number} is left out: {error}.")
             continue
-        drawn.append({"message": alone.message, "legend": alone.legend, **svgs})
+        drawn.append(
+            {
+                "message": alone.message,
+                "legend": alone.legend,
+                "source": alone.source,
+                **svgs,
+            }
+        )
     return drawn, missing
 
 
@@ -210,6 +217,7 @@ def _first_sections(
             page_section(
                 "charts",
                 "Charts",
+                "results.csv: the rows that are named below each chart",
                 is_open=True,
                 charts=charts,
                 wide=WIDE,
@@ -222,7 +230,13 @@ def _first_sections(
     ]
     return [
         *sections,
-        page_section("means", "Results", is_open=True, summary=summary),
+        page_section(
+            "means",
+            "Results",
+            f"results.csv: {len(results.rows)} rows with a defined value",
+            is_open=True,
+            summary=summary,
+        ),
     ]
 
 
@@ -235,14 +249,23 @@ def _last_sections(
     """Returns the numbers behind the charts, all results, and the files."""
     sections = []
     if numbers:
-        sections.append(page_section("summaries", "Summaries", numbers=numbers))
+        source = "results.csv and queries.csv: the rows of the charts"
+        sections.append(
+            page_section("summaries", "Summaries", source, numbers=numbers)
+        )
     answers = queries.answers if queries else ()
     return [
         *sections,
-        page_section("conditions", "Conditions", table=_wide_table(results)),
+        page_section(
+            "conditions",
+            "Conditions",
+            f"results.csv: all {len(results.rows)} rows",
+            table=_wide_table(results),
+        ),
         page_section(
             "made_by",
             "Files",
+            "the experiment's file",
             experiment_text=experiment_text,
             queries=sum(len(answer.columns["correct"]) for answer in answers),
         ),
@@ -309,7 +332,7 @@ def _summary(
         for name in in_table_order(row.label for row in rows)
         if any((name, gate, *column) in found for column in columns)
     ]
-    heads = [metric_named(metric).label for metric, *_ in columns]
+    heads = [metric_named(str(metric)).label for metric, *_ in columns]
     title = _TASKS.get(task, task)
     if by_condition:
         title += f": {heads[0]}"

@@ -35,12 +35,14 @@ class DrawnChart:
 
     Attributes:
         message: sentence that says what the chart shows.
+        source: the rows of the table that the chart shows, in words.
         figure: the drawing.
         legend: name of a method -> its style; the mapping is empty if the
             drawing itself contains the names.
     """
 
     message: str
+    source: str
     figure: Figure
     legend: Mapping[str, MethodStyle]
 
@@ -72,7 +74,7 @@ def draw_chart(
         results = Results.of(_renamed(results.rows, names_of))
         if queries is not None:
             queries = QueryRows.of(_renamed(queries.answers, names_of))
-    rows = _selected_rows(chart, keys, results)
+    rows, source = _selected_rows(chart, keys, results)
     styles = method_styles(in_table_order(row.label for row in rows))
     kind = chart["kind"]
     with figure_style({"font.size": FONT, "axes.titlesize": "medium"}):
@@ -85,13 +87,17 @@ def draw_chart(
         if alone:
             figure.suptitle(escape_dollars(textwrap.fill(message, width // 9)))
             _add_legend(figure, legend, width)
-    return DrawnChart(message, figure, legend)
+    return DrawnChart(message, source, figure, legend)
 
 
 def _selected_rows(
     chart: Mapping[str, Any], keys: Mapping[str, str], results: Results
-) -> tuple[Row, ...]:
-    """Returns the rows of a chart's metric that its description selects."""
+) -> tuple[tuple[Row, ...], str]:
+    """Returns the rows of a chart's metric that its description selects.
+
+    Returns:
+        The rows with a defined value; and in words, which rows these are.
+    """
     kind = chart["kind"]
     metric = keys.get("metric", keys.get("y", "auc"))
     chosen = {n: v for n, v in chart.items() if n != "kind" and n not in keys}
@@ -101,13 +107,21 @@ def _selected_rows(
     tasks = results.where(metric=metric).distinct("task")
     task = "place" if "place" in tasks else tasks[:1]
     chosen = {"task": task, "gate": 0, **chosen}
-    rows = results.where(chosen, metric=metric).rows
-    rows = tuple(row for row in rows if not math.isnan(row.value))
+    known, undefined = results.where(chosen, metric=metric).defined()
+    rows = known.rows
     if not rows:
         raise InputError(f"charts: {kind}: the table has no {metric} like that")
     for row in rows:
         metric_named(metric).checked(row.value)
-    return rows
+    named = ", ".join(f"{name} {_listed(one)}" for name, one in chosen.items())
+    source = f"{len(rows)} rows of results.csv: metric {metric}, {named}"
+    return rows, f"{source}; {undefined}" if undefined else source
+
+
+def _listed(value: object) -> str:
+    """Returns the value of a column, or possible values, as text."""
+    some = value if isinstance(value, tuple | list | set) else [value]
+    return " or ".join(map(str, some))
 
 
 def _file_names(rows: Sequence[Row]) -> dict[tuple[str, object], str]:

@@ -225,6 +225,7 @@ def change_section(
     return page_section(
         "change",
         "Change",
+        "results.csv: the rows of the task change; the maps of the drives",
         heads=_HEADS.values(),
         rows=[
             {

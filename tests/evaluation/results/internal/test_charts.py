@@ -650,7 +650,7 @@ def test_a_page_stands_alone(tmp_path):
         ((0.4, 0.6), (0,), "0.500(0.400–0.600)"),
         # An interval that is unknown, and results of several seeds.
         ((math.nan, math.nan), (0,), "0.500"),
-        ((0.4, 0.6), (0, 1), "0.5000.500 to 0.500"),
+        ((0.4, 0.6), (0, 1), "0.5000.500 to 0.500 (2)"),
     ],
 )
 def test_a_single_result_has_its_interval(tmp_path, ends, seeds, cell):
@@ -695,6 +695,7 @@ def test_a_page_without_a_chart_or_a_value(tmp_path):
     path = write_page(results, None, tmp_path, title="none", charts=[chart])
     assert "<h1>none</h1>" in path.read_text()
     assert "Chart 1 is left out" in path.read_text()
+    assert "as undefined: kept (1 of 1)." in path.read_text()
     header, first, _ = (tmp_path / "summaries.csv").read_text().splitlines()
     assert header == "what,map,task,method,gate,value,low,high,n"
     # A single year without a share has no lifetime.
