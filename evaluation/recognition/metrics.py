@@ -187,14 +187,14 @@ def _amount(name: str, title: str, unit: str, **fields: Any) -> Metric:
 
 def _retained(name: str, of: str, title: str, **fields: Any) -> Metric:
     """Returns the share of another metric that is left of its baseline."""
-    fields = {"least": 0.0, "better": "more", "share_of": of} | fields
-    return _metric(
-        name,
-        title,
-        over_queries="the value, divided by its value in the baseline",
-        undefined="in the baseline, the value is 0 or undefined",
-        **fields,
-    )
+    usual: dict[str, Any] = {
+        "least": 0.0,
+        "better": "more",
+        "share_of": of,
+        "over_queries": "the value, divided by its value in the baseline",
+        "undefined": "in the baseline, the value is 0 or undefined",
+    }
+    return _metric(name, title, **usual | fields)
 
 
 _NO_MATCH = "no query has a match"
