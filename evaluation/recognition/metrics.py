@@ -514,8 +514,9 @@ def register_metric(
 
     Args:
         name: name of the metric in tables.
-        title, unit, fields: attributes of the metric, see `Metric`. By default,
-            the title is the name in words.
+        title: name of the metric in words; by default made from `name`.
+        unit: unit of the values; "" for shares and counts.
+        fields: further attributes of the metric, see `Metric`.
 
     Raises:
         ValueError: another metric has this name, the name is empty or has
