@@ -1,6 +1,5 @@
 from evaluation.results.cells import as_factor as as_factor
 from evaluation.results.charts.kinds import chart_factors as chart_factors
-from evaluation.results.charts.kinds import check_chart as check_chart
 from evaluation.results.charts.kinds import check_factors as check_factors
 from evaluation.results.charts.kinds import draw_chart as draw_chart
 from evaluation.results.figure_files import save_figure as save_figure
