@@ -8,7 +8,7 @@ from collections.abc import (
     MutableMapping,
     Sequence,
 )
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -64,8 +64,8 @@ class Engine:
             study takes.
         jobs: name -> job.
         pictures: name -> job that draws from the files of other jobs. They run
-            after the tables are written, so that a picture that cannot be
-            drawn takes no number along.
+            once the tables are written, so that a picture that cannot be drawn
+            takes no number along.
         measured: all comparisons.
     """
 
@@ -137,7 +137,7 @@ class Engine:
         make_folder(self.output)
         jobs = list(self.jobs.values())
         _renew_removed_descriptors(jobs)
-        pictures = [replace(one, needs=()) for one in self.pictures.values()]
+        pictures = list(self.pictures.values())
         told = forecast([*jobs, *pictures], cluster, space, least=_LONG)
         if told is not None:
             self.on_note(
@@ -153,7 +153,8 @@ class Engine:
             )
         self._write(*tables)
         _remove_descriptors(jobs)
-        run_jobs(pictures, cluster)
+        if pictures:
+            run_jobs(pictures, cluster)
         doing("writing the page")
         return tables
 

@@ -33,7 +33,7 @@ from evaluation.study.recordings.map_drives import MapDrives
 from evaluation.study.sources import DriveSource, RecordingSource
 from evaluation.study.study_files import FeatureFiles
 from evaluation.study.tasks.change import ChangeTask
-from evaluation.study.tasks.jobs import Jobs, job_name
+from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 from evaluation.study.tasks.place import PlaceTask
 
@@ -261,8 +261,7 @@ def _draw_drives(
         for one in (*city.stages.values(), *city.others)
         if one.name in compared
     ]
-    needs: list[str] = []
-    features = [planned.features(one, needs) for one in shown]
+    features = [planned.features(one, []) for one in shown]
     part = planned.files.part("pages", city.name)
     step = MakePart(
         part,
@@ -275,7 +274,7 @@ def _draw_drives(
         ),
     )
     name = f"draw {city.name}"
-    pictures[name] = Job(name, step, tuple(needs), _COST)
+    pictures[name] = Job(name, step, (), _COST)
     return part
 
 
@@ -300,9 +299,8 @@ def _draw_changes(
             continue
         stages = earlier.stage, later.stage
         pictures = ChangePictures(city.name, stages, planned.files.figures)
-        needs = [job_name(parts[0])]
         first, last = (
-            planned.features(one.named, needs) for one in (earlier, later)
+            planned.features(one.named, []) for one in (earlier, later)
         )
         step = MakePart(
             planned.files.part("changes", city.name, *stages),
@@ -318,7 +316,7 @@ def _draw_changes(
             pictures.files,
         )
         name = f"draw {city.name} {stages[0]} > {stages[1]}"
-        jobs[name] = Job(name, step, tuple(needs), _COST)
+        jobs[name] = Job(name, step, (), _COST)
         found.append(pictures)
     return found
 
