@@ -202,6 +202,7 @@ def _report_of(
         dated=staged.dated,
         drives=tuple(drive.length for drive in drives),
         faults=faults.rows(),
+        parts=faults.parts(),
     )
 
 

@@ -12,7 +12,11 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.strtree import STRtree
 
-from cns_drake.imports.building_years import construction_year, year_of_date
+from cns_drake.imports.building_years import (
+    construction_year,
+    demolition_year,
+    year_of_date,
+)
 from cns_drake.imports.colours import RED_ROOF
 from cns_drake.imports.faces import parts_of, valid_parts
 from cns_drake.imports.faults import ImportFaults
@@ -21,6 +25,7 @@ from cns_drake.imports.openstreetmap.building_tags import (
     LEAST_WALL,
     building_kind,
     heights,
+    is_open_below,
     why_absent,
 )
 from cns_drake.imports.openstreetmap.features import OsmArea, Tags
@@ -127,7 +132,7 @@ def make_buildings(
         outlines, nested = _taken_once(outlines, faults)
         parts += nested
     copies: Counter[str] = Counter()
-    for whole, blocks in _grouped_by_building(outlines, parts):
+    for whole, blocks in _grouped_by_building(outlines, parts, faults):
         walls, roofs = [], []
         for block in _solids_with_openings(blocks, through, faults):
             wall, roof = extruded(
@@ -151,7 +156,7 @@ def make_buildings(
             {"body": np.concatenate(walls), "roof": np.concatenate(roofs)},
             {"roof": RED_ROOF},
             construction_year(whole.tags, year_attribute, whole.name, faults),
-            year_of_date(whole.tags.get("end_date", "")),
+            demolition_year(whole.tags, whole.name, faults),
             # If parts look different, the look of the first one counts.
             tags={**blocks[0].tags, **whole.tags},
             lod=1.0,
@@ -168,6 +173,8 @@ def _outlines_and_parts(
     parts: list[_Block] = []
     for name, tags, polygons in areas:
         low, high, roof = heights(tags, (name, faults))
+        if is_open_below(tags) and low > 0.0:
+            faults.add("roof without walls, made without its posts", name)
         blocks = parts if has_tag(tags, "building:part") else outlines
         for polygon in polygons:
             for footprint in valid_parts(local.polygon(polygon), name, faults):
@@ -176,12 +183,13 @@ def _outlines_and_parts(
 
 
 def _grouped_by_building(
-    outlines: Iterable[_Block], parts: Iterable[_Block]
+    outlines: Iterable[_Block], parts: Iterable[_Block], faults: ImportFaults
 ) -> list[tuple[_Block, list[_Block]]]:
     """Returns each building: its outline, and the solids that it consists of.
 
-    A part that lies in no outline is a building of its own. Parts do not belong
-    to a former building that once stood in their place.
+    A part that lies in no outline, or has a date that its building does not
+    have, is a building of its own; `faults` counts the latter. Parts do not
+    belong to a former building that once stood in their place.
     """
     # Standing buildings come first, so they have the same numbers as in the
     # tree.
@@ -199,13 +207,28 @@ def _grouped_by_building(
             of_outline.setdefault(int(inside.min()), []).append(part)
         else:
             alone.append((part, [part]))
-    return [
-        *(
-            (outline, _with_parts(outline, of_outline.get(number, [])))
-            for number, outline in enumerate(outlines)
-        ),
-        *alone,
-    ]
+    buildings = []
+    for number, outline in enumerate(outlines):
+        solids = _with_parts(outline, of_outline.get(number, []))
+        own = [one for one in solids if _has_own_date(one, outline)]
+        for part in own:
+            kind = "building part with a date of its own, made as a building"
+            faults.add(kind, part.name)
+            # What the part does not state is as for the whole.
+            part = replace(part, tags={**_dates(outline.tags), **part.tags})
+            alone.append((part, [part]))
+        rest = [one for one in solids if one not in own]
+        if rest:
+            buildings.append((outline, rest))
+    return [*buildings, *alone]
+
+
+def _has_own_date(part: _Block, outline: _Block) -> bool:
+    """Returns whether a part was built or demolished at another date."""
+    whole = _dates(outline.tags)
+    return any(
+        whole.get(key) != value for key, value in _dates(part.tags).items()
+    )
 
 
 def _solids_with_openings(
