@@ -21,7 +21,7 @@ from evaluation.clouds.pcd_files import read_pcd
 from evaluation.clouds.ply_files import read_ply
 from evaluation.clouds.record_reading import read_records
 
-# Least rounding step of float32 coordinates at which surfaces look blurred [m].
+# Least rounding step of coordinates at which surfaces look blurred [m].
 _COARSE_STEP = 0.03
 # A function that reads a file; its second argument is the number of points per
 # block.
@@ -101,23 +101,24 @@ def read_blocks(
             read += len(points)
             if not coarse and (coarse := _coarse_step(points)):
                 on_note(
-                    f"{path}: so far from the origin float32 has steps of"
-                    f" {coarse:.2g} m; write float64, or from a nearer origin"
+                    f"{path}: so far from the origin {points.dtype['x'].name}"
+                    f" has steps of {coarse:.2g} m; write float64, or from a"
+                    " nearer origin"
                 )
             yield points
 
 
 def _coarse_step(points: np.ndarray) -> float:
-    """Returns the step between float32 numbers at the farthest point [m].
+    """Returns the greatest step between coordinates of their type [m].
 
-    The result is 0 if this step is too fine to matter.
+    The step is that at the farthest point; the result is 0 if it is too fine to
+    matter.
     """
     farthest = [
         np.abs(points[axis]).max(where=np.isfinite(points[axis]), initial=0)
         for axis in "xyz"
-        if points.dtype[axis].str[1:] == "f4"
     ]
-    step = float(np.spacing(max(farthest, default=np.float32(0.0))))
+    step = max(float(np.spacing(value)) for value in farthest)
     return step if step >= _COARSE_STEP else 0.0
 
 
