@@ -279,7 +279,9 @@ def drive_along(path: Path) -> WaypointRoute:
         InputError: if the file cannot be used, or a bend is too tight.
     """
     points, _ = read_waypoints(path)
-    control = load_waypoint_path(path, POINT_SPACING).points[:, :2]
+    control = load_waypoint_path(
+        path, POINT_SPACING, ground=lambda xy: np.zeros(len(xy))
+    ).points[:, :2]
     driven, radii = driven_path(control)
     radius = radii.min()
     x, y = driven[radii.argmin()]

@@ -79,7 +79,7 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     pictures: dict[tuple, np.ndarray] = {}
     for axes, (title, positions) in zip(panels, drives.items(), strict=False):
         scenario = scenarios[title]
-        world = (scenario.world_file, scenario.without)
+        world = scenario.world_file, scenario.without, scenario.model_paths
         if world not in pictures:
             pictures[world] = StageScene(*world).photograph(
                 view, _SIDE, _SIDE, haze_length=np.inf

@@ -78,6 +78,12 @@ _ALTERNATIVES: tuple[tuple[str, str, Any, str], ...] = (
         "give either a map and its stage, or a world",
     ),
     (
+        "model_paths",
+        "world",
+        lambda paths, world: world or not paths,
+        "for a world only; the stages of a map have their models beside them",
+    ),
+    (
         "route",
         "world",
         _not_both,
@@ -101,7 +107,7 @@ _ALTERNATIVES: tuple[tuple[str, str, Any, str], ...] = (
 # Field -> fields that are removed when it is set.
 _REPLACED: dict[str, tuple[str, ...]] = {
     "world": ("map", "stage", "route", "aside"),
-    "map": ("world",),
+    "map": ("world", "model_paths"),
     "route": ("waypoints", "u_turns"),
     "waypoints": ("route", "aside"),
 }
@@ -318,13 +324,17 @@ class Scenario(Section):
         stage: stage of the map, such as `"01"`.
         world: SDF file of a world to drive in, instead of `map` and `stage`. A
             `world` needs `waypoints`.
+        model_paths: folders in which `model://` and `package://` of the `world`
+            are searched, before the folders in the environment variable
+            GZ_SIM_RESOURCE_PATH.
         without: names of structures to leave out of the world; the names are in
             the map's `structures.csv`.
         title: one line for readers that says what the drive shows.
         route: lanes to follow, road by road. Give either `route` or
             `waypoints`.
         waypoints: CSV file of points for the car to pass. Required with
-            `world`, because an SDF world has no roads.
+            `world`, because an SDF world has no roads. Without a column `z`,
+            the car drives on the ground below the points.
         u_turns: whether the car makes a U-turn where the waypoints lead
             straight back. Without `u_turns`, such waypoints are an error.
         aside: lateral offset of the car from the centreline of its lane,
@@ -359,6 +369,7 @@ class Scenario(Section):
     map: str | None = None
     stage: Name | None = _Optional
     world: str | None = _Optional
+    model_paths: tuple[str, ...] = field_off_by_default(())
     without: tuple[str, ...] = ()
     title: str = ""
     route: Route | None = None
@@ -399,7 +410,9 @@ class Scenario(Section):
             raise ValueError(f'not a text; quote it: stage: "{stage:02d}"')
         return stage
 
-    @field_validator("stage", "world", "route", "waypoints", "u_turns")
+    @field_validator(
+        "stage", "world", "model_paths", "route", "waypoints", "u_turns"
+    )
     @classmethod
     def _check_alternatives(cls, value: Any, info: ValidationInfo) -> Any:
         for field, other, fits, fault in _ALTERNATIVES:
@@ -668,5 +681,5 @@ def _fastest_rate(lidars: dict[str, LidarSection]) -> int:
 
 
 def _is_given(value: object) -> bool:
-    """Returns whether a value is neither None, False nor zero."""
-    return value is not None and value != 0
+    """Returns whether a value is neither None, False, zero nor empty."""
+    return value is not None and value not in (0, ())

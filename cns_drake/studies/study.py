@@ -341,7 +341,7 @@ def _check_drives_are_frozen(
 ) -> None:
     """Checks that the drives of each map and level are those of a table."""
     prints: dict[tuple[str, int], list[str]] = {}
-    worlds: dict[Path, str] = {}
+    worlds: dict[tuple, str] = {}
     for some, pairs in zip(maps, changed, strict=True):
         for one in pairs:
             factors = {**some.factors, **one.condition.factors}
@@ -510,25 +510,30 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
 
 
 def drives_fingerprint(
-    compared: ComparedDrives, worlds: dict[Path, str]
+    compared: ComparedDrives, worlds: dict[tuple, str]
 ) -> str:
     """Returns a hash of all drives and of the cities along these drives.
 
     Args:
         compared: the drives.
-        worlds: cache, world file -> digest of the files of its world. This
-            function adds the digests of the worlds of these drives.
+        worlds: cache, world file and folders of models -> digest of the files
+            of the world. This function adds the digests of the worlds of these
+            drives.
 
     Raises:
         InputError: a file of a world cannot be read.
     """
     for drive in compared.drives:
-        if drive.world_file not in worlds:
-            worlds[drive.world_file] = combined_digest(digest_inputs(drive))
+        world = drive.world_file, drive.model_paths
+        if world not in worlds:
+            worlds[world] = combined_digest(digest_inputs(drive))
     return fingerprint(
         {
             "drives": compared.fingerprint(),
-            "worlds": [worlds[one.world_file] for one in compared.drives],
+            "worlds": [
+                worlds[one.world_file, one.model_paths]
+                for one in compared.drives
+            ],
         }
     )
 

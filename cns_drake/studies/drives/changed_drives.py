@@ -328,7 +328,11 @@ class DriveChanger:
         world = drive.world_file, drive.without
         if "without" in given and world not in self._loaded:
             with errors_at(f"{where}.without"):
-                load_world(world[0], without=drive.without)
+                load_world(
+                    world[0],
+                    without=drive.without,
+                    model_paths=drive.model_paths,
+                )
             self._loaded.add(world)
 
 
@@ -446,7 +450,9 @@ def _structures_of(base: Scenario, stage: str, source: str) -> set[str]:
     """
     scenario = base.replaced(stage=stage)
     check_files(scenario, source)
-    return structures_in(load_world(scenario.world_file))
+    return structures_in(
+        load_world(scenario.world_file, model_paths=scenario.model_paths)
+    )
 
 
 def _removal_order(

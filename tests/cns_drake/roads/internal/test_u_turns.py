@@ -99,7 +99,11 @@ def test_bends_are_driven_down_to_the_limit_of_steering(tmp_path):
             "{world: d.sdf, waypoints: d.csv, speeds: {cruise: 3}}"
         )
         (tmp_path / "d.sdf").write_text("<sdf version='1.9'/>")
-        path = load_waypoint_path(tmp_path / "d.csv", POINT_SPACING)
+        path = load_waypoint_path(
+            tmp_path / "d.csv",
+            POINT_SPACING,
+            ground=lambda xy: np.zeros(len(xy)),
+        )
         _, curvature = driven(Trajectory(path, Speeds()))
         tightest = 1 / np.abs(curvature).max()
         fault = None
