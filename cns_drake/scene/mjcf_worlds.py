@@ -100,6 +100,8 @@ def read_mjcf_world(
         raise InputError(f"{path}: <{model.tag}> is no MJCF (<mujoco>)")
     reader = _Reader(path, finder)
     reader.reduce(model)
+    # Drake needs the name, which MJCF does not.
+    model.set("model", model.get("model") or "model")
     with collected_warnings() as warnings:
         Parser(plant).AddModelsFromString(tostring(model, "unicode"), "xml")
     for warning in warnings:

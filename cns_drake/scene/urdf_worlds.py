@@ -81,6 +81,7 @@ def read_urdf_world(
             )
     counts: Counter[str] = Counter()
     _reduce(robot, counts)
+    _drop_colourless(robot)
     missing = _find_meshes(robot, path, finder)
     text = tostring(robot, "unicode")
     Parser(plant).AddModelsFromString(text, "urdf")
@@ -107,6 +108,19 @@ def _reduce(element: Element, counts: Counter[str]) -> None:
         name = "drake:*" if is_drakes else child.tag
         if name not in _words(_HARMLESS, tag):
             counts[f"elements <{child.tag}> in <{tag}>"] += 1
+
+
+def _drop_colourless(robot: Element) -> None:
+    """Removes materials that have no colour anywhere, which Drake refuses."""
+    coloured = {
+        material.get("name")
+        for material in robot.iter("material")
+        if material.find("color") is not None
+    }
+    for parent in list(robot.iter()):
+        for material in parent.findall("material"):
+            if material.get("name") not in coloured:
+                parent.remove(material)
 
 
 def _find_meshes(robot: Element, path: Path, finder: ModelFinder) -> list[str]:

@@ -299,7 +299,7 @@ def test_a_loop_is_smooth():
 
 
 def test_a_scenario_states_whether_it_turns_round(tmp_path):
-    (tmp_path / "d.csv").write_text("0,0\n40,0\n5,0\n")
+    (tmp_path / "d.csv").write_text("0,0,0\n40,0,0\n5,0,0\n")
     (tmp_path / "d.sdf").write_text("<sdf version='1.9'/>")
     text = "{world: d.sdf, waypoints: d.csv, speeds: {}%s}"
     (tmp_path / "d.yaml").write_text(text % "")
