@@ -80,6 +80,7 @@ def read_urdf_world(
                 " xacro writes the URDF"
             )
     counts: Counter[str] = Counter()
+    _leave_out_shapes(robot, counts)
     _reduce(robot, counts)
     _drop_colourless(robot)
     missing = _find_meshes(robot, path, finder)
@@ -90,6 +91,16 @@ def read_urdf_world(
         for what, count in sorted(counts.items())
     ]
     return (*notes, *note_of_missing(path, "meshes", missing))
+
+
+def _leave_out_shapes(robot: Element, counts: Counter[str]) -> None:
+    """Removes and counts the visuals of a shape that is not read."""
+    for link in robot.iterfind("link"):
+        for visual in link.findall("visual"):
+            shape = visual.find("geometry/*")
+            if shape is not None and shape.tag not in _words(_READ, "geometry"):
+                counts[f"visuals of type {shape.tag}"] += 1
+                link.remove(visual)
 
 
 def _reduce(element: Element, counts: Counter[str]) -> None:
