@@ -172,7 +172,7 @@ def rows():
                     yield name, treated.strip(), tag
 
 
-@pytest.mark.parametrize(("name", "treated", "tag"), rows())
+@pytest.mark.parametrize(("name", "treated", "tag"), list(rows()))
 def test_elements_are_treated_as_the_tables_say(tmp_path, name, treated, tag):
     file, make = FORMATS[name]
     text = make(tag)
