@@ -52,10 +52,11 @@ def tcr(
         paths: Compare the paths and speeds of the two drives, instead of
             measuring change. Every 5 m along A, the command measures how B
             differs from A in lateral offset, lane, heading and height. The
-            command also prints the speeds of each car, and the share of the
-            time during which the car stands. For comparison, the command prints
-            the same numbers for two pairs of real drives: a pair of Boreas, 28
-            days apart, and the pair KAIST 01 and 02 of MulRan.
+            median difference of the heights is subtracted. The command also
+            prints the speeds of each car, and the share of the time during
+            which the car stands. For comparison, the command prints the same
+            numbers for two pairs of real drives: a pair of Boreas, 28 days
+            apart, and the pair KAIST 01 and 02 of MulRan.
     """
     if paths:
         commands.check_only_with(context, "paths", _WITH_PATHS)
