@@ -104,7 +104,7 @@ def demolition_year(
     """
     lower = {key.lower(): value for key, value in attributes.items()}
     for key in _DEMOLITION_ATTRIBUTES:
-        year = _understood(lower.get(key), key, name, faults)
+        year = understood_year(lower.get(key), key, name, faults)
         if year not in (None, _PLACEHOLDER):
             return year
     return None
@@ -134,7 +134,7 @@ def construction_year(
             key: lower[key] for key in _USUAL_ATTRIBUTES if key in lower
         }
     for key, value in candidates.items():
-        year = _understood(value, key, name, faults)
+        year = understood_year(value, key, name, faults)
         if year is None:
             continue
         is_dutch = key.lower() in _DUTCH_ATTRIBUTES
@@ -147,7 +147,7 @@ def construction_year(
     return None
 
 
-def _understood(
+def understood_year(
     value: object, key: str, name: str, faults: ImportFaults
 ) -> int | None:
     """Returns the year in an attribute, a number or a text; None if none.

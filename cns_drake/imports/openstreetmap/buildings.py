@@ -15,6 +15,7 @@ from shapely.strtree import STRtree
 from cns_drake.imports.building_years import (
     construction_year,
     demolition_year,
+    understood_year,
     year_of_date,
 )
 from cns_drake.imports.colours import RED_ROOF
@@ -210,7 +211,7 @@ def _grouped_by_building(
     buildings = []
     for number, outline in enumerate(outlines):
         solids = _with_parts(outline, of_outline.get(number, []))
-        own = [one for one in solids if _has_own_date(one, outline)]
+        own = [one for one in solids if _has_own_date(one, outline, faults)]
         for part in own:
             kind = "building part with a date of its own, made as a building"
             faults.add(kind, part.name)
@@ -223,11 +224,22 @@ def _grouped_by_building(
     return [*buildings, *alone]
 
 
-def _has_own_date(part: _Block, outline: _Block) -> bool:
-    """Returns whether a part was built or demolished at another date."""
+def _has_own_date(part: _Block, outline: _Block, faults: ImportFaults) -> bool:
+    """Returns whether a part was built or demolished in another year.
+
+    Dates of the part that are not understood are counted in `faults`, and do
+    not differ.
+    """
+    if part.name == outline.name:
+        return False
     whole = _dates(outline.tags)
+    years = {
+        key: understood_year(value, key, part.name, faults)
+        for key, value in _dates(part.tags).items()
+    }
     return any(
-        whole.get(key) != value for key, value in _dates(part.tags).items()
+        year not in (None, year_of_date(whole.get(key, "")))
+        for key, year in years.items()
     )
 
 
@@ -375,7 +387,7 @@ def _solids_below(
         # Of parts above each other, only the lowest is supported.
         open_below = part.polygon.difference(filled)
         top = min(part.low, outline.high)
-        if top > outline.low:
+        if top > outline.low and not is_open_below(part.tags):
             for piece in parts_of(open_below):
                 yield outline.replaced(piece, outline.low, top)
         filled = shapely.union(filled, part.polygon)

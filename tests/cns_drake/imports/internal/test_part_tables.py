@@ -7,7 +7,7 @@ changes no shape.
 
 import json
 
-from helpers.imported_osm import import_osm
+from helpers.imported_osm import import_osm, volume
 from helpers.small_opendrive import straight, write_roads
 from helpers.small_osm import OsmWriter
 import numpy as np
@@ -141,6 +141,33 @@ def test_barriers_are_as_thick_and_high_as_their_tags_say(tmp_path):
 
     assert covered(found[f"hedge_w{filled}"]) == pytest.approx(60, rel=0.01)
     assert covered(found[f"hedge_w{ring}"]) == pytest.approx(25.6, rel=0.1)
+
+
+def test_a_canopy_within_a_building_is_open_below(tmp_path):
+    osm = OsmWriter()
+    whole = osm.box(0, 0, 20, 20, building="yes", height="10")
+    osm.box(0, 0, 20, 5, building__part="roof", height="4")
+    _, found = import_osm(osm.write(tmp_path / "a.osm"))
+    one = found[f"building_w{whole}"]
+    expected = 20.0 * 15.0 * 10.0 + 20.0 * 5.0 * 0.5
+    assert volume(one.triangles) == pytest.approx(expected, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("date", "buildings"),
+    [("1960", 2), ("1900-05", 1), ("1960?", 1), (None, 1)],
+)
+def test_parts_of_another_year_are_buildings(tmp_path, date, buildings):
+    osm = OsmWriter()
+    osm.box(0, 0, 20, 20, building="church", start_date="1900", height="10")
+    own = {"start_date": date} if date else {}
+    osm.box(0, 0, 5, 20, building__part="yes", height="40", **own)
+    city, found = import_osm(osm.write(tmp_path / "a.osm"))
+    years = sorted(one.year for one in found.values())
+    assert years == [1900, 1960][:buildings]
+    kinds = {fault.kind for fault in city.faults.rows()}
+    is_unclear = date == "1960?"
+    assert ("date in start_date that is not understood" in kinds) == is_unclear
 
 
 SIGNAL = {"s": "50", "t": "-9", "id": "1", "type": "274", "dynamic": "no"}
