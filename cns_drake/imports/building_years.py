@@ -26,6 +26,8 @@ _DATE = re.compile(
     r"(?:t[\d:.]+)?(?:z|[+-]\d\d:?\d\d)?)?)?",
     re.ASCII,
 )
+# Day, month and year, as some registers write them.
+_DAY_FIRST = re.compile(r"\d{1,2}\.\d{1,2}\.(\d{4})", re.ASCII)
 _BEFORE_CHRIST = re.compile(r"(\d{1,4})\s*(?:bce?|b\.c\.)", re.ASCII)
 # Longer texts are cut [characters].
 _LONGEST_TEXT = 255
@@ -90,7 +92,7 @@ def year_of_date(text: str) -> int | None:
         return 10 * int(period[3]) + round(10 * share)
     if found := _BEFORE_CHRIST.fullmatch(text):
         return 1 - int(found[1]) if int(found[1]) else None
-    match = _DATE.fullmatch(text)
+    match = _DATE.fullmatch(text) or _DAY_FIRST.fullmatch(text)
     # A year of 0 is a placeholder for an unknown year.
     return (int(match[1]) or None) if match else None
 
