@@ -68,12 +68,12 @@ def same_turns(one: ArrayLike, other: ArrayLike) -> bool:
 
     The length and the sign of a quaternion do not matter.
     """
-    one, other = np.asarray(one, float), np.asarray(other, float)
-    norms = np.linalg.norm(one), np.linalg.norm(other)
+    p, q = np.asarray(one, float), np.asarray(other, float)
+    norms = np.linalg.norm(p), np.linalg.norm(q)
     if not all(np.isfinite(norm) and norm > 0.0 for norm in norms):
-        return same_numbers(one, other)
-    one, other = one / norms[0], other / norms[1]
-    return same_numbers(one, other) or same_numbers(one, -other)
+        return same_numbers(p, q)
+    p, q = p / norms[0], q / norms[1]
+    return same_numbers(p, q) or same_numbers(p, -q)
 
 
 def inverse(X: np.ndarray) -> np.ndarray:
