@@ -696,7 +696,7 @@ def _choose_lidar_topic(
     elif _LIDAR_TOPIC not in topics and len(clouds) == 1:
         wanted = clouds[0]
     if wanted not in topics and clouds:
-        advice = "" if lidar else "; --lidar takes one of them"
+        advice = "" if lidar else "; choose one as the LiDAR"
         raise InputError(
             f"{source}: no topic {wanted} (point clouds:"
             f" {' '.join(clouds)}{advice})"

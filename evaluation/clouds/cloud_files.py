@@ -95,31 +95,33 @@ def read_blocks(
     with user_errors(path), value_errors(path):
         check_regular(path)
         read = 0
-        coarse = 0.0
+        is_noted = False
         for points in reader(path, block, on_note):
             check_range(points, FARTHEST, first=read)
             read += len(points)
-            if not coarse and (coarse := _coarse_step(points)):
-                on_note(
-                    f"{path}: so far from the origin {points.dtype['x'].name}"
-                    f" has steps of {coarse:.2g} m; write float64, or from a"
-                    " nearer origin"
-                )
+            if not is_noted and (step_note := _coarse_note(points)):
+                is_noted = True
+                on_note(f"{path}: {step_note}")
             yield points
 
 
-def _coarse_step(points: np.ndarray) -> float:
-    """Returns the greatest step between coordinates of their type [m].
+def _coarse_note(points: np.ndarray) -> str:
+    """Returns a note on coordinates whose type is coarse; "" if it is not.
 
-    The step is that at the farthest point; the result is 0 if it is too fine to
-    matter.
+    A type is coarse if the step between its numbers is, at the farthest point.
     """
-    farthest = [
-        np.abs(points[axis]).max(where=np.isfinite(points[axis]), initial=0)
-        for axis in "xyz"
-    ]
-    step = max(float(np.spacing(value)) for value in farthest)
-    return step if step >= _COARSE_STEP else 0.0
+    steps = {}
+    for axis in "xyz":
+        values = points[axis]
+        farthest = np.abs(values).max(where=np.isfinite(values), initial=0)
+        steps[axis] = float(np.spacing(farthest))
+    axis = max(steps, key=lambda axis: steps[axis])
+    if steps[axis] < _COARSE_STEP:
+        return ""
+    return (
+        f"so far from the origin {points.dtype[axis].name} has steps of"
+        f" {steps[axis]:.2g} m; write float64, or from a nearer origin"
+    )
 
 
 def is_cloud(path: Path) -> bool:
