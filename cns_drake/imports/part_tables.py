@@ -5,7 +5,7 @@ of its parts (tags, attributes) are read, and which cannot change a shape. All
 other parts are counted, so that no part is dropped in silence.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 import functools
 from pathlib import Path
 import re
@@ -31,14 +31,8 @@ class PartTable:
         table = parse_yaml(file.read_bytes())
         self._elements: Mapping[str, Mapping] = table["elements"]
         self._shapeless = " ".join(table.get("shapeless", ()))
-
-    def __contains__(self, element: str) -> bool:
-        """Returns whether an element is in the table."""
-        return element in self._elements
-
-    def __iter__(self) -> Iterator[str]:
-        """Yields the names of the elements."""
-        yield from self._elements
+        # Elements and a part -> usual values and use.
+        self._rules: dict[tuple, tuple[list[str] | None, str | None]] = {}
 
     def names(self, element: str, use: str) -> list[str]:
         """Returns the names in one list of an element, such as `read`."""
@@ -75,18 +69,31 @@ class PartTable:
         self, elements: tuple[str, ...], part: str, value: str
     ) -> str | None:
         """Returns `read` or `shapeless`; "" if no effect; None to count."""
-        usual = [self._elements[one].get("usual", {}) for one in elements]
-        named = [values[part] for values in usual if part in values]
-        if named and not any(value in values for values in named):
+        key = elements, part
+        if key not in self._rules:
+            self._rules[key] = self._rule(elements, part)
+        usual, use = self._rules[key]
+        if usual is not None and value not in usual:
             return None
+        return use
+
+    def _rule(
+        self, elements: tuple[str, ...], part: str
+    ) -> tuple[list[str] | None, str | None]:
+        """Returns the usual values of a part, if listed, and its use."""
+        usual = None
+        for element in elements:
+            values = self._elements[element].get("usual", {})
+            if part in values:
+                usual = [*(usual or []), *values[part]]
         for use in ("read", "shapeless"):
             for element in elements:
                 listed = self._elements[element].get(use, ())
                 if _pattern(" ".join(listed)).fullmatch(part):
-                    return use
+                    return usual, use
         if _pattern(self._shapeless).fullmatch(part):
-            return "shapeless"
-        return "" if named else None
+            return usual, "shapeless"
+        return usual, None if usual is None else ""
 
 
 @functools.cache

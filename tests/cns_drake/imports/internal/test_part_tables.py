@@ -6,14 +6,16 @@ changes no shape.
 """
 
 import json
+from pathlib import Path
 
 from helpers.imported_osm import import_osm, volume
 from helpers.small_opendrive import straight, write_roads
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
+import yaml
 
-from cns_drake.imports import import_cityjson, import_openstreetmap
+from cns_drake.imports import import_cityjson, import_openstreetmap, opendrive
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.road_reader import read_roads
 
@@ -208,6 +210,21 @@ def test_attributes_of_things_change_them_or_are_named(
     assert (
         before != after or f"{key} of {tag}, not read" in told or key in lines
     )
+
+
+def test_each_element_of_opendrive_that_is_read_has_a_row():
+    page = Path(opendrive.__file__).with_name("parts.yaml")
+    elements = yaml.safe_load(page.read_text("utf-8"))["elements"]
+    children = {
+        child for row in elements.values() for child in row.get("children", ())
+    }
+    assert children <= set(elements)
+    assert {key for row in elements.values() for key in row} <= {
+        "children",
+        "read",
+        "shapeless",
+        "usual",
+    }
 
 
 @pytest.mark.parametrize(
