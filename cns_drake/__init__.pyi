@@ -13,7 +13,6 @@ from cns_drake.scenarios import make_scenario as make_scenario
 from cns_drake.scenarios import plan_drive as plan_drive
 from cns_drake.scene import World as World
 from cns_drake.scene import load_world as load_world
-from cns_drake.sensors import LIDAR_PRESETS as LIDAR_PRESETS
 from cns_drake.sensors import ApplyImuConfig as ApplyImuConfig
 from cns_drake.sensors import ApplyLidarConfig as ApplyLidarConfig
 from cns_drake.sensors import ApplyOdometryConfig as ApplyOdometryConfig
@@ -46,3 +45,4 @@ from cns_drake.simulation import make_station as make_station
 from cns_drake.simulation import plan_scenario_traffic as plan_scenario_traffic
 from cns_drake.simulation import simulate as simulate
 from cns_drake.traffic import add_traffic as add_traffic
+from cns_drake.units import LIDAR_PRESETS as LIDAR_PRESETS

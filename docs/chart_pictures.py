@@ -27,9 +27,9 @@ from docs.picture_parts import (
     add_heading,
     make_plain,
 )
+from evaluation.methods import method_facts, shipped_methods
 from evaluation.results import (
     INK,
-    METHOD_STYLES,
     OWN,
     PALE,
     STAGE,
@@ -37,15 +37,26 @@ from evaluation.results import (
     Results,
     Row,
     draw_chart,
+    in_table_order,
     listed,
+    method_style,
     method_styles,
     rank_methods,
     survivors,
     title,
 )
 
+METHOD_STYLES = {
+    name: style
+    for name in in_table_order(shipped_methods())
+    if (style := method_style(name))
+}
 # The methods that this project made; all others are published ones.
-OURS = {"layered-overlap", "learned"}
+OURS = {
+    name
+    for name in shipped_methods()
+    if (facts := method_facts(name)) and not facts.source
+}
 
 
 def survival(path: Path) -> str:

@@ -15,13 +15,13 @@ import re
 import subprocess
 import sys
 
-from matplotlib import rc_context
 import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 # As a program, this file is not in the package `docs`.
 sys.path.insert(0, str(ROOT))
 
+from cns_drake.base import figure_style  # noqa: E402
 from docs import chart_pictures, scene_pictures  # noqa: E402
 from docs.picture_parts import FONT  # noqa: E402
 
@@ -78,7 +78,7 @@ def main(names: Sequence[str]) -> None:
         if command and not (ROOT / entry.get("file", " ")).exists():
             subprocess.run(command, shell=True, check=True, cwd=ROOT)
         if draw:
-            with rc_context(FONT):
+            with figure_style(FONT):
                 function_of(draw)(PICTURES / name, **entry)
         head, mark, rest = REGISTRY.read_text().partition(f"\n{name}:")
         rest = rest.replace(f"digest: {made}", f"digest: {digest(data)}", 1)

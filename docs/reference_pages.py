@@ -36,6 +36,8 @@ from cns_drake.city import (
     Stages,
     StreetPlan,
 )
+from cns_drake.export import export_formats
+from cns_drake.imports import map_sources
 from cns_drake.roads import (
     JunctionEntry,
     RoadEntry,
@@ -59,14 +61,34 @@ from cns_drake.sensors import (
     OdometrySection,
     WeatherConfig,
 )
-from cns_drake.studies import DrawnRoute, Experiment, Fleet, Losses, MadeMap
+from cns_drake.studies import (
+    DrawnRoute,
+    Experiment,
+    Fleet,
+    Losses,
+    MadeMap,
+    shipped_causes,
+)
+from cns_drake.units import (
+    LIDAR_PRESETS,
+    Head,
+    LidarSheet,
+    NoddingSheet,
+    Response,
+    ReturnsSheet,
+    RosetteSheet,
+    SpinningSheet,
+)
 from evaluation import command_line as evaluation_cli
+from evaluation.drives import data_sets
 from evaluation.methods import (
     MethodConfig,
-    NetworkConfig,
-    make_method,
+    find_method,
+    optional_methods,
     shipped_methods,
 )
+from evaluation.recognition import METRICS
+from evaluation.results import in_table_order, listed
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 Sections = dict[str, type[BaseModel]]
@@ -84,6 +106,15 @@ SCENARIO: Sections = {
     "IMU": ImuSection,
     "Weather": WeatherConfig,
     "Odometry": OdometrySection,
+}
+LIDAR: Sections = {
+    "A data sheet": LidarSheet,
+    "A spinning LiDAR": SpinningSheet,
+    "A LiDAR with prisms": RosetteSheet,
+    "A nodding LiDAR": NoddingSheet,
+    "Returns": ReturnsSheet,
+    "Response": Response,
+    "Head": Head,
 }
 CITY: Sections = {
     "roads.yaml": RoadsFile,
@@ -111,14 +142,22 @@ EXPERIMENT: Sections = {
     "A route at random": DrawnRoute,
     "A fleet": Fleet,
 }
+
+
+def _sections_of_methods() -> Sections:
+    """Returns the classes of settings, by the names of their methods."""
+    names: dict[type[MethodConfig], list[str]] = {}
+    for name in (*shipped_methods(), *optional_methods()):
+        names.setdefault(find_method(name).Config, []).append(name)
+    return {listed(some): config for config, some in names.items()}
+
+
 METHODS: Sections = {
     "All methods": MethodConfig,
-    **{
-        name: make_method(name, {}).Config
-        for name in (*shipped_methods(), "probe")
-    },
-    "svt-net, dpa-net and bevplace": NetworkConfig,
+    **_sections_of_methods(),
 }
+# Where the page of the fields of a drive finds those of a data sheet.
+_OF_LIDARS = "lidars.md"
 # What stands for the default where the model's own does not say it.
 _FILLED_IN = {
     (Scenario, "name"): "the file's name",
@@ -129,6 +168,10 @@ _FILLED_IN = {
     (Experiment, "protocol"): "`fair`",
     (Experiment, "baseline"): "the first values",
     (Fleet, "seed"): "the condition's seed",
+    (LidarSheet, "pattern"): "`spinning`",
+    (LidarSheet, "period"): "`0.05` or `0.1`",
+    (ReturnsSheet, "rows"): "one row",
+    (Response, "far"): "any range",
 }
 
 
@@ -141,6 +184,7 @@ def pages() -> dict[str, str]:
             "Relative paths start at the folder of the file.",
             SCENARIO,
         ),
+        "lidars.md": _lidars_page(),
         "city.md": _fields_page(
             "Fields of a city",
             "[Files of a city](../city.md) says what each file is for, and "
@@ -151,20 +195,116 @@ def pages() -> dict[str, str]:
             "Fields of an experiment",
             "[Studies](../studies.md) explains these fields with examples. It "
             "also lists what can vary, and the settings of tasks. Relative "
-            "paths start at the working folder.",
+            "paths start at the working folder, but those of data sheets of "
+            "LiDARs at the folder of the experiment.",
             EXPERIMENT,
         ),
         "methods.md": _fields_page(
             "Settings of the methods",
-            "[Methods](../methods.md) shows how to change these settings.",
+            "[Methods](../methods.md) shows how to change these settings.\n\n"
+            + _table_of_methods(),
             METHODS,
         ),
+        "causes.md": _causes_page(),
+        "data.md": _data_page(),
+        "metrics.md": _metrics_page(),
         "commands.md": _commands_page(),
     }
 
 
+def _data_page() -> str:
+    drives = [(one.title, one.files) for one in data_sets().values()]
+    maps = [
+        (one.title, ", ".join(f"`{ending}`" for ending in one.suffixes))
+        for one in map_sources()
+    ]
+    parts = [
+        _heading("Data"),
+        "`cns-eval` reads these drives ([evaluation](../evaluation.md#data)):",
+        _table(("drives of", "path that you give"), drives),
+        "`cns-drake import` makes maps from these files"
+        " ([your own city](../how-to/own_city.md)):",
+        _table(("format", "files"), maps),
+        "`cns-drake export` writes recordings in the formats"
+        f" {listed(f'`{name}`' for name in export_formats())}"
+        " ([exports](../recordings.md#exports)).",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _table_of_methods() -> str:
+    names = in_table_order((*shipped_methods(), *optional_methods()))
+    rows = []
+    for name in names:
+        method = find_method(name)
+        rows.append(
+            (
+                f"`{name}`",
+                method.title,
+                method.source or "this project",
+                "yes" if method.standard else "no",
+                str(method.scans_per_place),
+                "yes" if method.estimates_poses() else "no",
+            )
+        )
+    heading = (
+        "`--method`",
+        "method",
+        "publication",
+        "standard",
+        "scans of a place",
+        "estimates poses",
+    )
+    return _table(heading, rows)
+
+
+def _causes_page() -> str:
+    rows = [
+        (
+            f"`{cause.name}`",
+            cause.title,
+            "query scans" if cause.scans_only else " and ".join(cause.sides),
+            " ".join(cause.about.split())
+            + ("" if cause.combined else " (not part of `all`)"),
+            _values_of_levels(cause.strengths.get("levels")),
+        )
+        for cause in shipped_causes().values()
+    ]
+    parts = [
+        _heading("Causes of change"),
+        "The experiment [`ladder`](../ladder.md) measures each cause by itself,"
+        " at up to four levels, and all of them together. The"
+        " [levels](../levels.md) combine weaker causes.",
+        _table(
+            (
+                "cause",
+                "in words",
+                "changes",
+                "levels 1 to 4 of the ladder",
+                "in the levels",
+            ),
+            rows,
+        ),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _values_of_levels(fields: Any, path: str = "") -> str:
+    """Returns the values at each level of the fields of drives."""
+    if fields is None:
+        return "-"
+    if not isinstance(fields, dict):
+        return f"`{path}` {_plain(fields)}"
+    return "; ".join(
+        _values_of_levels(value, f"{path}.{name}".lstrip("."))
+        for name, value in fields.items()
+    )
+
+
 def _fields_page(title: str, introduction: str, sections: Sections) -> str:
     links = {model: heading for heading, model in sections.items()}
+    if sections is not LIDAR:
+        links |= {LidarSheet: _OF_LIDARS}
     parts = [_heading(title), introduction]
     for heading, model in sections.items():
         description, meanings = explain_fields(model)
@@ -185,14 +325,44 @@ def _fields_page(title: str, introduction: str, sections: Sections) -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def _lidars_page() -> str:
+    fields = _fields_page(
+        "LiDARs and their data sheets",
+        "[Your own LiDAR](../how-to/own_lidar.md) shows how to write and use a "
+        "data sheet. A preset is a data sheet that ships with the program. "
+        "[LiDAR presets](../scenarios.md#lidar-presets) explains rates, angles "
+        "and the order of firing.",
+        LIDAR,
+    )
+    rows = [
+        (f"`{name}`", *_beams_of(sheet), sheet.source)
+        for name, sheet in LIDAR_PRESETS.items()
+    ]
+    columns = "preset", "rings", "elevations [deg]", "columns", "ranges [m]"
+    presets = _table((*columns, "source"), rows)
+    return f"{fields}\n## Presets\n\n{presets}\n"
+
+
+def _beams_of(sheet: LidarSheet) -> tuple[str, ...]:
+    """Returns what the table of presets says of a LiDAR's beams."""
+    lowest, highest = sheet.field_deg
+    columns = sheet.columns if isinstance(sheet, SpinningSheet) else "-"
+    return (
+        str(sheet.num_rings),
+        f"{highest:g} to {lowest:g}" if lowest < highest else f"{lowest:g}",
+        str(columns),
+        f"{sheet.ranges[0]:g} to {sheet.ranges[1]:g}",
+    )
+
+
 def own_fields(model: type[BaseModel]) -> dict[str, FieldInfo]:
     """Returns the fields that have a row in the model's table.
 
     What a road shares with the style of all roads, and a method with all
-    methods, is in the tables of those.
+    methods, and a kind of LiDAR with all LiDARs, is in the tables of those.
     """
     shared: dict[str, FieldInfo] = {}
-    for base in (RoadStyle, MethodConfig):
+    for base in (RoadStyle, MethodConfig, LidarSheet):
         if issubclass(model, base) and model is not base:
             shared |= base.model_fields
     fields = model.model_fields
@@ -308,7 +478,12 @@ def _links(annotation: Any, headings: dict[type[BaseModel], str]) -> str:
     found = [headings[model] for model in models_in(annotation)]
     if not found:
         return ""
-    links = (f"[{each}](#{_anchor(each)})" for each in dict.fromkeys(found))
+    links = (
+        f"[data sheet]({each})"
+        if each == _OF_LIDARS
+        else f"[{each}](#{_anchor(each)})"
+        for each in dict.fromkeys(found)
+    )
     return f" See {', '.join(links)}."
 
 
@@ -318,6 +493,32 @@ def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
         yield RouteLeg if annotation is Route else annotation
     for argument in typing.get_args(annotation):
         yield from models_in(argument)
+
+
+def _metrics_page() -> str:
+    rows = [
+        (
+            f"`{metric.name}`",
+            metric.label,
+            metric.range_text,
+            metric.better or "-",
+            metric.over_queries,
+            metric.undefined or "never",
+        )
+        for metric in METRICS.values()
+    ]
+    head = ("metric", "title", "values", "better", "what", "undefined if")
+    parts = (
+        _heading("Metrics"),
+        "The values of the column `metric` in [results.csv]"
+        "(../studies.md#the-table-of-results). Over conditions, a metric is"
+        " averaged by the arithmetic mean of its defined values; an undefined"
+        " value is an empty cell, and is left out with a note. [A metric of"
+        " your own](../how-to/own_method.md#a-metric-of-your-own) is a function"
+        " in a file.",
+        _table(head, rows),
+    )
+    return "\n\n".join(parts) + "\n"
 
 
 def _commands_page() -> str:

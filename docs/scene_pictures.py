@@ -195,7 +195,7 @@ def weather(path: Path) -> None:
     for axes, (name, kind) in zip(
         figure.subplots(2, 2).flat, kinds.items(), strict=True
     ):
-        scenario = load_scenario("metropolis_04").with_lidar_preset("os1-64")
+        scenario = load_scenario("metropolis_04").with_lidar("os1-64")
         scenario = scenario.with_returns("calibrated")
         scenario = scenario.model_copy(update={"weather": kind})
         scan, p_WS = _in_world(scenario, np.array([18.0]))[0]
@@ -216,7 +216,7 @@ def weather(path: Path) -> None:
 
 def intensity(path: Path) -> None:
     """Draws the intensity of two seconds from above."""
-    scenario = load_scenario("metropolis_04").with_lidar_preset("os1-128")
+    scenario = load_scenario("metropolis_04").with_lidar("os1-128")
     times = 6.0 + 0.1 * np.arange(20)
     found = _in_world(scenario.with_returns("calibrated"), times)
     cloud = np.concatenate([scan for scan, _ in found])

@@ -3,6 +3,7 @@ from cns_drake.drives import Drive as Drive
 from evaluation.change import TemporalChange as TemporalChange
 from evaluation.change import covered as covered
 from evaluation.change import temporal_change as temporal_change
+from evaluation.drives import check_data_set as check_data_set
 from evaluation.drives import compare_drives as compare_drives
 from evaluation.drives import open_drive as open_drive
 from evaluation.maps import VoxelMap as VoxelMap
@@ -10,9 +11,11 @@ from evaluation.maps import map_drive as map_drive
 from evaluation.maps import voxelise as voxelise
 from evaluation.methods import Method as Method
 from evaluation.methods import MethodConfig as MethodConfig
+from evaluation.methods import check_method as check_method
 from evaluation.methods import known_methods as known_methods
 from evaluation.methods import make_method as make_method
 from evaluation.methods import register as register
+from evaluation.recognition import Metric as Metric
 from evaluation.recognition import (
     PlaceRecognitionMetrics as PlaceRecognitionMetrics,
 )
@@ -22,6 +25,7 @@ from evaluation.recognition import RetrievalProtocol as RetrievalProtocol
 from evaluation.recognition import compared_frames as compared_frames
 from evaluation.recognition import evaluate as evaluate
 from evaluation.recognition import judge as judge
+from evaluation.recognition import register_metric as register_metric
 from evaluation.recognition import retrieve as retrieve
 from evaluation.recognition import route_blocks as route_blocks
 from evaluation.results import QueryRows as QueryRows

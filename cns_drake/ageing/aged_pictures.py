@@ -7,7 +7,7 @@ import matplotlib.image
 import numpy as np
 
 from cns_drake.ageing.aged_map import AgedMap
-from cns_drake.base import doing
+from cns_drake.base import doing, figure_style, save_figure
 from cns_drake.pictures import StageScene, View
 from cns_drake.scene import stage_name
 
@@ -73,6 +73,7 @@ def air_view(aged: AgedMap) -> View:
     return View(position=up, target=(x, y, z), fov_y_deg=52)
 
 
+@figure_style()
 def draw_pictures(folder: Path, aged: AgedMap) -> None:
     """Writes a picture of each view in each year, and a picture of all views.
 
@@ -102,4 +103,4 @@ def draw_pictures(folder: Path, aged: AgedMap) -> None:
             axes.imshow(picture)
             axes.set_axis_off()
         row[0].set_title(f"year {year}" if year else "today", loc="left")
-    figure.savefig(folder / PICTURES / "film.jpg", dpi=110)
+    save_figure(figure, folder / PICTURES / "film.jpg", dpi=110)

@@ -49,6 +49,9 @@ from cns_drake.base.errors import errors_at_option as errors_at_option
 from cns_drake.base.errors import one_line as one_line
 from cns_drake.base.errors import validated as validated
 from cns_drake.base.errors import value_errors as value_errors
+from cns_drake.base.families import family_members as family_members
+from cns_drake.base.figures import figure_style as figure_style
+from cns_drake.base.figures import save_figure as save_figure
 from cns_drake.base.file_locks import lock_file as lock_file
 from cns_drake.base.files import cache_folder as cache_folder
 from cns_drake.base.files import check_regular as check_regular

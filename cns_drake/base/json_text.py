@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import math
 import re
 from typing import Any
 
@@ -18,15 +19,17 @@ _SUSPECT = re.compile(rb"\\u(?:0000|[dD][89a-fA-F])")
 
 
 def json_values(value: Any) -> Any:
-    """Returns a value for JSON, with None for each NaN.
+    """Returns a value for JSON, with None for each NaN and each infinity.
 
+    JSON has neither.
     A dictionary or a list is copied, with all that is in it.
     """
     if isinstance(value, dict):
         return {name: json_values(entry) for name, entry in value.items()}
     if isinstance(value, list):
         return [json_values(entry) for entry in value]
-    return None if value != value else value
+    is_unknown = isinstance(value, float) and not math.isfinite(value)
+    return None if is_unknown else value
 
 
 def parse_json(data: bytes) -> Any:

@@ -3,8 +3,11 @@
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+# Numbers of poses and velocities that differ by less are equal [m, rad, m/s].
+_SAME = 1e-6
 # Farther than anything on Earth from the origin of a survey grid [m].
 FARTHEST = 1e8
 
@@ -50,6 +53,27 @@ def rotation_from_quaternion(quat_xyzw: np.ndarray) -> np.ndarray:
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def same_numbers(one: ArrayLike, other: ArrayLike) -> bool:
+    """Returns whether positions or velocities are equal, up to rounding.
+
+    NaN equals NaN.
+    """
+    return np.allclose(one, other, rtol=0.0, atol=_SAME, equal_nan=True)
+
+
+def same_turns(one: ArrayLike, other: ArrayLike) -> bool:
+    """Returns whether quaternions (4,) are one rotation, up to rounding.
+
+    The length and the sign of a quaternion do not matter.
+    """
+    pair = [np.asarray(quat, float) for quat in (one, other)]
+    norms = [np.linalg.norm(quat) for quat in pair]
+    if not all(np.isfinite(norm) and norm > 0.0 for norm in norms):
+        return same_numbers(*pair)
+    a, b = (quat / norm for quat, norm in zip(pair, norms, strict=True))
+    return same_numbers(a, b) or same_numbers(a, -b)
 
 
 def inverse(X: np.ndarray) -> np.ndarray:

@@ -45,7 +45,8 @@ def run_drive(
         name_or_file: name of a shipped drive, or a scenario file.
         output: folder for the recordings.
         frames: number of frames to record, from the start; by default all.
-        lidar: preset that replaces the LiDARs of the scenario.
+        lidar: preset, or file of a data sheet, that replaces the LiDARs of the
+            scenario.
         returns: `ideal` or `calibrated`, the model of the LiDARs' returns; by
             default as the scenario says.
         weather: weather; by default the weather of the scenario.
@@ -139,7 +140,7 @@ def _changed_scenario(
 ) -> Scenario:
     """Returns a scenario with the changes that `run_drive` takes."""
     if lidar is not None:
-        scenario = scenario.with_lidar_preset(lidar)
+        scenario = scenario.with_lidar(lidar)
     if returns is not None:
         scenario = scenario.with_returns(returns, weather)
     if traffic is not None:
@@ -180,7 +181,7 @@ def run_script(name: str, description: str) -> None:
     def script(
         output: options.Output = Path("recordings"),
         frames: options.Frames = None,
-        lidar: options.LidarPreset = None,
+        lidar: options.LidarUnit = None,
         traffic: options.Traffic = None,
         recording: options.Recording = None,
         graphviz: options.Graphviz = None,

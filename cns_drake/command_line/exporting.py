@@ -13,6 +13,7 @@ import typer
 from cns_drake.base import (
     InputError,
     commands,
+    did_you_mean,
     next_command,
     note,
     shared_options,
@@ -26,6 +27,7 @@ from cns_drake.command_line.suggestions import (
     suggest_page,
     suggest_recognition,
 )
+from cns_drake.export import export_formats
 from evaluation.recognition import RetrievalProtocol
 
 if TYPE_CHECKING:
@@ -36,12 +38,8 @@ if TYPE_CHECKING:
 
 
 class Format(str, Enum):
-    """Formats that the command writes."""
+    """Formats that the command writes, beside those of `export_formats`."""
 
-    CNS = "cns"
-    KITTI = "kitti"
-    MULRAN = "mulran"
-    TUM = "tum"
     POINTNETVLAD = "pointnetvlad"
     OVERLAP = "overlap"
     OVERLAP_TABLE = "overlap-table"
@@ -51,15 +49,15 @@ class Format(str, Enum):
     FILM = "film"
 
 
-_CONVERTED = (Format.CNS, Format.KITTI, Format.MULRAN, Format.TUM)
+_CONVERTED = export_formats()
 _PAIRS = (Format.POINTNETVLAD, Format.OVERLAP, Format.OVERLAP_TABLE)
 _MAPS = (Format.MAP_TRUTH, Format.MAP_SESSIONS)
 # Option -> the formats with which it has an effect.
-_FORMATS: Mapping[str, tuple[Format, ...]] = {
+_FORMATS: Mapping[str, tuple[str, ...]] = {
     "lidar": (*_CONVERTED, Format.MAP_SESSIONS, Format.BEV_IMAGES),
     "columns": (Format.MAP_SESSIONS, Format.BEV_IMAGES),
-    "absent_in": (Format.KITTI,),
-    "sequence": (Format.KITTI,),
+    "absent_in": _CONVERTED,
+    "sequence": _CONVERTED,
     "vary": _PAIRS,
     "held_out": (Format.POINTNETVLAD, Format.OVERLAP),
     "spacing": (*_PAIRS, *_MAPS),
@@ -88,7 +86,7 @@ def export(
         list[str] | None, typer.Argument(metavar="DRIVE ...")
     ] = None,
     *,
-    layout: Annotated[Format, typer.Option("--format", metavar="FORMAT")],
+    layout: Annotated[str, typer.Option("--format", metavar="FORMAT")],
     output: Annotated[Path, typer.Option()],
     lidar: shared_options.LidarName = None,
     columns: shared_options.Columns = None,
@@ -120,7 +118,7 @@ def export(
 ) -> None:
     """Export drives to the formats of other programs.
 
-    The formats cns, kitti, mulran and tum convert a recording.
+    The formats CONVERTED convert a recording.
 
     The formats pointnetvlad, overlap and overlap-table are data for training
     place recognition: point clouds with exact positives, negatives and
@@ -152,13 +150,13 @@ def export(
         drives: Drives to export. With --format pointnetvlad or overlap, you can
             leave them out: then the drives of the experiment that --vary names
             are exported, or all shipped drives if --vary is not given.
-        layout: Format to write: cns (the CNS data set), kitti (KITTI odometry),
-            mulran (MulRan), tum (only the trajectory), pointnetvlad (clouds and
-            pickle files for PointNetVLAD), overlap (scans and the exact overlap
-            of each pair), overlap-table (only the overlaps between a database
-            and a query drive, for cns-eval pr --exact-overlaps), map-truth (two
-            maps with labels of what changed), map-sessions (two maps without
-            labels), bev-images (bird's-eye images with poses) or film.
+        layout: Format to write: one of CONVERTED (tum has only the
+            trajectory), pointnetvlad (clouds and pickle files for
+            PointNetVLAD), overlap (scans and the exact overlap of each pair),
+            overlap-table (only the overlaps between a database and a query
+            drive, for cns-eval pr --exact-overlaps), map-truth (two maps with
+            labels of what changed), map-sessions (two maps without labels),
+            bev-images (bird's-eye images with poses) or film.
         output: Folder to write; created if it does not exist. With map-truth,
             map-sessions and bev-images, the folder must be new or empty. With
             film, the output is a file instead, and an existing file is
@@ -190,6 +188,7 @@ def export(
             scenario has no traffic, as many vehicles as the streets have room
             for, but at most 60.
     """
+    _check_format(layout)
     _check_options(commands.given_options(context), layout)
     words = drives or []
     if layout in _PAIRS:
@@ -222,9 +221,7 @@ def export(
     number = 2 if layout in _MAPS else 1
     if len(words) != number:
         wanted = "one drive" if number == 1 else "two drives"
-        raise InputError(
-            f"--format {layout.value}: give {wanted}, not {len(words)}"
-        )
+        raise InputError(f"--format {layout}: give {wanted}, not {len(words)}")
     first = words[0]
     if layout == Format.MAP_TRUTH:
         spacing = spacing or _MAP_SPACING
@@ -256,7 +253,22 @@ def export(
         )
 
 
-def _check_options(names: Iterable[str], layout: Format) -> None:
+# The help lists the formats.
+export.__doc__ = (export.__doc__ or "").replace(
+    "CONVERTED", f"{', '.join(_CONVERTED[:-1])} and {_CONVERTED[-1]}"
+)
+
+
+def _check_format(layout: str) -> None:
+    known = (*_CONVERTED, *(one.value for one in Format))
+    if layout not in known:
+        raise InputError(
+            f"--format: no format {layout!r} (known: {', '.join(known)})"
+            f"{did_you_mean(layout, known)}"
+        )
+
+
+def _check_options(names: Iterable[str], layout: str) -> None:
     """Refuses options that have no effect with a format.
 
     Args:
@@ -270,14 +282,14 @@ def _check_options(names: Iterable[str], layout: Format) -> None:
         formats = _FORMATS.get(name, (layout,))
         if layout not in formats:
             raise InputError(
-                f"--{name.replace('_', '-')}: not with --format {layout.value};"
-                f" only with {', '.join(known.value for known in formats)}"
+                f"--{name.replace('_', '-')}: not with --format {layout};"
+                f" only with {', '.join(formats)}"
             )
 
 
 def _export_recording(
     recording: str,
-    layout: Format,
+    layout: str,
     output: Path,
     *,
     lidar: str | None,
@@ -288,10 +300,11 @@ def _export_recording(
     """Converts a recording to the layout of a data set."""
     with uninterrupted():
         from cns_drake.export import export_drive
+        from evaluation.drives import find_data_sets
 
     path = export_drive(
         Path(recording),
-        layout.value,
+        layout,
         output,
         lidar=lidar,
         absent_in=absent_in,
@@ -299,7 +312,7 @@ def _export_recording(
         on_note=note,
     )
     show({"output": str(path)}, str(path), json=json)
-    if layout != Format.TUM:
+    if find_data_sets(path):
         suggest_evaluation(Path(recording), lidar, path)
 
 

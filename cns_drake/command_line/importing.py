@@ -25,6 +25,8 @@ from cns_drake.imports import (
     ImportOptions,
     ImportReport,
     Undated,
+    map_sources,
+    source_of,
 )
 from cns_drake.scene import MapFolder
 
@@ -60,8 +62,7 @@ def import_city(
     drives along the map's streets.
 
     Args:
-        source: File of the city: CityJSON 1.0 to 2.0 (.json), CityJSONSeq
-            (.jsonl), OpenStreetMap (.osm, .pbf) or OpenDRIVE (.xodr).
+        source: File of the city: FORMATS.
         output: Folder of the map to write; its name becomes the map's name.
         years: Years for which to make stages. The stage of a year contains the
             buildings that were built in that year or earlier.
@@ -108,7 +109,8 @@ def import_city(
         raise InputError(
             "--grow: not with --plain, which adds nothing at random"
         )
-    if not plain and not stages and path.suffix != ".xodr" and grow is None:
+    has_stages = bool(stages) or source_of(path).has_stages
+    if not plain and not has_stages and grow is None:
         grow = _CHANGED_SHARE
     options = ImportOptions(
         stages,
@@ -145,6 +147,15 @@ def import_city(
         "faults": {fault.kind: fault.number for fault in report.faults},
     }
     show(values, _report_rows(report, output, options.years), json=json)
+
+
+# The help lists the formats.
+import_city.__doc__ = (import_city.__doc__ or "").replace(
+    "FORMATS",
+    ", ".join(
+        f"{one.title} ({', '.join(one.suffixes)})" for one in map_sources()
+    ),
+)
 
 
 def _shortcomings(

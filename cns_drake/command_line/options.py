@@ -5,6 +5,9 @@ from typing import Annotated
 
 import typer
 
+from cns_drake.units import LIDAR_PRESETS
+
+_PRESETS = list(LIDAR_PRESETS)
 Output = Annotated[
     Path,
     typer.Option(
@@ -26,13 +29,11 @@ Frames = Annotated[
     ),
 ]
 LIDAR_OPTION = typer.Option(
-    metavar="PRESET",
-    help="Model of LiDAR to simulate, by the name of its preset: cns, os0-128,"
-    " os1-32, os1-64, os1-128, os1-64-33, os1-128-42, vlp-16, hdl-64e, hdl-32e,"
-    " alpha-prime, hesai-pandar64, hesai-pandar-xt32, hokuyo-ust-20lx, mid-70,"
-    " avia or mid-360.",
+    metavar="PRESET|FILE.yaml",
+    help="Model of LiDAR to simulate: the file of a data sheet of your own, or"
+    f" the name of a preset: {', '.join(_PRESETS[:-1])} or {_PRESETS[-1]}.",
 )
-LidarPreset = Annotated[str | None, LIDAR_OPTION]
+LidarUnit = Annotated[str | None, LIDAR_OPTION]
 Traffic = Annotated[
     int | None,
     typer.Option(

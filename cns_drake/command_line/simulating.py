@@ -112,7 +112,7 @@ def simulate(
     scenario: Annotated[str, typer.Argument(metavar="NAME|SCENARIO.yaml")],
     output: options.Output,
     frames: options.Frames = None,
-    lidar: options.LidarPreset = None,
+    lidar: options.LidarUnit = None,
     returns: Returns = None,
     fog: Fog = None,
     rain: Rain = 0.0,

@@ -132,6 +132,7 @@ def study(
     """
     with uninterrupted():
         from cns_drake.studies import (
+            experiment_text,
             load_experiment,
             named_programs,
             parse_override,
@@ -146,9 +147,7 @@ def study(
     if name is None:
         raise InputError("study: give an experiment, or --list")
     if show:
-        load_experiment(name)
-        path = shipped_experiments().get(name, Path(name))
-        typer.echo(path.read_text("utf-8"), nl=False)
+        typer.echo(experiment_text(name), nl=False)
         return
     experiment = load_experiment(
         name,
@@ -162,7 +161,7 @@ def study(
     if not allow_code:
         # Others may have written the file; the words are the user's own.
         own = named_programs([method, *map(parse_override, override or ())])
-        for field in ("methods", "tasks"):
+        for field in ("methods", "metrics", "tasks"):
             for file in named_programs(getattr(experiment, field)):
                 if file not in own:
                     raise InputError(

@@ -4,6 +4,7 @@ from cns_drake.drives.deskewing import deskewed_scan as deskewed_scan
 from cns_drake.drives.drive import IMU_DTYPE as IMU_DTYPE
 from cns_drake.drives.drive import Drive as Drive
 from cns_drake.drives.drive import ImuSamples as ImuSamples
+from cns_drake.drives.drive import as_given as as_given
 from cns_drake.drives.drive import index_instances as index_instances
 from cns_drake.drives.drive_scenario import SCENARIO as SCENARIO
 from cns_drake.drives.drive_scenario import driven_way as driven_way

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Iterator, Mapping
+import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from cns_drake.base import InputError
 from cns_drake.drives.lidar_fields import LidarField, lidar_field
+from cns_drake.units import DEFAULT_PRESET
 
 # W is the world, B the vehicle on the ground, I the IMU. The pose is X_WB. Both
 # velocities are velocities of B in W, expressed in B [m/s, rad/s].
@@ -33,8 +35,6 @@ IMU_DTYPE = np.dtype(
         ("specific_force", "<f8", 3),
     ]
 )
-# The LiDAR of a scenario that names none.
-_DEFAULT_UNIT = "cns"
 
 
 class ImuSamples(NamedTuple):
@@ -214,10 +214,11 @@ class Drive(abc.ABC):
     @property
     def lidar_field(self) -> LidarField | None:
         """Rings and field of view of the LiDAR; None for an unknown model."""
-        unit = self.lidar_section.get("preset")
+        section = self.lidar_section
         if self.scenario and "lidars" not in self.scenario:
-            unit = _DEFAULT_UNIT
-        return lidar_field(unit)
+            section = {"preset": DEFAULT_PRESET}
+        unit = section.get("unit") or section.get("preset")
+        return lidar_field(unit, section.get("rings"))
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:
@@ -227,6 +228,15 @@ class Drive(abc.ABC):
         points of the scans carry the same instance ids and labels.
         """
         return None
+
+
+def as_given(path: Path) -> Path:
+    """Returns the absolute path of a drive, whose links are not resolved.
+
+    A drive has the name that its user gave it, and its tables lie beside this
+    name, wherever a link leads.
+    """
+    return Path(os.path.abspath(path))
 
 
 def index_instances(table: Any, source: str) -> dict[int, Mapping]:

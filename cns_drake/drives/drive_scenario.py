@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 import re
 
-from cns_drake.base import InputError, is_there, read_yaml
+from cns_drake.base import InputError, errors_at, is_there, read_yaml
+from cns_drake.units import read_sheet
 
 # Name of the file with the scenario, in the folder of an exported drive.
 SCENARIO = "scenario.yaml"
@@ -42,11 +43,12 @@ def driven_way(scenario: Mapping | None) -> dict | None:
 def read_scenario(folder: Path) -> Mapping | None:
     """Returns the content of `scenario.yaml` in an exported drive's folder.
 
-    The result is None if there is no such file.
+    The result is None if there is no such file. A LiDAR's field `unit` that
+    names a data sheet is replaced by the fields of the data sheet.
 
     Raises:
-        InputError: the file is not a mapping in YAML, or its field `name` is
-            not a valid name of a drive.
+        InputError: the file is not a mapping in YAML, its field `name` is not a
+            valid name of a drive, or a data sheet cannot be used.
     """
     path = folder / SCENARIO
     if not is_there(path):
@@ -57,4 +59,10 @@ def read_scenario(folder: Path) -> Mapping | None:
     name = scenario.get("name")
     if name is not None and not _NAME.fullmatch(str(name)):
         raise InputError(f"{path}: name: {name!r} is no name of a drive")
+    lidars = scenario.get("lidars")
+    for section in lidars.values() if isinstance(lidars, dict) else ():
+        if isinstance(section, dict) and isinstance(section.get("unit"), str):
+            with errors_at(f"{path}: lidars"):
+                sheet = read_sheet(folder / section["unit"])
+            section["unit"] = sheet.to_fields()
     return scenario

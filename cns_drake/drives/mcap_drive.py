@@ -11,7 +11,12 @@ import numpy as np
 from cns_drake.base import InputError, listed, parse_json, value_errors
 from cns_drake.base import points as point_arrays
 from cns_drake.drives import mcap_messages, ros_types
-from cns_drake.drives.drive import ODOMETRY_DTYPE, Drive, index_instances
+from cns_drake.drives.drive import (
+    ODOMETRY_DTYPE,
+    Drive,
+    as_given,
+    index_instances,
+)
 from cns_drake.drives.mcap_file import LOCATION, McapFile
 from cns_drake.drives.mcap_messages import StaticTransforms, checked_poses
 from cns_drake.drives.message_rows import (
@@ -20,7 +25,7 @@ from cns_drake.drives.message_rows import (
     transform_row,
     vehicle_frames,
 )
-from cns_drake.drives.point_cloud2 import to_points, to_records
+from cns_drake.drives.point_cloud2 import has_wrong_rows, to_points, to_records
 from cns_drake.drives.point_layouts import from_layout
 
 _ODOMETRY_TOPIC = "/odometry"
@@ -166,6 +171,12 @@ class McapDrive(Drive):
                 f"{self._path}: {_ODOMETRY_TOPIC}: no pose (or no labels) for"
                 f" {missing} of {len(self._all_scans)} scans at the ends of the"
                 " drive; they are left out"
+            )
+        if has_wrong_rows(self._topics.first(self._lidar_topic)):
+            notes.append(
+                f"{self._path}: {self._lidar_topic}: row_step is not width x"
+                " point_step; the points are read one after the other, which"
+                " the length of the data shows"
             )
         for topic in (self._lidar_topic, _ODOMETRY_TOPIC):
             back = self._file.step_back_ns(topic) * 1e-9
@@ -411,6 +422,15 @@ class McapDrive(Drive):
     def _mount(self, frame: str) -> np.ndarray:
         """Returns the pose (4, 4) of a sensor's frame on the vehicle."""
         base = self._topics.first(_ODOMETRY_TOPIC).child_frame_id
+        for topic, name, value in (
+            (_ODOMETRY_TOPIC, "child_frame_id", base),
+            ("the sensor's topic", "frame_id", frame),
+        ):
+            if not value:
+                raise InputError(
+                    f"{self._path}: {topic}: {name} is empty, so no mounting"
+                    f" pose can be found ({self._transforms.listed()})"
+                )
         return self._transforms.pose(base, frame)
 
     @cached_property
@@ -471,7 +491,14 @@ class _McapTopics:
         """
         found = self.file.topics.get(topic)
         if found is None:
-            raise InputError(f"{self.path}: no topic {topic}")
+            there = "; ".join(
+                f"{name}: {' and '.join(kinds)}"
+                for name, kinds in sorted(self.file.topics.items())
+            )
+            raise InputError(
+                f"{self.path}: no topic {topic} of {message_type} (there are:"
+                f" {there or 'no topics'})"
+            )
         if found != [f"{message_type} in cdr"]:
             raise InputError(
                 f"{self.path}: {topic}: {' and '.join(found)} instead of"
@@ -623,11 +650,9 @@ def _mcap_path(path: Path) -> Path:
 
 
 def _drive_name(path: Path) -> str:
-    resolved = path.resolve()
+    place = as_given(path)
     # rosbag2 numbers the files of a recording: <name>_0.mcap.
-    return (
-        resolved.name if resolved.is_dir() else resolved.stem.removesuffix("_0")
-    )
+    return place.name if place.is_dir() else place.stem.removesuffix("_0")
 
 
 _LIDAR_TOPIC = "/lidar/points"
@@ -674,7 +699,7 @@ def _choose_lidar_topic(
     elif _LIDAR_TOPIC not in topics and len(clouds) == 1:
         wanted = clouds[0]
     if wanted not in topics and clouds:
-        advice = "" if lidar else "; --lidar takes one of them"
+        advice = "" if lidar else "; choose one as the LiDAR"
         raise InputError(
             f"{source}: no topic {wanted} (point clouds:"
             f" {' '.join(clouds)}{advice})"

@@ -150,7 +150,12 @@ class StaticTransforms:
                 )
                 # Nodes repeat what is fixed.
                 old = self._edges.setdefault(edge.child_frame_id, new)
-                if old != new:
+                is_same = (
+                    old[0] == new[0]
+                    and poses.same_numbers(old[1], new[1])
+                    and poses.same_turns(old[2], new[2])
+                )
+                if not is_same:
                     raise InputError(
                         f"{where}: {edge.child_frame_id}: at"
                         f" {stamp_ns(edge.header)} ns {new}, before {old}"
@@ -177,7 +182,18 @@ class StaticTransforms:
             child, p_PC, quat_PC = self._edges[child]
             X_PC = checked_poses(np.array(p_PC), np.array(quat_PC), self._where)
             X_CF = X_PC @ X_CF
-        raise InputError(f"{self._where}: no transform from {base} to {frame}")
+        raise InputError(
+            f"{self._where}: no transform from {base} to {frame}"
+            f" ({self.listed()})"
+        )
+
+    def listed(self) -> str:
+        """Returns what transforms there are, for error messages."""
+        edges = [
+            f"{parent or 'a frame without a name'} to {child}"
+            for child, (parent, *_) in sorted(self._edges.items())
+        ]
+        return f"there are: {', '.join(edges) or 'none'}"
 
 
 def checked_poses(

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cns_drake.base import poses
 from cns_drake.drives import ros_types
 from cns_drake.drives.drive import IMU_DTYPE, ODOMETRY_DTYPE
 from cns_drake.drives.mcap_messages import decode, stamp_ns, xyz, xyzw
@@ -211,7 +212,10 @@ def check_agreement(rows: np.ndarray) -> None:
     for one, other in zip(order[twice], order[twice + 1], strict=True):
         for name in rows.dtype.names or ():
             old, new = rows[name][one], rows[name][other]
-            if not np.array_equal(old, new, equal_nan=True):
+            is_same = (
+                poses.same_turns if name == "quat_xyzw" else poses.same_numbers
+            )
+            if not is_same(old, new):
                 raise ValueError(
                     f"{name} at {rows['stamp_ns'][one]} ns: {old} and {new}"
                 )

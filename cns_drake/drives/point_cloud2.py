@@ -48,6 +48,22 @@ def to_points(message: Any) -> np.ndarray:
     return _records(message, dtype)
 
 
+def is_dense(message: Any) -> bool:
+    """Returns whether a PointCloud2's points follow each other without gaps.
+
+    The data then have one meaning only, whatever `row_step` says. Drivers write
+    0 there, or forget to change it when they remove points.
+    """
+    size = message.width * message.height * message.point_step
+    return bool(len(message.data) == size)
+
+
+def has_wrong_rows(message: Any) -> bool:
+    """Returns whether the `row_step` of a cloud without gaps is wrong."""
+    is_right = message.row_step == message.width * message.point_step
+    return is_dense(message) and not is_right
+
+
 def to_records(message: Any) -> np.ndarray:
     """Returns the points of a message sensor_msgs/msg/PointCloud2 as records.
 
@@ -65,12 +81,16 @@ def to_records(message: Any) -> np.ndarray:
 def _records(message: Any, dtype: np.dtype) -> np.ndarray:
     """Returns the points of a message as records of a dtype."""
     data = np.frombuffer(message.data, dtype=np.uint8)
+    if is_dense(message):
+        return data.view(dtype) if len(data) else np.zeros(0, dtype)
     if message.row_step < message.width * message.point_step:
         raise ValueError("the point cloud's rows overlap")
     if len(data) != message.height * message.row_step:
         raise ValueError(
             f"the point cloud has {len(data)} bytes instead of"
-            f" {message.height} x {message.row_step}"
+            f" {message.height} x {message.row_step} (height x row_step) or"
+            f" {message.width} x {message.height} x {message.point_step} (width"
+            " x height x point_step)"
         )
     rows = data.reshape(message.height, message.row_step)
     used = rows[:, : message.width * message.point_step]

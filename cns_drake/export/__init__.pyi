@@ -1,2 +1,3 @@
 from cns_drake.export.exporting import export_drive as export_drive
+from cns_drake.export.formats import export_formats as export_formats
 from cns_drake.export.marked_drive import MarkedDrive as MarkedDrive

@@ -55,7 +55,38 @@ def _mount_yaml(X_BC: np.ndarray) -> str:
     return yaml.safe_dump(values, sort_keys=False)
 
 
-CNS = Layout(
+LAYOUT = Layout(
+    {
+        "transformation_lidar.yaml": (
+            "pose of the LiDAR in the vehicle's frame: translation [m] and "
+            "rotation (quaternion x y z w)"
+        ),
+        "transformation_imu.yaml": (
+            "pose of the IMU in the vehicle's frame: translation [m] and "
+            "rotation (quaternion x y z w)"
+        ),
+        "<Map>/<Sequence>/gt.csv": (
+            "t, x, y, z, qx, qy, qz, qw: pose of the vehicle's frame (on "
+            "the ground, under the LiDAR; forward, left, up) in the world; "
+            "t in nanoseconds"
+        ),
+        "<Map>/<Sequence>/imu.csv": (
+            "t, qx, qy, qz, qw, wx, wy, wz, ax, ay, az: orientation of the "
+            "IMU in the world; angular velocity [rad/s] and specific force "
+            "[m/s^2] along the axes of the IMU"
+        ),
+        "<Map>/<Sequence>/pcd/<t>.pcd": (
+            "x, y, z [m] and intensity, float32, in the LiDAR's frame at "
+            "the time t; intensities have the unit of the recording"
+        ),
+        "<Map>/<Sequence>/imu.yaml": (
+            "noise of the IMU in Kalibr's format; missing for an IMU "
+            "without noise"
+        ),
+        "<Map>/<Sequence>/scenario.yaml": (
+            "scenario of the drive, if it was simulated"
+        ),
+    },
     _drive_folder,
     _inner_files,
     outer_files=_outer_files,

@@ -7,6 +7,7 @@ final name when it is complete.
 """
 
 from collections.abc import Callable, Iterator, Mapping
+import importlib
 import os
 from pathlib import Path
 import shutil
@@ -29,16 +30,22 @@ from cns_drake.drives import (
     deskewed_scan,
     holds_mcap,
 )
-from cns_drake.export.cns_layout import CNS
-from cns_drake.export.kitti_layout import KITTI, kitti_layout
+from cns_drake.export.formats import ENDING, export_formats
 from cns_drake.export.layout import Layout
-from cns_drake.export.mulran_layout import MULRAN
-from cns_drake.export.tum_layout import TUM
 from cns_drake.recording import to_yaml
 
-_LAYOUTS = {"cns": CNS, "kitti": KITTI, "mulran": MULRAN, "tum": TUM}
 # File that shows that an export wrote a folder of drives.
 _MARKER = "export.yaml"
+
+
+def _layout(format_name: str) -> Layout:
+    module = importlib.import_module(f"{__package__}.{format_name}{ENDING}")
+    return module.LAYOUT
+
+
+def _formats_with(name: str) -> str:
+    """Returns the formats whose layout has something, for error messages."""
+    return " or ".join(n for n in export_formats() if getattr(_layout(n), name))
 
 
 def export_drive(
@@ -55,7 +62,7 @@ def export_drive(
 
     Args:
         recording: path of the recording.
-        format_name: name of the format: `cns`, `kitti`, `mulran` or `tum`.
+        format_name: name of the format, see `export_formats`.
         output: the folder of drives: a new or empty folder, or a folder to
             which this function has already written drives of the same format.
         lidar: name of the LiDAR to export, if the recording has several LiDARs.
@@ -73,17 +80,23 @@ def export_drive(
             if the files cannot be written; or if `absent_in` is given and
             labels are not possible.
     """
-    layout = _LAYOUTS[format_name]
+    layout = _layout(format_name)
     if absent_in is not None and not layout.has_labels:
-        raise InputError(f"--absent-in: {format_name} has no labels; use kitti")
-    if sequence is not None and layout is not KITTI:
-        raise InputError(f"--sequence: {format_name} has no numbers; use kitti")
+        raise InputError(
+            f"--absent-in: {format_name} has no labels; use"
+            f" {_formats_with('has_labels')}"
+        )
+    if sequence is not None:
+        if layout.numbered is None:
+            raise InputError(
+                f"--sequence: {format_name} has no numbers; use"
+                f" {_formats_with('numbered')}"
+            )
+        layout = layout.numbered(f"{sequence:02d}")
     if not holds_mcap(recording):
         raise InputError(f"{recording}: no recording (.mcap) there")
     doing(f"opening {recording}")
     drive = _open_recording(recording, lidar, absent_in)
-    if sequence is not None:
-        layout = kitti_layout(f"{sequence:02d}")
     folder = output / layout.drive_folder(drive)
     outer = {
         output / name: text for name, text in layout.outer_files(drive).items()
@@ -165,7 +178,7 @@ def _claim(output: Path, format_name: str) -> None:
             values = read_yaml(marker)
             found = values.get("format") if isinstance(values, dict) else None
             # A YAML list cannot be a key.
-            if not isinstance(found, str) or found not in _LAYOUTS:
+            if not isinstance(found, str) or found not in export_formats():
                 raise InputError(
                     f"{marker}: not written by an export of cns-drake; give "
                     "another folder"
@@ -181,11 +194,10 @@ def _claim(output: Path, format_name: str) -> None:
                 "empty one"
             )
     make_folder(output)
-    explained = read_yaml(Path(__file__).with_name("layouts.yaml"))
     values = {
         "writer": "cns-drake export",
         "format": format_name,
-        "files": explained[format_name],
+        "files": dict(_layout(format_name).explained),
     }
     write_text(marker, to_yaml(values))
 

@@ -105,7 +105,54 @@ def _pose_rows(X: np.ndarray) -> str:
     return "".join(f"{' '.join(map(repr, row))}\n" for row in rows)
 
 
-def kitti_layout(number: str | None = None) -> Layout:
+_EXPLAINED = {
+    "<NN>": (
+        "number of the drive, plus 100 for the second LiDAR of the "
+        "recording or 200 for the third; or the number that --sequence "
+        "gives"
+    ),
+    "poses/<NN>.txt": (
+        "upper 3 x 4 of the camera's pose, in the camera's frame at the"
+        " first scan; one row for each scan"
+    ),
+    "sequences/<NN>/poses.txt": (
+        "copy of poses/<NN>.txt, which tools for SemanticKITTI read"
+    ),
+    "sequences/<NN>/calib.txt": (
+        "Tr: upper 3 x 4 of the LiDAR's pose in the camera's frame. The"
+        " drive has no camera: the camera's axes (right, down, forward)"
+        " are placed in the LiDAR, and P0 to P3 are the identity"
+    ),
+    "sequences/<NN>/times.txt": ("seconds since the first scan"),
+    "sequences/<NN>/velodyne/<frame>.bin": (
+        "x, y, z [m] and intensity, float32, in the LiDAR's frame at "
+        "the time of the scan. Calibrated intensities have KITTI's "
+        "scale: a byte / 256 in hundredths, at most 0.99. Ideal "
+        "intensities are from 0 to 1"
+    ),
+    "sequences/<NN>/labels/<frame>.label": (
+        "one uint32 for each point: class (id of SemanticKITTI) + 65536"
+        " * instance; 252 to 259 for structures that are absent in "
+        "another stage (absent_in in structures.json)"
+    ),
+    "sequences/<NN>/first_pose.txt": (
+        "upper 3 x 4 of the LiDAR's pose in the world at the first "
+        "scan; all drives of a map have the same world"
+    ),
+    "sequences/<NN>/structures.json": (
+        "table of the instances; with --absent-in, also the other stage"
+        " from which an instance is absent"
+    ),
+    "sequences/<NN>/imu.yaml": (
+        "noise of the IMU in Kalibr's format; missing for an IMU without noise"
+    ),
+    "sequences/<NN>/scenario.yaml": (
+        "scenario of the drive, if it was simulated"
+    ),
+}
+
+
+def _layout(number: str | None = None) -> Layout:
     """Returns the layout of KITTI odometry.
 
     Args:
@@ -118,6 +165,7 @@ def kitti_layout(number: str | None = None) -> Layout:
         return number or _drive_number(drive)
 
     return Layout(
+        _EXPLAINED,
         lambda drive: PurePosixPath("sequences", number_of(drive)),
         _inner_files,
         outer_files=lambda drive: {
@@ -125,10 +173,11 @@ def kitti_layout(number: str | None = None) -> Layout:
         },
         scan_files=_scan_files,
         has_labels=True,
+        numbered=_layout,
     )
 
 
-KITTI = kitti_layout()
+LAYOUT = _layout()
 
 
 def encode_labels(scan: np.ndarray) -> bytes:

@@ -3,7 +3,9 @@
 Frames: world W, vehicle B on the ground, LiDAR S, IMU I.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import json
 from pathlib import PurePosixPath
@@ -25,11 +27,13 @@ _ROUNDING = 1e-9
 class Layout:
     """The files that an export in one format contains for a drive.
 
-    All attributes except the last two are functions that take the drive. Paths
-    are relative to the folder that holds all exported drives, unless stated
-    otherwise.
+    A module NAME_layout of this package has the layout of the format NAME as
+    its constant `LAYOUT`, and is found by this. Functions take the drive, and
+    paths are relative to the folder that holds all exported drives, unless
+    stated otherwise.
 
     Attributes:
+        explained: what `export.yaml` says of each file: path -> content.
         drive_folder: function that returns the folder of the drive.
         inner_files: function that returns the text files inside this folder:
             path in the folder -> text. Scans are not included.
@@ -42,8 +46,11 @@ class Layout:
         shared_outer_files: whether the outer files belong to all drives
             together, and must therefore be the same for all drives.
         has_labels: whether points have labels.
+        numbered: function that returns the layout for a drive with a given
+            number, as text; None for formats without numbers.
     """
 
+    explained: Mapping[str, str]
     drive_folder: Callable[[McapDrive], PurePosixPath]
     inner_files: Callable[[McapDrive], dict[str, str]]
     outer_files: Callable[[McapDrive], dict[str, str]] = lambda drive: {}
@@ -52,6 +59,7 @@ class Layout:
     ) = None
     shared_outer_files: bool = False
     has_labels: bool = False
+    numbered: Callable[[str], Layout] | None = None
 
 
 def checked_name(drive: McapDrive, text: str) -> str:

@@ -25,7 +25,26 @@ def _inner_files(drive: McapDrive) -> dict[str, str]:
     }
 
 
-MULRAN = Layout(
+LAYOUT = Layout(
+    {
+        "<drive>/global_pose.csv": (
+            "t, then the upper 3 x 4 of the pose of MulRan's vehicle, one "
+            "row for each scan; t in nanoseconds. The pose follows from the"
+            " LiDAR's pose by MulRan's calibration, which readers of MulRan"
+            " apply. Coordinates are those of the map, with easting 350,000"
+            " m and northing 4,020,000 m added (UTM, zone 52N)"
+        ),
+        "<drive>/Ouster/<t>.bin": (
+            "x, y, z [m] and intensity, float32, in the LiDAR's frame at "
+            "the time t; only returns; intensities have the unit of the "
+            "recording"
+        ),
+        "<drive>/imu.yaml": (
+            "noise of the IMU in Kalibr's format; missing for an IMU "
+            "without noise"
+        ),
+        "<drive>/scenario.yaml": ("scenario of the drive, if it was simulated"),
+    },
     lambda drive: PurePosixPath(checked_name(drive, drive.name)),
     _inner_files,
     scan_files=lambda _, frame, stamp_ns, scan: {

@@ -33,7 +33,23 @@ def _inner_files(drive: McapDrive) -> dict[str, str]:
     }
 
 
-TUM = Layout(
+LAYOUT = Layout(
+    {
+        "<drive>/base_link.tum": (
+            "timestamp tx ty tz qx qy qz qw: pose of the vehicle's frame "
+            "(on the ground, under the LiDAR; forward, left, up) in the "
+            "world, one row for each message of the odometry; seconds and "
+            "metres"
+        ),
+        "<drive>/lidar.tum": (
+            "timestamp tx ty tz qx qy qz qw: pose of the LiDAR in the "
+            "world, one row for each scan; seconds and metres"
+        ),
+        "<drive>/imu.yaml": (
+            "noise of the IMU in Kalibr's format; missing for an IMU "
+            "without noise"
+        ),
+    },
     lambda drive: PurePosixPath(checked_name(drive, drive.name)),
     _inner_files,
 )

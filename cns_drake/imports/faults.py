@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 # Longer texts are cut [characters].
 _LONGEST_TEXT = 100
+# Use of a part -> how a report calls it.
+_USES = {"read": "read", "shapeless": "ignored, changes no shape"}
 
 
 class FaultCount(NamedTuple):
@@ -30,6 +32,7 @@ class ImportFaults:
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
         self._examples: dict[str, str] = {}
+        self._parts: dict[tuple[str, str], set[str]] = {}
 
     def add(self, kind: str, example: str, number: int = 1) -> None:
         """Adds `number` faults of one kind to the counts.
@@ -51,6 +54,23 @@ class ImportFaults:
         self._counts[kind] -= 1
         if not self._counts[kind]:
             del self._counts[kind], self._examples[kind]
+
+    def note_part(self, element: str, use: str, part: str) -> None:
+        """Notes that objects have a part that is no fault.
+
+        Args:
+            element: kind of the objects, such as `street`.
+            use: what becomes of the part: `read` or `shapeless`.
+            part: name of the part, such as a tag's key.
+        """
+        self._parts.setdefault((element, use), set()).add(_printable(part))
+
+    def parts(self) -> list[str]:
+        """Returns a line for each kind of object and each use of its parts."""
+        return [
+            f"{element}: {_USES[use]}: {' '.join(sorted(names))}"
+            for (element, use), names in sorted(self._parts.items())
+        ]
 
     def rows(self) -> list[FaultCount]:
         """Returns the counts of all kinds of faults, most frequent first."""

@@ -12,10 +12,9 @@ from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 from threadpoolctl import threadpool_limits
 
-from cns_drake.base import InputError, doing, draft_folder, uninterrupted
+from cns_drake.base import InputError, doing, draft_folder
 from cns_drake.city import Mesh, MeshShape
 from cns_drake.imports import map_files, overview
-from cns_drake.imports.cityjson.city import import_cityjson
 from cns_drake.imports.dressing.dressed_city import dress_city
 from cns_drake.imports.drives.cell_graph import CellGraph
 from cns_drake.imports.drives.free_space import FreeSpace, find_free_space
@@ -31,7 +30,7 @@ from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.ground import ground_of, ground_structures
 from cns_drake.imports.grown_city import grow
 from cns_drake.imports.imported_objects import ImportedObject
-from cns_drake.imports.openstreetmap.city import import_openstreetmap
+from cns_drake.imports.map_source import MapSource, source_of
 from cns_drake.imports.openstreetmap.traffic import lane_text_of_streets
 from cns_drake.imports.options import DriveOn, ImportOptions
 from cns_drake.imports.report import ImportReport
@@ -61,8 +60,7 @@ def import_city(
     """Writes a map folder from a file of a real city.
 
     Args:
-        source: CityJSON (.json, .jsonl), OpenStreetMap (.osm, .pbf) or
-            OpenDRIVE (.xodr).
+        source: a file of one of `map_sources`.
         output: the folder to write, which must not exist yet.
         options: the options of the import.
         finish: function that can add files. It is called with the folder and
@@ -77,12 +75,13 @@ def import_city(
         InputError: if the file or the options cannot be used, or the folder
             exists or cannot be written.
     """
-    _check_options(source, output, options)
+    kind = source_of(source)
+    _check_options(kind, source, output, options)
     own = None if options.along is None else [drive_along(options.along)]
     doing(f"reading {source}")
-    if source.suffix == ".xodr":
-        return _import_roads(source, output, options, own, finish)
-    city = _read(source, options)
+    if kind.read is None:
+        return _import_roads(kind, source, output, options, own, finish)
+    city = kind.read(source, options)
     staged = stage_city(source, city, options)
     changes = None
     if options.grow is not None:
@@ -202,25 +201,19 @@ def _report_of(
         dated=staged.dated,
         drives=tuple(drive.length for drive in drives),
         faults=faults.rows(),
+        parts=faults.parts(),
     )
 
 
-def _check_options(source: Path, output: Path, options: ImportOptions) -> None:
+def _check_options(
+    kind: MapSource, source: Path, output: Path, options: ImportOptions
+) -> None:
     """Checks the options before the file is read.
 
     Raises:
         InputError: an option cannot be used; the message names the option.
     """
-    if source.suffix == ".xodr":
-        for option, value, lacking in (
-            ("--years", options.years, "years of construction"),
-            ("--lod", options.lod is not None, "levels of detail"),
-        ):
-            if value:
-                raise InputError(
-                    f"{option}: {source} is a road network, which has no"
-                    f" {lacking}; leave the option out"
-                )
+    kind.check_options(source, options)
     if options.grow is not None and options.years:
         raise InputError(
             "--grow: --years define the stages already; give one of them"
@@ -231,6 +224,7 @@ def _check_options(source: Path, output: Path, options: ImportOptions) -> None:
 
 
 def _import_roads(
+    kind: MapSource,
     source: Path,
     output: Path,
     options: ImportOptions,
@@ -241,34 +235,12 @@ def _import_roads(
 
     `own` are drives that replace the proposed drives; None to propose drives.
     """
-    with uninterrupted():  # This imports the whole city generator.
-        from cns_drake.imports.opendrive.town import build_town
-        from cns_drake.imports.opendrive.town_files import write_town
-
-    town = build_town(source, options, own)
     with draft_folder(output) as draft:
-        report, sizes = write_town(draft, source, town)
+        assert kind.write_town is not None
+        report, sizes = kind.write_town(source, options, own, draft)
         map_files.write_report(draft, report)
         finish(draft, sizes)
     return report
-
-
-def _read(source: Path, options: ImportOptions) -> ForeignCity:
-    """Returns the city in a CityJSON or OpenStreetMap file.
-
-    Raises:
-        InputError: the file is of another format or cannot be used.
-    """
-    if source.suffix in (".json", ".jsonl"):
-        return import_cityjson(source, options.lod, options.year_attribute)
-    if source.suffix not in (".osm", ".pbf"):
-        raise InputError(
-            f"{source}: not CityJSON (.json, .jsonl), OpenStreetMap (.osm,"
-            " .pbf) or OpenDRIVE (.xodr)"
-        )
-    if options.lod is not None:
-        raise InputError(f"--lod: {source} has no levels of detail")
-    return import_openstreetmap(source, options.year_attribute, options.dressed)
 
 
 def drive_along(path: Path) -> WaypointRoute:
@@ -278,7 +250,9 @@ def drive_along(path: Path) -> WaypointRoute:
         InputError: if the file cannot be used, or a bend is too tight.
     """
     points, _ = read_waypoints(path)
-    control = load_waypoint_path(path, POINT_SPACING).points[:, :2]
+    control = load_waypoint_path(
+        path, POINT_SPACING, ground=lambda xy: np.zeros(len(xy))
+    ).points[:, :2]
     driven, radii = driven_path(control)
     radius = radii.min()
     x, y = driven[radii.argmin()]

@@ -196,6 +196,7 @@ def write_report(draft: Path, report: ImportReport) -> None:
         f"{fault.kind}: {fault.number}, such as {fault.example}"
         for fault in report.faults
     ]
+    lines += report.parts
     (draft / REPORT_NAME).write_text("\n".join([*lines, ""]), "utf-8")
 
 

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 import numpy as np
 
+from cns_drake.base import figure_style, save_figure
 from cns_drake.imports.colours import WATER, Rgb
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
@@ -37,6 +38,7 @@ _ROOM_COLOUR = "#ffd92f"
 _ROOM_ALPHA = 0.6
 
 
+@figure_style()
 def draw_overview(
     path: Path,
     objects: Sequence[ImportedObject],
@@ -86,7 +88,7 @@ def draw_overview(
         loc="outside lower center",
         ncols=columns,
     )
-    figure.savefig(path, dpi=_DPI, metadata={"Software": None})
+    save_figure(figure, path, _DPI, metadata={"Software": None})
 
 
 def _draw_objects(

@@ -21,6 +21,8 @@ class ImportReport:
         drives: lengths of the proposed drives [m].
         faults: counts of the repaired and omitted parts of the file, most
             frequent first.
+        parts: lines on the parts of elements that are read, or that change no
+            shape.
     """
 
     kinds: dict[str, int]
@@ -30,3 +32,4 @@ class ImportReport:
     dated: int
     drives: tuple[float, ...]
     faults: list[FaultCount]
+    parts: list[str]

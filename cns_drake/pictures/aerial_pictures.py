@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 import numpy as np
 
+from cns_drake.base import figure_style, make_folder, save_figure
 from cns_drake.pictures.camera_views import View
-from cns_drake.pictures.figure_files import save_figure
 from cns_drake.pictures.stage_scene import StageScene
 from cns_drake.scenarios import Scenario, plan_drive
 
@@ -45,6 +45,7 @@ _COLUMNS = 2
 _PANEL_INCHES = 4.0
 
 
+@figure_style()
 def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     """Draws drives in two columns of panels, seen from above, with north up.
 
@@ -79,7 +80,7 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     pictures: dict[tuple, np.ndarray] = {}
     for axes, (title, positions) in zip(panels, drives.items(), strict=False):
         scenario = scenarios[title]
-        world = (scenario.world_file, scenario.without)
+        world = scenario.world_file, scenario.without, scenario.model_paths
         if world not in pictures:
             pictures[world] = StageScene(*world).photograph(
                 view, _SIDE, _SIDE, haze_length=np.inf
@@ -89,6 +90,7 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
         _draw_route(axes, view, positions)
         _draw_scale_bar(axes, view)
     _draw_key(figure)
+    make_folder(path.parent)
     save_figure(figure, path, dpi=150)
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from matplotlib.figure import Figure
 import numpy as np
 
+from cns_drake.base import figure_style, make_folder, save_figure
 from cns_drake.pictures.camera_views import View
-from cns_drake.pictures.figure_files import save_figure
 from cns_drake.pictures.stage_scene import StageScene
 from cns_drake.recording import FRAME_PERIOD
 from cns_drake.sensors import make_beam_pattern
@@ -20,6 +20,7 @@ _FARTHEST = 100.0
 _SENSOR_HEIGHT = 1.6
 
 
+@figure_style()
 def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
     """Draws stages side by side as a camera sees them.
 
@@ -59,6 +60,7 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
         points, ax=axes, location="bottom", shrink=0.5, aspect=40,
         extend="max", label="distance from the LiDAR [m]",
     )  # fmt: skip
+    make_folder(path.parent)
     save_figure(figure, path, dpi=220)
 
 

@@ -44,13 +44,18 @@ class StageScene:
         scene: the geometry, on which rays can be cast.
     """
 
-    def __init__(self, path: Path, without: Collection[str] = ()):
-        """Loads an SDF world.
+    def __init__(
+        self,
+        path: Path,
+        without: Collection[str] = (),
+        model_paths: Collection[str] = (),
+    ):
+        """Loads an SDF world; the arguments are as for `load_world`.
 
         Raises:
             InputError: the world cannot be loaded.
         """
-        world = load_world(path, without=without)
+        world = load_world(path, without=without, model_paths=model_paths)
         self._geometries = read_perception_geometry(
             world.scene_graph.model_inspector()
         )

@@ -1,6 +1,6 @@
 """Paths along waypoints, for worlds without a road network."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import math
 from pathlib import Path
 
@@ -38,15 +38,19 @@ _SAME_PLACE = 1e-3
 
 
 def load_waypoint_path(
-    path: Path | str, spacing: float, *, u_turns: bool = False
+    path: Path | str,
+    spacing: float,
+    *,
+    u_turns: bool = False,
+    ground: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> LanePath:
     """Returns the path along the waypoints in a file.
 
     Each line of the CSV file contains one waypoint: x, y and, if given, z of
     the vehicle frame in W [m]. The origin of this frame is on the ground.
-    Without the third number, z is 0. If the first line contains the names of
-    the columns, the columns can be in another order, and there can be further
-    columns.
+    Without the third number, `ground` gives z. If the first line contains the
+    names of the columns, the columns can be in another order, and there can be
+    further columns.
 
     The path is the line from waypoint to waypoint, with corners rounded by arcs
     of 8 m radius. Where the waypoints are too close together, the radius is
@@ -60,6 +64,8 @@ def load_waypoint_path(
         u_turns: whether the car turns round in its tightest loop where the path
             turns by more than 150 degrees at a waypoint. The far end of the
             loop is at the waypoint. Without `u_turns`, such a turn is an error.
+        ground: function that returns the heights (N,) of the ground at places
+            (N, 2) in W [m]; by default, a file without z is an error.
 
     Raises:
         InputError: a line of the file is not usable, or the path turns too
@@ -68,6 +74,10 @@ def load_waypoint_path(
     """
     path = Path(path)
     points, lines = read_waypoints(path)
+    if np.isnan(points).any():
+        if ground is None:
+            raise InputError(f"{path}: has no column z")
+        points[:, 2] = ground(points[:, :2])
     names = [f"{path}: line {line}" for line in lines]
     return make_waypoint_path(points, spacing, names, path, u_turns=u_turns)
 
@@ -244,7 +254,8 @@ def read_waypoints(path: Path) -> tuple[np.ndarray, list[int]]:
     """Reads waypoints from a file.
 
     Returns:
-        (N, 3) positions of the waypoints [m]; the line number of each waypoint.
+        (N, 3) positions of the waypoints [m], z is NaN in a file without z; the
+        line number of each waypoint.
 
     Raises:
         InputError: the file cannot be read, or a line is not usable. The
@@ -272,7 +283,7 @@ def read_waypoints(path: Path) -> tuple[np.ndarray, list[int]]:
                     f"{where}: {value} m are more than {_FARTHEST:.0f} m"
                 )
         x, y, *z = map(float, values)
-        points.append((x, y, z[0] if z else 0.0))
+        points.append((x, y, z[0] if z else math.nan))
         lines.append(line)
     if not points:
         raise InputError(f"{path}: the file has no waypoints")

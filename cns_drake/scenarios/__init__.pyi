@@ -3,6 +3,7 @@ from cns_drake.scenarios.drive_table import drive_rows as drive_rows
 from cns_drake.scenarios.drive_table import write_table as write_table
 from cns_drake.scenarios.planning import DrivePlan as DrivePlan
 from cns_drake.scenarios.planning import count_frames as count_frames
+from cns_drake.scenarios.planning import ground_notes as ground_notes
 from cns_drake.scenarios.planning import plan_drive as plan_drive
 from cns_drake.scenarios.provenance import INPUTS_KEY as INPUTS_KEY
 from cns_drake.scenarios.provenance import combined_digest as combined_digest

@@ -171,7 +171,11 @@ def _stage_size(scenario: Scenario) -> tuple[int, int]:
         read_perception_geometry,
     )
 
-    world = load_world(scenario.world_file, without=scenario.without)
+    world = load_world(
+        scenario.world_file,
+        without=scenario.without,
+        model_paths=scenario.model_paths,
+    )
     geometries = read_perception_geometry(world.scene_graph.model_inspector())
     return len({geometry.structure for geometry in geometries}), sum(
         len(geometry.surface.triangles)

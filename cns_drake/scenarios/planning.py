@@ -49,6 +49,21 @@ _AROUND = np.array(
 )
 # Range of these rays [m].
 _SIGHT = 5.0
+# Height of the start of rays that look for the ground, from above everything
+# and from above a path [m].
+_SKY = 2000.0
+_ABOVE_PATH = 2.0
+# Number of points of a path that are compared with the ground.
+_CHECKED = 500
+# Range of the latter rays [m].
+_DEEPEST = 1000.0
+# Rays go on this far below a surface [m], through at most so many surfaces.
+_STEP_BELOW = 0.01
+_MOST_SURFACES = 64
+# A car has room where this height above the ground is free [m].
+_CLEARANCE = 2.0
+# A car is off the ground at a greater height above or below it [m].
+_OFF_GROUND = 0.5
 # Greatest z component of the normal of an obstacle.
 _STEEP = 0.7
 
@@ -114,7 +129,10 @@ class DrivePlan:
         spacing = FINE_SPACING if scenario.driver.departs else POINT_SPACING
         if scenario.waypoints is not None:
             path = load_waypoint_path(
-                scenario.waypoints, spacing, u_turns=scenario.u_turns
+                scenario.waypoints,
+                spacing,
+                u_turns=scenario.u_turns,
+                ground=lambda xy: _ground_heights(scenario, xy),
             )
             source = scenario.waypoints
             cure = "place waypoints farther apart, or leave some out"
@@ -224,7 +242,105 @@ def _obstacles_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
     Raises:
         InputError: the world cannot be loaded.
     """
-    world = load_world(scenario.world_file, without=scenario.without)
+    scene = _scene_of(scenario)
+    p_WR = (points + _HEIGHTS[:, None]).reshape(-1, 3)
+    d_W = np.repeat(_AROUND, len(p_WR), axis=0)
+    hits = scene.cast_rays(p_WR, d_W, _SIGHT, with_normals=True)
+    # The ground is no obstacle.
+    steep = np.isfinite(hits.ranges) & (np.abs(hits.normals_W[:, 2]) < _STEEP)
+    p_WQ = np.tile(p_WR, (len(_AROUND), 1))[steep]
+    p_WQ += hits.ranges[steep, None] * d_W[steep]
+    # One point per centimetre is enough.
+    xy = np.unique(np.round(p_WQ[:, :2], 2), axis=0)
+    return STRtree(np.asarray(shapely.points(xy)))
+
+
+def ground_notes(scenario: Scenario, trajectory: Trajectory) -> tuple[str, ...]:
+    """Returns notes if the car does not drive on the ground of a world.
+
+    Maps have roads, or waypoints with the heights of their ground. Only worlds
+    are therefore checked.
+
+    Raises:
+        InputError: the world cannot be loaded.
+    """
+    if scenario.world is None:
+        return ()
+    times = np.linspace(0.0, trajectory.duration, _CHECKED)
+    path = trajectory.poses(times)[1]
+    start = path + np.array([0.0, 0.0, _ABOVE_PATH])
+    down = np.tile([0.0, 0.0, -1.0], (len(path), 1))
+    ranges = _scene_of(scenario).cast_rays(start, down, _DEEPEST).ranges
+    above = ranges - _ABOVE_PATH
+    is_there = np.isfinite(above)
+    notes = []
+    if not is_there.all():
+        notes.append(
+            f"{scenario.waypoints}: no ground is below"
+            f" {(~is_there).mean():.0%} of the path"
+        )
+    if is_there.any() and np.abs(above[is_there]).max() > _OFF_GROUND:
+        worst = int(np.argmax(np.where(is_there, np.abs(above), 0.0)))
+        x, y, z = path[worst]
+        side = "above" if above[worst] > 0.0 else "below"
+        notes.append(
+            f"{scenario.waypoints}: at {x:.1f}, {y:.1f} the car drives"
+            f" {abs(above[worst]):.2f} m {side} the ground, at z = {z:.2f} m"
+        )
+    return tuple(notes)
+
+
+def _ground_heights(scenario: Scenario, xy: np.ndarray) -> np.ndarray:
+    """Returns the heights (N,) of the ground at places (N, 2) of a world [m].
+
+    The ground is the surface on which a car has room. If there are several, it
+    is the one at z = 0; without any surface, the height is 0.
+
+    Raises:
+        InputError: the world cannot be loaded, or there are several surfaces
+            and none is at z = 0.
+    """
+    scene = _scene_of(scenario)
+    down = np.tile([0.0, 0.0, -1.0], (len(xy), 1))
+    start = np.column_stack([xy, np.full(len(xy), _SKY)])
+    levels: list[list[float]] = [[] for _ in xy]
+    for _ in range(_MOST_SURFACES):
+        ranges = scene.cast_rays(start, down, 2.0 * _SKY).ranges
+        if not np.isfinite(ranges).any():
+            break
+        for number in np.flatnonzero(np.isfinite(ranges)).tolist():
+            start[number, 2] -= ranges[number]
+            levels[number].append(float(start[number, 2]))
+        start[:, 2] -= _STEP_BELOW
+    heights = np.zeros(len(xy))
+    for number, found in enumerate(levels):
+        room = np.diff([_SKY, *found]) < -_CLEARANCE
+        usable = [z for z, free in zip(found, room, strict=True) if free]
+        level = [z for z in usable if abs(z) < _OFF_GROUND]
+        chosen = usable if len(usable) < 2 else level
+        if usable and len(chosen) != 1:
+            x, y = xy[number]
+            some = " and ".join(f"{z:.2f}" for z in usable[:3])
+            raise InputError(
+                f"{scenario.waypoints}: has no column z, and at {x:.1f},"
+                f" {y:.1f} the ground can be at {some} m; add the column z"
+            )
+        # Rays are exact to a tenth of a millimetre here.
+        heights[number] = round(chosen[0], 3) + 0.0 if chosen else 0.0
+    return heights
+
+
+def _scene_of(scenario: Scenario) -> RayCastingScene:
+    """Returns the geometry of a scenario's world, for rays.
+
+    Raises:
+        InputError: the world cannot be loaded.
+    """
+    world = load_world(
+        scenario.world_file,
+        without=scenario.without,
+        model_paths=scenario.model_paths,
+    )
     context = world.plant.CreateDefaultContext()
     inspector = world.scene_graph.model_inspector()
     bodies = {
@@ -238,16 +354,6 @@ def _obstacles_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
             return RigidTransform()
         return bodies[frame].EvalPoseInWorld(context)
 
-    scene = RayCastingScene(
+    return RayCastingScene(
         read_perception_geometry(inspector), world.anchored_frames(), X_WF
     )
-    p_WR = (points + _HEIGHTS[:, None]).reshape(-1, 3)
-    d_W = np.repeat(_AROUND, len(p_WR), axis=0)
-    hits = scene.cast_rays(p_WR, d_W, _SIGHT, with_normals=True)
-    # The ground is no obstacle.
-    steep = np.isfinite(hits.ranges) & (np.abs(hits.normals_W[:, 2]) < _STEEP)
-    p_WQ = np.tile(p_WR, (len(_AROUND), 1))[steep]
-    p_WQ += hits.ranges[steep, None] * d_W[steep]
-    # One point per centimetre is enough.
-    xy = np.unique(np.round(p_WQ[:, :2], 2), axis=0)
-    return STRtree(np.asarray(shapely.points(xy)))

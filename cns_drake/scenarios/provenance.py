@@ -1,5 +1,6 @@
 """All inputs of a recording except its scenario: files, code, libraries."""
 
+from collections.abc import Sequence
 import hashlib
 import json
 from pathlib import Path
@@ -64,7 +65,12 @@ def digest_inputs(
         InputError: a file cannot be read.
     """
     inputs = _input_files(scenario)
-    digests = {name: digest_file(file, watch) for name, file in inputs.items()}
+    digests = {
+        name: digest_file(
+            file, watch, scenario.model_paths if name == "world" else ()
+        )
+        for name, file in inputs.items()
+    }
     if watch and scenario.imu.kalibr is not None:
         watch.record(str(scenario.imu.kalibr))
     kalibr = scenario.imu.describe_kalibr(scenario.fastest_rate)
@@ -118,6 +124,9 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
         for field in ("map", "world", "waypoints")
         if (place := getattr(scenario, field)) is not None
     }
+    if scenario.model_paths:
+        names = tuple(Path(place).name for place in scenario.model_paths)
+        places["model_paths"] = names
     if scenario.imu.kalibr is not None:
         places["imu"] = scenario.imu.replaced(kalibr=KALIBR_FILE)
     if scenario.traffic.fcd is not None:
@@ -140,7 +149,11 @@ def recording_code() -> str:
     )
 
 
-def digest_file(path: Path, watch: FileWatch | None = None) -> str:
+def digest_file(
+    path: Path,
+    watch: FileWatch | None = None,
+    model_paths: Sequence[str] = (),
+) -> str:
     """Returns the SHA-256 digest of a file, or of a model and its files.
 
     A model in SDF or URDF names other files, such as meshes.
@@ -150,13 +163,14 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
         watch: object that records size and time of each file before the file is
             read, so that a later change can be noticed; by default nothing is
             recorded.
+        model_paths: folders in which the models of a world are searched first.
 
     Raises:
         InputError: a file cannot be read.
     """
     check_regular(path)
     digest = hashlib.sha256()
-    found = referenced_files(path, watch or FileWatch())
+    found = referenced_files(path, watch or FileWatch(), model_paths)
     named = [(f"{n} {size}\n", one) for n, (one, size) in sorted(found.items())]
     # The file itself comes last, without its name. Meshes may have any size.
     files: list[tuple[str, Path | str]] = [*named, ("", path)]

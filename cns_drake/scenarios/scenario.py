@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 import operator
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import (
@@ -78,6 +78,12 @@ _ALTERNATIVES: tuple[tuple[str, str, Any, str], ...] = (
         "give either a map and its stage, or a world",
     ),
     (
+        "model_paths",
+        "world",
+        lambda paths, world: world or not paths,
+        "for a world only; the stages of a map have their models beside them",
+    ),
+    (
         "route",
         "world",
         _not_both,
@@ -98,14 +104,6 @@ _ALTERNATIVES: tuple[tuple[str, str, Any, str], ...] = (
         "back on its road",
     ),
 )
-# Field -> fields that are removed when it is set.
-_REPLACED: dict[str, tuple[str, ...]] = {
-    "world": ("map", "stage", "route", "aside"),
-    "map": ("world",),
-    "route": ("waypoints", "u_turns"),
-    "waypoints": ("route", "aside"),
-}
-
 
 # More vehicles or pedestrians than any map can hold.
 _MOST_TRAFFIC = 2000
@@ -318,13 +316,17 @@ class Scenario(Section):
         stage: stage of the map, such as `"01"`.
         world: SDF file of a world to drive in, instead of `map` and `stage`. A
             `world` needs `waypoints`.
+        model_paths: folders in which `model://` and `package://` of the `world`
+            are searched, before the folders in the environment variable
+            GZ_SIM_RESOURCE_PATH.
         without: names of structures to leave out of the world; the names are in
             the map's `structures.csv`.
         title: one line for readers that says what the drive shows.
         route: lanes to follow, road by road. Give either `route` or
             `waypoints`.
         waypoints: CSV file of points for the car to pass. Required with
-            `world`, because an SDF world has no roads.
+            `world`, because an SDF world has no roads. Without a column `z`,
+            the car drives on the ground below the points.
         u_turns: whether the car makes a U-turn where the waypoints lead
             straight back. Without `u_turns`, such waypoints are an error.
         aside: lateral offset of the car from the centreline of its lane,
@@ -351,7 +353,7 @@ class Scenario(Section):
     Example:
         from cns_drake import load_scenario
 
-        scenario = load_scenario("downtown_01").with_lidar_preset("vlp-16")
+        scenario = load_scenario("downtown_01").with_lidar("vlp-16")
     """
 
     name: Name
@@ -359,6 +361,7 @@ class Scenario(Section):
     map: str | None = None
     stage: Name | None = _Optional
     world: str | None = _Optional
+    model_paths: tuple[str, ...] = field_off_by_default(())
     without: tuple[str, ...] = ()
     title: str = ""
     route: Route | None = None
@@ -382,6 +385,14 @@ class Scenario(Section):
     frames: int | None = Field(default=None, ge=1)
     seed: int = Field(default=0, ge=0)
 
+    # A field -> the fields that a change of it removes.
+    replaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "world": ("map", "stage", "route", "aside"),
+        "map": ("world", "model_paths"),
+        "route": ("waypoints", "u_turns"),
+        "waypoints": ("route", "aside"),
+    }
+
     # The file of the scenario, and those of its bases.
     _files: tuple[Path, ...] = PrivateAttr(())
 
@@ -399,7 +410,9 @@ class Scenario(Section):
             raise ValueError(f'not a text; quote it: stage: "{stage:02d}"')
         return stage
 
-    @field_validator("stage", "world", "route", "waypoints", "u_turns")
+    @field_validator(
+        "stage", "world", "model_paths", "route", "waypoints", "u_turns"
+    )
     @classmethod
     def _check_alternatives(cls, value: Any, info: ValidationInfo) -> Any:
         for field, other, fits, fault in _ALTERNATIVES:
@@ -579,15 +592,14 @@ class Scenario(Section):
                 section. Setting `world` removes `map`, `stage`, `route` and
                 `aside`, setting `map` removes `world`, setting `route` removes
                 `waypoints` and `u_turns`, and setting `waypoints` removes
-                `route` and `aside`.
+                `route` and `aside`. Of a LiDAR, setting `unit` removes
+                `preset`, and setting `preset` removes `unit`.
             source: the file or argument that error messages name.
 
         Raises:
             InputError: a field is unknown, or its value is not usable.
         """
-        replaced = [n for field in changes for n in _REPLACED.get(field, ())]
-        values = _merged(self, {**dict.fromkeys(replaced), **changes})
-        scenario = validated(Scenario, values, source)
+        scenario = validated(Scenario, _merged(self, changes), source)
         scenario._files = self._files
         return scenario
 
@@ -627,20 +639,21 @@ class Scenario(Section):
             chosen = chosen.replaced(lane_changes=0.0)
         return self.replaced(driver=chosen)
 
-    def with_lidar_preset(self, preset: str) -> Scenario:
+    def with_lidar(self, unit: str) -> Scenario:
         """Returns the scenario with every LiDAR replaced by another model.
 
         The LiDARs keep their poses and all settings of the measurement.
 
         Args:
-            preset: name of the model's preset, such as `vlp-16`.
+            unit: name of the model's preset, such as `vlp-16`, or the file of
+                its data sheet.
 
         Raises:
-            InputError: there is no such preset.
+            InputError: there is no such preset, or the file is no data sheet.
         """
-        units = self.lidars.items()
+        lidars = self.lidars.items()
         return self.replaced(
-            lidars={name: lidar.with_preset(preset) for name, lidar in units}
+            lidars={name: lidar.with_lidar(unit) for name, lidar in lidars}
         )
 
 
@@ -649,7 +662,9 @@ def _merged(
 ) -> dict[str, Any]:
     """Returns fields with changes; see `Scenario.with_fields`."""
     merged = dict(values)
-    for field, change in changes.items():
+    replaces = getattr(values, "replaces", {})
+    removed = [other for field in changes for other in replaces.get(field, ())]
+    for field, change in {**dict.fromkeys(removed), **changes}.items():
         if change is None:
             merged.pop(field, None)
         elif isinstance(change, Mapping):
@@ -668,5 +683,5 @@ def _fastest_rate(lidars: dict[str, LidarSection]) -> int:
 
 
 def _is_given(value: object) -> bool:
-    """Returns whether a value is neither None, False nor zero."""
-    return value is not None and value != 0
+    """Returns whether a value is neither None, False, zero nor empty."""
+    return value is not None and value not in (0, ())

@@ -163,9 +163,19 @@ def make_paths_absolute(values: dict, path: Path) -> None:
 
     for field in ("map", "world", "waypoints"):
         values |= absolute(values, field)
+    if isinstance(values.get("model_paths"), (list, tuple)):
+        values["model_paths"] = [
+            absolute({"model_paths": place}, "model_paths")["model_paths"]
+            for place in values["model_paths"]
+        ]
     for section, field in (("imu", "kalibr"), ("traffic", "fcd")):
         if isinstance(values.get(section), dict):
             values[section] = absolute(values[section], field)
+    if isinstance(lidars := values.get("lidars"), dict):
+        values["lidars"] = {
+            name: absolute(lidar, "unit") if isinstance(lidar, dict) else lidar
+            for name, lidar in lidars.items()
+        }
 
 
 def check_files(scenario: Scenario, source: object = None) -> None:
@@ -191,6 +201,11 @@ def check_files(scenario: Scenario, source: object = None) -> None:
     ):
         if file is not None and not os.path.isfile(file):
             raise InputError(f"{source}: {field}: {file}: no such file")
+    for folder_of_models in scenario.model_paths:
+        if not os.path.isdir(folder_of_models):
+            raise InputError(
+                f"{source}: model_paths: {folder_of_models}: no such folder"
+            )
     if scenario.imu.kalibr is not None:
         scenario.imu.sample_rate(scenario.fastest_rate)
     has_traffic = not scenario.traffic.is_off
@@ -244,6 +259,8 @@ def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
     for field in ("map", "world", "waypoints"):
         if field in values:
             values[field] = moved(values[field])
+    if "model_paths" in values:
+        values["model_paths"] = [*map(moved, values["model_paths"])]
     traffic = values.get("traffic", {})
     if "fcd" in traffic:
         traffic["fcd"] = moved(traffic["fcd"])

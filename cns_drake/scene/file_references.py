@@ -1,5 +1,6 @@
 """Finds the files to which a model refers."""
 
+from collections.abc import Iterable
 import contextlib
 import os
 from pathlib import Path
@@ -23,13 +24,14 @@ _NAMING = {
 
 
 def referenced_files(
-    model: Path, watch: FileWatch
+    model: Path, watch: FileWatch, model_paths: Iterable[str] = ()
 ) -> dict[str, tuple[str, int]]:
     """Returns the files to which a model refers, directly or indirectly.
 
     Args:
         model: SDF or URDF file of the model.
         watch: records the status of the model and of all files found.
+        model_paths: folders in which models are searched first.
 
     Returns:
         Name -> path of the file and its size [bytes]. The name is the path
@@ -38,7 +40,7 @@ def referenced_files(
     Raises:
         InputError: a file cannot be read.
     """
-    finder = ModelFinder(model)
+    finder = ModelFinder(model, map(Path, model_paths))
     found: dict[str, tuple[str, int]] = {}
     waiting = [str(model)]
     watch.record(str(model))
@@ -48,6 +50,7 @@ def referenced_files(
         for uri in _references(file):
             place = os.path.join(folder, uri)
             name = os.path.relpath(place, model.parent)
+            # A file that is missing now must be noticed when it appears.
             status = watch.record(place)
             if status is None:
                 place = _found_file(finder, uri, folder)

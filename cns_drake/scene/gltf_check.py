@@ -1,13 +1,18 @@
-"""Checks glTF files for contents that Open3D reads wrongly or not at all.
+"""Prepares glTF files for Open3D, which reads some wrongly or not at all.
 
 Specification: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """
 
+import base64
 from collections import Counter
+import json
+from pathlib import Path
 import struct
 from typing import Any
 
-from cns_drake.base import parse_json
+from cns_drake.base import parse_json, read_bytes
+from cns_drake.scene.model_finder import resolve
+from cns_drake.scene.obj_check import LARGEST_FILE
 
 # Prefixes of glTF extensions that do not change shapes.
 _HARMLESS = (
@@ -67,6 +72,42 @@ def check_gltf(content: bytes) -> tuple[str, ...]:
             " are not read; export it without"
         )
     return tuple(f"{number} {what}" for what, number in counts.items())
+
+
+def with_own_buffers(path: Path, content: bytes) -> bytes | None:
+    """Returns a glTF file with its buffers, without looks; None if it has none.
+
+    Open3D does not find buffers whose names have percent escapes, and fails on
+    missing textures. The result is text (`.gltf`).
+
+    Args:
+        path: the file, whose folder has the buffers.
+        content: the file, which `check_gltf` has checked.
+
+    Raises:
+        ValueError: a buffer does not exist.
+        InputError: a buffer cannot be read.
+    """
+    top = parse_json(_json_chunk(content))
+    outside = [
+        one
+        for one in top.get("buffers", [])
+        if not one.get("uri", "data:").startswith("data:")
+    ]
+    if not outside or content[:4] == b"glTF":
+        return None
+    for one in outside:
+        found = resolve(one["uri"], path.parent)
+        if found is None or not found.is_file():
+            raise ValueError(f"its buffer {one['uri']} does not exist")
+        data = base64.b64encode(read_bytes(found, LARGEST_FILE)).decode()
+        one["uri"] = f"data:application/octet-stream;base64,{data}"
+    for key in ("images", "textures", "samplers", "materials"):
+        top.pop(key, None)
+    for mesh in top.get("meshes", []):
+        for primitive in mesh["primitives"]:
+            primitive.pop("material", None)
+    return json.dumps(top).encode()
 
 
 def _json_chunk(content: bytes) -> bytes:

@@ -11,7 +11,7 @@ import struct
 
 from cns_drake.base import read_bytes
 from cns_drake.scene.gltf_check import check_gltf
-from cns_drake.scene.obj_check import LARGEST_FILE
+from cns_drake.scene.obj_check import LARGEST_FILE, obj_notes
 from cns_drake.scene.ply_check import check_ply
 
 # File name extensions of glTF.
@@ -34,8 +34,7 @@ def check_mesh_file(path: Path) -> tuple[str, ...]:
     """Checks a mesh file; returns notes on what is not read, such as lines.
 
     There is one note for each kind of content that is not read. The tuple is
-    empty if everything is read. OBJ files, which `check_obj` checks, and files
-    of other formats have no notes.
+    empty if everything is read, and for files of other formats.
 
     Raises:
         ValueError: the shapes in the file would be misread.
@@ -93,6 +92,7 @@ def _check_stl(content: bytes) -> tuple[()]:
 # File name extension -> function that checks the contents of a file.
 _CHECKS = {
     **dict.fromkeys(GLTF, check_gltf),
+    ".obj": obj_notes,
     ".ply": check_ply,
     ".stl": _check_stl,
     ".dae": _check_collada,

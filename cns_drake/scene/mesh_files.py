@@ -15,11 +15,12 @@ from pydrake.geometry import (
     RefineVolumeMeshIntoVtkFileContents,
 )
 
-from cns_drake.base import InputError
+from cns_drake.base import InputError, read_bytes
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.foreign_meshes import ForeignMeshes
+from cns_drake.scene.gltf_check import with_own_buffers
 from cns_drake.scene.mesh_check import GLTF, check_mesh_file
-from cns_drake.scene.obj_check import check_obj
+from cns_drake.scene.obj_check import LARGEST_FILE, check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 
 # The faces of a tetrahedron, counter-clockwise seen from outside. This holds if
@@ -95,7 +96,12 @@ class MeshFiles:
             raise ValueError("no such mesh file")
         ending = path.suffix.lower()
         check_mesh_file(path)
-        p_GVset, triangles = _READERS.get(ending, self._foreign.read)(path)
+        if ending in _READERS:
+            p_GVset, triangles = _READERS[ending](path)
+        elif ending == ".gltf":
+            p_GVset, triangles = self._read_gltf(path)
+        else:
+            p_GVset, triangles = self._foreign.read(path)
         if len(triangles) == 0:
             raise ValueError("holds no triangles")
         # Drake only warns; a ray caster would read outside its memory.
@@ -105,6 +111,15 @@ class MeshFiles:
             x, y, z = p_GVset.T
             p_GVset = np.stack([x, -z, y], axis=1)
         return TriangleSurface(p_GVset, triangles)
+
+    def _read_gltf(self, path: Path) -> tuple[np.ndarray, np.ndarray]:
+        whole = with_own_buffers(path, read_bytes(path, LARGEST_FILE))
+        if whole is None:
+            return self._foreign.read(path)
+        with tempfile.TemporaryDirectory() as folder:
+            copy = Path(folder) / "mesh.gltf"
+            copy.write_bytes(whole)
+            return self._foreign.read(copy)
 
 
 def _write_mesh(source: MeshSource, folder: Path) -> Path:

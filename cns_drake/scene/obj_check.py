@@ -1,5 +1,6 @@
 """Finds faults in OBJ files that Drake would misread or on which it crashes."""
 
+from collections import Counter
 from pathlib import Path
 import re
 
@@ -9,18 +10,30 @@ from cns_drake.base import read_bytes
 
 # Larger mesh files are refused [bytes].
 LARGEST_FILE = 1 << 28
-# Statements of OBJ with surfaces that are not read.
-_OBJ_SURFACES = re.compile(
-    rb"^[ \t]*(fo|surf|call|bsp|bzp|cdc|cdp|res)[ \t]", re.MULTILINE
-)
+# Statements of OBJ that are read, or that show nothing.
+_READ = (
+    "v", "vt", "vn", "f", "o", "g", "s", "mg", "usemtl", "mtllib", "maplib",
+    "usemap", "bevel", "c_interp", "d_interp", "lod", "shadow_obj",
+    "trace_obj", "end",
+)  # fmt: skip
+# Statements of OBJ with points and lines, which a note counts.
+_NOTED = ("p", "l")
+# Statements of OBJ with surfaces, or that change what others mean.
+_REFUSED = (
+    "fo", "surf", "curv", "curv2", "cstype", "deg", "bmat", "step", "parm",
+    "trim", "hole", "scrv", "sp", "con", "vp", "call", "csh", "bsp", "bzp",
+    "cdc", "cdp", "res", "ctech", "stech",
+)  # fmt: skip
+_STATEMENT = re.compile(rb"^[ \t]*([A-Za-z_]\w*)(?=[ \t\n]|\Z)", re.MULTILINE)
 # If a face refers to a missing vertex, Drake's reader reads outside its memory
 # and may end the process.
 _VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
 # Drake's reader takes what it cannot read in a vertex for 0.
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _NO_VERTEX = re.compile(
-    rb"^[ \t]*v[ \t](?![ \t]*(?:" + _NUMBER + rb"(?:[ \t]+|(?=[\n#]|\Z))){3,8}"
-    rb"(?:[\n#]|\Z))",
+    rb"^[ \t]*v[ \t](?![ \t]*(?:(?:" + _NUMBER + rb"(?:[ \t]+|(?=[\n#]|\Z)))"
+    # With a weight of 1, or with a colour.
+    rb"{3}(?:1(?:\.0*)?[ \t]*|(?:" + _NUMBER + rb"[ \t]*){3})?)(?:[\n#]|\Z))",
     re.MULTILINE,
 )
 _FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
@@ -28,6 +41,33 @@ _FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
 # them.
 _OTHER_INDICES = re.compile(rb"/[^\s]*")
 _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
+
+
+def obj_notes(content: bytes) -> tuple[str, ...]:
+    """Returns notes on statements of an OBJ file that are not read.
+
+    Args:
+        content: the file.
+
+    Raises:
+        ValueError: there are surfaces other than faces; the message names the
+            statement.
+    """
+    counts: Counter[str] = Counter()
+    for word, count in Counter(
+        _STATEMENT.findall(content.replace(b"\r", b"\n"))
+    ).items():
+        name = word.decode("ascii", "replace")
+        if name in _REFUSED:
+            raise ValueError(
+                f"has the statement '{name}' of OBJ, which is not read; export"
+                " it with faces"
+            )
+        if name in _NOTED:
+            counts["points or lines of OBJ ignored"] += count
+        elif name not in _READ:
+            counts[f"statements '{name}' of OBJ ignored"] += count
+    return tuple(f"{count} {what}" for what, count in sorted(counts.items()))
 
 
 def check_obj(path: Path) -> None:
@@ -41,14 +81,13 @@ def check_obj(path: Path) -> None:
     """
     # Drake accepts carriage returns as line ends, too.
     content = read_bytes(path, LARGEST_FILE).replace(b"\r", b"\n")
-    if found := _OBJ_SURFACES.search(content):
-        raise ValueError(
-            f"has the statement '{found[1].decode()}' of OBJ, which is not"
-            " read; export it with faces"
-        )
+    obj_notes(content)
     if found := _NO_VERTEX.search(content):
         number = content.count(b"\n", 0, found.start()) + 1
-        raise ValueError(f"line {number}: a vertex that is not three numbers")
+        raise ValueError(
+            f"line {number}: a vertex that is not three numbers, alone or with"
+            " a weight of 1 or a colour"
+        )
     num_vertices = len(_VERTEX.findall(content))
     faces = b" \n".join(_FACE.findall(content))
     if b"/" in faces:

@@ -7,11 +7,11 @@ in such a world moves.
 """
 
 from collections import Counter
-from collections.abc import Collection, Iterable
 import contextlib
 from dataclasses import dataclass
 import math
 from pathlib import Path
+from urllib.parse import unquote
 from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
 
 import numpy as np
@@ -37,7 +37,11 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from cns_drake.base import InputError
 from cns_drake.scene.model_check import SIZES, lacks_size, read_model
-from cns_drake.scene.model_finder import ModelFinder, model_file
+from cns_drake.scene.model_finder import (
+    ModelFinder,
+    model_file,
+    note_of_missing,
+)
 
 # Elements that are left out -> how a note calls them.
 _SKIPPED = {
@@ -98,8 +102,6 @@ _SHAPES = {
     "drake:ellipsoid": (Ellipsoid, ()),
 }
 # Gazebo's own models, for which no file is needed.
-_SUN = "model://sun"
-_GROUND_PLANE = "model://ground_plane"
 _GROUND = """<model name="ground_plane"><link name="link"><visual name="visual">
 <geometry><plane><normal>0 0 1</normal></plane></geometry></visual></link>
 </model>"""
@@ -115,14 +117,14 @@ _EVERY_FLAG = 0xFFFFFFFF
 
 
 def read_sdf_world(
-    plant: MultibodyPlant, path: Path, model_paths: Iterable[Path] = ()
+    plant: MultibodyPlant, path: Path, finder: ModelFinder
 ) -> tuple[str, ...]:
     """Adds the visuals of a world or model to a plant, all of them static.
 
     Args:
         plant: plant that is registered with a SceneGraph, and not finalized.
         path: the SDF file.
-        model_paths: folders in which `model://` is searched first.
+        finder: finds included models and meshes.
 
     Returns:
         Notes for the user on what is left out.
@@ -139,27 +141,11 @@ def read_sdf_world(
         if root.find("model") is None:
             raise InputError(f"{path}: has no world and no model of SDF")
         world.extend(root)
-    reader = _Reader(path, model_paths)
+    reader = _Reader(path, finder)
     reader.skip("further worlds of the file", len(worlds) - 1)
     reader.add_world(root, world)
     reader.register(plant)
     return reader.notes()
-
-
-def note_of_missing(
-    path: Path, what: str, uris: Collection[str]
-) -> tuple[str, ...]:
-    """Returns a note on the models or meshes of a file that are missing.
-
-    The advice holds for every program and for `load_world`.
-    """
-    if not uris:
-        return ()
-    some = ", ".join(list(uris)[:3]) + (", ..." if len(uris) > 3 else "")
-    return (
-        f"{path}: {len(uris)} {what} not found, and left out: {some}; name "
-        "their folder in the variable GZ_SIM_RESOURCE_PATH",
-    )
 
 
 @dataclass(frozen=True)
@@ -184,9 +170,9 @@ class _Visual:
 class _Reader:
     """One pass over a world and all models that it includes."""
 
-    def __init__(self, path: Path, model_paths: Iterable[Path]):
+    def __init__(self, path: Path, finder: ModelFinder):
         self._path = path
-        self._finder = ModelFinder(path, model_paths)
+        self._finder = finder
         self._skipped: Counter[str] = Counter()
         self._missing: dict[str, Counter[str]] = {
             "models": Counter(),
@@ -342,16 +328,16 @@ class _Reader:
         self, include: Element, target: Element, folder: Path, depth: int
     ) -> None:
         self._count_unknown(include)
-        uri = _local_uri((include.findtext("uri") or "").strip())
+        uri = (include.findtext("uri") or "").strip()
         place = self._finder.find(uri, folder)
+        file = None if place is None else model_file(place)
         model = None
-        if place is not None:
-            file = model_file(place)
+        if file is not None:
             folder = file.parent
             model = self._read_included(file)
-        elif uri.rstrip("/") == _SUN:
+        elif _own_model(uri) == "sun":
             self.skip("lights")
-        elif uri.rstrip("/") == _GROUND_PLANE:
+        elif _own_model(uri) == "ground_plane":
             model = fromstring(_GROUND)
         else:
             self._missing["models"][uri] += 1
@@ -665,12 +651,11 @@ def _numbers(text: str | None) -> list[float]:
     return [float(word) for word in (text or "").split()]
 
 
-def _local_uri(uri: str) -> str:
-    """Returns a local URI for the model that a server's URI names."""
-    if not uri.startswith(("http://", "https://")):
-        return uri
-    _, _, name = uri.rpartition("/models/")
-    return "model://" + name.split("/")[0].strip().lower().replace(" ", "_")
+def _own_model(uri: str) -> str:
+    """Returns the name of the model that a URI names, as Gazebo's own have."""
+    name = unquote(uri).rstrip("/").rpartition("://")[2]
+    name = name.rpartition("/models/")[2].split("/")[0]
+    return name.strip().lower().replace(" ", "_")
 
 
 def _number_in(text: str | None, default: float) -> float:

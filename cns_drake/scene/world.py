@@ -5,7 +5,6 @@ import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 import re
-from xml.etree import ElementTree
 
 from pydrake.geometry import (
     Convex,
@@ -31,15 +30,14 @@ from cns_drake.base import (
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.mesh_check import check_mesh_file
-from cns_drake.scene.model_check import check_model, read_model
+from cns_drake.scene.mjcf_worlds import read_mjcf_world
+from cns_drake.scene.model_check import check_model
 from cns_drake.scene.model_finder import ModelFinder
 from cns_drake.scene.perception_geometry import anchored_frames, check_shape
-from cns_drake.scene.sdf_worlds import note_of_missing, read_sdf_world
+from cns_drake.scene.sdf_worlds import read_sdf_world
 from cns_drake.scene.structure_names import structure_name
 from cns_drake.scene.structure_table import StructureTable, load_structure_table
-
-# Elements of MJCF with shapes that Drake leaves out without a warning.
-_NOT_OF_DRAKE = ("replicate", "attach", "composite", "flexcomp")
+from cns_drake.scene.urdf_worlds import read_urdf_world
 
 
 @dataclass(frozen=True)
@@ -85,8 +83,8 @@ def load_world(
     """Reads a world and, if given, a vehicle.
 
     From an SDF world, only the visuals are kept, at their initial places, and
-    nothing moves; the notes list what is left out. The visuals of URDF are
-    read by Drake, with all joints at zero; MJCF is read by Drake alone.
+    nothing moves; the notes list what is left out. The visuals of URDF and MJCF
+    are read by Drake, with all joints at zero.
 
     Args:
         sdf: SDF, URDF (`.urdf`) or MJCF (`.xml`) file of the world or model.
@@ -156,49 +154,15 @@ def _read_world(
     Raises:
         InputError: the file is missing, cannot be parsed, or has no models.
     """
-    ending = path.suffix.lower()
     _check_text(path)
-    if ending == ".xml":
-        for tag in _NOT_OF_DRAKE:
-            if next(read_model(path).iter(tag), None) is not None:
-                raise InputError(f"{path}: <{tag}> of MJCF is not read")
-        _parse_models(plant, path)
-        return ()
     doing(f"parsing {path.name}")
+    read = _READERS.get(path.suffix.lower(), read_sdf_world)
     with _drake_errors(path):
-        if ending == ".urdf":
-            return _read_urdf(plant, path, model_paths)
-        return read_sdf_world(plant, path, model_paths)
+        return read(plant, path, ModelFinder(path, model_paths))
 
 
-def _read_urdf(
-    plant: MultibodyPlant, path: Path, model_paths: Collection[Path]
-) -> tuple[str, ...]:
-    """Adds the visuals of a URDF file to a plant, without what is not seen."""
-    robot = read_model(path)
-    finder = ModelFinder(path, model_paths)
-    missing = []
-    for link in robot.iterfind("link"):
-        for part in list(link):
-            if part.tag != "visual":
-                link.remove(part)
-        for visual in link.findall("visual"):
-            mesh = visual.find("geometry/mesh")
-            if mesh is None:
-                continue
-            uri = mesh.get("filename", "")
-            found = finder.find(uri, path.absolute().parent)
-            if found is None or not found.is_file():
-                missing.append(uri)
-                link.remove(visual)
-            else:
-                mesh.set("filename", f"file://{found}")
-    for part in list(robot):
-        if part.tag not in ("link", "joint", "material"):
-            robot.remove(part)
-    text = ElementTree.tostring(robot, "unicode")
-    Parser(plant).AddModelsFromString(text, "urdf")
-    return note_of_missing(path, "meshes", missing)
+# File name ending -> reader; all others are read as SDF.
+_READERS = {".urdf": read_urdf_world, ".xml": read_mjcf_world}
 
 
 def _parse_models(

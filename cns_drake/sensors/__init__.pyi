@@ -52,12 +52,11 @@ from cns_drake.sensors.lidar.patterns import SpinningPattern as SpinningPattern
 from cns_drake.sensors.lidar.patterns import (
     make_flash_pattern as make_flash_pattern,
 )
-from cns_drake.sensors.lidar.presets import LIDAR_PRESETS as LIDAR_PRESETS
-from cns_drake.sensors.lidar.presets import (
-    make_beam_pattern as make_beam_pattern,
-)
 from cns_drake.sensors.lidar.ray_queries import RayHits as RayHits
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE as POINT_DTYPE
+from cns_drake.sensors.lidar.sheet_patterns import (
+    make_beam_pattern as make_beam_pattern,
+)
 from cns_drake.sensors.noise_draws import noise_generator as noise_generator
 from cns_drake.sensors.odometry import Odometry as Odometry
 from cns_drake.sensors.odometry import OdometrySensor as OdometrySensor
@@ -69,8 +68,9 @@ from cns_drake.sensors.returns.calibrated import (
     CalibratedReturns as CalibratedReturns,
 )
 from cns_drake.sensors.returns.link_budget import HOPELESS_SNR as HOPELESS_SNR
-from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS as UNIT_SHEETS
-from cns_drake.sensors.returns.unit_sheets import Response as Response
+from cns_drake.sensors.returns.link_budget import (
+    fit_link_budget as fit_link_budget,
+)
 from cns_drake.sensors.returns.weather import Weather as Weather
 from cns_drake.sensors.sensor_config import HIGHEST_RATE as HIGHEST_RATE
 from cns_drake.sensors.sensor_config import Mount as Mount

@@ -38,10 +38,10 @@ from cns_drake.sensors.imu.imu import Imu, add_imu
 from cns_drake.sensors.lidar.adding import add_described_lidar
 from cns_drake.sensors.lidar.config import LidarDescription, LidarSection
 from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from cns_drake.sensors.odometry_config import OdometrySection
 from cns_drake.sensors.sensor_config import HIGHEST_RATE, Section
 from cns_drake.sensors.system_names import check_unused_names
+from cns_drake.units import DEFAULT_PRESET
 
 # Fields of a section that no config has: `X_PB` replaces the mount, and only
 # recordings have a layout.
@@ -72,7 +72,7 @@ class LidarConfig(LidarDescription, PublishedSensor):
 
     The fields are those of a `LidarDescription`, of all sensors (`name`, `X_PB`
     and `lcm_bus`), and the following. Unlike in a scenario, coordinates are not
-    rounded by default.
+    rounded by default. A relative path `unit` starts at the working directory.
 
     Attributes:
         rate: revolutions per second, at most 1000; by default the rate of the
@@ -341,7 +341,7 @@ def ApplyLidarConfig(
         ApplyLidarConfig(LidarConfig(name="roof", rate=10), builder)
     """
     section = _checked_section(config, LidarSection, ("rate",))
-    period = LIDAR_PRESETS[section.preset].pattern.period
+    period = section.sheet.period
     if config.rate is not None:
         period = 1.0 / config.rate
     _check_timing(config, period)
@@ -506,6 +506,8 @@ def _checked_section(
         for name in kind.model_fields
         if name not in (*_LEFT_OUT, *left_out)
     }
+    if given.get("unit") is not None and given["preset"] == DEFAULT_PRESET:
+        given["preset"] = None  # Nobody has given it.
     try:
         return kind.model_validate(given)
     except ValidationError as error:

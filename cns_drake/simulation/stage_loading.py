@@ -8,7 +8,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base import doing
-from cns_drake.scenarios import DrivePlan, Scenario, vehicle_file
+from cns_drake.scenarios import DrivePlan, Scenario, ground_notes, vehicle_file
 from cns_drake.scene import World, load_world
 from cns_drake.traffic import read_lanes
 from cns_drake.transient import change_world
@@ -35,7 +35,11 @@ def load_stage(plan: DrivePlan, *, with_vehicle: bool = True) -> World:
         scenario.world_file,
         vehicle=vehicle_file() if with_vehicle else None,
         without=(*scenario.without, *in_the_way),
+        model_paths=scenario.model_paths,
     )
+    if scenario.world is not None:
+        notes = ground_notes(scenario, plan.trajectory)
+        world = replace(world, notes=(*world.notes, *notes))
     if in_the_way:
         note = f"traffic: {len(in_the_way)} things in its lanes left out"
         world = replace(world, notes=(*world.notes, note))

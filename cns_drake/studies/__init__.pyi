@@ -1,10 +1,17 @@
 from cns_drake.studies.drives.changed_drives import Losses as Losses
 from cns_drake.studies.drives.sampled_drives import DrawnRoute as DrawnRoute
 from cns_drake.studies.drives.sampled_drives import Fleet as Fleet
+from cns_drake.studies.experiments.cause_files import Cause as Cause
+from cns_drake.studies.experiments.cause_files import (
+    shipped_causes as shipped_causes,
+)
 from cns_drake.studies.experiments.experiment import Experiment as Experiment
 from cns_drake.studies.experiments.experiment import MadeMap as MadeMap
 from cns_drake.studies.experiments.experiment import (
     named_programs as named_programs,
+)
+from cns_drake.studies.experiments.experiment_files import (
+    experiment_text as experiment_text,
 )
 from cns_drake.studies.experiments.experiment_files import (
     load_experiment as load_experiment,

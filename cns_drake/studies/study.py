@@ -54,8 +54,13 @@ from cns_drake.studies.pairs.simulated_pairs import (
 from cns_drake.studies.tasks.map_task import DrivenMapTask
 from cns_drake.studies.tasks.seen_task import SeenTask
 from evaluation.drives import sample_frames
-from evaluation.methods import optional_methods
-from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
+from evaluation.methods import known_methods, optional_methods
+from evaluation.recognition import (
+    KEEP_ALL,
+    RetrievalProtocol,
+    checked_keep,
+    choose_metrics,
+)
 from evaluation.results import (
     CAUSE,
     LAST,
@@ -63,8 +68,10 @@ from evaluation.results import (
     OWN,
     QUERIES,
     RESULTS,
+    SETTINGS,
     STAGE,
-    check_chart,
+    chart_factors,
+    check_factors,
     write_page,
 )
 from evaluation.study import (
@@ -142,9 +149,8 @@ def run_study(
         cluster,
         on_note,
     )
-    for chart in experiment.charts:
-        with errors_at(run.source):
-            check_chart(chart)
+    with errors_at(f"{run.source}: metrics"):
+        metrics = choose_metrics(experiment.metrics)
     engine, cities = plan_study(run, maps)
     results, queries = engine.run(cluster)
     return write_page(
@@ -154,6 +160,7 @@ def run_study(
         title=experiment.name,
         about=experiment.about,
         charts=experiment.charts,
+        metrics=metrics,
         experiment_text=experiment.text,
         notes=[one.to_text() for one in _protocols(run)],
         sections=recorded_sections(cities, results, queries, run.output, {})
@@ -186,6 +193,7 @@ def plan_study(
     tasks = made_tasks(_wanted_tasks(run), TASKS, run.source)
     with errors_at(f"{run.source}: methods", "--method: "):
         methods = _choose_variants(experiment)
+    _check_charts(run, methods)
     if experiment.frozen is not None:
         with errors_at(f"{run.source}: frozen"):
             frozen_drives(experiment.frozen)
@@ -289,6 +297,43 @@ def _wanted_tasks(run: ExperimentRun) -> Mapping[str, Mapping[str, Any]]:
     return wanted
 
 
+def _check_charts(
+    run: ExperimentRun,
+    methods: Mapping[str, tuple[MethodChoice, Mapping[str, Any]]],
+) -> None:
+    """Checks the metrics, and the settings of methods, that charts show.
+
+    `load_experiment` has checked all other factors. A setting of a method that
+    this run leaves out is known, too.
+
+    Raises:
+        InputError: there is no such metric, or no such factor.
+    """
+    experiment = run.experiment
+    chosen = {choice.name for choice, _ in methods.values()}
+    factors = [
+        *(n for n in experiment.factor_names if not n.startswith(SETTINGS)),
+        *dict.fromkeys(n for _, columns in methods.values() for n in columns),
+    ]
+    for chart in experiment.charts:
+        with errors_at(run.source):
+            names = [
+                name
+                for name in chart_factors(chart)
+                if name in (chart.get("x"), chart.get("y"))
+                or (
+                    name.startswith(SETTINGS)
+                    and not any(
+                        name.startswith(f"{SETTINGS}{method}.")
+                        for method in {*known_methods()} - chosen
+                    )
+                )
+            ]
+            check_factors(chart, names, factors)
+            with errors_at(f"charts: {chart['kind']}"):
+                choose_metrics([chart[n] for n in ("metric",) if n in chart])
+
+
 def _note_lower_levels(run: ExperimentRun) -> None:
     """Notes the cases that lack the highest level of the experiment."""
     wanted = max(run.experiment.levels or (0,))
@@ -341,7 +386,7 @@ def _check_drives_are_frozen(
 ) -> None:
     """Checks that the drives of each map and level are those of a table."""
     prints: dict[tuple[str, int], list[str]] = {}
-    worlds: dict[Path, str] = {}
+    worlds: dict[tuple, str] = {}
     for some, pairs in zip(maps, changed, strict=True):
         for one in pairs:
             factors = {**some.factors, **one.condition.factors}
@@ -510,25 +555,30 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
 
 
 def drives_fingerprint(
-    compared: ComparedDrives, worlds: dict[Path, str]
+    compared: ComparedDrives, worlds: dict[tuple, str]
 ) -> str:
     """Returns a hash of all drives and of the cities along these drives.
 
     Args:
         compared: the drives.
-        worlds: cache, world file -> digest of the files of its world. This
-            function adds the digests of the worlds of these drives.
+        worlds: cache, world file and folders of models -> digest of the files
+            of the world. This function adds the digests of the worlds of these
+            drives.
 
     Raises:
         InputError: a file of a world cannot be read.
     """
     for drive in compared.drives:
-        if drive.world_file not in worlds:
-            worlds[drive.world_file] = combined_digest(digest_inputs(drive))
+        world = drive.world_file, drive.model_paths
+        if world not in worlds:
+            worlds[world] = combined_digest(digest_inputs(drive))
     return fingerprint(
         {
             "drives": compared.fingerprint(),
-            "worlds": [worlds[one.world_file] for one in compared.drives],
+            "worlds": [
+                worlds[one.world_file, one.model_paths]
+                for one in compared.drives
+            ],
         }
     )
 

@@ -7,6 +7,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 
 from cns_drake.scene import GROUND_CLASSES
+from cns_drake.transient.effect import Effect, Step
 from cns_drake.transient.surroundings import Surroundings
 
 # Cause of these changes in the structure table.
@@ -53,3 +54,6 @@ def move_furniture(around: Surroundings, share: float) -> None:
                 )
                 around.editing.move(piece, X_new, f"new_{piece.name}", _CAUSE)
                 break
+
+
+EFFECT = Effect("furniture", Step.OBJECTS, move_furniture, order=3)

@@ -18,6 +18,7 @@ from cns_drake.city import (
     top_of,
 )
 from cns_drake.scene import tessellate
+from cns_drake.transient.effect import Effect, Step
 from cns_drake.transient.scene_editing import SceneEditing
 from cns_drake.transient.structure_geometry import (
     PartGeometry,
@@ -69,6 +70,9 @@ def limit_heights(around: Surroundings, limit: float) -> None:
         editing.note(
             f"height_limit: no building and no plant is higher than {limit:g} m"
         )
+
+
+EFFECT = Effect("height_limit", Step.SHAPES, limit_heights)
 
 
 def _as_model(

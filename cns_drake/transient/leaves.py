@@ -3,6 +3,7 @@
 import numpy as np
 
 from cns_drake.scene import TriangleSurface
+from cns_drake.transient.effect import Effect, Step
 from cns_drake.transient.surroundings import Surroundings, change_rng
 
 # Cause of these changes in the structure table.
@@ -48,3 +49,6 @@ def thin_leaves(around: Surroundings, share: float) -> None:
             "leaves: no structure of class vegetation has leaves that are "
             "triangles"
         )
+
+
+EFFECT = Effect("leaves", Step.OBJECTS, thin_leaves, order=2)

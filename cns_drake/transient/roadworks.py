@@ -7,6 +7,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city import OBJECTS, assemble, block, pick_key
 from cns_drake.scene import GROUND_CLASSES
+from cns_drake.transient.effect import Effect, Step
 from cns_drake.transient.kerb_stretches import KerbStretch, straight_kerbs
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings
@@ -60,6 +61,9 @@ def put_up_works(around: Surroundings, share: float) -> None:
             if free:
                 _Site(around, stretch, x, length, free[0], rng).build(standing)
                 break
+
+
+EFFECT = Effect("works", Step.OBJECTS, put_up_works, order=5)
 
 
 @dataclass

@@ -8,6 +8,7 @@ import shapely
 from cns_drake.base import sin
 from cns_drake.city import from_above, quartered, turned_up, unit_normals
 from cns_drake.scene import GROUND_CLASSES
+from cns_drake.transient.effect import Effect, Step
 from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.scene_editing import SceneEditing, SurfaceLook
 from cns_drake.transient.structure_geometry import (
@@ -45,16 +46,16 @@ _SPACING = 1.5
 _WAVES = (9.0, 3.7)
 
 
-def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
+def lay_snow(around: Surroundings, depth: float) -> None:
     """Covers surfaces with snow, except roads, plants and thin objects.
 
     Roads are cleared, and get banks of snow along their kerbs.
 
     Args:
         around: surroundings of the drive, which are changed.
-        ground: the ground as it was before any other change.
         depth: depth of the snow [m].
     """
+    ground = around.bare_ground
     editing = around.editing
     for structure in around.structures.values():
         if structure.semantic_class in _BARE:
@@ -80,6 +81,9 @@ def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
         )
     else:
         _lay_banks(around, ground, depth)
+
+
+EFFECT = Effect("snow", Step.COVER, lay_snow)
 
 
 def _is_below_road(part: PartGeometry, ground: GroundSurface) -> bool:

@@ -1,5 +1,7 @@
 """What surrounds a drive: structures, ground, and what is chosen to change."""
 
+from __future__ import annotations
+
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -39,6 +41,8 @@ class Surroundings:
         drive: path of the vehicle, seen from above [m].
         kept_free: area that must stay free of new objects, seen from above [m].
         seed: seed of all random choices.
+        bare: the surroundings before new objects were put up; None if there are
+            none.
     """
 
     editing: SceneEditing
@@ -46,6 +50,12 @@ class Surroundings:
     drive: BaseGeometry
     kept_free: BaseGeometry
     seed: int
+    bare: Surroundings | None = None
+
+    @property
+    def bare_ground(self) -> GroundSurface:
+        """The ground near the drive, without new objects."""
+        return (self.bare or self).ground
 
     @cached_property
     def ground(self) -> GroundSurface:

@@ -19,6 +19,8 @@ poses at the same times, and p_i and q_i the positions of these poses:
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from fractions import Fraction
+import math
 from pathlib import Path
 from typing import Literal
 import warnings
@@ -145,9 +147,7 @@ def trajectory_errors(
             within the drive.
     """
     truth = _true_poses(drive, frame)
-    if not abs(time_offset) <= 1e9:
-        raise InputError(f"--time-offset: {time_offset} s is no usual time")
-    stamps_ns = estimate.stamps_ns + round(time_offset * 1e9)
+    stamps_ns = _shifted(estimate.stamps_ns, time_offset)
     own = truth.stamps_ns
     inside = (stamps_ns >= own[0]) & (stamps_ns <= own[-1])
     if inside.sum() < _LEAST_POSES:
@@ -155,6 +155,7 @@ def trajectory_errors(
             f"{estimate.path}: time: {inside.sum()} poses within that of the"
             f" drive, of {_LEAST_POSES} at least: the estimate spans"
             f" {_seconds_text(stamps_ns)}, {drive.name} {_seconds_text(own)}"
+            f" ({_fitting_offset(estimate.stamps_ns, own)})"
         )
     X_WB, _ = truth.interpolate(stamps_ns[inside], "the estimated pose")
     Y_WB = estimate.X_WB[inside]
@@ -167,6 +168,32 @@ def trajectory_errors(
         float(travelled(truth.X_WB[:, :3, 3])[-1]),
         int((~inside).sum()),
     )
+
+
+def _shifted(stamps_ns: np.ndarray, offset: float) -> np.ndarray:
+    """Returns times [ns], moved by an offset [s].
+
+    Raises:
+        InputError: the offset is not finite, or int64 cannot hold the times.
+    """
+    if not math.isfinite(offset):
+        raise InputError(f"--time-offset: {offset} is not a finite number")
+    # Exact, unlike offset * 1e9: a double of ns since 1970 has steps of 256 ns.
+    offset_ns = round(Fraction(offset) * 10**9)
+    limits = np.iinfo(np.int64)
+    ends = [one + offset_ns for one in stamps_ns[[0, -1]].tolist()]
+    if not limits.min <= ends[0] <= ends[1] <= limits.max:
+        raise InputError(
+            f"--time-offset: {offset:g} s moves the times of the estimate"
+            f" beyond {limits.max * 1e-9:.0f} s"
+        )
+    # The sum fits, even where the offset alone would not.
+    return np.array([one + offset_ns for one in stamps_ns.tolist()], np.int64)
+
+
+def _fitting_offset(estimate_ns: np.ndarray, drive_ns: np.ndarray) -> str:
+    offset_ns = int(drive_ns[0]) - int(estimate_ns[0])
+    return f"both begin together with --time-offset={offset_ns / 1e9:.3f}"
 
 
 def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:

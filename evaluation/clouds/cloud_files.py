@@ -21,7 +21,7 @@ from evaluation.clouds.pcd_files import read_pcd
 from evaluation.clouds.ply_files import read_ply
 from evaluation.clouds.record_reading import read_records
 
-# Least rounding step of float32 coordinates at which surfaces look blurred [m].
+# Least rounding step of coordinates at which surfaces look blurred [m].
 _COARSE_STEP = 0.03
 # A function that reads a file; its second argument is the number of points per
 # block.
@@ -95,30 +95,33 @@ def read_blocks(
     with user_errors(path), value_errors(path):
         check_regular(path)
         read = 0
-        coarse = 0.0
+        is_noted = False
         for points in reader(path, block, on_note):
             check_range(points, FARTHEST, first=read)
             read += len(points)
-            if not coarse and (coarse := _coarse_step(points)):
-                on_note(
-                    f"{path}: so far from the origin float32 has steps of"
-                    f" {coarse:.2g} m; write float64, or from a nearer origin"
-                )
+            if not is_noted and (step_note := _coarse_note(points)):
+                is_noted = True
+                on_note(f"{path}: {step_note}")
             yield points
 
 
-def _coarse_step(points: np.ndarray) -> float:
-    """Returns the step between float32 numbers at the farthest point [m].
+def _coarse_note(points: np.ndarray) -> str:
+    """Returns a note on coordinates whose type is coarse; "" if it is not.
 
-    The result is 0 if this step is too fine to matter.
+    A type is coarse if the step between its numbers is, at the farthest point.
     """
-    farthest = [
-        np.abs(points[axis]).max(where=np.isfinite(points[axis]), initial=0)
-        for axis in "xyz"
-        if points.dtype[axis].str[1:] == "f4"
-    ]
-    step = float(np.spacing(max(farthest, default=np.float32(0.0))))
-    return step if step >= _COARSE_STEP else 0.0
+    steps = {}
+    for axis in "xyz":
+        values = points[axis]
+        farthest = np.abs(values).max(where=np.isfinite(values), initial=0)
+        steps[axis] = float(np.spacing(farthest))
+    axis = max(steps, key=lambda axis: steps[axis])
+    if steps[axis] < _COARSE_STEP:
+        return ""
+    return (
+        f"so far from the origin {points.dtype[axis].name} has steps of"
+        f" {steps[axis]:.2g} m; write float64, or from a nearer origin"
+    )
 
 
 def is_cloud(path: Path) -> bool:

@@ -18,7 +18,7 @@ from evaluation.clouds.record_reading import (
 )
 
 _PCD_TYPES = {"F": "f", "I": "i", "U": "u"}
-_PCD_SIZES = {"f": (2, 4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}
+_PCD_SIZES = {"f": (4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}
 _UNMOVED = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
 # LZF expands three bytes to at most 264. Compressed files are unpacked in
 # memory; larger ones must not be compressed.

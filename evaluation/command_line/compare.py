@@ -42,8 +42,8 @@ def compare(
     Args:
         tables: Tables of results to compare, or folders with a results.csv.
         metric: Metric by which the methods are ranked: auc, r1 or another
-            metric in the tables. An unknown name makes the command list all
-            metrics.
+            metric in the tables, or a Python file that registers a metric of
+            your own. An unknown name makes the command list all metrics.
         protocol: Protocol of the results to compare; own stands for results
             that were measured with changed options. By default results of all
             protocols are used, and each result is compared only with results of
@@ -74,7 +74,7 @@ def compare(
         where = f"mean of {found.conditions or 'its own'} conditions"
         known = any(_spaced_interval(mean.interval) for mean in found.ranked)
         level = "  [95 %]" if known else ""
-        rows.insert(0, ("method", f"{metric}, {where}{level}"))
+        rows.insert(0, ("method", f"{found.metric}, {where}{level}"))
     for compared in found.differences:
         interval = interval_text(compared.difference.interval)
         rows.append(

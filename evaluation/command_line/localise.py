@@ -70,10 +70,10 @@ def localise(
     initial guess is instead the estimated pose of the previous scan, moved by
     the odometry. The results are pose errors and success rates.
 
-    MAP and QUERY are drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
-    odometry, CNS) or point clouds (.pcd .ply .npy .bin). If MAP is a drive, its
-    scans are merged at their ground-truth poses. If QUERY is a point cloud, it
-    counts as one scan, whose ground-truth pose is the origin of the map.
+    MAP and QUERY are drives (MCAP, or as a public data set has them) or point
+    clouds (.pcd .ply .npy .bin). If MAP is a drive, its scans are merged at
+    their ground-truth poses. If QUERY is a point cloud, it counts as one scan,
+    whose ground-truth pose is the origin of the map.
 
     With --estimate, the command localises no scans. It measures the errors of
     poses that another program estimated. MAP is then the drive with the ground
@@ -229,13 +229,14 @@ def _write_results(
     """Writes the tables and, of a tracked drive, the picture."""
     from evaluation.localisation import write_rows
 
+    write_rows(rows, output / "localisation.csv")
+    terminal.note(f"wrote {output / 'localisation.csv'}")
+    options.write_tables(engine)
+    # A picture that fails takes no number along.
     if track:
         from evaluation.results import draw_track
 
         draw_track(rows, output / "track")
-    write_rows(rows, output / "localisation.csv")
-    terminal.note(f"wrote {output / 'localisation.csv'}")
-    options.write_tables(engine)
 
 
 def _check_together(

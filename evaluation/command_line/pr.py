@@ -81,8 +81,8 @@ def pr(
 
     The command measures how well a method finds the place of each scan along
     QUERY among the places of DATABASE. QUERY and DATABASE are recorded drives
-    (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI odometry, CNS). Drives in
-    different world frames are aligned first.
+    (MCAP, or as a public data set has them). Drives in different world frames
+    are aligned first.
 
     Args:
         database: Recorded drive that provides the known places.

@@ -36,11 +36,11 @@ def tcr(
 ) -> None:
     """Measure how much changed between two drives or maps.
 
-    A and B are recorded drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
-    odometry, CNS) or maps (.pcd .ply .npy .bin). The main result, TCR_sym, is 0
-    if nothing changed and 1 if everything changed. The command also prints two
-    directed ratios: the share of A that is missing in B, and the share of B
-    that is missing in A. Drives in different world frames are aligned first.
+    A and B are recorded drives (MCAP, or as a public data set has them) or maps
+    (.pcd .ply .npy .bin). The main result, TCR_sym, is 0 if nothing changed and
+    1 if everything changed. The command also prints two directed ratios: the
+    share of A that is missing in B, and the share of B that is missing in A.
+    Drives in different world frames are aligned first.
 
     Args:
         source: Drive or map before the change.
@@ -52,10 +52,11 @@ def tcr(
         paths: Compare the paths and speeds of the two drives, instead of
             measuring change. Every 5 m along A, the command measures how B
             differs from A in lateral offset, lane, heading and height. The
-            command also prints the speeds of each car, and the share of the
-            time during which the car stands. For comparison, the command prints
-            the same numbers for two pairs of real drives: a pair of Boreas, 28
-            days apart, and the pair KAIST 01 and 02 of MulRan.
+            median difference of the heights is subtracted. The command also
+            prints the speeds of each car, and the share of the time during
+            which the car stands. For comparison, the command prints the same
+            numbers for two pairs of real drives: a pair of Boreas, 28 days
+            apart, and the pair KAIST 01 and 02 of MulRan.
     """
     if paths:
         commands.check_only_with(context, "paths", _WITH_PATHS)

@@ -15,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cns_drake.drives import as_given
+from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
@@ -65,7 +67,7 @@ class BoreasDrive(FileDrive):
         X_WS, spanned = trajectory.interpolate(stamps_ns)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         super().__init__(
-            name=path.resolve().name,
+            name=as_given(path).name,
             world_frame=f"boreas/{'enu' if local else 'utm-17n'}",
             files=kept,
             stamps_ns=stamps_ns[spanned],
@@ -90,3 +92,11 @@ def _read_scan(path: Path, stamp_ns: int) -> np.ndarray:
 def holds_boreas(path: Path) -> bool:
     """Returns whether a folder looks like a drive of Boreas."""
     return (path / _POSES).is_file()
+
+
+DATA_SET = DataSet(
+    "Boreas",
+    holds_boreas,
+    BoreasDrive,
+    ("the folder with `lidar` and `applanix`"),
+)

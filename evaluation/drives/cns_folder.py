@@ -27,8 +27,9 @@ from cns_drake.base import (
     read_text,
     value_errors,
 )
-from cns_drake.drives import IMU_DTYPE, SCENARIO, read_scenario
+from cns_drake.drives import IMU_DTYPE, SCENARIO, as_given, read_scenario
 from evaluation.clouds import read_cloud
+from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import FileDrive, first_existing, list_stamped
 from evaluation.drives.text_tables import read_stamped_rows
 from evaluation.drives.trajectories import pose_matrices, read_quaternions
@@ -89,16 +90,16 @@ class CnsFolderDrive(FileDrive):
         files, stamps_ns = list_stamped(folder, ".pcd")
         trajectory = read_quaternions(path / _POSES, ",")
         X_WB = trajectory.at(stamps_ns, _TOLERANCE_NS)
-        resolved = path.resolve()
         self._imu_path = path / _IMU
-        mount = _find_mount(resolved, chosen)
-        name = resolved.name
+        mount = _find_mount(path, chosen)
+        place = as_given(path)
+        name = place.name
         scenario = read_scenario(path)
-        if mount is not None and mount.parent == resolved.parent.parent:
-            name = f"{resolved.parent.name}_{resolved.name}".lower()
+        if mount is not None and mount.parent.samefile(place.parent.parent):
+            name = f"{place.parent.name}_{place.name}".lower()
             scenario = scenario or {
-                "map": resolved.parent.name.lower(),
-                "stage": resolved.name,
+                "map": place.parent.name.lower(),
+                "stage": place.name,
             }
         super().__init__(
             name=str((scenario or {}).get("name", name)),
@@ -144,8 +145,21 @@ def holds_cns(path: Path) -> bool:
     return (path / _POSES).is_file() or (path / _FOLDERS[0]).is_dir()
 
 
+DATA_SET = DataSet(
+    "CNS",
+    holds_cns,
+    CnsFolderDrive,
+    ("`<Map>/<NN>`, as published or exported"),
+    is_nested=True,
+)
+
+
 def _find_mount(path: Path, notes: list[str]) -> Path | None:
-    folders = (path, path.parent, path.parent.parent)
+    folders = [
+        folder
+        for place in (as_given(path), path.resolve())
+        for folder in (place, place.parent, place.parent.parent)
+    ]
     return first_existing(
         [folder / _MOUNT for folder in folders if is_there(folder / _MOUNT)],
         notes,

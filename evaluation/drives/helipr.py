@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base import InputError
+from cns_drake.drives import LidarField, as_given
+from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
@@ -62,7 +64,12 @@ _RECORDS = {
 }
 # Records of Aeva up to this time have no intensity [ns].
 _AEVA_CHANGE_NS = 1691936557946849179
-_UNITS = {"Ouster": "os2-128", "Velodyne": "vlp-16", "Avia": "avia"}
+# The Ouster is an OS2 with 128 channels over 22.5 deg (its data sheet).
+_UNITS: dict[str, str | LidarField] = {
+    "Ouster": LidarField(128, -11.25, 11.25),
+    "Velodyne": "vlp-16",
+    "Avia": "avia",
+}
 _NUM_RINGS = {"Ouster": 128, "Velodyne": 16}
 
 
@@ -87,7 +94,7 @@ class HeliprDrive(FileDrive):
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
         """
-        is_chosen = lidar is not None or _is_lidar_folder(path.resolve())
+        is_chosen = lidar is not None or _lidar_folder(path) is not None
         drive, lidar = _choose(path, lidar)
         there = _lidars(drive)
         chosen: tuple[str, ...] = ()
@@ -103,11 +110,11 @@ class HeliprDrive(FileDrive):
         X_US, spanned = trajectory.interpolate(stamps_ns)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         X_WS = to_world(X_US, trajectory.path) if in_utm else X_US
-        drive = drive.resolve()
+        session = as_given(drive).name
         super().__init__(
-            name=f"{drive.name}_{lidar}",
-            session=drive.name,
-            world_frame=f"helipr{f'/{DATUM}' if in_utm else drive}",
+            name=f"{session}_{lidar}",
+            session=session,
+            world_frame=f"helipr{f'/{DATUM}' if in_utm else drive.resolve()}",
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=X_WS,
@@ -145,13 +152,28 @@ def read_helipr_scan(
 
 def holds_helipr(path: Path) -> bool:
     """Returns whether a folder is a drive of HeLiPR, or one LiDAR of it."""
-    return _is_lidar_folder(path.resolve()) or bool(_lidars(path))
+    return _lidar_folder(path) is not None or bool(_lidars(path))
 
 
-def _is_lidar_folder(path: Path) -> bool:
-    return (
-        path.is_dir() and path.parent.name == _SCANS and path.name in _RECORDS
-    )
+DATA_SET = DataSet(
+    "HeLiPR",
+    holds_helipr,
+    HeliprDrive,
+    (
+        "the folder with `LiDAR` and `LiDAR_GT`; to choose one of its "
+        "LiDARs, the LiDAR's folder, such as `LiDAR/Avia`"
+    ),
+    has_lidars=True,
+)
+
+
+def _lidar_folder(path: Path) -> Path | None:
+    """Returns the folder of one LiDAR with its drive above it, if it is one."""
+    for place in (as_given(path), path.resolve()):
+        of_lidar = place.parent.name == _SCANS and place.name in _RECORDS
+        if of_lidar and place.is_dir():
+            return place
+    return None
 
 
 def _lidars(drive: Path) -> list[str]:
@@ -160,9 +182,9 @@ def _lidars(drive: Path) -> list[str]:
 
 def _choose(path: Path, lidar: str | None) -> tuple[Path, str]:
     """Returns the folder of the drive and the name of the LiDAR."""
-    resolved = path.resolve()
-    if _is_lidar_folder(resolved):
-        return resolved.parent.parent, resolved.name
+    folder = _lidar_folder(path)
+    if folder is not None:
+        return folder.parent.parent, folder.name
     there = _lidars(path)
     if lidar is None:
         lidar = there[0] if len(there) == 1 else "Ouster"

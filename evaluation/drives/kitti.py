@@ -41,7 +41,8 @@ from cns_drake.base import (
     read_text,
     value_errors,
 )
-from cns_drake.drives import SCENARIO, index_instances, read_scenario
+from cns_drake.drives import SCENARIO, as_given, index_instances, read_scenario
+from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import BinDrive, first_existing, read_packed
 from evaluation.drives.text_tables import (
     check_increasing,
@@ -118,7 +119,7 @@ class KittiDrive(BinDrive):
                 " taken as those of the LiDAR"
             )
         X_WS = poses.inverse(X_CS) @ X_C0C @ X_CS
-        name = path.resolve().name
+        name = as_given(path).name
         # Drives of one name in two folders have two world frames.
         world_frame = f"kitti{path.resolve()}"
         first_pose = path / _FIRST_POSE
@@ -192,6 +193,20 @@ def holds_kitti(path: Path) -> bool:
     return (path / _SCANS).is_dir()
 
 
+DATA_SET = DataSet(
+    "KITTI odometry",
+    holds_kitti,
+    KittiDrive,
+    (
+        "`sequences/NN` of KITTI odometry or SemanticKITTI; the poses must "
+        "be in `poses/NN.txt` next to `sequences`, or in `poses.txt` next "
+        "to `velodyne`"
+    ),
+    is_nested=True,
+    needs_scenario=True,
+)
+
+
 def _numbered_files(path: Path) -> tuple[list[Path], list[int]]:
     """Returns the scan files of a drive in order, and the scans' numbers."""
     folder = path / _SCANS
@@ -251,12 +266,14 @@ def _rows_of_scans(
 
 
 def _poses_path(path: Path, notes: list[str]) -> Path:
-    resolved = path.resolve()
-    common = resolved.parent.parent / "poses" / f"{resolved.name}.txt"
-    found = first_existing([common, path / "poses.txt"], notes)
+    given, resolved = (
+        one.parent.parent / "poses" / f"{one.name}.txt"
+        for one in (as_given(path), path.resolve())
+    )
+    found = first_existing([given, path / "poses.txt", resolved], notes)
     if found is None:
         raise InputError(
-            f"{path}: KITTI: no poses, neither ../../poses/{resolved.name}.txt"
+            f"{path}: KITTI: no poses, neither ../../poses/{given.name}"
             " nor poses.txt"
         )
     return found

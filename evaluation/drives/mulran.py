@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base import InputError
-from cns_drake.drives import SCENARIO, X_BS, read_scenario
+from cns_drake.drives import SCENARIO, X_BS, as_given, read_scenario
+from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     BinDrive,
     first_existing,
@@ -68,7 +69,7 @@ class MulranDrive(BinDrive):
         X_UB, spanned = trajectory.interpolate(stamps_ns)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         notes = (*chosen, *notes)
-        name = path.resolve().name
+        name = as_given(path).name
         local = is_local(trajectory.X_WB)
         if local:
             notes += (
@@ -109,6 +110,17 @@ class MulranDrive(BinDrive):
 def holds_mulran(path: Path) -> bool:
     """Returns whether a folder looks like a drive of MulRan."""
     return (path / _POSES).is_file() or _scan_folder(path, []) is not None
+
+
+DATA_SET = DataSet(
+    "MulRan",
+    holds_mulran,
+    MulranDrive,
+    (
+        "the folder with `global_pose.csv` (UTM or local coordinates) and "
+        "`Ouster`"
+    ),
+)
 
 
 def _scan_folder(path: Path, notes: list[str]) -> Path | None:

@@ -15,6 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base import InputError, poses
+from cns_drake.drives import as_given
+from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
@@ -77,7 +79,7 @@ class NcltDrive(FileDrive):
         files, stamps_ns = list_stamped(
             path / _SCANS, ".bin", parse_microseconds
         )
-        name = path.resolve().name
+        name = as_given(path).name
         chosen: list[str] = []
         trajectory, unknown = read_angles(_poses_path(path, chosen))
         X_NB, spanned = trajectory.interpolate(stamps_ns)
@@ -98,6 +100,18 @@ class NcltDrive(FileDrive):
 def holds_nclt(path: Path) -> bool:
     """Returns whether a folder looks like a session of NCLT."""
     return (path / _SCANS).is_dir() or (path / _HITS).is_file()
+
+
+DATA_SET = DataSet(
+    "NCLT",
+    holds_nclt,
+    NcltDrive,
+    (
+        "the folder with `velodyne_sync`, such as `2012-01-08`; "
+        "`groundtruth_2012-01-08.csv` must be in this folder, next to it, "
+        "or in `../ground_truth`"
+    ),
+)
 
 
 def read_nclt_scan(path: Path) -> np.ndarray:
@@ -123,14 +137,15 @@ def read_nclt_scan(path: Path) -> np.ndarray:
 
 
 def _poses_path(path: Path, notes: list[str]) -> Path:
-    resolved = path.resolve()
-    name = f"groundtruth_{resolved.name}.csv"
-    beside = resolved.parent
-    folders = (path, beside, beside / "ground_truth")
-    found = first_existing([folder / name for folder in folders], notes)
+    candidates = [
+        folder / f"groundtruth_{place.name}.csv"
+        for place in (as_given(path), path.resolve())
+        for folder in (path, place.parent, place.parent / "ground_truth")
+    ]
+    found = first_existing(candidates, notes)
     if found is None:
         raise InputError(
-            f"{path}: NCLT: no {name}, neither in it nor beside it nor in"
-            " ../ground_truth"
+            f"{path}: NCLT: no {candidates[0].name}, neither in it nor beside"
+            " it nor in ../ground_truth"
         )
     return found

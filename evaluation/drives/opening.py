@@ -1,10 +1,14 @@
 """Opening a recorded drive with the reader for its format."""
 
+from collections.abc import Mapping
+import functools
+import importlib
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import InputError, doing, listed
+from cns_drake.base import InputError, doing, family_members, listed
 from cns_drake.drives import Drive
+from evaluation.drives.data_set import DataSet
 
 
 def open_drive(
@@ -14,9 +18,8 @@ def open_drive(
 
     Args:
         path: an .mcap file; a folder with such a file, as cns-drake and rosbag2
-            write it; or a drive's folder, as MulRan, HeLiPR, NCLT, Boreas,
-            KITTI odometry or CNS publish it. `LiDAR/<name>` in a folder of
-            HeLiPR chooses the LiDAR.
+            write it; or a drive's folder, as one of `data_sets` publishes it.
+            `LiDAR/<name>` in a folder of HeLiPR chooses the LiDAR.
         lidar: name of the LiDAR to read, if the recording has several LiDARs.
         columns: number of float32 values per point in `.bin` files of KITTI and
             MulRan; by default the number is guessed from the values.
@@ -35,19 +38,15 @@ def open_drive(
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
     doing(f"opening {path.name}")
-    fitting = find_readers(path)
-    from cns_drake.drives import McapDrive
-    from evaluation.drives.helipr import HeliprDrive
-
+    fitting = find_data_sets(path)
     if len(fitting) > 1:
-        names = ", ".join(reader.__name__ for reader in fitting)
+        names = ", ".join(one.title for one in fitting)
         raise InputError(f"{path}: files of several formats ({names})")
-    if fitting and fitting[0] in (McapDrive, HeliprDrive):
-        return fitting[0](path, lidar)
-    if fitting and lidar is not None:
-        raise InputError(f"{path}: has one LiDAR, not a '{lidar}'")
     if fitting:
-        return fitting[0](path, columns)
+        found: Any = fitting[0]
+        if not found.has_lidars and lidar is not None:
+            raise InputError(f"{path}: has one LiDAR, not a '{lidar}'")
+        return found.open(path, lidar if found.has_lidars else columns)
     if path.is_dir() and any(path.glob("*.mcap.part")):
         raise InputError(
             f"{path}: the recording was not finished; simulate the drive again"
@@ -58,34 +57,25 @@ def open_drive(
             f"{file}: the whole recording is compressed (rosbag2's mode"
             " `file`); uncompress it first"
         )
+    titles = [one.title for one in data_sets().values() if one.title != "MCAP"]
     raise InputError(
         f"{path}: not a recorded drive (a folder with an .mcap file, or"
-        " one, or a drive of MulRan, HeLiPR, NCLT, Boreas, KITTI odometry or"
-        " CNS)"
+        f" one, or a drive of {', '.join(titles[:-1])} or {titles[-1]})"
     )
 
 
-def find_readers(path: Path) -> list[Any]:
-    """Returns the drive classes whose format a file or folder has."""
-    # Imported here: the readers' libraries are slow to load, and a map file
+@functools.cache
+def data_sets() -> Mapping[str, DataSet]:
+    """Returns name -> data set; the name is that of its module."""
+    # Imported late: the readers' libraries are slow to load, and a map file
     # needs none of them.
-    from cns_drake.drives import McapDrive, holds_mcap
-    from evaluation.drives import (
-        boreas,
-        cns_folder,
-        helipr,
-        kitti,
-        mulran,
-        nclt,
-    )
+    members = family_members(str(__package__), "DATA_SET = ")
+    return {
+        name: importlib.import_module(module).DATA_SET
+        for name, module in members.items()
+    }
 
-    readers = (
-        (holds_mcap, McapDrive),
-        (mulran.holds_mulran, mulran.MulranDrive),
-        (helipr.holds_helipr, helipr.HeliprDrive),
-        (nclt.holds_nclt, nclt.NcltDrive),
-        (boreas.holds_boreas, boreas.BoreasDrive),
-        (kitti.holds_kitti, kitti.KittiDrive),
-        (cns_folder.holds_cns, cns_folder.CnsFolderDrive),
-    )
-    return [reader for holds, reader in readers if holds(path)]
+
+def find_data_sets(path: Path) -> list[DataSet]:
+    """Returns the data sets whose layout a file or folder has."""
+    return [one for one in data_sets().values() if one.holds(path)]

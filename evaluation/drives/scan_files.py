@@ -37,7 +37,7 @@ class FileDrive(Drive):
         notes: tuple[str, ...] = (),
         datum: str | None = None,
         scenario: Mapping | None = None,
-        unit: str | None = None,
+        unit: str | LidarField | None = None,
         session: str | None = None,
     ):
         """Describes a drive of N >= 1 scans.
@@ -57,7 +57,8 @@ class FileDrive(Drive):
             datum: name of the survey grid in which W lies; None if there is
                 none.
             scenario: see `evaluation.drives.Drive.scenario`.
-            unit: name of the LiDAR's unit, if the data set has only one.
+            unit: the LiDAR, if the data set has only one, as in
+                `cns_drake.drives.lidar_field`.
             session: see `evaluation.drives.Drive.session`; by default the name.
         """
         self.name = name
@@ -180,20 +181,21 @@ def first_existing(candidates: Iterable[Path], notes: list[str]) -> Path | None:
     If other files or folders exist as well and differ from the first, a note is
     added to `notes`.
     """
-    there = [candidate for candidate in candidates if candidate.exists()]
+    there: list[Path] = []
+    for candidate in candidates:
+        if candidate.exists() and not any(map(candidate.samefile, there)):
+            there.append(candidate)
     if not there:
         return None
     first, *others = there
-    others = [other for other in others if not _is_same(first, other)]
+    others = [other for other in others if not _are_alike(first, other)]
     if others:
         named = ", ".join(map(str, others))
         notes.append(f"{first}: read; not read: {named}")
     return first
 
 
-def _is_same(first: Path, second: Path) -> bool:
-    if first.samefile(second):
-        return True
+def _are_alike(first: Path, second: Path) -> bool:
     both = first.is_file() and second.is_file()
     return both and filecmp.cmp(first, second, shallow=False)
 

@@ -38,7 +38,7 @@ from evaluation.localisation.settings import (
     SMALL_GICP_KINDS,
     Settings,
 )
-from evaluation.methods import run_module, with_named_faults
+from evaluation.methods import as_users_code, run_module
 
 # An alignment ends when a step is below both of these [m, rad].
 _LEAST_MOVE = 1e-4
@@ -258,7 +258,7 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
             f" FILE.py){did_you_mean(method, METHODS)}"
         )
     path = Path(method)
-    function = with_named_faults(_function_of_file(path), path)
+    function = as_users_code(_function_of_file(path), path)
     return partial(_by_own, function, path)
 
 

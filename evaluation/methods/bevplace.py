@@ -348,6 +348,9 @@ class BevPlace(Network):
     The descriptor (8192,) of a cloud whose image is empty is NaN.
     """
 
+    title = "BEVPlace"
+    source = "Luo et al.: ICCV 2023"
+    order = 10
     sees_images = True
     describe_time = 0.85
     shapes = SHAPES

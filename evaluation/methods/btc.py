@@ -413,6 +413,11 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     of a loop is not applied.
     """
 
+    title = "BTC"
+    style = ("#D55E00", "--", "s")
+    source = "Yuan et al.: T-RO 2024"
+    standard = True
+    order = 4
     Config = BtcConfig
     skips_places = True
     divides = True

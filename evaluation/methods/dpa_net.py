@@ -168,5 +168,8 @@ def _deformable_attention(
 class DpaNet(CloudNetwork):
     """The place-recognition method DPA-Net."""
 
+    title = "DPA-Net"
+    source = "Park, Kim, Jeon, Kwon, Lee, Lee: RA-L 2026"
+    order = 10
     shapes = DPA_NET_SHAPES
     infer = staticmethod(dpa_net)

@@ -479,6 +479,10 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     integers, so that scores are the same on every processor.
     """
 
+    title = "Layered overlap"
+    style = ("#E69F00", "-", "v")
+    standard = True
+    order = 5
     Config = LayeredOverlapConfig
     skips_places = True
     sees_images = True

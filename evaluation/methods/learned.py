@@ -198,6 +198,10 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
     over the relative heading.
     """
 
+    title = "Learned"
+    style = ("#56B4E9", "--", "P")
+    standard = True
+    order = 6
     Config = LearnedConfig
     skips_places = True
     divides = True

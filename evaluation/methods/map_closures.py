@@ -37,11 +37,10 @@ _ABOVE_ALL_PLACES = 1 << 17
 class MapClosuresConfig(MethodConfig):
     """Settings of MapClosures; the defaults are from the package.
 
-    The height of the sensor is not used: the package finds the ground.
+    The height of the sensor is not used: the package finds the ground. By
+    default, the `middle` of the merged scans stands for a `place`.
 
     Attributes:
-        place: which of the merged scans stands for a place, `middle` or
-            `first`.
         density_map_resolution: length of a pixel, and of the voxels to which
             local maps are downsampled [m].
         density_threshold: density below which a pixel is empty, as a fraction
@@ -86,6 +85,9 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
     LiDAR, and as much behind it.
     """
 
+    title = "MapClosures"
+    source = "Gupta et al.: ICRA 2024"
+    order = 10
     Config = MapClosuresConfig
     skips_places = True
     config: MapClosuresConfig

@@ -2,13 +2,14 @@
 
 import abc
 from collections.abc import Sequence
+import contextlib
 from pathlib import Path
 from typing import ClassVar, Generic, Literal, TypeVar
 
 import numpy as np
 from pydantic import ConfigDict, NonNegativeFloat
 
-from cns_drake.base import InputError, InputModel
+from cns_drake.base import InputError, InputModel, poses
 from cns_drake.drives import LidarField
 
 Descriptor = TypeVar("Descriptor")
@@ -59,6 +60,14 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
     Attributes:
         name: name of the method on the command line.
+        title: name of the method in tables and charts, as its authors write it;
+            by default `name`.
+        style: colour (`#RRGGBB`), line style and marker in charts, in the terms
+            of Matplotlib; by default one of several that no other method has.
+        source: publication of the method; empty for one that is not published.
+        standard: whether a shipped method runs by default.
+        order: place of the method in tables, counted upwards; methods with the
+            same number are sorted by name.
         Config: type of its parameters.
         scans_per_place: number of consecutive scans that are merged into the
             described cloud. The cloud is in the frame of the scan that stands
@@ -93,6 +102,11 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     """
 
     name: ClassVar[str]
+    title: ClassVar[str] = ""
+    style: ClassVar[tuple[str, str, str] | None] = None
+    source: ClassVar[str] = ""
+    standard: ClassVar[bool] = False
+    order: ClassVar[int] = 100
     Config: ClassVar[type[MethodConfig]] = MethodConfig
     scans_per_place: ClassVar[int] = 1
     point_fields: ClassVar[tuple[str, ...]] = ()
@@ -155,6 +169,14 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     def describes_alike(self) -> bool:
         """Whether the method describes places and queries in the same way."""
         return type(self).describe_place is Method.describe_place
+
+    @classmethod
+    def estimates_poses(cls) -> bool:
+        """Returns whether the method estimates a query's pose at a place."""
+        return (
+            cls.relative_pose is not Method.relative_pose
+            or cls.relative_poses is not Method.relative_poses
+        )
 
     @abc.abstractmethod
     def build_database(self, places: Sequence[Descriptor]) -> Database:
@@ -303,3 +325,57 @@ def check_number(
             f"{method.name}: {function} returned {type(found).__name__} of"
             f" length {count} instead of {number}"
         )
+
+
+def checked_scores(
+    method: Method, function: str, scores: object, number: int
+) -> np.ndarray:
+    """Returns the scores of a method as a float64 array of shape (number,).
+
+    Raises:
+        InputError: the scores have another shape or are no numbers, or they are
+            complex or masked: a conversion would drop the imaginary part or the
+            mask.
+    """
+    fault = ""
+    try:
+        values = np.asarray(scores)
+    except ValueError:  # Rows of different lengths.
+        values = np.empty(0)
+    if isinstance(scores, np.ma.MaskedArray):
+        fault = " with a mask (NaN says that a place is no candidate)"
+    elif values.dtype.kind in "cSU":
+        fault = f" and type {values.dtype}"
+    elif values.shape == (number,):
+        with contextlib.suppress(TypeError, ValueError):
+            return values.astype(np.float64)
+    raise InputError(
+        f"{method.name}: {function} returned {type(scores).__name__} of shape"
+        f" {values.shape}{fault} instead of {number} numbers"
+    )
+
+
+def checked_pose(method: Method, X_PQ: object) -> np.ndarray | None:
+    """Returns a method's estimate after checking that it is a pose, or None.
+
+    Args:
+        method: the method, for the error message.
+        X_PQ: result of `Method.relative_pose`: a pose (4, 4) or None.
+
+    Raises:
+        InputError: `X_PQ` is neither a pose nor None.
+    """
+    if X_PQ is None:
+        return None
+    pose = np.asarray(X_PQ)
+    if pose.shape != (4, 4) or pose.dtype.kind != "f":
+        raise InputError(
+            f"{method.name}: relative_pose returned {type(X_PQ).__name__} of"
+            f" shape {pose.shape} instead of (4, 4) floats or None"
+        )
+    if not poses.is_pose(pose):
+        raise InputError(
+            f"{method.name}: relative_pose returned no pose: a rotation, and a"
+            " last row 0 0 0 1"
+        )
+    return pose

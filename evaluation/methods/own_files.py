@@ -1,16 +1,25 @@
-"""Loads Python files of users, and reports a fault in a file in one line.
+"""A wall: Python files of users, which share the process with the program.
 
 A user's file defines a method of place recognition, or an estimator of poses.
+All code of such a file runs in one context, `users_code`. What the file changes
+in the process (the search path of modules, the modules beside it, the working
+directory) is there while its code runs, and for its code alone. What it prints
+goes to stderr, because stdout contains the program's results. A fault is
+reported in one line.
 """
 
 from collections.abc import Callable, Iterator
 import contextlib
+from dataclasses import dataclass, field
 import functools
+import hashlib
 import importlib.util
 import inspect
 import os
 from pathlib import Path
 import sys
+import sysconfig
+import threading
 import traceback
 from types import ModuleType
 from typing import Any
@@ -27,6 +36,9 @@ _WRITTEN_BY_USERS = (
     "build_database",
     "score",
     "score_in_drive",
+    "num_shortlisted",
+    "shortlist",
+    "score_best",
     "rerank",
     "relative_pose",
     "relative_poses",
@@ -38,7 +50,7 @@ _WRITTEN_BY_USERS = (
 def load_method(path: Path) -> type[Method]:
     """Returns the method that a user's Python file defines.
 
-    The functions of the method are wrapped by `with_named_faults`.
+    The functions of the method run in the context `users_code`.
 
     Args:
         path: Python file that defines and registers one subclass of Method.
@@ -55,10 +67,12 @@ def load_method(path: Path) -> type[Method]:
         if function is inspect.getattr_static(Method, name):
             continue
         if isinstance(function, staticmethod | classmethod):
-            own = with_named_faults(function.__func__, path)
+            own = as_users_code(function.__func__, path)
             setattr(method, name, type(function)(own))
+        elif isinstance(function, property):
+            setattr(method, name, function.getter(_own_getter(function, path)))
         else:
-            setattr(method, name, with_named_faults(function, path))
+            setattr(method, name, as_users_code(function, path))
     return method
 
 
@@ -103,6 +117,35 @@ def _registered_method(module: ModuleType, path: Path) -> type[Method]:
     return method
 
 
+def _own_getter(found: property, path: Path) -> Callable:
+    assert found.fget is not None
+    return as_users_code(found.fget, path)
+
+
+@dataclass
+class _Share:
+    """What a user's file has changed in the process, for its own code alone.
+
+    Attributes:
+        folders: folders that the file has put on the search path of modules.
+        modules: name -> module that the file has imported from its folder or
+            from `folders`.
+        directory: working directory that the file has chosen, if any.
+        depth: how many calls of the file's code are running, one in another.
+    """
+
+    folders: list[str] = field(default_factory=list)
+    modules: dict[str, ModuleType] = field(default_factory=dict)
+    directory: str | None = None
+    depth: int = 0
+
+
+_shares: dict[str, _Share] = {}
+# The process has one stdout and one working directory, so the code of one file
+# runs at a time.
+_turn = threading.RLock()
+
+
 def run_module(path: Path) -> ModuleType:
     """Returns the module of a user's Python file, after running it.
 
@@ -111,37 +154,149 @@ def run_module(path: Path) -> ModuleType:
     """
     if not path.is_file():
         raise InputError(f"--method: {path}: no such file")
-    name = f"own_method_{path.stem}"
+    place = os.path.abspath(path)
+    # Files of one name in different folders are different modules.
+    where = hashlib.sha256(place.encode("utf-8", "surrogateescape"))
+    name = f"own_method_{path.stem}_{where.hexdigest()[:8]}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise InputError(f"--method: {path}: not a Python file")
     module = importlib.util.module_from_spec(spec)
     # Dataclasses look up their module there.
     sys.modules[name] = module
-    with named_faults(path):
+    _shares[place] = _Share()
+    with users_code(path):
         spec.loader.exec_module(module)
     return module
 
 
-def with_named_faults(function: Callable, path: Path) -> Callable:
-    """Returns a function of a user's file, wrapped in `named_faults`."""
+def as_users_code(function: Callable, path: Path) -> Callable:
+    """Returns a function of a user's file that runs in `users_code`."""
+
+    # The file may change the directory in which a relative path begins.
+    place = os.path.abspath(path)
 
     @functools.wraps(function)
     def call(*arguments: Any, **options: Any) -> Any:
-        with named_faults(path):
+        with users_code(path, place):
             return function(*arguments, **options)
 
     return call
 
 
 @contextlib.contextmanager
-def named_faults(path: Path) -> Iterator[None]:
-    """Turns an exception of a user's file into an error that names the file.
+def users_code(path: Path, place: str | None = None) -> Iterator[None]:
+    """Runs code of a user's file, without effects on the rest of the program.
+
+    Inside, stdout is stderr, and the modules, the search path and the working
+    directory are those that the file has chosen so far. Afterwards they are
+    what they were before.
+
+    Args:
+        path: the file, as errors name it.
+        place: its absolute path, if known.
 
     Raises:
         InputError: the code in the context raised an exception. The error has
             one line, with the file and the number of the line that failed.
     """
+    place = place or os.path.abspath(path)
+    share = _shares.setdefault(place, _Share())
+    with _turn, _named_faults(path, place):
+        share.depth += 1
+        try:
+            if share.depth > 1:  # One function of the file calls another.
+                yield
+                return
+            with _stdout_on_stderr(), _own_share(share, place):
+                yield
+        finally:
+            share.depth -= 1
+
+
+@contextlib.contextmanager
+def _stdout_on_stderr() -> Iterator[None]:
+    """Sends to stderr what Python code, libraries and child processes print."""
+    with contextlib.redirect_stdout(sys.stderr):
+        try:
+            kept = os.dup(1)
+        except OSError:  # The program has no stdout.
+            yield
+            return
+        try:
+            # Python's own buffer still belongs to stdout.
+            if sys.__stdout__ is not None:
+                sys.__stdout__.flush()
+            with contextlib.suppress(OSError):
+                os.dup2(2, 1)
+            yield
+        finally:
+            os.dup2(kept, 1)
+            os.close(kept)
+
+
+@contextlib.contextmanager
+def _own_share(share: _Share, place: str) -> Iterator[None]:
+    """Puts a file's share of the process in place, and takes it out again."""
+    directory, folders = os.getcwd(), list(sys.path)
+    modules = dict(sys.modules)
+    sys.path[:0] = share.folders
+    sys.modules.update(share.modules)
+    if share.directory is not None:
+        os.chdir(share.directory)
+    try:
+        yield
+    finally:
+        share.directory = os.getcwd()
+        if share.directory == directory:
+            share.directory = None
+        os.chdir(directory)
+        share.folders = [one for one in sys.path if one not in folders]
+        sys.path[:] = folders
+        own = (os.path.dirname(place), *share.folders)
+        for name, module in list(sys.modules.items()):
+            if module is modules.get(name):
+                continue
+            if module is not share.modules.get(name):
+                if not _lies_in(module, own):
+                    continue
+                share.modules[name] = module
+            if name in modules:
+                sys.modules[name] = modules[name]
+            else:
+                del sys.modules[name]
+
+
+def _lies_in(module: ModuleType, folders: tuple[str, ...]) -> bool:
+    """Returns whether a module lies in folders, and is not installed."""
+    file = getattr(module, "__file__", None)
+    places = [file] if file else list(getattr(module, "__path__", ()))
+    return any(
+        _is_below(place, folders) and not _is_below(place, _installed())
+        for place in places
+        if isinstance(place, str)
+    )
+
+
+def _is_below(place: str, folders: tuple[str, ...]) -> bool:
+    place = os.path.realpath(place)
+    return any(
+        place.startswith(os.path.join(os.path.realpath(folder or "."), ""))
+        for folder in folders
+    )
+
+
+@functools.cache
+def _installed() -> tuple[str, ...]:
+    """Returns the folders of Python, of its packages and of this project."""
+    project = Path(__file__).parents[2]
+    ours = (str(project / "evaluation"), str(project / "cns_drake"))
+    return (*sysconfig.get_paths().values(), *ours)
+
+
+@contextlib.contextmanager
+def _named_faults(path: Path, place: str) -> Iterator[None]:
+    """Turns an exception of a user's file into an error that names the file."""
     try:
         yield
     except (InputError, KeyboardInterrupt):
@@ -152,7 +307,7 @@ def named_faults(path: Path) -> Iterator[None]:
         lines = [
             frame.lineno
             for frame in traceback.extract_tb(error.__traceback__)
-            if os.path.abspath(frame.filename) == os.path.abspath(path)
+            if os.path.abspath(frame.filename) == place
         ]
         where = f"line {lines[-1]}: " if lines else ""
         advice = ""

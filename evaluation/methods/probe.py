@@ -117,6 +117,9 @@ class ProbeMethod(Method[Probe, ProbeDatabase]):
     The score is from 0 to 1, by equation 16 of this paper.
     """
 
+    title = "PROBE"
+    source = "Lee, Lee, Yoo: RA-L 2026"
+    order = 10
     Config = ProbeConfig
     skips_places = True
     sees_images = True

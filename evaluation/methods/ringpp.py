@@ -141,6 +141,11 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
       map has no candidates.
     """
 
+    title = "RING++"
+    style = ("#0072B2", "-", "o")
+    source = "Xu, Lu, Wu, Lu, Zhu, Liang, Xiong, Wang: T-RO 2023"
+    standard = True
+    order = 3
     Config = RingPlusPlusConfig
     skips_places = True
     sees_images = True

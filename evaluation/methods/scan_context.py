@@ -154,6 +154,11 @@ class ContextDatabase:
 class ScanContext(Method[Contexts, ContextDatabase]):
     """Scan Context++; the score of two scans is 1 minus their distance."""
 
+    title = "Scan Context++"
+    style = ("#009E73", "-.", "^")
+    source = "Kim, Choi, Kim: T-RO 2022"
+    standard = True
+    order = 1
     Config = ScanContextConfig
     skips_places = True
     sees_images = True

@@ -134,6 +134,11 @@ class SolidMethod(Method[Solid, SolidDatabase]):
       without such points has no candidates.
     """
 
+    title = "SOLiD"
+    style = ("#CC79A7", ":", "D")
+    source = "Kim, Choi, Sim, Kim, Park: RA-L 2024"
+    standard = True
+    order = 2
     Config = SolidConfig
     skips_places = True
     divides = True

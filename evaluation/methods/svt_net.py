@@ -135,5 +135,8 @@ def _token_attention(weights: Weights, x: np.ndarray) -> np.ndarray:
 class SvtNet(CloudNetwork):
     """The place-recognition method SVT-Net."""
 
+    title = "SVT-Net"
+    source = "Fan, Song, Liu, Lu, He, Du: AAAI 2022"
+    order = 10
     shapes = SVT_NET_SHAPES
     infer = staticmethod(svt_net)

@@ -57,6 +57,8 @@ def paper_section(
     return page_section(
         "paper",
         "Paper",
+        "results.csv: the rows with the change, of place recognition by the"
+        " protocol paper; the tables of the paper",
         changes=[
             (pair, value, paper().change(pair[0], pair[1:]))
             for pair, value in changes.items()

@@ -299,7 +299,7 @@ def _named_poses(table: Path, files: Sequence[Path]) -> np.ndarray:
         raise InputError(
             f"{table.parent}: a scan's name is no number"
         ) from error
-    return read_quaternions(table, None).at(numbers, 0)
+    return read_quaternions(table, None, in_order=False).at(numbers, 0)
 
 
 def simulated_drives(

@@ -41,7 +41,7 @@ from evaluation.recognition import (
     RetrievalProtocol,
     Role,
 )
-from evaluation.results import QueryRows, Results
+from evaluation.results import QueryRows, Results, write_page
 from evaluation.study import (
     SHIPPED,
     DescribedSource,
@@ -86,7 +86,7 @@ def measure_real(
     on_note: OnNote = lambda text: None,
     queries: int | None = None,
 ) -> tuple[Results, QueryRows]:
-    """Measures data sets in a folder, and writes both tables.
+    """Measures data sets in a folder; writes both tables and the page.
 
     Args:
         folder: folder that contains a folder for each data set.
@@ -151,7 +151,16 @@ def measure_real(
             f"{folder}: no data set that these methods can measure; the notes"
             " say why"
         )
-    return engine.run(cluster)
+    results, queries_table = engine.run(cluster)
+    write_page(
+        results,
+        queries_table,
+        output,
+        title=_NAME,
+        about="What do the methods find in public scans?",
+        on_note=on_note,
+    )
+    return results, queries_table
 
 
 def _is_estimator(name: str) -> bool:

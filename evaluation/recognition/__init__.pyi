@@ -29,13 +29,12 @@ from evaluation.recognition.descriptors import (
 )
 from evaluation.recognition.descriptors import joined_scans as joined_scans
 from evaluation.recognition.faults import FAULTS as FAULTS
-from evaluation.recognition.metrics import MODES as MODES
-from evaluation.recognition.metrics import Mode as Mode
-from evaluation.recognition.metrics import (
-    PlaceRecognitionMetrics as PlaceRecognitionMetrics,
-)
-from evaluation.recognition.metrics import evaluate as evaluate
-from evaluation.recognition.metrics import main_metrics as main_metrics
+from evaluation.recognition.metrics import METRICS as METRICS
+from evaluation.recognition.metrics import Metric as Metric
+from evaluation.recognition.metrics import choose_metrics as choose_metrics
+from evaluation.recognition.metrics import load_metrics as load_metrics
+from evaluation.recognition.metrics import metric_named as metric_named
+from evaluation.recognition.metrics import register_metric as register_metric
 from evaluation.recognition.overlap_truth import (
     compared_frames as compared_frames,
 )
@@ -49,6 +48,12 @@ from evaluation.recognition.overlap_truth import read_overlaps as read_overlaps
 from evaluation.recognition.overlap_truth import (
     write_overlaps as write_overlaps,
 )
+from evaluation.recognition.pair_scores import MODES as MODES
+from evaluation.recognition.pair_scores import Mode as Mode
+from evaluation.recognition.pair_scores import (
+    PlaceRecognitionMetrics as PlaceRecognitionMetrics,
+)
+from evaluation.recognition.pair_scores import evaluate as evaluate
 from evaluation.recognition.place_metrics import kept_share as kept_share
 from evaluation.recognition.place_metrics import place_numbers as place_numbers
 from evaluation.recognition.place_metrics import pose_numbers as pose_numbers
@@ -91,6 +96,7 @@ from evaluation.recognition.protocol_options import (
 )
 from evaluation.recognition.query_outcomes import QueryOutcomes as QueryOutcomes
 from evaluation.recognition.query_outcomes import auroc as auroc
+from evaluation.recognition.query_outcomes import common_blocks as common_blocks
 from evaluation.recognition.query_outcomes import judge as judge
 from evaluation.recognition.result_number import Number as Number
 from evaluation.recognition.retrieval import Retrieval as Retrieval

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from evaluation.methods import Method, check_number
-from evaluation.recognition.pose_errors import checked_pose
+from evaluation.methods import Method, check_number, checked_pose
 from evaluation.recognition.ranking import ranked_places
 
 # Number of places with the best scores that are tested. This value and the next

@@ -1,158 +1,606 @@
-"""Recall, precision-recall curve, AUC and F1 of place recognition.
+"""Metrics, a family: what each number in a table of results is.
 
-The definitions were derived from the paper's numbers. Only the top-ranked place
-of each query counts:
-
-- TP: accepted, and the top-ranked place is a true match,
-- FP: accepted, and the top-ranked place is not a true match, whether or not the
-  query has a match,
-- FN: rejected, although the query has a match.
-
-A rejected query without a match is neither TP, FP nor FN. A query without a
-candidate is never accepted. In mode `all` every query counts; in mode
-`filtered` only queries that have a match (in this mode, the greatest F1 follows
-from R@1).
-
-A query with a match and a wrong top-ranked place is FN while it is rejected,
-and FP once it is accepted. Recall = TP / (TP + FN) therefore reaches 1 for
-every method that has a top-ranked place for all queries. The strict AUC,
-`auc_strict`, is the area under another curve, with recall = TP / N, where N is
-the number of queries with a match.
-
-In both modes, R@N is the share of the queries with a match that have a match
-among their N top-ranked places.
+A metric is one entry of this file, or of a file of a user. Tables, rankings,
+charts, pages and documents ask it for its words, its range and its direction.
 """
 
-from dataclasses import dataclass
-from typing import Literal
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import dataclass, replace
+import math
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
+from cns_drake.base import InputError, did_you_mean, errors_at
+from evaluation.methods import as_users_code, run_module
 from evaluation.recognition.bootstrap import (
-    Interval,
-    bootstrap_intervals,
+    SampledMetrics,
+    own_samples,
+    resampled_metrics,
+    resampled_weights,
 )
-from evaluation.recognition.precision_recall import (
-    PrCurve,
-    pr_curve,
-)
+from evaluation.recognition.precision_recall import pr_curve
 from evaluation.recognition.query_outcomes import QueryOutcomes
 
-Mode = Literal["all", "filtered"]
-MODES: tuple[Mode, ...] = ("all", "filtered")
-
-# Greatest N of R@N.
-MAX_RANK = 25
+# Sums and quotients of floating-point numbers leave a range by this at most.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class PlaceRecognitionMetrics:
-    """The scores of one method on one pair of drives.
+class Metric:
+    """A number that is measured: what it is, and which values it can have.
+
+    Over conditions, each metric is averaged by the arithmetic mean of its
+    defined values.
 
     Attributes:
-        mode: which queries the precision-recall curve counts: `all`, or only
-            queries with a match (`filtered`).
-        curve: exact precision-recall curve.
-        auc: area under the curve.
-        auc_strict: area under the curve with recall = TP / N at each of its
-            points.
-        f1_max: greatest F1 on the curve; 0 if nothing is accepted.
-        f1_max_index: index of the point of the curve with this F1; None if the
-            curve is empty.
-        recall_at_n: (25,) R@1 to R@25.
-        recall_at_1_percent: R@N, where N is a hundredth of the number of
-            places.
-        num_queries: number of queries.
-        num_with_match: N, the number of queries with a match.
-        num_right: number of queries whose top-ranked place is right. R@1 =
-            num_right / N.
-        auc_interval: 95 % interval of `auc`, by bootstrap over blocks of the
-            route.
-        recall_at_1_interval: 95 % interval of R@1, by the same bootstrap.
+        name: name in tables and options.
+        title: name in words, in charts and pages.
+        unit: unit of the values; "" for shares and counts.
+        least, greatest: limits of the values.
+        is_whole: whether the values are whole numbers, such as counts.
+        better: whether more or less is better; "" if neither is.
+        over_queries: what a value says, and how it comes from the queries,
+            points or structures of a condition.
+        undefined: when a value is undefined, an empty cell; "" if never.
+        share_of: name of the metric of which this is the retained share, its
+            value divided by its value in the baseline; "" for any other metric.
+        main_in: tasks whose summary on the page shows the metric.
+        grows: whether the values grow with the places of a database. Charts
+            then have a logarithmic axis, and summaries contain the exponent of
+            the growth.
+        compute: returns the value from the outcomes of queries; None if a task
+            computes it from something else.
+        has_interval: whether a bootstrap over the route gives the computed
+            values an interval.
+        file: the user's file that defines the metric; None for a metric of this
+            package.
 
     Example:
-        from evaluation import evaluate, judge
+        from evaluation import Metric
 
-        print(evaluate(judge(scores, matches), "filtered").f1_max)
+        drift = Metric("drift", "drift of the map", "m", 0.0, better="less")
     """
 
-    mode: Mode
-    curve: PrCurve
-    auc: float
-    auc_strict: float
-    f1_max: float
-    f1_max_index: int | None
-    recall_at_n: np.ndarray
-    recall_at_1_percent: float
-    num_queries: int
-    num_with_match: int
-    num_right: int
-    auc_interval: Interval
-    recall_at_1_interval: Interval
+    name: str
+    title: str
+    unit: str = ""
+    least: float = -math.inf
+    greatest: float = math.inf
+    is_whole: bool = False
+    better: Literal["more", "less", ""] = ""
+    over_queries: str = ""
+    undefined: str = ""
+    share_of: str = ""
+    main_in: Collection[str] = ()
+    grows: bool = False
+    compute: Callable[[QueryOutcomes], float] | None = None
+    has_interval: bool = True
+    file: Path | None = None
 
     @property
-    def main_metrics(self) -> dict[str, float]:
-        """AUC, R@1 and strict AUC, by their names in tables."""
-        return {
-            "auc": self.auc,
-            "r1": self.recall_at_1,
-            "auc_strict": self.auc_strict,
-        }
+    def label(self) -> str:
+        """The title with the unit, for axes and heads of columns."""
+        return f"{self.title} [{self.unit}]" if self.unit else self.title
 
     @property
-    def recall_at_1(self) -> float:
-        """R@1: share of right answers among the queries with a match."""
-        return float(self.recall_at_n[0])
+    def range_text(self) -> str:
+        """The possible values, in words."""
+        if self.least == -math.inf and self.greatest == math.inf:
+            return "any number"
+        kind = "a whole number" if self.is_whole else "a number"
+        if math.isinf(self.greatest):
+            return f"{kind} from {self.least:g} on"
+        if math.isinf(self.least):
+            return f"{kind} up to {self.greatest:g}"
+        return f"{kind} from {self.least:g} to {self.greatest:g}"
+
+    def checked(self, value: float) -> float:
+        """Returns a value, moved to its limit if rounding put it out of range.
+
+        Args:
+            value: the value; NaN if it is undefined.
+
+        Raises:
+            InputError: the metric cannot have the value.
+        """
+        if math.isnan(value):
+            return value
+        inside = min(max(value, self.least), self.greatest)
+        if abs(value - inside) > _ROUNDING or (
+            self.is_whole and math.isfinite(value) and value != round(value)
+        ):
+            raise InputError(
+                f"{self.name}: {value:g} cannot be: it is {self.range_text}"
+            )
+        return value if inside == value else inside
+
+    @property
+    def is_resampled(self) -> bool:
+        """Whether a bootstrap over queries gives the values an interval."""
+        return self.compute is not None and self.has_interval
+
+    def of(self, outcomes: QueryOutcomes) -> float:
+        """Returns the value of the outcomes of queries.
+
+        Raises:
+            InputError: a user's file computes something else than a number
+                that the metric can have.
+        """
+        assert self.compute is not None
+        value = self.compute(outcomes)
+        if self.file is None:
+            return value
+        with errors_at(str(self.file)):
+            try:
+                number = float(value)
+            except (TypeError, ValueError):
+                raise InputError(
+                    f"{self.name}: {value!r} is no number"
+                ) from None
+            return self.checked(number)
+
+    def samples(
+        self, outcomes: QueryOutcomes, weights: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Returns the values (B,) of bootstrap samples of queries.
+
+        Args:
+            outcomes: the outcomes of Q queries.
+            weights: (B, Q) how often each query is in each sample; by default,
+                whole blocks of the route are sampled.
+        """
+        if self.name in SampledMetrics._fields:
+            drawn = (
+                own_samples(outcomes)
+                if weights is None
+                else resampled_metrics(outcomes, weights)
+            )
+            return getattr(drawn, self.name)
+        if weights is None:
+            weights = resampled_weights(len(outcomes), blocks=outcomes.blocks)
+        counts = weights.astype(np.int64)
+        every = np.arange(len(outcomes))
+        return np.array(
+            [self.of(outcomes.subset(np.repeat(every, n))) for n in counts]
+        )
 
 
-def main_metrics(outcomes: QueryOutcomes) -> dict[str, float]:
-    """Returns AUC, R@1 and strict AUC, by their names in tables."""
-    curve = pr_curve(outcomes)
-    return {
-        "auc": curve.auc,
-        "r1": outcomes.recall_at(1),
-        "auc_strict": curve.strict_auc(int(outcomes.has_match.sum())),
+def _metric(name: str, title: str, unit: str = "", **fields: Any) -> Metric:
+    return Metric(name, title, unit, **fields)
+
+
+def _share(name: str, title: str, **fields: Any) -> Metric:
+    """Returns a metric from 0 to 1, of which more is better."""
+    usual: dict[str, Any] = {"least": 0.0, "greatest": 1.0, "better": "more"}
+    return _metric(name, title, **usual | fields)
+
+
+def _count(name: str, title: str, **fields: Any) -> Metric:
+    usual: dict[str, Any] = {"least": 0.0, "is_whole": True}
+    return _metric(name, title, **usual | fields)
+
+
+def _amount(name: str, title: str, unit: str, **fields: Any) -> Metric:
+    """Returns a metric from 0 on, of which less is better."""
+    usual: dict[str, Any] = {"least": 0.0, "better": "less"}
+    return _metric(name, title, unit, **usual | fields)
+
+
+def _retained(name: str, of: str, title: str, **fields: Any) -> Metric:
+    """Returns the share of another metric that is left of its baseline."""
+    usual: dict[str, Any] = {
+        "least": 0.0,
+        "better": "more",
+        "share_of": of,
+        "over_queries": "the value, divided by its value in the baseline",
+        "undefined": "in the baseline, the value is 0 or undefined",
     }
+    return _metric(name, title, **usual | fields)
 
 
-def evaluate(
-    outcomes: QueryOutcomes, mode: Mode = "all", seed: int = 0
-) -> PlaceRecognitionMetrics:
-    """Returns the scores of one method on one pair of drives.
+_NO_MATCH = "no query has a match"
+_NO_POSE = "the method estimates no pose"
+_MAIN_PLACE = ("place",)
+
+
+def _shipped() -> Iterator[Metric]:
+    """Yields the metrics of this package, in the order of pages."""
+    # Place recognition.
+    yield _share(
+        "auc",
+        "AUC",
+        over_queries="area under the precision-recall curve",
+        main_in=_MAIN_PLACE,
+        compute=lambda outcomes: pr_curve(outcomes).auc,
+    )
+    yield _share(
+        "auc_strict",
+        "AUC strict",
+        over_queries="area under the curve in which every query with a match"
+        " counts",
+        main_in=_MAIN_PLACE,
+        compute=lambda outcomes: pr_curve(outcomes).strict_auc(
+            int(outcomes.has_match.sum())
+        ),
+    )
+    yield _share(
+        "r1",
+        "R@1",
+        over_queries="share of the queries with a match",
+        undefined=_NO_MATCH,
+        main_in=_MAIN_PLACE,
+        compute=lambda outcomes: outcomes.recall_at(1),
+    )
+    # Shares of right poses, and what is left of all of these.
+    yield _share(
+        "pose_success",
+        "pose success",
+        over_queries="share of the queries with a match whose pose is within"
+        " 2 m and 5 deg",
+        undefined=f"{_NO_MATCH}, or {_NO_POSE}",
+        main_in=("pose",),
+    )
+    for name, title in (
+        ("success_03m_1deg", "success within 0.3 m and 1 deg"),
+        ("success_2m_5deg", "success within 2 m and 5 deg"),
+    ):
+        yield _share(
+            name,
+            title,
+            over_queries="share of the queries whose pose is so accurate",
+            main_in=("localise",),
+        )
+    yield _retained(
+        "kept", "auc", "retained share", main_in=("place", "pose", "localise")
+    )
+    yield _retained(
+        "kept_strict",
+        "auc_strict",
+        "retained share of AUC strict",
+        main_in=_MAIN_PLACE,
+    )
+    yield _retained("kept_r1", "r1", "retained share of R@1")
+    yield _count(
+        "lost",
+        "answers lost",
+        better="less",
+        over_queries="number of queries that are right in the baseline and"
+        " wrong in the condition",
+    )
+    yield _count(
+        "found",
+        "answers gained",
+        better="more",
+        over_queries="number of queries that are wrong in the baseline and"
+        " right in the condition",
+    )
+    yield _count(
+        "with_match",
+        "queries with a match",
+        over_queries="number of queries that have a true match",
+        compute=lambda outcomes: float(outcomes.has_match.sum()),
+        has_interval=False,
+    )
+    yield _count(
+        "places",
+        "places",
+        over_queries="number of places in the database",
+        # 0 stands for unknown, where only the answers are known.
+        compute=lambda outcomes: float(outcomes.num_places or math.nan),
+        has_interval=False,
+    )
+    yield _share(
+        "recall_at_full_precision",
+        "recall at full precision",
+        over_queries="greatest recall at which no accepted place is wrong",
+        compute=lambda outcomes: pr_curve(outcomes).recall_at_full_precision,
+        has_interval=False,
+    )
+    for name, title in (
+        ("no_place", "queries without a match"),
+        ("no_candidate", "queries without a candidate"),
+        ("other_city", "answers in another city"),
+        ("too_far", "answers just too far"),
+        ("elsewhere", "answers elsewhere"),
+    ):
+        yield _count(
+            name,
+            title,
+            better="less",
+            over_queries="number of queries whose top-ranked place is wrong for"
+            " this reason",
+        )
+    yield _count(
+        "hidden",
+        "wrong answers with little overlap",
+        over_queries="number of wrong answers where no match shows half of the"
+        " query's scan",
+    )
+    for name, title, shown in (
+        ("visible_change", "visible change", ""),
+        (
+            "visible_change_added",
+            "visible change without parallax",
+            ", minus the mean in the baseline",
+        ),
+    ):
+        yield _metric(
+            name,
+            title,
+            least=-1.0,
+            greatest=1.0,
+            over_queries="mean share of a query's scan that the best of its"
+            f" matches does not show{shown}",
+            undefined=_NO_MATCH,
+        )
+    # Poses.
+    yield _amount(
+        "translation_median",
+        "median error of the position",
+        "m",
+        over_queries="median over the poses; in the task `pose`, over the right"
+        " answers that F1max counts",
+        undefined="there is no pose",
+        main_in=("pose",),
+    )
+    yield _amount(
+        "translation_95",
+        "95 % quantile of the error of the position",
+        "m",
+        over_queries="95 % quantile over the poses",
+        undefined="there is no pose",
+    )
+    yield _amount(
+        "rotation_median_deg",
+        "median error of the orientation",
+        "deg",
+        over_queries="median over the poses; in the task `pose`, over the right"
+        " answers that F1max counts",
+        undefined="there is no pose",
+    )
+    # Localisation.
+    yield _share(
+        "auroc_own_score",
+        "AUROC of the estimator's score",
+        over_queries="probability that a right pose scores above a wrong one",
+        undefined="all poses are right, or all wrong",
+    )
+    yield _share(
+        "within_03m",
+        "share of the way within 0.3 m",
+        over_queries="share of the length of the drive",
+        undefined="the drive has no length",
+    )
+    yield _amount(
+        "lost_per_km",
+        "losses of the track",
+        "1/km",
+        over_queries="number, divided by the length of the drive",
+        undefined="the drive has no length",
+    )
+    # Map update.
+    yield _share(
+        "miou",
+        "mean IoU",
+        over_queries="mean over the labels that occur",
+        undefined="no label occurs",
+        main_in=("map",),
+    )
+    for name in ("kept", "gone", "new", "unobserved"):
+        yield _share(
+            f"iou_{name}",
+            f"IoU of {name}",
+            over_queries="intersection over union of points",
+            undefined="no point has the label",
+        )
+    for name in ("gone", "new"):
+        for kind in ("precision", "recall"):
+            yield _share(
+                f"{kind}_{name}",
+                f"{kind} of {name}",
+                over_queries="share of points",
+                undefined="there is no such point",
+            )
+    yield _share(
+        "right_structures",
+        "structures with the right verdict",
+        over_queries="share of the observed structures that get the right label"
+        " (kept, gone or new)",
+        undefined="no structure changed",
+        main_in=("map",),
+    )
+    for name, title, of in (
+        ("called_structures", "structures called changed", "structures"),
+        ("called_points", "points called changed", "points"),
+    ):
+        yield _share(
+            name,
+            title,
+            better="",
+            over_queries=f"share of the {of} that are called gone or new",
+            undefined=f"there are no {of}",
+            main_in=("map",) if of == "structures" else (),
+        )
+    for name in ("gone", "new"):
+        yield _count(
+            name, f"points that are {name}", over_queries="number of points"
+        )
+    # Structural change.
+    for name, title, main in (
+        ("tcr_sym", "TCR_sym", True),
+        ("tcr_sym_masked", "TCR_sym where both drove", True),
+        ("tcr_source_to_target", "TCR from first to second", False),
+        ("tcr_target_to_source", "TCR from second to first", False),
+    ):
+        yield _share(
+            name,
+            title,
+            better="",
+            over_queries="share of voxels",
+            undefined="no voxel lies in the hulls of both maps",
+            main_in=("change",) if main else (),
+        )
+    # Changes that a map of several drives notices.
+    for end, where in (("", ""), ("_here", ", of those that the query sees")):
+        yield _count(
+            f"changed{end}",
+            f"changed structures{where}",
+            over_queries="number of structures that were added or removed"
+            " between the first drive and the query",
+        )
+        yield _share(
+            f"seen{end}",
+            f"changes noticed{where}",
+            over_queries="share of the changed structures that a drive of the"
+            " database notices",
+            undefined="no structure changed",
+        )
+        for name, title in (
+            ("delay_median", "median delay of a change"),
+            ("delay_95", "95 % quantile of the delay of a change"),
+        ):
+            yield _amount(
+                f"{name}{end}",
+                f"{title}{where}",
+                "years",
+                over_queries="quantile of the time to the drive that notices a"
+                " change",
+                undefined="no change is noticed",
+            )
+    # Costs.
+    for name, title, unit in (
+        ("query_time", "time of a query", "s"),
+        ("build_time", "time to build the database", "s"),
+        ("memory", "memory of the descriptors", "bytes"),
+    ):
+        yield _amount(
+            name,
+            title,
+            unit,
+            grows=True,
+            over_queries="median over the queries"
+            if name == "query_time"
+            else "of the whole database",
+            main_in=("cost",),
+        )
+    # Real beside simulated scans.
+    yield _share(
+        "auc_control",
+        "AUC of the control",
+        better="",
+        over_queries="area under the curve of a classifier",
+    )
+
+
+METRICS: dict[str, Metric] = {one.name: one for one in _shipped()}
+
+
+def metric_named(name: str) -> Metric:
+    """Returns a metric; one that is not known has any values.
+
+    Tables of other programs can have metrics that are not known here.
+    """
+    if name in METRICS:
+        return METRICS[name]
+    return Metric(name, name.replace("_", " "))
+
+
+def register_metric(
+    name: str, title: str = "", unit: str = "", **fields: Any
+) -> Callable[[Callable[[QueryOutcomes], float]], Metric]:
+    """Returns a decorator that makes a function a metric of place recognition.
+
+    The function gets the outcomes of the queries of a condition, and returns
+    the value, or NaN if it is undefined.
 
     Args:
-        outcomes: outcome of each query.
-        mode: which queries the precision-recall curve counts: `all`, or only
-            queries with a match (`filtered`).
-        seed: seed of the bootstrap.
+        name: name of the metric in tables.
+        title: name of the metric in words; by default made from `name`.
+        unit: unit of the values; "" for shares and counts.
+        fields: further attributes of the metric, see `Metric`.
+
+    Raises:
+        ValueError: another metric has this name, the name is empty or has
+            unprintable characters, or `fields` has something else.
 
     Example:
-        from evaluation import evaluate, judge
+        import numpy as np
+        from evaluation import register_metric
 
-        print(evaluate(judge(scores, matches)).recall_at_1)
+        @register_metric("median_rank", least=1.0, better="less")
+        def median_rank(outcomes):
+            return float(np.median(outcomes.first_right_ranks))
     """
-    counted = outcomes
-    if mode == "filtered":
-        counted = outcomes.subset(outcomes.has_match)
-    curve = pr_curve(counted)
-    num_with_match = int(outcomes.has_match.sum())
-    best = int(curve.f1.argmax()) if len(curve.thresholds) else None
-    auc_interval, recall_interval = bootstrap_intervals(counted, seed)
-    values = main_metrics(counted)
-    return PlaceRecognitionMetrics(
-        mode=mode,
-        curve=curve,
-        auc=values["auc"],
-        auc_strict=values["auc_strict"],
-        f1_max=0.0 if best is None else float(curve.f1[best]),
-        f1_max_index=best,
-        recall_at_n=np.array(
-            [outcomes.recall_at(rank) for rank in range(1, MAX_RANK + 1)]
-        ),
-        recall_at_1_percent=outcomes.recall_at(outcomes.one_percent_rank),
-        num_queries=len(outcomes),
-        num_with_match=num_with_match,
-        num_right=int(outcomes.is_right.sum()),
-        auc_interval=auc_interval,
-        recall_at_1_interval=recall_interval,
-    )
+    if not (name.isprintable() and name.strip() == name != ""):
+        raise ValueError(f"{name!r} is no name of a metric")
+    better = fields.get("better", "")
+    if better not in ("more", "less", ""):
+        raise ValueError(f"{name}: better: {better!r} is no direction")
+
+    def enter(compute: Callable[[QueryOutcomes], float]) -> Metric:
+        metric = _metric(
+            name,
+            title or name.replace("_", " "),
+            unit,
+            compute=compute,
+            **fields,
+        )
+        if name in METRICS and METRICS[name].file is None:
+            raise ValueError(f"there is another metric {name!r}")
+        return metric
+
+    return enter
+
+
+def load_metrics(path: Path) -> list[Metric]:
+    """Returns the metrics that a user's Python file registers.
+
+    Raises:
+        InputError: there is no such file, it fails, or it registers no metric,
+            or one whose name another file has registered.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    module = run_module(path)
+    found = [
+        replace(value, compute=as_users_code(value.compute, path), file=path)
+        for value in vars(module).values()
+        if isinstance(value, Metric)
+        and value.file is None
+        and value.compute
+        and METRICS.get(value.name) is not value
+    ]
+    if not found:
+        raise InputError(
+            f"{path}: registers no metric; see evaluation.register_metric"
+        )
+    for metric in found:
+        known = METRICS.get(metric.name)
+        if known is not None and known.file != path:
+            raise InputError(f"{path}: another metric is named {metric.name!r}")
+        METRICS[metric.name] = metric
+    return found
+
+
+def choose_metrics(names: Iterable[str]) -> list[Metric]:
+    """Returns metrics by their names, and those of Python files.
+
+    Raises:
+        InputError: there is no metric of a name, or a file cannot be used.
+    """
+    found: list[Metric] = []
+    for name in names:
+        if name.endswith(".py"):
+            found += load_metrics(Path(name))
+        elif name in METRICS:
+            found.append(METRICS[name])
+        else:
+            raise InputError(
+                f"no metric {name!r} (there are: {', '.join(METRICS)})"
+                f"{did_you_mean(name, METRICS)}"
+            )
+    return found

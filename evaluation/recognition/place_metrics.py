@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 import math
 
 import numpy as np
 
 from evaluation.recognition.bootstrap import (
-    own_samples,
+    UNKNOWN,
+    SampledMetrics,
     paired_samples,
     percentile_interval,
 )
 from evaluation.recognition.faults import FAULTS
+from evaluation.recognition.metrics import METRICS, Metric
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.pose_errors import is_accepted
 from evaluation.recognition.result_number import Number
+
+# The retained shares of the resampled metrics, in their order.
+_RETAINED = [
+    next(one.name for one in METRICS.values() if one.share_of == name)
+    for name in SampledMetrics._fields
+]
 
 
 def place_numbers(
@@ -42,18 +50,13 @@ def place_numbers(
         `_visible_change_added`.
     """
     outcomes = now.outcomes
-    values = now.by_mode["all"].main_metrics
-    samples = own_samples(outcomes)
-    for (name, value), drawn in zip(values.items(), samples, strict=True):
-        yield now.number(name, value, percentile_interval(drawn))
+    for name in SampledMetrics._fields:
+        yield _computed(now, METRICS[name])
     if before is not None:
         yield from _compared_numbers(now, before)
-    yield now.number("with_match", float(outcomes.has_match.sum()))
-    yield now.number("places", float(outcomes.num_places))
-    yield now.number(
-        "recall_at_full_precision",
-        now.by_mode["all"].curve.recall_at_full_precision,
-    )
+    for metric in METRICS.values():
+        if metric.compute and metric.name not in SampledMetrics._fields:
+            yield _computed(now, metric)
     overlaps = now.columns["overlap"]
     for name in FAULTS:
         yield now.number(name, float(np.sum(now.columns["why"] == name)))
@@ -61,6 +64,14 @@ def place_numbers(
     yield now.number("hidden", float(is_little_shown.sum()))
     if not math.isnan(shown := _mean_visible_change(overlaps)[0]):
         yield now.number("visible_change", shown)
+
+
+def _computed(now: PlaceOutcome, metric: Metric) -> Number:
+    """Returns a metric that follows from the outcomes, with its interval."""
+    interval = UNKNOWN
+    if metric.has_interval:
+        interval = percentile_interval(metric.samples(now.outcomes))
+    return now.number(metric.name, metric.of(now.outcomes), interval)
 
 
 def _compared_numbers(
@@ -72,21 +83,16 @@ def _compared_numbers(
     only `kept`, `kept_r1` and `kept_strict` are known, without intervals.
     """
     outcomes = now.outcomes
-    values = now.by_mode["all"].main_metrics
-    samples = own_samples(outcomes)
-    drawn_then: Sequence[np.ndarray | float] = [math.nan] * len(samples)
-    if is_paired := len(before.outcomes) == len(outcomes):
-        drawn_then = paired_samples(before.outcomes, outcomes)
-    for name, then, today, drawn, other in zip(
-        ("kept", "kept_r1", "kept_strict"),
-        before.by_mode["all"].main_metrics.values(),
-        values.values(),
-        samples,
-        drawn_then,
-        strict=True,
-    ):
-        interval = percentile_interval(kept_share(drawn, other))
-        yield now.number(name, float(kept_share(today, then)), interval)
+    is_paired = len(before.outcomes) == len(outcomes)
+    for name, of in zip(_RETAINED, SampledMetrics._fields, strict=True):
+        metric = METRICS[of]
+        share = kept_share(metric.of(outcomes), metric.of(before.outcomes))
+        interval = UNKNOWN
+        if is_paired:
+            then = getattr(paired_samples(before.outcomes, outcomes), of)
+            drawn = kept_share(metric.samples(outcomes), then)
+            interval = percentile_interval(drawn)
+        yield now.number(name, float(share), interval)
     if is_paired:
         right = outcomes.is_right
         was = before.outcomes.is_right

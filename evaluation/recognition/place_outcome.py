@@ -17,7 +17,7 @@ from evaluation.recognition.bootstrap import (
     Interval,
 )
 from evaluation.recognition.faults import faults
-from evaluation.recognition.metrics import (
+from evaluation.recognition.pair_scores import (
     MODES,
     Mode,
     PlaceRecognitionMetrics,

@@ -7,8 +7,7 @@ import math
 
 import numpy as np
 
-from cns_drake.base import InputError, poses
-from evaluation.methods import Method
+from cns_drake.base import poses
 from evaluation.recognition.precision_recall import pr_curve
 from evaluation.recognition.query_outcomes import QueryOutcomes
 
@@ -80,32 +79,6 @@ def pose_error(
     axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     angle = math.atan2(float(np.linalg.norm(axis)), float(np.trace(R)) - 1.0)
     return float(np.linalg.norm(X_error[:3, 3])), math.degrees(angle)
-
-
-def checked_pose(method: Method, X_PQ: object) -> np.ndarray | None:
-    """Returns a method's estimate after checking that it is a pose, or None.
-
-    Args:
-        method: the method, for the error message.
-        X_PQ: result of `Method.relative_pose`: a pose (4, 4) or None.
-
-    Raises:
-        InputError: `X_PQ` is neither a pose nor None.
-    """
-    if X_PQ is None:
-        return None
-    pose = np.asarray(X_PQ)
-    if pose.shape != (4, 4) or pose.dtype.kind != "f":
-        raise InputError(
-            f"{method.name}: relative_pose returned {type(X_PQ).__name__} of"
-            f" shape {pose.shape} instead of (4, 4) floats or None"
-        )
-    if not poses.is_pose(pose):
-        raise InputError(
-            f"{method.name}: relative_pose returned no pose: a rotation, and a"
-            " last row 0 0 0 1"
-        )
-    return pose
 
 
 def is_accepted(outcomes: QueryOutcomes) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
@@ -95,6 +96,26 @@ class QueryOutcomes:
     def one_percent_rank(self) -> int:
         """The N of R@1%: a hundredth of the number of places, at least 1."""
         return max(1, round(0.01 * self.num_places))
+
+
+def common_blocks(outcomes: Sequence[QueryOutcomes]) -> np.ndarray:
+    """Returns the block (Q,) of each of Q queries that several methods answer.
+
+    The order of the methods does not matter.
+
+    Args:
+        outcomes: the outcomes of one or more methods. Those without blocks take
+            the blocks of the others. If none has blocks, each query is a block
+            of its own.
+
+    Raises:
+        ValueError: two methods have other blocks.
+    """
+    known = [one for one in outcomes if one.blocks is not None]
+    for one in known:
+        if not np.array_equal(one.own_blocks, known[0].own_blocks):
+            raise ValueError("other blocks of the route")
+    return (known or outcomes)[0].own_blocks
 
 
 def judge(

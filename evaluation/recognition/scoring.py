@@ -1,13 +1,12 @@
 """Asks a method for the scores of places, and checks them."""
 
 from collections.abc import Sequence
-import contextlib
 from typing import Any
 
 import numpy as np
 
 from cns_drake.base import InputError, read_only
-from evaluation.methods import Method
+from evaluation.methods import Method, checked_scores
 from evaluation.recognition.geometric_verification import gated
 from evaluation.recognition.ranking import ranked_places
 
@@ -95,31 +94,3 @@ def _reranked(
         found = method.rerank(read_only(query), clouds, scores[best])
         result[best] = checked_scores(method, "rerank", found, len(best))
     return result
-
-
-def checked_scores(
-    method: Method, function: str, scores: object, number: int
-) -> np.ndarray:
-    """Returns the scores of a method as a float64 array of shape (number,).
-
-    Raises:
-        InputError: the scores have another shape or are no numbers, or they are
-            complex or masked: a conversion would drop the imaginary part or the
-            mask.
-    """
-    fault = ""
-    try:
-        values = np.asarray(scores)
-    except ValueError:  # Rows of different lengths.
-        values = np.empty(0)
-    if isinstance(scores, np.ma.MaskedArray):
-        fault = " with a mask (NaN says that a place is no candidate)"
-    elif values.dtype.kind in "cSU":
-        fault = f" and type {values.dtype}"
-    elif values.shape == (number,):
-        with contextlib.suppress(TypeError, ValueError):
-            return values.astype(np.float64)
-    raise InputError(
-        f"{method.name}: {function} returned {type(scores).__name__} of shape"
-        f" {values.shape}{fault} instead of {number} numbers"
-    )

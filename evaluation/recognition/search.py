@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base import track
-from evaluation.methods import Method
+from evaluation.methods import Method, checked_scores
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 from evaluation.recognition.geometric_verification import estimated_poses
-from evaluation.recognition.scoring import checked_scores, score_places
+from evaluation.recognition.scoring import score_places
 from evaluation.recognition.stored_places import StoredDescriptors
 
 

@@ -16,10 +16,15 @@ from evaluation.recognition.bootstrap import (
     weights_by_drive,
 )
 from evaluation.recognition.precision_recall import pr_curve
-from evaluation.recognition.query_outcomes import QueryOutcomes
+from evaluation.recognition.query_outcomes import (
+    QueryOutcomes,
+    common_blocks,
+)
 
 # Probability of a value below the upper limit of a 95 % interval.
 _UPPER_LIMIT = 0.975
+# Differences and spreads of areas below this are rounding errors.
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,8 @@ class Difference:
         value: the first area minus the second.
         interval: 95 % interval.
         p_value: two-sided p-value under the hypothesis that there is no
-            difference; NaN if a route has a single bootstrap block.
+            difference: 1 for equal areas in all samples; NaN if a route has a
+            single bootstrap block.
     """
 
     value: float
@@ -67,10 +73,17 @@ def compared_by_auc(
     n/(n-1). Different drives are independent: their variances add up, and their
     degrees of freedom (n - 1 for each drive) add up.
 
+    A p-value is never below 2^(1 - n), where n is the number of blocks of all
+    drives. This is the least p-value of an exact test over n blocks, in which
+    the sign of each block's difference is random (Fisher, The Design of
+    Experiments, 1935). A lead without any spread has this p-value, because the
+    t test, which divides by the spread, does not apply.
+
     Args:
         answers: method -> its outcomes on each set of queries. The queries must
             be the same for all methods, and so must their blocks of the route,
-            see `QueryOutcomes.blocks`.
+            see `QueryOutcomes.blocks`. Outcomes without blocks take the blocks
+            of the other methods.
         drives: for each set of queries, a number that identifies the drive. By
             default, each set belongs to a different drive.
 
@@ -78,6 +91,9 @@ def compared_by_auc(
         (first method, second method) -> AUC of the first minus AUC of the
         second; and the p-value, corrected by Holm's method for the number of
         differences.
+
+    Raises:
+        ValueError: two methods have other blocks for the same queries.
     """
     sets = list(zip(*answers.values(), strict=True))
     drives = range(len(sets)) if drives is None else drives
@@ -100,9 +116,12 @@ def compared_by_auc(
         spread = math.sqrt(variances.sum()) / len(sets)
         freedom = (numbers - 1).sum()
         margin = float(stdtrit(freedom, _UPPER_LIMIT)) * spread
-        p_value = 1.0
-        if spread > 0.0:
+        if spread <= _ROUNDING and abs(value) <= _ROUNDING:
+            return Difference(value, Interval(value, value), 1.0)
+        p_value = 0.0
+        if spread > _ROUNDING:
             p_value = 2.0 * float(stdtr(freedom, -abs(value) / spread))
+        p_value = max(p_value, 2.0 ** (1.0 - float(numbers.sum())))
         interval = Interval(value - margin, value + margin)
         return Difference(value, interval, p_value)
 
@@ -130,7 +149,7 @@ def _samples_by_drive(
     """
     numbers: dict[int, int] = {}
     sums: dict[int, Any] = {}
-    blocks = [outcomes[0].own_blocks for outcomes in sets]
+    blocks = [common_blocks(outcomes) for outcomes in sets]
     drawn = weights_by_drive(blocks, drives)
     for drive, outcomes, (number, weights) in zip(
         drives, sets, drawn, strict=True

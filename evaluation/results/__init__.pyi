@@ -1,4 +1,6 @@
-from evaluation.results.charts.kinds import check_chart as check_chart
+from evaluation.results.cells import as_factor as as_factor
+from evaluation.results.charts.kinds import chart_factors as chart_factors
+from evaluation.results.charts.kinds import check_factors as check_factors
 from evaluation.results.charts.kinds import draw_chart as draw_chart
 from evaluation.results.figure_files import save_figure as save_figure
 from evaluation.results.headlines import SURVIVES as SURVIVES
@@ -44,9 +46,9 @@ from evaluation.results.sections.routes import (
 from evaluation.results.sections.routes import routes_section as routes_section
 from evaluation.results.styles import GONE as GONE
 from evaluation.results.styles import INK as INK
-from evaluation.results.styles import METHOD_STYLES as METHOD_STYLES
 from evaluation.results.styles import NEW as NEW
 from evaluation.results.styles import PALE as PALE
+from evaluation.results.styles import method_style as method_style
 from evaluation.results.styles import method_styles as method_styles
 from evaluation.results.styles import unit_rgb as unit_rgb
 from evaluation.results.summaries import LEAST_POINTS as LEAST_POINTS

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import itertools
 from typing import Any
 import zlib
 
 import numpy as np
 
-from cns_drake.base import InputError
-from evaluation.recognition import Difference, compared_by_auc
+from cns_drake.base import InputError, value_errors
+from evaluation.recognition import (
+    Difference,
+    common_blocks,
+    compared_by_auc,
+)
 from evaluation.results.table import Answers
 
 
@@ -17,14 +22,18 @@ def check_same_queries(first: Answers, second: Answers) -> None:
     """Raises an error unless two methods answered the same queries.
 
     Raises:
-        InputError: the two methods answered different queries.
+        InputError: the two methods answered different queries, or the queries
+            are in other blocks of the route.
     """
     frames, others = (a.columns["query_frame"] for a in (first, second))
+    two = (
+        f"{first.experiment}: {first.database}, {first.query}:"
+        f" {first.label} and {second.label}"
+    )
     if not np.array_equal(frames, others):
-        raise InputError(
-            f"{first.experiment}: {first.database}, {first.query}:"
-            f" {first.label} and {second.label} answered different queries"
-        )
+        raise InputError(f"{two} answered different queries")
+    with value_errors(f"{two}: column block"):
+        common_blocks([first.outcomes, second.outcomes])
 
 
 def drive_number(queries: Answers) -> int:
@@ -48,9 +57,9 @@ def compared_answers(
     Raises:
         InputError: two methods answered different queries.
     """
-    for first, *others in zip(*answers.values(), strict=True):
-        for other in others:
-            check_same_queries(first, other)
+    for of_condition in zip(*answers.values(), strict=True):
+        for pair in itertools.combinations(of_condition, 2):
+            check_same_queries(*pair)
     return compared_by_auc(
         {
             name: [in_condition.outcomes for in_condition in of_method]

@@ -1,22 +1,9 @@
-"""The names of methods, as their authors write them and in one order."""
+"""The names of methods in tables and charts, and their order."""
 
 from collections.abc import Iterable
+import math
 
-# The spelling of the methods' authors, in the order of tables; our methods come
-# last.
-_METHOD_TITLES = {
-    "scan-context++": "Scan Context++",
-    "solid": "SOLiD",
-    "ring++": "RING++",
-    "btc": "BTC",
-    "layered-overlap": "Layered overlap",
-    "learned": "Learned",
-    "bevplace": "BEVPlace",
-    "dpa-net": "DPA-Net",
-    "map-closures": "MapClosures",
-    "probe": "PROBE",
-    "svt-net": "SVT-Net",
-}
+from evaluation.methods import method_facts
 
 
 def title(label: str) -> str:
@@ -27,16 +14,19 @@ def title(label: str) -> str:
             settings, if any.
     """
     method, comma, settings = label.partition(",")
-    return f"{_METHOD_TITLES.get(method, method)}{comma}{settings}"
+    facts = method_facts(method)
+    return f"{facts.title if facts else method}{comma}{settings}"
 
 
 def in_table_order(methods: Iterable[str]) -> list[str]:
     """Returns methods in the order of tables.
 
-    Methods without a place in this order follow, sorted by name.
+    Methods that are not known, and labels with settings, follow, sorted by
+    name.
     """
-    known = list(_METHOD_TITLES)
-    return sorted(
-        set(methods),
-        key=lambda m: (known.index(m) if m in known else len(known), m),
-    )
+
+    def place(method: str) -> tuple[float, str]:
+        facts = method_facts(method)
+        return (facts.order if facts else math.inf), method
+
+    return sorted(set(methods), key=place)

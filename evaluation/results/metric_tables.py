@@ -3,11 +3,13 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import functools
+import itertools
+import math
 from pathlib import Path
 from typing import Any
 
 from cns_drake.base import InputError
-from evaluation.recognition import PROTOCOLS, main_metrics
+from evaluation.recognition import METRICS, PROTOCOLS, metric_named
 from evaluation.results.keys import SETTINGS
 from evaluation.results.table import (
     QUERIES,
@@ -20,10 +22,6 @@ from evaluation.results.table import (
 
 _BASELINES = Path(__file__).with_name("baselines")
 SHIPPED = "shipped"
-# Metrics of which bootstrap samples are drawn, fields of `SampledMetrics`.
-RESAMPLED_METRICS = ("auc", "r1")
-# Metrics that are computed from answers to queries.
-_FROM_ANSWERS = ("auc", "r1", "auc_strict")
 # The same for a value and its answers, for tables that were rounded by hand.
 _ROUNDED_BY_HAND = 1e-3
 # What identifies a condition, without the method.
@@ -123,26 +121,25 @@ def _check_answers(
         (*row.identity, row.metric): row
         for row in results.where(task="place").rows
     }
-    for answer in answers:
-        # Areas take time, and other tasks have none.
-        if answer.task != "place" or not any(
-            (*answer.identity, name) in known for name in _FROM_ANSWERS
+    computed = [one for one in METRICS.values() if one.compute is not None]
+    for answer, metric in itertools.product(answers, computed):
+        name, number = metric.name, len(answer.outcomes)
+        row = known.get((*answer.identity, name))
+        # Areas take time.
+        if row is None:
+            continue
+        value = metric.of(answer.outcomes)
+        if not (
+            abs(row.value - value) > _ROUNDED_BY_HAND
+            or row.n not in (None, number)
         ):
             continue
-        for name, value in main_metrics(answer.outcomes).items():
-            row = known.get((*answer.identity, name))
-            number = len(answer.outcomes)
-            if row is None or (
-                abs(row.value - value) <= _ROUNDED_BY_HAND
-                and row.n in (None, number)
-            ):
-                continue
-            count = "" if row.n is None else f" of {row.n} queries"
-            raise InputError(
-                f"{queries}: contradicts {path}: {name} of {answer.label},"
-                f" {answer.database} -> {answer.query}: {value:.4f} of {number}"
-                f" queries, but {row.value:.4f}{count} in the results"
-            )
+        count = "" if row.n is None else f" of {row.n} queries"
+        raise InputError(
+            f"{queries}: contradicts {path}: {name} of {answer.label},"
+            f" {answer.database} -> {answer.query}: {value:.4f} of {number}"
+            f" queries, but {row.value:.4f}{count} in the results"
+        )
 
 
 def read_metric_table(
@@ -177,6 +174,16 @@ def read_metric_table(
     if is_alone and "protocol" not in selection:
         rows = _by_one_protocol(rows, path)
     notes = []
+    known, note = Results(results.factors, rows).defined()
+    if note:
+        left = next(row for row in rows if math.isnan(row.value))
+        notes.append(
+            f"{path}: {note}; the first is of {left.label}, {left.database} ->"
+            f" {left.query}"
+        )
+        rows = known.rows
+    if not rows:
+        raise InputError(f"{path}: no {selection['metric']} is defined")
     if any(not row.protocol_digest for row in rows):
         notes.append(
             f"{path}: rows do not say how they were made (column"
@@ -190,7 +197,8 @@ def read_metric_table(
         for answer in answers
         if (answer.task, answer.gate) == (selection["task"], selection["gate"])
     ]
-    if selection["metric"] in RESAMPLED_METRICS and any(
+    metric = metric_named(str(selection["metric"]))
+    if metric.is_resampled and any(
         answer.outcomes.blocks is None for answer in asked
     ):
         notes.append(
@@ -213,7 +221,9 @@ def _no_row_text(results: Results, selection: Mapping[str, object]) -> str:
 def shipped_table(selection: Mapping[str, object]) -> MetricTable:
     """Returns the selected rows of all shipped tables, see `Results.where`."""
     rows = [
-        row for table in _baselines() for row in table.where(selection).rows
+        row
+        for table in _baselines()
+        for row in table.where(selection).defined()[0].rows
     ]
     return MetricTable(SHIPPED, _by_method_and_condition(rows), {})
 

@@ -18,6 +18,7 @@ from cns_drake.base import (
     write_csv,
     write_text,
 )
+from evaluation.recognition import METRICS, Metric, metric_named
 from evaluation.results.charts.chart import NARROW, WIDE
 from evaluation.results.charts.kinds import DrawnChart, draw_chart
 from evaluation.results.charts.words import in_words, value_words
@@ -37,9 +38,8 @@ from evaluation.results.page_frame import (
     page_section,
     value_text,
 )
-from evaluation.results.ranges import check_all
 from evaluation.results.summaries import Summary, means, summarised
-from evaluation.results.table import COSTS, QueryRows, Results
+from evaluation.results.table import QueryRows, Results
 
 _TASKS = {
     "place": "Place recognition",
@@ -50,15 +50,8 @@ _TASKS = {
     "cost": "Costs",
 }
 _SUMMARIES = "summaries.csv"
-# Task -> the metrics of its summary, the headline first.
-_HEADLINES = {
-    "place": ("auc", "auc_strict", "r1", "kept", "kept_strict"),
-    "pose": ("pose_success", "kept", "translation_median"),
-    "localise": ("success_03m_1deg", "success_2m_5deg", "kept"),
-    "map": ("miou", "right_structures", "called_structures"),
-    "change": ("tcr_sym", "tcr_sym_masked"),
-    "cost": COSTS,
-}
+# Files that only some pages have beside them.
+_OF_A_PAGE = re.compile(r"summaries\.csv|chart_\d+\.(pdf|png)")
 # Greatest number of columns of the table of conditions.
 _MOST_COLUMNS = 12
 # Line style of Matplotlib -> dashes of an SVG line.
@@ -73,6 +66,7 @@ def write_page(
     title: str,
     about: str = "",
     charts: Sequence[Mapping[str, Any]] = (),
+    metrics: Sequence[Metric] = (),
     experiment_text: str = "",
     notes: Iterable[str] = (),
     sections: Iterable[PageSection] = (),
@@ -82,7 +76,8 @@ def write_page(
 
     Next to the page, the function writes the charts for print and, if there are
     numbers behind the charts (see `evaluation.results.summaries.summarised`),
-    `summaries.csv`.
+    `summaries.csv`. Such files of an earlier page that this page does not have
+    are removed.
 
     Args:
         results: the table of results, written next to the page as
@@ -97,6 +92,8 @@ def write_page(
             the table is left out, with a note. If the experiment has several
             protocols, a chart shows the first, unless it names the factor
             `protocol.base`.
+        metrics: the metrics that the summary of each task shows, if the task
+            has them; by default, its main metrics.
         experiment_text: the experiment as YAML.
         notes: further sentences for the page, such as on settings.
         sections: further sections, such as those of recordings.
@@ -109,14 +106,18 @@ def write_page(
         InputError: a file cannot be written.
     """
     make_folder(folder)
-    shown, missing = _drawn_charts(results, queries, folder, charts)
-    for note in missing:
-        on_note(note)
+    for path in folder.iterdir():
+        if _OF_A_PAGE.fullmatch(path.name):
+            path.unlink()
+    known, undefined = results.defined()
     numbers = summarised(*_charted(results, queries, {}), charts)
     if numbers:
-        for number in numbers:
-            check_all(number.what, (number.value, number.low, number.high))
         write_csv(folder / _SUMMARIES, Summary._fields, numbers)
+    shown, missing = _drawn_charts(known, queries, folder, charts)
+    if undefined:
+        missing.append(f"{undefined[:1].upper()}{undefined[1:]}.")
+    for note in missing:
+        on_note(note)
     protocols = ", ".join(filter(None, results.distinct("protocol")))
     about = f". {about}" if about else ""
     text = framed_page(
@@ -124,7 +125,7 @@ def write_page(
         str(shown[0]["message"]) if shown else title,
         Markup("<p><strong>{}</strong>{}</p>").format(title, about),
         [
-            *_first_sections(results, shown),
+            *_first_sections(known, shown, metrics),
             *sections,
             *_last_sections(results, queries, numbers, experiment_text),
         ],
@@ -172,7 +173,14 @@ def _drawn_charts(
             # What was measured does not depend on it.
             missing.append(f"Chart {number} is left out: {error}.")
             continue
-        drawn.append({"message": alone.message, "legend": alone.legend, **svgs})
+        drawn.append(
+            {
+                "message": alone.message,
+                "legend": alone.legend,
+                "source": alone.source,
+                **svgs,
+            }
+        )
     return drawn, missing
 
 
@@ -198,7 +206,9 @@ def _names(chart: Mapping[str, Any]) -> set[str]:
 
 
 def _first_sections(
-    results: Results, charts: Sequence[Mapping[str, Any]]
+    results: Results,
+    charts: Sequence[Mapping[str, Any]],
+    metrics: Sequence[Metric],
 ) -> list[PageSection]:
     """Returns the charts, and the main results of each task."""
     sections = []
@@ -207,6 +217,7 @@ def _first_sections(
             page_section(
                 "charts",
                 "Charts",
+                "results.csv: the rows that are named below each chart",
                 is_open=True,
                 charts=charts,
                 wide=WIDE,
@@ -214,10 +225,18 @@ def _first_sections(
                 corners=marker_corners,
             )
         )
-    summary = [_summary(results, task) for task in results.distinct("task")]
+    summary = [
+        _summary(results, task, metrics) for task in results.distinct("task")
+    ]
     return [
         *sections,
-        page_section("means", "Results", is_open=True, summary=summary),
+        page_section(
+            "means",
+            "Results",
+            f"results.csv: {len(results.rows)} rows with a defined value",
+            is_open=True,
+            summary=summary,
+        ),
     ]
 
 
@@ -230,14 +249,23 @@ def _last_sections(
     """Returns the numbers behind the charts, all results, and the files."""
     sections = []
     if numbers:
-        sections.append(page_section("summaries", "Summaries", numbers=numbers))
+        source = "results.csv and queries.csv: the rows of the charts"
+        sections.append(
+            page_section("summaries", "Summaries", source, numbers=numbers)
+        )
     answers = queries.answers if queries else ()
     return [
         *sections,
-        page_section("conditions", "Conditions", table=_wide_table(results)),
+        page_section(
+            "conditions",
+            "Conditions",
+            f"results.csv: all {len(results.rows)} rows",
+            table=_wide_table(results),
+        ),
         page_section(
             "made_by",
             "Files",
+            "the experiment's file",
             experiment_text=experiment_text,
             queries=sum(len(answer.columns["correct"]) for answer in answers),
         ),
@@ -254,7 +282,9 @@ def _svg(drawn: DrawnChart, prefix: str) -> Markup:
     return Markup(re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{prefix}-", text))
 
 
-def _summary(results: Results, task: str) -> dict[str, Any]:
+def _summary(
+    results: Results, task: str, chosen: Sequence[Metric]
+) -> dict[str, Any]:
     """Returns a table of a task's main results: a row for each method.
 
     Results without and with geometric verification are in different rows. If
@@ -263,7 +293,12 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
     """
     rows = results.where(task=task).rows
     known = dict.fromkeys(row.metric for row in rows)
-    metrics = [m for m in _HEADLINES.get(task, known) if m in known] or [*known]
+    main = [one for one in METRICS.values() if task in one.main_in]
+    metrics = next(
+        names
+        for some in (chosen, main, map(metric_named, known))
+        if (names := [one.name for one in some if one.name in known])
+    )
     factors = _told_factors(results.where(task=task))
     cells = dict.fromkeys(tuple(row[f] for f in factors) for row in rows)
     by_condition = 1 < len(cells) <= _MOST_COLUMNS
@@ -297,7 +332,7 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
         for name in in_table_order(row.label for row in rows)
         if any((name, gate, *column) in found for column in columns)
     ]
-    heads = [in_words(str(metric)) for metric, *_ in columns]
+    heads = [metric_named(str(metric)).label for metric, *_ in columns]
     title = _TASKS.get(task, task)
     if by_condition:
         title += f": {heads[0]}"

@@ -26,6 +26,7 @@ class PageSection(NamedTuple):
     Attributes:
         name: identifier of the section, to which links lead.
         word: name of the section among the links at the top.
+        source: the rows of the tables, or other data, that the section shows.
         body: contents of the section as HTML.
         is_open: whether the section is shown from the start. Otherwise, the
             section unfolds when a reader clicks its name.
@@ -35,6 +36,7 @@ class PageSection(NamedTuple):
 
     name: str
     word: str
+    source: str
     body: Markup
     is_open: bool = False
     data: Mapping[str, Any] | None = None
@@ -43,6 +45,7 @@ class PageSection(NamedTuple):
 def page_section(
     name: str,
     word: str,
+    source: str,
     *,
     is_open: bool = False,
     data: Mapping[str, Any] | None = None,
@@ -53,7 +56,7 @@ def page_section(
     Values can be functions, which the template then calls.
     """
     return PageSection(
-        name, word, rendered(f"{name}.html", **values), is_open, data
+        name, word, source, rendered(f"{name}.html", **values), is_open, data
     )
 
 

@@ -10,8 +10,13 @@ import zlib
 import numpy as np
 from scipy.special import stdtrit
 
-from evaluation.recognition import UNKNOWN, Interval, resampled_weights
-from evaluation.results.ranges import Range, range_of
+from evaluation.recognition import (
+    UNKNOWN,
+    Interval,
+    Metric,
+    metric_named,
+    resampled_weights,
+)
 from evaluation.results.table import Row
 
 # Least number of maps or conditions whose spread gives a mean an interval.
@@ -26,12 +31,13 @@ class Ranked(NamedTuple):
     interval: Interval
 
 
-def rank_methods(
-    rows: Iterable[Row], *, least_first: bool = False
-) -> tuple[list[Ranked], np.ndarray]:
+def rank_methods(rows: Iterable[Row]) -> tuple[list[Ranked], np.ndarray]:
     """Returns methods ranked by their means over conditions.
 
-    Only conditions that were measured with all methods count. The intervals of
+    The least mean is the best if less of the metric is better.
+
+    Only conditions that were measured with all methods count, and of these only
+    those in which the values of all methods are defined. The intervals of
     the means are t intervals. The independent units of the intervals are maps
     if there are several maps, and conditions otherwise. Intervals are limited
     to the metric's range. With two or three units, intervals are unknown,
@@ -42,8 +48,6 @@ def rank_methods(
 
     Args:
         rows: rows of one metric.
-        least_first: whether a smaller value is better, so that the least value
-            comes first.
 
     Returns:
         The M methods, the best first; and (B, M) the mean of each method in
@@ -64,20 +68,20 @@ def rank_methods(
     with np.errstate(invalid="ignore"):
         samples = weights @ values / weights.sum(axis=1, keepdims=True)
     first = [common[0][name] for name in names]
+    metric = metric_named(first[0].metric)
     number = len(set(units))
     if number == 1:
         intervals = [Interval(row.low, row.high) for row in first]
     elif number < LEAST_UNITS:
         intervals = [UNKNOWN] * len(names)
     else:
-        limits = range_of(first[0].metric) or Range()
-        intervals = _t_intervals(values, unit_of_row, limits)
+        intervals = _t_intervals(values, unit_of_row, metric)
     means = values.mean(axis=0).tolist()
     found = [
         Ranked(*columns)
         for columns in zip(names, means, intervals, strict=True)
     ]
-    sign = 1.0 if least_first else -1.0
+    sign = 1.0 if metric.better == "less" else -1.0
     order = sorted(
         range(len(names)), key=lambda k: (sign * found[k].value, names[k])
     )
@@ -99,7 +103,7 @@ def _common_conditions(rows: Iterable[Row]) -> list[dict[str, Row]]:
 
 
 def _t_intervals(
-    values: np.ndarray, unit_of_row: np.ndarray, limits: Range
+    values: np.ndarray, unit_of_row: np.ndarray, metric: Metric
 ) -> list[Interval]:
     """Returns the 95 % t interval of the mean of each column.
 
@@ -111,7 +115,7 @@ def _t_intervals(
     Args:
         values: (N, M) values.
         unit_of_row: (N,) number of each row's unit, from 0 to G - 1.
-        limits: range of the values, to which the intervals are limited.
+        metric: the metric, to whose range the intervals are limited.
     """
     means = values.mean(axis=0)
     number = int(unit_of_row.max()) + 1
@@ -120,6 +124,6 @@ def _t_intervals(
     errors = np.sqrt(number / (number - 1) * squares) / len(values)
     margins = stdtrit(number - 1, 0.975) * errors
     ends = np.clip(
-        [means - margins, means + margins], limits.least, limits.greatest
+        [means - margins, means + margins], metric.least, metric.greatest
     )
     return [Interval(*pair) for pair in ends.T.tolist()]

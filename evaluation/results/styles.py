@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from evaluation.methods import method_facts
 from evaluation.results.method_names import title
 
 
@@ -20,17 +21,9 @@ class MethodStyle(NamedTuple):
     marker: str
 
 
-# Style of each method. All kinds of colour vision can distinguish these colours
-# by Okabe and Ito. Line styles and markers are for prints without colour.
-METHOD_STYLES = {
-    "ring++": MethodStyle("#0072B2", "-", "o"),
-    "btc": MethodStyle("#D55E00", "--", "s"),
-    "scan-context++": MethodStyle("#009E73", "-.", "^"),
-    "solid": MethodStyle("#CC79A7", ":", "D"),
-    "layered-overlap": MethodStyle("#E69F00", "-", "v"),
-    "learned": MethodStyle("#56B4E9", "--", "P"),
-}
-# Styles of methods that are not shipped.
+# Styles of methods without a style of their own. All kinds of colour vision can
+# distinguish the colours of the standard methods, by Okabe and Ito. Line styles
+# and markers are for prints without colour.
 _OTHERS = (
     MethodStyle("#000000", "-.", "X"),
     MethodStyle("#8C564B", ":", "p"),
@@ -61,14 +54,34 @@ def method_styles(labels: Sequence[str]) -> dict[str, MethodStyle]:
     """Returns the style of each method in a figure.
 
     Args:
-        labels: names of the methods, with their settings.
+        labels: names of all methods of a page, with their settings. Methods
+            without a style of their own get theirs by their place among
+            `labels`.
 
     Returns:
         Method as written in the legend (see `title`) -> its style.
     """
-    others = [name for name in labels if name not in METHOD_STYLES]
-    return {
-        title(name): METHOD_STYLES.get(name)
-        or _OTHERS[others.index(name) % len(_OTHERS)]
-        for name in labels
-    }
+    styles = {}
+    num_others = 0
+    for name in labels:
+        style = method_style(name)
+        if style is None:
+            style = _other_style(num_others)
+            num_others += 1
+        styles[title(name)] = style
+    return styles
+
+
+def method_style(name: str) -> MethodStyle | None:
+    """Returns a method's own style; None if it has none."""
+    facts = method_facts(name)
+    return MethodStyle(*facts.style) if facts and facts.style else None
+
+
+def _other_style(number: int) -> MethodStyle:
+    """Returns one of several styles, which differ as long as possible."""
+    size = len(_OTHERS)
+    colour = _OTHERS[number % size].colour
+    # In the next round, each colour has another line and marker.
+    _, line, marker = _OTHERS[(number + number // size) % size]
+    return MethodStyle(colour, line, marker)

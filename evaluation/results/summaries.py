@@ -22,12 +22,13 @@ from scipy.stats import rankdata
 from evaluation.recognition import (
     UNKNOWN,
     kept_share,
+    metric_named,
     paired_samples,
     percentile_interval,
     pr_curve,
 )
 from evaluation.results.keys import CAUSE, LEVEL, NO_CAUSE, Key
-from evaluation.results.table import COSTS, Answers, QueryRows, Results, Row
+from evaluation.results.table import Answers, QueryRows, Results, Row
 
 # Factor: what updates the map of several drives.
 MAINTAIN = "database.maintain"
@@ -246,7 +247,10 @@ def lifetime(
 
 
 def lifetimes(
-    results: Results, factor: str, shares: Iterable[float] = (0.9, 0.5)
+    results: Results,
+    factor: str,
+    shares: Iterable[float] = (0.9, 0.5),
+    metric: str = "kept",
 ) -> list[Summary]:
     """Returns at which values of a factor a given share of a result is left.
 
@@ -254,13 +258,13 @@ def lifetimes(
     method still has 90 % of the AUC that it has in a new map.
 
     Args:
-        results: table of results. The rows of the metric `kept` contain the
-            share that is left at each value of the factor; the least value of
-            the factor is its value in the baseline. A row that was measured
-            with a single seed, such as a row of the baseline, counts for all
-            seeds.
+        results: table of results. The rows of the metric contain the share that
+            is left at each value of the factor; the least value of the factor
+            is its value in the baseline. A row that was measured with a single
+            seed, such as a row of the baseline, counts for all seeds.
         factor: name of the factor, whose values are numbers.
         shares: the given shares, from 0 to 1.
+        metric: name of a retained share.
 
     Returns:
         For each share and each condition (such as map and method): the value of
@@ -270,7 +274,7 @@ def lifetimes(
         factor in the table.
     """
     groups: dict[tuple, list[Row]] = {}
-    for row in results.where(metric="kept").rows:
+    for row in results.where(metric=metric).rows:
         if row[factor] is not None:
             groups.setdefault(row.without("seed", factor), []).append(row)
     found = []
@@ -489,11 +493,11 @@ def summarised(
     """Returns numbers that sum up an experiment's charts.
 
     A scatter plot is summed up by the function `correlations` of this module. A
-    chart of the kind `lines` is summed up by `lifetimes` if its metric is
-    `kept`, and by `growths` if its metric is a CPU time. A chart over the ways
-    of updating a map is summed up by `worths`. Other charts give no numbers.
-    For an experiment with the factor `cause`, the result also contains the
-    numbers of `excesses`.
+    chart of the kind `lines` is summed up by `lifetimes` if its metric is a
+    retained share, and by `growths` if its metric grows with a database. A
+    chart over the ways of updating a map is summed up by `worths`. Other charts
+    give no numbers. For an experiment with the factor `cause`, the result also
+    contains the numbers of `excesses`.
 
     Args:
         results: all results of the experiment.
@@ -509,9 +513,9 @@ def summarised(
             found += correlations(results.where(gate=False), x, y)
         elif over == MAINTAIN:
             found += worths(results, metric)
-        elif chart.get("kind") == "lines" and metric == "kept":
-            found += lifetimes(results, over)
-        elif chart.get("kind") == "lines" and metric in COSTS:
+        elif chart.get("kind") == "lines" and metric_named(metric).share_of:
+            found += lifetimes(results, over, metric=metric)
+        elif chart.get("kind") == "lines" and metric_named(metric).grows:
             x = "places" if "places" in results.distinct("metric") else over
             found += growths(results, x, metric)
     if queries is not None and CAUSE in queries.factors:

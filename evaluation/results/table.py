@@ -6,6 +6,7 @@ followed by what was measured.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,47 +16,48 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import csv_text, errors_at, write_text
-from evaluation.recognition import Number, QueryOutcomes
+from cns_drake.base import InputError, csv_text, errors_at, write_text
+from evaluation.recognition import Number, QueryOutcomes, metric_named
+from evaluation.results.cells import (
+    FACTOR,
+    NUMBER,
+    SEED,
+    TEXT,
+    TRUTH,
+    WHOLE,
+)
 from evaluation.results.keys import MEASURED, Key, key_columns
-from evaluation.results.ranges import Range, checked, range_of
 from evaluation.results.table_lines import TableLine, TableLines
 
 RESULTS = "results.csv"
 QUERIES = "queries.csv"
-# Columns of a query -> what kind of value they have.
+# Columns of a query -> the kind of their cells.
 _ANSWERS = {
-    "query_frame": int,
-    "query_stamp_ns": int,
-    "query_x": float,
-    "query_y": float,
-    "query_z": float,
-    "block": int,
-    "correct": bool,
-    "has_match": bool,
-    "score": float,
-    "first_right_rank": int,
-    "why": str,
-    "match_drive": str,
-    "match_frame": int,
-    "distance": float,
-    "translation_error": float,
-    "rotation_error_deg": float,
-    "overlap": float,
-    "visible_change": float,
+    "query_frame": WHOLE,
+    "query_stamp_ns": WHOLE,
+    "query_x": NUMBER,
+    "query_y": NUMBER,
+    "query_z": NUMBER,
+    "block": WHOLE,
+    "correct": TRUTH,
+    "has_match": TRUTH,
+    "score": NUMBER,
+    "first_right_rank": WHOLE,
+    "why": TEXT,
+    "match_drive": TEXT,
+    "match_frame": WHOLE,
+    "distance": NUMBER,
+    "translation_error": NUMBER,
+    "rotation_error_deg": NUMBER,
+    "overlap": NUMBER,
+    "visible_change": NUMBER,
 }
+# Kinds of cells -> the type of an array of their values.
+_TYPES = {WHOLE: int, NUMBER: float, TRUTH: bool, TEXT: object}
 _NEEDED_ANSWERS = ("query_frame", "correct", "has_match", "score")
-# Metrics whose intervals come from resampled queries, and may miss the value
-# itself by a little.
-_RESAMPLED = ("auc", "auc_strict", "r1")
-# By so much, at most.
+# An interval of resampled queries misses the value by this share of the
+# metric's range, at most.
 _MOST_MISSED = 0.05
-# Rounding may lead beyond 0 and 1 by this.
-_ROUNDING = 1e-9
-# What a database costs; it grows with the number of places.
-COSTS = ("query_time", "build_time", "memory")
-# Metrics that are known for any set of queries.
-_ALWAYS_KNOWN = ("auc", "auc_strict")
 
 
 @dataclass(frozen=True)
@@ -210,6 +212,27 @@ class Results:
             ),
         )
 
+    def defined(self) -> tuple[Results, str]:
+        """Returns the rows whose values are known, and a note on the others.
+
+        Means and charts are made of these rows alone.
+
+        Returns:
+            The table without undefined values; and a sentence that says of
+            which metrics how many are left out, empty if none is.
+        """
+        rows = tuple(row for row in self.rows if not math.isnan(row.value))
+        left = Counter(row.metric for row in self.rows if math.isnan(row.value))
+        if not left:
+            return self, ""
+        total = Counter(row.metric for row in self.rows)
+        counts = ", ".join(
+            f"{name} ({number} of {total[name]})"
+            for name, number in left.items()
+        )
+        note = f"left out of means and charts, as undefined: {counts}"
+        return Results(self.factors, rows), note
+
     def distinct(self, column: str) -> list[Any]:
         """Returns the distinct values of a column, without None.
 
@@ -294,7 +317,7 @@ class QueryRows:
             key = _key_cells(answers, self.factors)
             number = len(answers.columns["correct"])
             columns = [
-                [_answer_cell(v, kind) for v in answers.columns[name].tolist()]
+                [kind.write(v) for v in answers.columns[name].tolist()]
                 if name in answers.columns
                 else [""] * number
                 for name, kind in _ANSWERS.items()
@@ -308,44 +331,34 @@ def _factor_names(keys: Iterable[Key]) -> tuple[str, ...]:
 
 
 def _key_cells(key: Key, factors: Sequence[str]) -> list[str]:
-    names = key_columns(factors)
-    cells = [_cell(key[name]) for name in names]
-    cells[names.index("gate")] = str(int(key.gate))
-    return cells
+    kinds = {"gate": TRUTH, "seed": SEED, **dict.fromkeys(factors, FACTOR)}
+    return [
+        kinds.get(name, TEXT).write(key[name]) for name in key_columns(factors)
+    ]
 
 
 def _measured_cells(row: Row) -> list[str]:
+    metric = metric_named(row.metric)
     values = [
-        checked(row.metric, float(number))
+        metric.checked(float(number))
         for number in (row.value, row.low, row.high)
     ]
-    return [row.metric, *map(_cell, (*values, row.n))]
-
-
-def _cell(value: object) -> str:
-    """Returns a value as the table has it, with all its digits."""
-    if isinstance(value, bool | np.bool_):
-        return str(value).lower()
-    if isinstance(value, float):
-        return "" if math.isnan(value) else repr(float(value))
-    return "" if value is None else str(value)
-
-
-def _answer_cell(value: Any, kind: type) -> str:
-    if kind is int and not 0 <= value < math.inf:
-        return ""
-    return str(int(value)) if kind in (bool, int) else _cell(value)
+    return [row.metric, *map(NUMBER.write, values), WHOLE.write(row.n)]
 
 
 def _answer_columns(
     lines: Sequence[TableLine], names: Iterable[str], task: str
 ) -> dict[str, np.ndarray]:
-    """Returns the checked values of all lines with the same key, by column."""
+    """Returns the checked values of all lines with the same key, by column.
+
+    The queries are in the order of their frames, whatever the order of lines.
+    """
+    lines = sorted(lines, key=lambda line: line.value("query_frame", WHOLE))
     columns: dict[str, np.ndarray] = {}
     for name in names:
         kind = _ANSWERS[name]
         values = [line.value(name, kind) for line in lines]
-        columns[name] = np.array(values, dtype=object if kind is str else kind)
+        columns[name] = np.array(values, dtype=_TYPES[kind])
     frames = columns["query_frame"]
     again = np.ones(len(frames), dtype=bool)
     again[np.unique(frames, return_index=True)[1]] = False
@@ -376,26 +389,29 @@ def _measured_values(line: TableLine) -> dict[str, Any]:
     """Returns a row's values in the columns that follow its key."""
     metric = line.text("metric")
     value, low, high = (
-        line.value(name, float) for name in ("value", "low", "high")
+        line.value(name, NUMBER) for name in ("value", "low", "high")
     )
-    if math.isnan(value) and metric in _ALWAYS_KNOWN:
+    known = metric_named(metric)
+    if math.isnan(value) and known.compute is not None and not known.undefined:
         raise line.fault("value", f"{metric} needs a number")
-    least, greatest, _ = range_of(metric) or Range()
-    if value < least or value > greatest:
-        limits = f"from {least:g} to {greatest:g}"
-        if math.isinf(greatest):
-            limits = f"{least:g} or more"
-        raise line.fault("value", f"{value:g}, but {metric} is {limits}")
+    for name, number in (("value", value), ("low", low), ("high", high)):
+        try:
+            known.checked(number)
+        except InputError:
+            raise line.fault(
+                name, f"{number:g}, but {metric} is {known.range_text}"
+            ) from None
     if math.isnan(low) != math.isnan(high):
         raise line.fault("low", "an interval has a low and a high end")
     if low > high:
         raise line.fault("low", f"{low:g} is more than high ({high:g})")
-    if metric in _RESAMPLED and not math.isnan(low):
-        if not (low >= -_ROUNDING and high <= 1.0 + _ROUNDING):
-            raise line.fault("low", "an interval from 0 to 1 at most")
-        if not low - _MOST_MISSED <= value <= high + _MOST_MISSED:
-            raise line.fault("value", f"{value:g} lies far off its interval")
-    n = line.value("n", int)
+    missed = max(low - value, value - high)
+    # Of a metric without limits, nothing is far.
+    if known.is_resampled and missed > _MOST_MISSED * (
+        known.greatest - known.least
+    ):
+        raise line.fault("value", f"{value:g} lies far off its interval")
+    n = line.value("n", WHOLE)
     return {
         "metric": metric,
         "value": value,

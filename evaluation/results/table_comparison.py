@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 import itertools
 from pathlib import Path
-import re
 from typing import Any, NamedTuple
 import warnings
 
@@ -14,11 +13,15 @@ from scipy.stats import kendalltau
 
 from cns_drake.base import InputError, json_values
 from evaluation.recognition import (
+    METRICS,
     PROTOCOL_NAMES,
     Difference,
     Interval,
+    Metric,
+    common_blocks,
+    load_metrics,
+    metric_named,
     percentile_interval,
-    resampled_metrics,
     weights_by_drive,
 )
 from evaluation.results.compared_answers import (
@@ -28,7 +31,6 @@ from evaluation.results.compared_answers import (
 )
 from evaluation.results.keys import KEYS, LAST, STAGE
 from evaluation.results.metric_tables import (
-    RESAMPLED_METRICS,
     SHIPPED,
     Condition,
     MetricTable,
@@ -38,12 +40,6 @@ from evaluation.results.metric_tables import (
 )
 from evaluation.results.ranking import LEAST_UNITS, Ranked, rank_methods
 from evaluation.results.table import Answers, Results, Row
-
-# Metrics for which less is better.
-_LESS = re.compile(
-    r"translation_\w+|rotation_\w+|\w+_ms|no_\w+|other_city|too_far|elsewhere"
-    r"|lost|memory|\w+_time"
-)
 
 # Values that differ by no more are the same result, with the digits that ship.
 _ALIKE = 1e-4
@@ -138,15 +134,14 @@ def _means_and_samples(
 
     `_rank_agreement` says what is sampled.
     """
-    ranked, samples = rank_methods(
-        row for (method, _), row in table.rows.items() if method in methods
-    )
+    rows = [row for (method, _), row in table.rows.items() if method in methods]
+    ranked, samples = rank_methods(rows)
     order = [[mean.method for mean in ranked].index(name) for name in methods]
     means = np.array([mean.value for mean in ranked])[order]
     measured = list(itertools.product(table.conditions, methods))
     if (
         len({row.map for row in table.rows.values()}) >= LEAST_UNITS
-        or metric not in RESAMPLED_METRICS
+        or not metric_named(metric).is_resampled
         or any(
             (method, condition) not in table.answers
             for condition, method in measured
@@ -158,15 +153,18 @@ def _means_and_samples(
         for condition in table.conditions
     ]
     for of_condition in asked:
-        for answers in of_condition:
-            check_same_queries(of_condition[0], answers)
+        for pair in itertools.combinations(of_condition, 2):
+            check_same_queries(*pair)
     drawn = weights_by_drive(
-        [of_condition[0].outcomes.own_blocks for of_condition in asked],
+        [
+            common_blocks([answers.outcomes for answers in of_condition])
+            for of_condition in asked
+        ],
         [drive_number(of_condition[0]) for of_condition in asked],
     )
     samples_of_asked = [
         [
-            getattr(resampled_metrics(answers.outcomes, weights), metric)
+            metric_named(metric).samples(answers.outcomes, weights)
             for answers in of_condition
         ]
         for of_condition, (_, weights) in zip(asked, drawn, strict=True)
@@ -263,8 +261,9 @@ def compare_tables(
     Args:
         paths: tables of results, or folders with a `results.csv`. The answers
             to queries in a `queries.csv` next to a table are used as well.
-        metric: the metric to compare. If several tasks have it, the results of
-            `place` are compared.
+        metric: name of the metric to compare, or a Python file that registers
+            it. If several tasks have it, the results of `place` are compared.
+            If the name is not known, more is taken for better, with a note.
         protocol: name of the protocol whose rows count. By default, rows of the
             same protocol are compared. With `rankings`, the default is `fair`
             or, in a table without this protocol, the table's only protocol.
@@ -283,6 +282,14 @@ def compare_tables(
     if protocol not in (None, *PROTOCOL_NAMES):
         names = ", ".join(PROTOCOL_NAMES)
         raise InputError(f"--protocol: {protocol!r} is none of {names}")
+    notes: list[str] = []
+    if metric.endswith(".py"):
+        metric = _only_metric(Path(metric)).name
+    elif metric not in METRICS:
+        notes.append(
+            f"{metric}: not known here; more is taken for better (with its"
+            " Python file as --metric, its own direction counts)"
+        )
     read = [Results.read(path) for path in paths]
     tasks = {
         row.task
@@ -298,7 +305,6 @@ def compare_tables(
     if protocol is not None:
         selection["protocol"] = protocol
     own: list[MetricTable] = []
-    notes: list[str] = []
     for path, results in zip(paths, read, strict=True):
         table, found = read_metric_table(
             path,
@@ -318,6 +324,19 @@ def compare_tables(
     return replace(compared, task=task, notes=notes)
 
 
+def _only_metric(path: Path) -> Metric:
+    """Returns the metric that a user's file registers.
+
+    Raises:
+        InputError: the file cannot be used, or registers several metrics.
+    """
+    found = load_metrics(path)
+    if len(found) > 1:
+        names = ", ".join(one.name for one in found)
+        raise InputError(f"--metric: {path}: registers several ({names})")
+    return found[0]
+
+
 def _compared_rankings(own: Sequence[MetricTable], metric: str) -> Comparison:
     """Compares the orders of the methods in the user's tables."""
     if len(own) < 2:
@@ -334,7 +353,7 @@ def _compared_rankings(own: Sequence[MetricTable], metric: str) -> Comparison:
     ranked = [
         mean._replace(method=f"{mean.method} ({table.name})")
         for table in tables
-        for mean in _ranked(table.rows.values(), metric)
+        for mean in rank_methods(table.rows.values())[0]
     ]
     return Comparison(metric, "", 0, ranked, (), agreements, notes)
 
@@ -365,16 +384,11 @@ def _compared_values(
         metric,
         "",
         len(common),
-        _ranked(rows, metric),
+        rank_methods(rows)[0],
         _differences(entries, common) if metric == "auc" else (),
         agreements,
         notes,
     )
-
-
-def _ranked(rows: Iterable[Row], metric: str) -> list[Ranked]:
-    is_less_better = bool(_LESS.fullmatch(metric))
-    return rank_methods(rows, least_first=is_less_better)[0]
 
 
 def _ranked_entries(

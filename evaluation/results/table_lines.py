@@ -6,13 +6,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import csv
 from dataclasses import dataclass
 import io
-import math
 from pathlib import Path
 import re
 from typing import Any
 
 from cns_drake.base import InputError, check_separator, read_bytes, repeated
 from evaluation.recognition import PROTOCOL_NAMES
+from evaluation.results.cells import FACTOR, SEED, TRUTH, CellKind
 from evaluation.results.keys import (
     NEEDED_KEYS,
     OPTIONAL_KEYS,
@@ -21,16 +21,8 @@ from evaluation.results.keys import (
     key_columns,
 )
 
-# Type -> value that stands for an empty cell.
-_EMPTY: dict[type, object] = {int: -1, float: math.nan, str: ""}
-# Greatest whole number, so that it fits in 64 bits.
-_LARGEST = 2**63 - 1
-_NUMBER = re.compile(
-    r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?", re.ASCII | re.IGNORECASE
-)
-# Leading zeros belong to names, as in the stage 01.
-_NAME_OF_DIGITS = re.compile(r"0\d+")
-_TRUTH = {"0": False, "1": True, "false": False, "true": True}
+# Control characters: no name has them, and a terminal would obey them.
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 
 
 @dataclass(frozen=True)
@@ -68,44 +60,16 @@ class TableLine:
             raise self.fault(column, "empty")
         return cell
 
-    def value(self, column: str, kind: type) -> Any:
-        """Returns a cell as a value of a type.
-
-        The value of an empty cell is -1 for int, NaN for float, and "" for str.
+    def value(self, column: str, kind: CellKind) -> Any:
+        """Returns the value of a cell.
 
         Raises:
-            InputError: the cell contains no value of this type.
+            InputError: the cell contains no value of this kind.
         """
-        cell = self.cells[self.columns[column]]
-        if kind is bool:
-            if cell.lower() not in _TRUTH:
-                raise self.fault(column, f"{cell!r} is neither 0 nor 1")
-            return _TRUTH[cell.lower()]
-        if kind is str or not cell:
-            return cell or _EMPTY[kind]
-        if not _NUMBER.fullmatch(cell) or math.isinf(float(cell)):
-            raise self.fault(column, f"{cell!r} is no number")
-        if kind is float:
-            return float(cell)
-        # Programs with NaN for empty cells write whole numbers with a point.
-        whole = int(cell) if cell.isdigit() else float(cell)
-        if not 0 <= whole <= _LARGEST or whole != int(whole):
-            raise self.fault(
-                column, f"{cell!r} is no whole number from 0 to {_LARGEST}"
-            )
-        return int(whole)
-
-    def factor(self, column: str) -> object:
-        """Returns the value of a factor: number, truth value, text or None."""
-        cell = self.cells[self.columns[column]]
-        if _NUMBER.fullmatch(cell) and not _NAME_OF_DIGITS.fullmatch(cell):
-            value = float(cell)
-            if math.isinf(value):
-                raise self.fault(column, f"{cell!r} is no number")
-            return int(cell) if cell.lstrip("+-").isdigit() else value
-        if cell.lower() in ("true", "false"):
-            return _TRUTH[cell.lower()]
-        return cell or None
+        try:
+            return kind.read(self.cells[self.columns[column]])
+        except ValueError as error:
+            raise self.fault(column, str(error)) from None
 
     def key(self, factors: Iterable[str]) -> dict[str, Any]:
         """Returns the arguments with which to make the `Key` of this line.
@@ -123,11 +87,10 @@ class TableLine:
             values[name] = self.cells[self.columns[name]]
         for name in filter(self.columns.__contains__, OPTIONAL_KEYS):
             values[name] = self.cells[self.columns[name]]
-        values["seed"] = self.value("seed", int)
-        if values["seed"] < 0:
-            raise self.fault("seed", "empty")
-        values["gate"] = self.value("gate", bool)
-        known = {name: self.factor(name) for name in factors}
+        self.text("seed")
+        values["seed"] = self.value("seed", SEED)
+        values["gate"] = self.value("gate", TRUTH)
+        known = {name: self.value(name, FACTOR) for name in factors}
         values["factors"] = {n: v for n, v in known.items() if v is not None}
         if not values["method"] and values["task"] != "change":
             raise self.fault("method", "empty")
@@ -235,7 +198,6 @@ def _csv_lines(file: Path) -> list[tuple[int, list[str]]]:
     """
     try:
         text = read_bytes(file).decode("utf-8-sig")
-        check_separator(file, text)
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)
         lines = [
             (reader.line_num, [cell.strip(" ") for cell in row])
@@ -246,11 +208,13 @@ def _csv_lines(file: Path) -> list[tuple[int, list[str]]]:
     except csv.Error as error:
         raise InputError(f"{file}: not CSV: {error}") from None
     names = lines[0][1]
+    if NEEDED_KEYS[0] not in names:
+        check_separator(file, text)
     for index, (number, cells) in enumerate(lines):
-        if "".join(cells).isprintable():
+        if not _CONTROL.search("".join(cells)):
             continue
         k, cell = next(
-            (k, cell) for k, cell in enumerate(cells) if not cell.isprintable()
+            (k, cell) for k, cell in enumerate(cells) if _CONTROL.search(cell)
         )
         column = names[k] if index > 0 and k < len(names) else k + 1
         raise InputError(

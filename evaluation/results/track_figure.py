@@ -5,11 +5,13 @@ from pathlib import Path
 from matplotlib.figure import Figure
 import numpy as np
 
+from cns_drake.base import figure_style
 from evaluation.localisation import LOST, RIGHT_TRANSLATION
 from evaluation.results.figure_files import save_figure
 from evaluation.results.styles import INK, PALE
 
 
+@figure_style()
 def draw_track(rows: np.ndarray, stem: Path) -> None:
     """Draws the results of a tracked drive over its length, and saves them.
 

@@ -163,8 +163,9 @@ def method_settings(
     """Returns the settings of each method, by the method's name.
 
     Args:
-        texts: `METHOD.NAME=VALUE` each. If there is only one method, its name
-            may be left out.
+        texts: `METHOD.NAME=VALUE` each, or `methods.METHOD.NAME=VALUE`, as in
+            the columns of tables. If there is only one method, its name may be
+            left out.
         names: names of the methods that run.
 
     Raises:
@@ -173,7 +174,8 @@ def method_settings(
     found: dict[str, dict[str, Setting]] = {name: {} for name in names}
     is_alone = len(names) == 1
     for text in texts:
-        key, value = parse_setting(text, "NAME=VALUE" if is_alone else _FORM)
+        form = "NAME=VALUE" if is_alone else _FORM
+        key, value = parse_setting(text.removeprefix(SETTINGS), form)
         method, dot, name = key.rpartition(".")
         if not dot:
             if not is_alone:
@@ -207,7 +209,6 @@ def choose_methods(
             invalid value.
     """
     chosen: list[MethodChoice] = []
-    stems = set()
     for name in expanded_names(map(str, names)) or shipped_methods():
         if name in (*shipped_methods(), *optional_methods()):
             chosen.append(MethodChoice(name))
@@ -219,10 +220,8 @@ def choose_methods(
                 f"--method: {name}: neither a Python file nor one of"
                 f" {', '.join(known)}{did_you_mean(name, known)}"
             )
-        # Two modules with one name would replace each other.
-        if path.stem in stems:
+        if path in {one.file for one in chosen}:
             raise InputError(f"--method: {path.name} is there twice")
-        stems.add(path.stem)
         choice = MethodChoice(load_method(path).name, path)
         if choice.name in {one.name for one in chosen}:
             raise InputError(f"{path}: another method is named {choice.name!r}")

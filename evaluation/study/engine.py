@@ -32,6 +32,7 @@ from evaluation.results import (
     QueryRows,
     Results,
     Row,
+    as_factor,
     made_by,
 )
 from evaluation.study.chosen_methods import MethodChoice
@@ -62,6 +63,9 @@ class Engine:
         on_note: is called with notes on what is left out, and on how long the
             study takes.
         jobs: name -> job.
+        pictures: name -> job that draws from the files of other jobs. They run
+            once the tables are written, so that a picture that cannot be drawn
+            takes no number along.
         measured: all comparisons.
     """
 
@@ -71,6 +75,7 @@ class Engine:
     output: Path
     on_note: Callable[[str], None] = lambda text: None
     jobs: dict[str, Job] = field(default_factory=dict)
+    pictures: dict[str, Job] = field(default_factory=dict)
     measured: list[Pair] = field(default_factory=list)
     _notes: dict[str, None] = field(default_factory=dict)
 
@@ -132,13 +137,14 @@ class Engine:
         make_folder(self.output)
         jobs = list(self.jobs.values())
         _renew_removed_descriptors(jobs)
-        told = forecast(jobs, cluster, space, least=_LONG)
+        pictures = list(self.pictures.values())
+        told = forecast([*jobs, *pictures], cluster, space, least=_LONG)
         if told is not None:
             self.on_note(
                 f"{told}; after an interruption, run the same command again"
             )
         run_jobs(jobs, cluster)
-        doing("writing the tables and the page")
+        doing("writing the tables")
         tables = self.tables()
         if not tables[0].rows:
             raise InputError(
@@ -147,6 +153,9 @@ class Engine:
             )
         self._write(*tables)
         _remove_descriptors(jobs)
+        if pictures:
+            run_jobs(pictures, cluster)
+        doing("writing the page")
         return tables
 
     def write_tables(self) -> tuple[Results, QueryRows]:
@@ -211,12 +220,12 @@ class Engine:
     def _key(
         self, one: Pair, task: str, method: str, gate: bool
     ) -> dict[str, Any]:
-        factors = dict(one.factors)
+        factors = {name: as_factor(v) for name, v in one.factors.items()}
         settings = {**self.tasks[task].changed_settings, **one.settings}
         if method in self.methods:
             choice, columns = self.methods[method]
             method = choice.name
-            factors |= columns
+            factors |= {name: as_factor(v) for name, v in columns.items()}
             # A text on the command line and a number in a file are the same.
             settings |= {
                 name: float(str(value))

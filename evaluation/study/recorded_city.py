@@ -33,7 +33,7 @@ from evaluation.study.recordings.map_drives import MapDrives
 from evaluation.study.sources import DriveSource, RecordingSource
 from evaluation.study.study_files import FeatureFiles
 from evaluation.study.tasks.change import ChangeTask
-from evaluation.study.tasks.jobs import Jobs, job_name
+from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 from evaluation.study.tasks.place import PlaceTask
 
@@ -104,8 +104,8 @@ def add_city(
     assert isinstance(planned, _ExtractionJobs)
     shown = ShownCity(
         city,
-        _draw_drives(city, pairs, planned),
-        tuple(_draw_changes(city, pairs, planned)),
+        _draw_drives(city, pairs, planned, engine.pictures),
+        tuple(_draw_changes(city, pairs, planned, engine.pictures)),
         tuple(
             one.parts[PlaceTask.name]
             for one in pairs
@@ -249,7 +249,10 @@ class _ExtractionJobs(Jobs):
 
 
 def _draw_drives(
-    city: MapDrives, pairs: Sequence[Pair], planned: _ExtractionJobs
+    city: MapDrives,
+    pairs: Sequence[Pair],
+    planned: _ExtractionJobs,
+    pictures: dict[str, Job],
 ) -> Part:
     """Adds the job that makes pictures of drives; returns its file."""
     compared = {name for one in pairs for name in one.names}
@@ -258,8 +261,7 @@ def _draw_drives(
         for one in (*city.stages.values(), *city.others)
         if one.name in compared
     ]
-    needs: list[str] = []
-    features = [planned.features(one, needs) for one in shown]
+    features = [planned.features(one, []) for one in shown]
     part = planned.files.part("pages", city.name)
     step = MakePart(
         part,
@@ -272,12 +274,15 @@ def _draw_drives(
         ),
     )
     name = f"draw {city.name}"
-    planned.jobs[name] = Job(name, step, tuple(needs), _COST)
+    pictures[name] = Job(name, step, (), _COST)
     return part
 
 
 def _draw_changes(
-    city: MapDrives, pairs: Sequence[Pair], planned: _ExtractionJobs
+    city: MapDrives,
+    pairs: Sequence[Pair],
+    planned: _ExtractionJobs,
+    jobs: dict[str, Job],
 ) -> list[ChangePictures]:
     """Adds jobs that draw changes between stages; returns the pictures."""
     found = []
@@ -294,9 +299,8 @@ def _draw_changes(
             continue
         stages = earlier.stage, later.stage
         pictures = ChangePictures(city.name, stages, planned.files.figures)
-        needs = [job_name(parts[0])]
         first, last = (
-            planned.features(one.named, needs) for one in (earlier, later)
+            planned.features(one.named, []) for one in (earlier, later)
         )
         step = MakePart(
             planned.files.part("changes", city.name, *stages),
@@ -312,7 +316,7 @@ def _draw_changes(
             pictures.files,
         )
         name = f"draw {city.name} {stages[0]} > {stages[1]}"
-        planned.jobs[name] = Job(name, step, tuple(needs), _COST)
+        jobs[name] = Job(name, step, (), _COST)
         found.append(pictures)
     return found
 

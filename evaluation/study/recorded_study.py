@@ -377,5 +377,6 @@ def _costs_section(output: Path) -> PageSection:
     return page_section(
         "costs",
         "Costs",
+        "the first pair of drives, measured on one core; in no table",
         costs=[of_method[name] for name in in_table_order(of_method)],
     )

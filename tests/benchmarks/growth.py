@@ -103,7 +103,7 @@ def of_recordings(drive: str, rounds: int) -> Series:
     result = []
     for rings, preset in PRESETS.items():
         for columns in COLUMNS:
-            scenario = load_scenario(drive).with_lidar_preset(preset)
+            scenario = load_scenario(drive).with_lidar(preset)
             lidars = {
                 name: lidar.model_copy(update={"columns": columns})
                 for name, lidar in scenario.lidars.items()

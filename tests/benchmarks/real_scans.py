@@ -40,7 +40,7 @@ def read_real(folder: Path) -> list[np.ndarray]:
 
 def simulate(returns: str) -> tuple[list[np.ndarray], int]:
     """Returns scans likewise, and the number of beams."""
-    scenario = load_scenario("suburbia_02").with_lidar_preset("hdl-64e")
+    scenario = load_scenario("suburbia_02").with_lidar("hdl-64e")
     scenario = scenario.with_returns(returns)
     diagram = make_station(scenario)
     context = diagram.CreateDefaultContext()

@@ -5,16 +5,15 @@ import pytest
 
 from cns_drake.city import ARCHETYPES, OBJECTS
 from cns_drake.scenarios import Scenario
-from cns_drake.sensors import LIDAR_PRESETS
 from docs import reference_pages
-from docs.reference_pages import CITY, EXPERIMENT, METHODS, SCENARIO
+from docs.reference_pages import CITY, EXPERIMENT, LIDAR, METHODS, SCENARIO
 
 PAGES = reference_pages.pages()
 # Each once, in one order for all processes of a run.
 MODELS = [
     *dict.fromkeys(
         model
-        for sections in (SCENARIO, CITY, EXPERIMENT)
+        for sections in (SCENARIO, LIDAR, CITY, EXPERIMENT)
         for model in sections.values()
     )
 ]
@@ -75,17 +74,3 @@ def test_what_can_be_placed_is_listed(heading, registry):
     section = documents.Page(page.name, rest.partition("\n#")[0])
     listed = [piece.text for piece in documents.inline(section)]
     assert sorted(listed) == sorted(registry)
-
-
-def test_lidar_presets():
-    page = documents.read("docs/scenarios.md")
-    rows = documents.table(page, "## LiDAR presets")
-    said = {row[0].strip("`"): (int(row[1]), row[3], row[4]) for row in rows}
-    assert said == {
-        name: (
-            preset.num_rings,
-            str(preset.num_columns or "-"),
-            f"{preset.min_range:g} to {preset.max_range:g}",
-        )
-        for name, (preset, _) in LIDAR_PRESETS.items()
-    }

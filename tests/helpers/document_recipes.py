@@ -546,22 +546,28 @@ RECIPES = {
         after=("own city",),
         all_methods=True,
     ),
+    "data sheet": Recipe(
+        "rings_deg: [[10.0, -10.0, 48]]\ncolumns: 512", file="unit.yaml"
+    ),
     "another unit": Recipe(
-        ".venv/bin/cns-drake simulate riverside_01 --lidar os1-128",
+        ".venv/bin/cns-drake simulate riverside_01 --lidar unit.yaml",
         changes=(
             ("--frames 100", "--frames 2"),
             ("riverside_01", "town/sequence_01.yaml"),
         ),
-        after=("start a city",),
-        prints=("sensors/town_01: 2 frames",),
+        after=("start a city", "data sheet"),
+        prints=("mine/town_01: 2 frames",),
     ),
     "two units": Recipe(
         "world: town/stage_02.sdf\nwaypoints: tour.csv\nspeeds: {cruise: 8}\n",
         file="sensors.yaml",
         command=".venv/bin/cns-drake simulate sensors.yaml --frames 2 "
         "--output sensors",
-        after=("waypoints", "start a city"),
+        after=("waypoints", "start a city", "data sheet"),
         prints=("sensors/sensors: 2 frames",),
+    ),
+    "units as a factor": Recipe(
+        "maps: [riverside]\nquery:\n  lidars:", file="units.yaml"
     ),
     "own beams": Recipe(
         "import numpy as np\n\nfrom cns_drake import SpinningPattern",
@@ -802,8 +808,14 @@ RECIPES = {
     "method": Recipe(
         "import numpy as np\n\nfrom evaluation.methods", file="heights.py"
     ),
+    # What becomes of it in tables and pages: test_metric_family.
+    "own metric": Recipe(
+        "import numpy as np\n\nfrom evaluation import register_metric",
+        file="ranks.py",
+        command=".venv/bin/python ranks.py",
+    ),
     "score matrix": Recipe(
-        "import numpy as np\n\nfrom evaluation import",
+        "import numpy as np\n\nfrom evaluation import (",
         # A program that knows how far each place is away is always right.
         changes=(_FIRST, _LAST, ('np.load("scores.npy")', "-distances")),
         after=("own city",),
@@ -817,6 +829,12 @@ RECIPES = {
         # project.
         after=("method", "Python", "own diagram", "own beams"),
         prints=("All checks passed!", "already formatted"),
+    ),
+    "own method, check": Recipe(
+        "from evaluation import check_method",
+        after=("method",),
+        file="check_heights.py",
+        command=".venv/bin/python check_heights.py",
     ),
     "own method": Recipe(
         ".venv/bin/cns-eval pr output/metropolis_01",
@@ -941,6 +959,12 @@ RECIPES = {
         file="convert.py",
         command=".venv/bin/python convert.py",
         makes=("mine/sequences/0[12]/velodyne/000039.bin",),
+    ),
+    "own scans, check": Recipe(
+        "from evaluation import check_data_set",
+        after=("own scans and poses",),
+        file="check_drives.py",
+        command=".venv/bin/python check_drives.py",
     ),
     "own scans, pairs": Recipe(
         ".venv/bin/cns-eval tcr mine/sequences/01 mine",

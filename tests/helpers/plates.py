@@ -16,9 +16,9 @@ from cns_drake.sensors import (
     CalibratedReturns,
     DirectionPattern,
     Lidar,
-    Response,
     connect_lidar,
 )
+from cns_drake.units import Response
 
 
 def plate(name, reflectivity, X_WG, size=(0.1, 400.0, 400.0), shape=None):
@@ -94,5 +94,5 @@ def unit(preset="os1-64", **options):
     """Returns the returns of a preset whose lasers are all alike."""
     returns = CalibratedReturns.of_preset(preset, **{"seed": 5, **options})
     even = Response(gain=0.0, speckle=0.0)
-    sheet = replace(returns.sheet, angle_error_deg=0.0, response=even)
+    sheet = returns.sheet.replaced(angle_error_deg=0.0, response=even)
     return replace(returns, sheet=sheet)

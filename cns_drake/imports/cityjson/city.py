@@ -13,7 +13,10 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city import Finish
 from cns_drake.imports import colours
-from cns_drake.imports.building_years import construction_year
+from cns_drake.imports.building_years import (
+    construction_year,
+    demolition_year,
+)
 from cns_drake.imports.cityjson.city_file import (
     CityFile,
     CityGeometry,
@@ -126,6 +129,7 @@ def import_objects(
                 _year_of_family(
                     members, year_attribute, names[root], city.faults
                 ),
+                _demolition_of_family(members, names[root], city.faults),
                 tags=_tags_of_family(members),
                 lod=max(geometry.lod for geometry in chosen),
             )
@@ -144,11 +148,38 @@ def _year_of_family(
     The result is the first year that the object or one of its parts states. The
     arguments are as for `construction_year`.
     """
-    years = [
-        construction_year(member.attributes, year_attribute, name, faults)
-        for member in members
-    ]
-    return next((year for year in years if year is not None), None)
+    return _first_year(
+        [
+            construction_year(member.attributes, year_attribute, name, faults)
+            for member in members
+        ],
+        name,
+        faults,
+    )
+
+
+def _demolition_of_family(
+    members: Iterable[CityObject], name: str, faults: ImportFaults
+) -> int | None:
+    """Returns the year in which an object was demolished; None if unknown."""
+    return _first_year(
+        [
+            demolition_year(member.attributes, name, faults)
+            for member in members
+        ],
+        name,
+        faults,
+    )
+
+
+def _first_year(
+    years: Iterable[int | None], name: str, faults: ImportFaults
+) -> int | None:
+    """Returns the first year that is known; counts the object if others are."""
+    known = [year for year in years if year is not None]
+    if len(set(known)) > 1:
+        faults.add("dates of parts differ, the first taken", name)
+    return known[0] if known else None
 
 
 def _tags_of_family(members: Sequence[CityObject]) -> dict[str, str]:

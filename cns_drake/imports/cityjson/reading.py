@@ -27,16 +27,13 @@ from cns_drake.imports.cityjson.reference_systems import (
     reference_system,
 )
 from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.part_tables import PartTable
 
 # Every city is wider than 1 m, and narrower than 1 deg (about 100 km).
 # Coordinates that extend over less than this are therefore degrees, if the
 # city's height, which is in metres in both cases, is greater than this.
 _DEGREES_BELOW = 1.0
-# Members of objects that are read, or that do not place anything.
-_KNOWN_MEMBERS = {
-    "type", "geometry", "attributes", "parents", "children", "children_roles",
-    "geographicalExtent", "address", "bbox", "extent", "members",
-}  # fmt: skip
+_PARTS = PartTable(Path(__file__).with_name("parts.yaml"))
 # A city is mirrored if less than this share of its geometries look outwards.
 _MIRRORED_SHARE = 0.1
 # At most this many geometries are judged.
@@ -271,6 +268,8 @@ def _read_geometry(
         faults: counts geometries and faces that are left out.
     """
     vertices = source.vertices
+    if isinstance(geometry, dict):
+        _PARTS.account(["geometry"], geometry, name, faults)
     try:
         lod = _level_of_detail(geometry.get("lod"))
         kind = geometry["type"]
@@ -368,6 +367,7 @@ def _read_objects(
     Raises:
         InputError: the objects, the vertices or the transform cannot be used.
     """
+    _PARTS.account(["file"], document, where, city.faults)
     objects = document.get("CityObjects", {})
     if not isinstance(objects, dict):
         raise InputError(f"{where}: CityObjects: not an object")
@@ -416,8 +416,7 @@ def _read_object(
 
     `source` is what the object's geometries refer to.
     """
-    for key in value.keys() - _KNOWN_MEMBERS:
-        faults.add(f"{key} of an object, not read", name)
+    _PARTS.account(["object"], value, name, faults)
     listed = value.get("geometry") or []
     geometries = [
         _read_geometry(geometry, source, name, faults)
@@ -425,10 +424,13 @@ def _read_object(
     ]
     parents = value.get("parents") or []
     attributes = value.get("attributes")
+    attributes = attributes if isinstance(attributes, dict) else {}
+    known = {k: v for k, v in attributes.items() if v not in (None, "")}
+    _PARTS.account(["attributes"], known, name, faults)
     return CityObject(
         name,
         value["type"],
-        attributes if isinstance(attributes, dict) else {},
+        attributes,
         list(map(str, parents if isinstance(parents, list) else [])),
         [geometry for geometry in geometries if geometry is not None],
     )

@@ -36,6 +36,7 @@ from cns_drake.imports.opendrive.lane_reader import (
     step_function,
 )
 from cns_drake.imports.opendrive.thing_reader import read_things
+from cns_drake.imports.part_tables import PartTable
 
 # Unit of a speed limit -> its size [m/s].
 _UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
@@ -55,7 +56,9 @@ _MOST_ROLL = math.radians(50.0)
 _LONGEST_NAME = 60
 # Elements of links at the two ends of a road or lane.
 _ENDS = ("predecessor", "successor")
-_KNOWN = parse_yaml(Path(__file__).with_name("unread.yaml").read_bytes())
+_TABLE_FILE = Path(__file__).with_name("parts.yaml")
+_PARTS = PartTable(_TABLE_FILE)
+_WHOLE = parse_yaml(_TABLE_FILE.read_bytes())["whole"].split()
 
 
 def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
@@ -371,20 +374,25 @@ def _count_unread(element: Element, faults: ImportFaults, name: str) -> None:
 
     `name` is the name of the road or junction that contains the element.
     """
-    known = _KNOWN["elements"].get(element.tag)
-    for key, usual in _KNOWN["attributes"].get(element.tag, {}).items():
-        value = element.attrib.get(key)
-        with contextlib.suppress(TypeError, ValueError):
-            value = f"{float(value or ''):g}"
-        if value is not None and value not in usual:
-            faults.add(f"{key} of {element.tag}, not read", name)
+    attributes = {
+        key: _plain_value(value) for key, value in element.attrib.items()
+    }
+    _PARTS.account([element.tag], attributes, name, faults)
+    known = _PARTS.names(element.tag, "children")
     for child in element.all("*"):
         own = name
         if child.tag in ("road", "junction"):
             own = child.attrib.get("id", "")
-        if not child.attrib and not len(child):
+        if child.tag in _WHOLE or not (child.attrib or len(child)):
             continue
-        if known is not None and child.tag not in known:
-            faults.add(f"{child.tag} of {element.tag}, not read", own)
-        elif child.tag != "userData":
+        if child.tag in known:
             _count_unread(child, faults, own)
+        else:
+            faults.add(f"{child.tag} of {element.tag}, not read", own)
+
+
+def _plain_value(text: str) -> str:
+    """Returns a value in one notation: `0` for `0.0` and `-0.0`."""
+    with contextlib.suppress(ValueError):
+        return f"{float(text) + 0.0:g}"
+    return text

@@ -38,10 +38,27 @@ def read_things(
         for _ in list(element.all("outlines", "outline"))[1:]:
             faults.add("further outline of an object, not read", thing.name)
         repeats = list(element.all("repeat"))
-        if not repeats:
+        if repeats:
+            _count_unscaled(thing, repeats, faults)
+        else:
             yield thing
         for number_of_repeat, repeat in enumerate(repeats):
             yield from _repetitions(thing, repeat, number_of_repeat, faults)
+
+
+def _count_unscaled(
+    thing: Thing, repeats: Sequence[Element], faults: ImportFaults
+) -> None:
+    """Counts outlines that the repetitions of an object change or lose."""
+    if thing.road_outline is not None:
+        faults.add("outline along the road, repeated as a box", thing.name)
+    if thing.outline is not None and any(
+        key.removesuffix("Start").removesuffix("End") in ("width", "height")
+        for repeat in repeats
+        for key in repeat.attrib
+        if repeat.number("distance", 0.0) > 0.0
+    ):
+        faults.add("repeated outline, its sizes left as they are", thing.name)
 
 
 def _read_signal(signal: Element, name: str) -> Thing:
@@ -51,9 +68,9 @@ def _read_signal(signal: Element, name: str) -> Thing:
         kind=signal.value("type", "").lower(),
         s=signal.number("s"),
         t=signal.number("t"),
-        z=signal.number("zOffset", 0.0),
+        z=0.0,
         heading=signal.number("hOffset", 0.0),
-        size=(0.0, signal.number("width", 0.0), signal.number("height", 0.0)),
+        size=(0.0, 0.0, 0.0),
         is_dynamic=signal.value("dynamic", "no") == "yes",
         faces_back=signal.value("orientation", "none") == "-",
     )

@@ -113,6 +113,7 @@ def _report_of(
         dated=0,
         drives=tuple(drive.length for drive in town.drives),
         faults=town.faults.rows(),
+        parts=town.faults.parts(),
     )
 
 

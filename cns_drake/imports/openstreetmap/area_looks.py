@@ -61,6 +61,7 @@ def raised_object(
     look: AreaLook,
     areas: Iterable[BaseGeometry],
     source: tuple[str, ImportFaults],
+    low: float = 0.0,
 ) -> Iterator[ImportedObject]:
     """Yields one solid on the ground that fills areas, if there are any.
 
@@ -70,9 +71,10 @@ def raised_object(
         areas: the areas in W [m].
         source: pair of the element's id in the file, for messages, and the
             fault counter that counts invalid areas.
+        low: height of the solid's lower side [m].
     """
     solids = [
-        np.concatenate(extruded(polygon, 0.0, look.z, *source))
+        np.concatenate(extruded(polygon, low, look.z, *source))
         for area in areas
         for part in faces.parts_of(area)
         for polygon in faces.valid_parts(part, *source)

@@ -30,6 +30,8 @@ _LEAST_HIGH = 1.0
 _LEAST_HEIGHT = 0.5
 # Least height of the walls below a roof [m].
 LEAST_WALL = 0.1
+# Values of `building` and `building:part` for a roof on posts.
+_OPEN = ("roof", "carport")
 
 
 class BuildingHeights(NamedTuple):
@@ -86,15 +88,26 @@ def heights(
         high = STOREY_HEIGHT * levels + (
             roof or STOREY_HEIGHT * (roof_levels or 0.0)
         )
-    low = metres("min_height")
-    if low is None:
-        low = STOREY_HEIGHT * (number("building:min_level") or 0.0)
     high = max(high, _LEAST_HIGH)
+    low = metres("min_height")
+    if low is None and "building:min_level" in tags:
+        low = STOREY_HEIGHT * (number("building:min_level") or 0.0)
+    if low is None:
+        low = 0.0
+        if is_open_below(tags):
+            # The slab is no higher than the least building.
+            low = max(high - roof - _LEAST_HEIGHT, 0.0)
     if low >= high and where is not None:
         name, faults = where
         faults.add("building that begins above its top, lowered", name)
     low = min(low, high - _LEAST_HEIGHT)
     return BuildingHeights(low, high, min(roof, high - low - LEAST_WALL))
+
+
+def is_open_below(tags: Mapping[str, str]) -> bool:
+    """Returns whether a building is a roof on posts, without walls."""
+    kinds = tags.get("building"), tags.get("building:part")
+    return tags.get("wall") == "no" or any(kind in _OPEN for kind in kinds)
 
 
 def why_absent(tags: Mapping[str, str]) -> str | None:

@@ -12,7 +12,12 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.strtree import STRtree
 
-from cns_drake.imports.building_years import construction_year, year_of_date
+from cns_drake.imports.building_years import (
+    construction_year,
+    demolition_year,
+    understood_year,
+    year_of_date,
+)
 from cns_drake.imports.colours import RED_ROOF
 from cns_drake.imports.faces import parts_of, valid_parts
 from cns_drake.imports.faults import ImportFaults
@@ -21,6 +26,7 @@ from cns_drake.imports.openstreetmap.building_tags import (
     LEAST_WALL,
     building_kind,
     heights,
+    is_open_below,
     why_absent,
 )
 from cns_drake.imports.openstreetmap.features import OsmArea, Tags
@@ -127,7 +133,7 @@ def make_buildings(
         outlines, nested = _taken_once(outlines, faults)
         parts += nested
     copies: Counter[str] = Counter()
-    for whole, blocks in _grouped_by_building(outlines, parts):
+    for whole, blocks in _grouped_by_building(outlines, parts, faults):
         walls, roofs = [], []
         for block in _solids_with_openings(blocks, through, faults):
             wall, roof = extruded(
@@ -151,7 +157,7 @@ def make_buildings(
             {"body": np.concatenate(walls), "roof": np.concatenate(roofs)},
             {"roof": RED_ROOF},
             construction_year(whole.tags, year_attribute, whole.name, faults),
-            year_of_date(whole.tags.get("end_date", "")),
+            demolition_year(whole.tags, whole.name, faults),
             # If parts look different, the look of the first one counts.
             tags={**blocks[0].tags, **whole.tags},
             lod=1.0,
@@ -168,6 +174,8 @@ def _outlines_and_parts(
     parts: list[_Block] = []
     for name, tags, polygons in areas:
         low, high, roof = heights(tags, (name, faults))
+        if is_open_below(tags) and low > 0.0:
+            faults.add("roof without walls, made without its posts", name)
         blocks = parts if has_tag(tags, "building:part") else outlines
         for polygon in polygons:
             for footprint in valid_parts(local.polygon(polygon), name, faults):
@@ -176,12 +184,13 @@ def _outlines_and_parts(
 
 
 def _grouped_by_building(
-    outlines: Iterable[_Block], parts: Iterable[_Block]
+    outlines: Iterable[_Block], parts: Iterable[_Block], faults: ImportFaults
 ) -> list[tuple[_Block, list[_Block]]]:
     """Returns each building: its outline, and the solids that it consists of.
 
-    A part that lies in no outline is a building of its own. Parts do not belong
-    to a former building that once stood in their place.
+    A part that lies in no outline, or has a date that its building does not
+    have, is a building of its own; `faults` counts the latter. Parts do not
+    belong to a former building that once stood in their place.
     """
     # Standing buildings come first, so they have the same numbers as in the
     # tree.
@@ -199,13 +208,39 @@ def _grouped_by_building(
             of_outline.setdefault(int(inside.min()), []).append(part)
         else:
             alone.append((part, [part]))
-    return [
-        *(
-            (outline, _with_parts(outline, of_outline.get(number, [])))
-            for number, outline in enumerate(outlines)
-        ),
-        *alone,
-    ]
+    buildings = []
+    for number, outline in enumerate(outlines):
+        solids = _with_parts(outline, of_outline.get(number, []))
+        own = [one for one in solids if _has_own_date(one, outline, faults)]
+        for part in own:
+            kind = "building part with a date of its own, made as a building"
+            faults.add(kind, part.name)
+            # What the part does not state is as for the whole.
+            part = replace(part, tags={**_dates(outline.tags), **part.tags})
+            alone.append((part, [part]))
+        rest = [one for one in solids if one not in own]
+        if rest:
+            buildings.append((outline, rest))
+    return [*buildings, *alone]
+
+
+def _has_own_date(part: _Block, outline: _Block, faults: ImportFaults) -> bool:
+    """Returns whether a part was built or demolished in another year.
+
+    Dates of the part that are not understood are counted in `faults`, and do
+    not differ.
+    """
+    if part.name == outline.name:
+        return False
+    whole = _dates(outline.tags)
+    years = {
+        key: understood_year(value, key, part.name, faults)
+        for key, value in _dates(part.tags).items()
+    }
+    return any(
+        year not in (None, year_of_date(whole.get(key, "")))
+        for key, year in years.items()
+    )
 
 
 def _solids_with_openings(
@@ -352,7 +387,7 @@ def _solids_below(
         # Of parts above each other, only the lowest is supported.
         open_below = part.polygon.difference(filled)
         top = min(part.low, outline.high)
-        if top > outline.low:
+        if top > outline.low and not is_open_below(part.tags):
             for piece in parts_of(open_below):
                 yield outline.replaced(piece, outline.low, top)
         filled = shapely.union(filled, part.polygon)

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from pathlib import Path
 import re
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -41,7 +42,12 @@ from cns_drake.imports.openstreetmap.element_kinds import (
     is_building,
     was_building,
 )
-from cns_drake.imports.openstreetmap.features import OsmArea, OsmFeatures
+from cns_drake.imports.openstreetmap.features import (
+    OsmArea,
+    OsmFeatures,
+    OsmWay,
+    Tags,
+)
 from cns_drake.imports.openstreetmap.grounds import ground_areas
 from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.passages import (
@@ -51,28 +57,54 @@ from cns_drake.imports.openstreetmap.passages import (
     passages_of,
 )
 from cns_drake.imports.openstreetmap.sea import coasts_of, sea
-from cns_drake.imports.openstreetmap.small_objects import make_small_objects
+from cns_drake.imports.openstreetmap.small_objects import (
+    make_small_objects,
+    object_kind,
+)
 from cns_drake.imports.openstreetmap.tags import (
-    TABLES,
     has_tag,
     is_inside,
     length,
     tag_value,
 )
-from cns_drake.imports.openstreetmap.way_tags import is_tunnel, street_width
+from cns_drake.imports.openstreetmap.way_tags import (
+    is_tunnel,
+    path_width,
+    street_width,
+)
+from cns_drake.imports.part_tables import PartTable
 from cns_drake.imports.solids import extruded
 from cns_drake.imports.streets import Street
 
+_PARTS = PartTable(Path(__file__).with_name("parts.yaml"))
 # Greatest height of a barrier or a tree [m].
 _TALLEST = 150.0
 # A car can hit this part of a tree: radius and height of the trunk [m].
 _TRUNK_RADIUS = 0.3
 _TRUNK_HEIGHT = 2.0
-_HEDGE_WIDTH = 0.8  # [m]
-_WALL_WIDTH = 0.2  # [m]
-# Heights of hedges and walls without a tag for their height [m].
-_HEDGE_HEIGHT = 1.2
-_WALL_HEIGHT = 1.6
+_THICKEST = 60.0  # Greatest width of a barrier [m].
+
+
+class _UsualBarrier(NamedTuple):
+    """A kind of barrier.
+
+    Attributes:
+        width: width without a tag for it [m].
+        height: height without a tag for it [m].
+        semantic_class: its class.
+    """
+
+    width: float
+    height: float
+    semantic_class: str
+
+
+_WALL = _UsualBarrier(0.2, 1.6, "fence")
+# Value of the tag `barrier` -> the barrier. All others are left out.
+_BARRIERS = {
+    "hedge": _UsualBarrier(0.8, 1.2, "vegetation"),
+    **dict.fromkeys(("wall", "fence", "city_wall"), _WALL),
+}
 # How far the sea extends beyond the buildings [m].
 _SEA_MARGIN = 60.0
 # Wider areas, such as whole countries, are refused [m].
@@ -146,7 +178,7 @@ def import_openstreetmap(
         *_trees(features, local),
     ]
     counted = bridges.left_out | {way.name for way in coasts}
-    _count_unused(features, objects, counted)
+    _count_unused(features, objects, counted, dressed)
     return ForeignCity(
         objects,
         (latitude, longitude),
@@ -244,6 +276,7 @@ def _count_unused(
     features: OsmFeatures,
     objects: Iterable[ImportedObject],
     counted: AbstractSet[str],
+    dressed: bool,
 ) -> None:
     """Counts, by kind, the tags and objects that the city does not use.
 
@@ -254,19 +287,13 @@ def _count_unused(
         counted: ids of objects that are counted elsewhere, as are the buildings
             that are left out.
     """
-    tagged = {way.name: way.tags for way in features.ways}
-    tagged |= {area.name: area.tags for area in features.areas}
-    tagged |= {tree.name: tree.tags for tree in features.trees}
-    for name, tags in tagged.items():
-        for key, usual in TABLES["unread"].items():
-            if tags.get(key, "") not in ("", *usual):
-                features.faults.add(f"tag {key}, not read", name)
     used = {
         name
         for one in objects
         for name in re.findall(r"_([nwr]-?\d+)", one.structure.name)
     }
     used |= {area.name for area in features.areas if is_building(area.tags)}
+    _account_for_tags(features, used, dressed)
     used |= counted
     for name, kind in features.kinds.items():
         is_relation_of_parts = kind == "relation of type building"
@@ -274,6 +301,53 @@ def _count_unused(
             if kind.startswith(("building=", "building:part=")):
                 continue
             features.faults.add(f"{kind}, left out", name)
+
+
+def _account_for_tags(
+    features: OsmFeatures, used: AbstractSet[str], dressed: bool
+) -> None:
+    """Accounts for each tag of the things that the city has.
+
+    `used` contains the ids of things with a structure. The other arguments are
+    as for `_count_unused`.
+    """
+    things = {area.name: area.tags for area in features.areas}
+    things |= {way.name: way.tags for way in features.ways}
+    things |= {tree.name: tree.tags for tree in features.trees}
+    rows = {
+        way.name
+        for way in features.ways
+        if dressed and way.tags.get("natural") == "tree_row"
+    }
+    for name, tags in things.items():
+        elements = _elements_of(tags) if name in used else []
+        if name in rows:
+            elements.append("tree row")
+        if elements:
+            _PARTS.account(elements, tags, name, features.faults, "tag ")
+    for number, tags in features.crossings:
+        if f"n{number}" in used:
+            _PARTS.account(
+                ["crossing"], tags, f"n{number}", features.faults, "tag "
+            )
+    for name, tags, _ in features.nodes if dressed else ():
+        if object_kind(tags) is not None and not is_inside(tags):
+            _PARTS.account(
+                ["small object"], tags, name, features.faults, "tag "
+            )
+
+
+def _elements_of(tags: Tags) -> list[str]:
+    """Returns what a thing with a structure is, in words of the table."""
+    kinds = {
+        "building": is_building(tags) or was_building(tags),
+        "barrier": "barrier" in tags,
+        "tree": tags.get("natural") == "tree",
+        "street": street_width(tags) is not None,
+        "path": path_width(tags) is not None,
+        "coastline": tags.get("natural") == "coastline",
+    }
+    return [kind for kind, is_it in kinds.items() if is_it] or ["ground"]
 
 
 def _barriers(
@@ -284,24 +358,46 @@ def _barriers(
     `local` converts longitudes and latitudes to coordinates in metres.
     """
     openings = WayOpenings(features.ways, local)
+    faults = features.faults
     for way in features.ways:
-        name, tags, line, _ = way
-        kind = tags.get("barrier")
-        if kind == "hedge":
-            width, usual = _HEDGE_WIDTH, _HEDGE_HEIGHT
-            semantic_class = "vegetation"
-        elif kind in ("wall", "fence", "city_wall"):
-            width, usual = _WALL_WIDTH, _WALL_HEIGHT
-            semantic_class = "fence"
-        else:
+        if way.tags.get("barrier") not in _BARRIERS or _is_filled(way):
             continue
-        where = (name, features.faults)
-        high = tag_value(tags, "height", length, _TALLEST, where) or usual
-        course = LineString(local(line))
-        strip: BaseGeometry = course.buffer(width / 2.0, cap_style="flat")
-        strip = strip.difference(openings.across(way, course, features.faults))
-        look = AreaLook("Barrier", semantic_class, None, high)
-        yield from raised_object(f"{kind}_{name}", look, [strip], where)
+        usual = _BARRIERS[way.tags["barrier"]]
+        where = (way.name, faults)
+        width = tag_value(way.tags, "width", length, _THICKEST, where)
+        course = LineString(local(way.line))
+        strip: BaseGeometry = course.buffer(
+            (width or usual.width) / 2.0, cap_style="flat"
+        )
+        strip = strip.difference(openings.across(way, course, faults))
+        yield from _barrier(way, [strip], faults)
+    for area in features.areas:
+        if area.tags.get("barrier") in _BARRIERS and _is_filled(area):
+            yield from _barrier(area, map(local.polygon, area.polygons), faults)
+
+
+def _is_filled(thing: OsmWay | OsmArea) -> bool:
+    """Returns whether a barrier fills its outline."""
+    is_relation = thing.name.startswith("r")
+    return is_relation or thing.tags.get("area", "no") != "no"
+
+
+def _barrier(
+    thing: OsmWay | OsmArea, areas: Iterable[BaseGeometry], faults: ImportFaults
+) -> Iterator[ImportedObject]:
+    """Yields the solid of a barrier on areas in W [m]."""
+    name, tags = thing.name, thing.tags
+    where = (name, faults)
+    usual = _BARRIERS[tags["barrier"]]
+    high = tag_value(tags, "height", length, _TALLEST, where) or usual.height
+    low = tag_value(tags, "min_height", length, _TALLEST, where) or 0.0
+    if low >= high:
+        faults.add("barrier that begins above its top, lowered", name)
+        low = 0.0
+    look = AreaLook("Barrier", usual.semantic_class, None, high)
+    yield from raised_object(
+        f"{tags['barrier']}_{name}", look, areas, where, low
+    )
 
 
 def _trees(

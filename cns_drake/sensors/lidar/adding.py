@@ -28,8 +28,8 @@ from cns_drake.sensors.lidar.config import (
 )
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
-from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.sensors.lidar.seen_geometry import Structures
+from cns_drake.sensors.lidar.sheet_patterns import aimed, make_beam_pattern
 from cns_drake.sensors.system_names import check_new_sensor, check_unused_names
 
 if TYPE_CHECKING:
@@ -79,9 +79,9 @@ def add_lidar(
             frame another pose. Drake's cameras behave in the same way.
         X_PB: pose of the sensor B in P, as in Drake's RgbdSensor. In outputs,
             the frame of the sensor is S.
-        pattern: beams of the LiDAR, or the name of a preset. With a name, the
-            LiDAR makes as many revolutions per second as its data sheet states,
-            and coordinates are not rounded.
+        pattern: beams of the LiDAR, the name of a preset, or the file of a data
+            sheet. With a name or file, the LiDAR makes as many revolutions per
+            second as its data sheet states, and coordinates are not rounded.
         name: name of the system, and of the LiDAR's frame and topics in a
             recording.
         unseen: bodies, frames and geometries that the LiDAR does not see; by
@@ -132,7 +132,8 @@ def add_lidar(
         ValueError: there is no preset of that name, the name of the LiDAR is
             taken, reserved or cannot be a part of a ROS 2 topic, the noise is
             out of range or given twice, motion distortion needs a body, or
-            calibrated returns need a preset.
+            calibrated returns need a preset or a data sheet.
+        InputError: the file cannot be read, or is no data sheet.
 
     Warns:
         UserWarning: the SceneGraph has no geometry that the LiDAR could see.
@@ -153,17 +154,17 @@ def add_lidar(
     check_new_sensor(builder, name, parts=(_DRAW,))
     if not isinstance(body, FrameId):
         body, X_PB = body_and_pose(body, X_PB)
-    preset = pattern if isinstance(pattern, str) else None
-    if preset is not None:
-        pattern = make_beam_pattern(preset)
+    unit = pattern if isinstance(pattern, str) else None
+    if unit is not None:
+        pattern = make_beam_pattern(unit)
     if not isinstance(pattern, BeamPattern):
         raise TypeError(
             f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "
-            "preset"
+            "preset or a file"
         )
-    model = _returns_model(returns, preset, seed, name)
-    if model is not None and preset is not None:
-        pattern = model.sheet.aimed(pattern)
+    model = _returns_model(returns, unit, seed, name)
+    if model is not None and unit is not None:
+        pattern = aimed(pattern, model.sheet)
     if model is not None:
         _check_no_noise(measurement, range_noise, dropout)
     else:
@@ -360,12 +361,12 @@ def connect_lidar(
 
 
 def _returns_model(
-    returns: CalibratedReturns | str, preset: str | None, seed: int, name: str
+    returns: CalibratedReturns | str, unit: str | None, seed: int, name: str
 ) -> CalibratedReturns | None:
     """Returns the model of calibrated returns, None for ideal returns.
 
-    The arguments are the same as for `add_lidar`; `preset` is None for a
-    pattern that is not given by the name of a preset.
+    The arguments are the same as for `add_lidar`; `unit` is None for a pattern
+    that is given by neither the name of a preset nor a file.
 
     Raises:
         ValueError: calibrated returns need a preset, or the seed is given
@@ -375,8 +376,8 @@ def _returns_model(
         return None
     from cns_drake.sensors.returns.calibrated import CalibratedReturns
 
-    if returns == "calibrated" and preset is not None:
-        return CalibratedReturns.of_preset(preset, seed=seed, sensor_name=name)
+    if returns == "calibrated" and unit is not None:
+        return CalibratedReturns.of_preset(unit, seed=seed, sensor_name=name)
     if not isinstance(returns, CalibratedReturns):
         raise ValueError(
             f"returns: {returns!r}: give 'ideal', 'calibrated' with the "

@@ -1,18 +1,27 @@
 """Descriptions of a LiDAR and the weather, and their conversion to models."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, PlainSerializer, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    PlainSerializer,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
-from cns_drake.base import validated
+from cns_drake.base import InputError, validated
 from cns_drake.drives import LayoutName
 from cns_drake.sensors.lidar.measurement import Echoes
-from cns_drake.sensors.lidar.presets import (
-    LIDAR_PRESETS,
+from cns_drake.sensors.lidar.patterns import SpinningPattern
+from cns_drake.sensors.lidar.sheet_patterns import (
     UnitPattern,
-    check_preset,
+    aimed,
     make_beam_pattern,
 )
 from cns_drake.sensors.sensor_config import (
@@ -20,6 +29,17 @@ from cns_drake.sensors.sensor_config import (
     Section,
     Triple,
     field_off_by_default,
+)
+from cns_drake.units import (
+    DEFAULT_PRESET,
+    LIDAR_PRESETS,
+    MOST_BEAMS,
+    MOST_RINGS,
+    LidarSheet,
+    check_preset,
+    is_sheet_file,
+    make_sheet,
+    read_sheet,
 )
 
 if TYPE_CHECKING:
@@ -53,11 +73,17 @@ class LidarDescription:
 
     Attributes:
         preset: name of the LiDAR model, from the table of presets in the
-            documentation.
+            documentation; none if there is a `unit`.
+        unit: file with the data sheet of a LiDAR of your own, instead of a
+            preset.
+        rings: number of rings, evenly spaced from the highest to the lowest
+            ring of the data sheet; by default the rings of the data sheet.
         columns: number of columns (azimuths) per revolution; by default the
-            preset's.
-        min_range: smallest range that is measured [m]; by default the preset's.
-        max_range: largest range that is measured [m]; by default the preset's.
+            data sheet's.
+        min_range: smallest range that is measured [m]; by default the data
+            sheet's.
+        max_range: largest range that is measured [m]; by default the data
+            sheet's.
         resolution: step to which coordinates are rounded [m]. 0 gives exact
             values.
         range_noise: standard deviation of a Gaussian error of the range [m].
@@ -83,7 +109,9 @@ class LidarDescription:
             same unit. Only with calibrated returns.
     """
 
-    preset: str = "cns"
+    preset: str | None = DEFAULT_PRESET
+    unit: str | None = None
+    rings: int | None = None
     columns: int | None = None
     min_range: float | None = None
     max_range: float | None = None
@@ -97,10 +125,27 @@ class LidarDescription:
     unit_seed: int = 0
 
 
+def _find_unit(given: Any) -> Any:
+    """Returns the data sheet in a file, or with the given fields."""
+    try:
+        if isinstance(given, str):
+            return read_sheet(Path(given))
+        if isinstance(given, Mapping):
+            return make_sheet(given, "its data sheet")
+    except InputError as error:
+        # Becomes an error at the section's field.
+        raise ValueError(str(error)) from None
+    if given is not None and not isinstance(given, LidarSheet):
+        raise ValueError(f"{given!r} is not the file of a data sheet")
+    return given
+
+
 class LidarSection(LidarDescription, Mount):
     """A LiDAR on the vehicle.
 
     Attributes:
+        unit: file with the data sheet of a LiDAR of your own, or the fields of
+            the data sheet, instead of a preset.
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
         resolution: step to which recorded coordinates are rounded [m]; the
@@ -115,6 +160,13 @@ class LidarSection(LidarDescription, Mount):
 
     xyz: Triple = (0.0, 0.0, 1.6)
     # Fields of the description, with their limits.
+    # The content of the file, so that a recording states all of it.
+    unit: Annotated[
+        LidarSheet | None,
+        BeforeValidator(_find_unit, json_schema_input_type=str | None),
+        PlainSerializer(lambda sheet: sheet and sheet.to_fields()),
+    ] = field_off_by_default(None)  # type: ignore[assignment]  # Narrower.
+    rings: int | None = field_off_by_default(None, ge=2, le=MOST_RINGS)
     columns: int | None = Field(default=None, ge=4, le=8192)
     min_range: float | None = Field(default=None, ge=0.0)
     max_range: float | None = Field(default=None, gt=0.0, le=1000.0)
@@ -132,11 +184,40 @@ class LidarSection(LidarDescription, Mount):
     rate: int = field_off_by_default(20, ge=1, le=100)
     layout: LayoutName = field_off_by_default("cns")
 
+    # A field -> the fields that a change of it removes.
+    replaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "preset": ("unit",),
+        "unit": ("preset",),
+    }
+
+    @model_validator(mode="before")
+    @classmethod
+    def _choose_unit(cls, fields: Any) -> Any:
+        """Leaves out the preset of a LiDAR with a data sheet of its own."""
+        if not isinstance(fields, Mapping):
+            return fields
+        preset, unit = fields.get("preset"), fields.get("unit")
+        if unit is not None and preset is None:
+            return {**fields, "preset": None}
+        if unit is None and preset is None:
+            return {**fields, "preset": DEFAULT_PRESET}
+        return fields
+
     @field_validator("preset")
     @classmethod
-    def _check_known(cls, preset: str) -> str:
-        check_preset(preset)
+    def _check_known(cls, preset: str | None) -> str | None:
+        if preset is not None:
+            check_preset(preset)
         return preset
+
+    @field_validator("unit")
+    @classmethod
+    def _check_one(
+        cls, unit: LidarSheet | None, info: ValidationInfo
+    ) -> LidarSheet | None:
+        if unit is not None and info.data.get("preset") is not None:
+            raise ValueError("give either a unit or a preset")
+        return unit
 
     @model_validator(mode="after")
     def _check_returns(self) -> "LidarSection":
@@ -161,43 +242,67 @@ class LidarSection(LidarDescription, Mount):
 
     @model_validator(mode="after")
     def _check_unit(self) -> "LidarSection":
-        unit = LIDAR_PRESETS[self.preset].pattern
-        if self.columns and unit.num_columns is None:
-            raise ValueError(f"the preset '{self.preset}' has no columns")
-        nearest = unit.min_range if self.min_range is None else self.min_range
-        farthest = unit.max_range if self.max_range is None else self.max_range
+        sheet = self.sheet
+        nearest, farthest = sheet.ranges
+        nearest = nearest if self.min_range is None else self.min_range
+        farthest = farthest if self.max_range is None else self.max_range
         if nearest >= farthest:
             raise ValueError(
                 f"min_range {nearest:g} is not below max_range {farthest:g}"
             )
+        pattern = make_pattern(self)
+        if isinstance(pattern, SpinningPattern):
+            number = pattern.num_beams
+        else:
+            number = pattern.num_firings * pattern.num_lines
+        if number > MOST_BEAMS:
+            raise ValueError(
+                f"{number} beams in a revolution, more than {MOST_BEAMS}; "
+                "give fewer rings or columns, or a higher rate"
+            )
         return self
 
-    def with_preset(self, preset: str) -> "LidarSection":
+    @property
+    def sheet(self) -> LidarSheet:
+        """The data sheet, with the number of rings that the section sets."""
+        sheet = self.unit
+        if sheet is None:
+            assert self.preset is not None  # One of the two is given.
+            sheet = LIDAR_PRESETS[self.preset]
+        return sheet if self.rings is None else sheet.with_rings(self.rings)
+
+    def with_lidar(self, unit: str) -> "LidarSection":
         """Returns this description of a LiDAR, with another model.
 
-        The name of the preset, the number of columns and the range limits come
-        from the new preset; all other fields stay the same.
+        The data sheet, the numbers of rings and columns, and the range limits
+        are the other model's; all other fields stay the same.
 
         Args:
-            preset: name of the other model.
+            unit: name of a preset, or the file of a data sheet.
 
         Raises:
-            InputError: there is no such preset.
+            InputError: there is no such preset, or the file is no data sheet.
         """
-        unit = make_lidar_config(preset)
-        names = ("preset", "columns", "min_range", "max_range")
-        return self.replaced(**{name: getattr(unit, name) for name in names})
+        new = make_lidar_config(unit)
+        names = (
+            "preset", "unit", "rings", "columns", "min_range", "max_range",
+        )  # fmt: skip
+        return self.replaced(**{name: getattr(new, name) for name in names})
 
 
-def make_lidar_config(preset: str) -> LidarSection:
-    """Returns the description of a LiDAR with a given preset.
+def make_lidar_config(unit: str) -> LidarSection:
+    """Returns the description of a LiDAR of a given model.
 
-    All its other fields have their defaults.
+    All other fields have their defaults.
+
+    Args:
+        unit: name of a preset, or the file of a data sheet.
 
     Raises:
-        InputError: there is no such preset.
+        InputError: there is no such preset, or the file is no data sheet.
     """
-    return validated(LidarSection, {"preset": preset}, "--lidar")
+    field = "unit" if is_sheet_file(unit) else "preset"
+    return validated(LidarSection, {field: unit}, "--lidar")
 
 
 def make_pattern(
@@ -205,15 +310,15 @@ def make_pattern(
 ) -> UnitPattern:
     """Returns the beam pattern of a LiDAR.
 
-    With calibrated returns, the elevations are the elevations of a real unit,
-    if a unit of this preset was measured.
+    With calibrated returns, the elevations are those of a real unit, if the
+    data sheet states them.
 
     Args:
         config: description of the LiDAR.
         period: duration of a revolution [s]; by default 1 / `config.rate`.
     """
     pattern = make_beam_pattern(
-        config.preset,
+        config.sheet,
         period or 1.0 / config.rate,
         num_columns=config.columns,
         min_range=config.min_range,
@@ -221,24 +326,24 @@ def make_pattern(
     )
     if config.returns == "ideal":
         return pattern
-    # Slow to import, and ideal returns do without.
-    from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
-
-    return UNIT_SHEETS[config.preset].aimed(pattern)
+    return aimed(pattern, config.sheet.returns)
 
 
 def describe_unit(config: LidarSection) -> dict[str, Any]:
     """Returns facts about a LiDAR that are stored in its recordings.
 
     Returns:
-        A mapping with the keys `preset`, `unit_seed`, and `elevations_deg`: the
-        nominal elevations of the lasers [deg], empty for a preset without
-        rings. The true angles differ from the nominal elevations by the errors
-        of the individual unit.
+        A mapping with the keys `preset` (or, for a data sheet of the user's,
+        its `source`), `unit_seed`, and `elevations_deg`: the nominal elevations
+        of the lasers [deg], empty for a LiDAR without rings. The true angles
+        differ from the nominal elevations by the errors of the individual unit.
     """
     nominal = getattr(make_pattern(config), "elevations_rad", ())
+    model = {"preset": config.preset}
+    if config.unit is not None:
+        model = {"source": config.unit.source}
     return {
-        "preset": config.preset,
+        **model,
         "unit_seed": config.unit_seed,
         "elevations_deg": [round(math.degrees(one), 6) for one in nominal],
     }
@@ -261,11 +366,11 @@ def make_returns(
     from cns_drake.sensors.returns.calibrated import CalibratedReturns
     from cns_drake.sensors.returns.weather import Weather
 
-    return CalibratedReturns.of_preset(
-        config.preset,
-        echoes=config.echoes,
-        weather=Weather(**weather.model_dump()),
-        seed=seed,
-        sensor_name=name,
-        unit_seed=config.unit_seed,
+    return CalibratedReturns(
+        config.sheet.returns,
+        config.echoes,
+        Weather(**weather.model_dump()),
+        seed,
+        name,
+        config.unit_seed,
     )

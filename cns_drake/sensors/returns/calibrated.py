@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -14,17 +15,17 @@ from cns_drake.ray_casting import RayCastingScene, SceneHits, rotate
 from cns_drake.scene import PerceptionGeometry, StructureTable
 from cns_drake.sensors.lidar.beams import BeamPattern, Beams
 from cns_drake.sensors.lidar.measurement import Echoes
-from cns_drake.sensors.lidar.presets import check_preset
 from cns_drake.sensors.returns.echoes import Receiver, Reported, report_echoes
 from cns_drake.sensors.returns.footprint import correct_side_hits, find_sides
 from cns_drake.sensors.returns.light import BeamHits, Shots
+from cns_drake.sensors.returns.link_budget import fit_link_budget
 from cns_drake.sensors.returns.materials import Materials, find_materials
 from cns_drake.sensors.returns.propagation import follow, start_ways
 from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
 from cns_drake.sensors.returns.surface_texture import with_texture
 from cns_drake.sensors.returns.tables import join
-from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS, UnitSheet
 from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
+from cns_drake.units import ReturnsSheet, find_sheet
 
 CLEAR = Weather()
 
@@ -107,7 +108,7 @@ class _LaserErrors(NamedTuple):
 
 
 def _make_unit_beams(
-    beams: Beams, sheet: UnitSheet, key: np.uint64
+    beams: Beams, sheet: ReturnsSheet, key: np.uint64
 ) -> _UnitBeams:
     """Returns the beams of a revolution, with the errors of their lasers.
 
@@ -149,7 +150,7 @@ def _make_unit_beams(
 
 
 def _draw_laser_errors(
-    laser: np.ndarray, sheet: UnitSheet, key: np.uint64
+    laser: np.ndarray, sheet: ReturnsSheet, key: np.uint64
 ) -> _LaserErrors:
     """Returns the random errors of lasers with the numbers (L,)."""
     alternate, response = sheet.head.alternate, sheet.response
@@ -193,7 +194,7 @@ class CalibratedReturns:
     with the same unit.
 
     Attributes:
-        sheet: data sheet of the unit.
+        sheet: what the data sheet of the unit says of its returns.
         echoes: which echoes of a beam are reported.
         weather: weather of the drive.
         seed: seed of random numbers.
@@ -207,7 +208,7 @@ class CalibratedReturns:
         returns = CalibratedReturns.of_preset("os1-64", seed=7)
     """
 
-    sheet: UnitSheet
+    sheet: ReturnsSheet
     echoes: Echoes = Echoes.STRONGEST
     weather: Weather = CLEAR
     seed: int = 0
@@ -217,7 +218,7 @@ class CalibratedReturns:
     @classmethod
     def of_preset(
         cls,
-        preset: str,
+        unit: str | Path,
         *,
         echoes: Echoes | str = Echoes.STRONGEST,
         weather: Weather = CLEAR,
@@ -225,10 +226,10 @@ class CalibratedReturns:
         sensor_name: str = "",
         unit_seed: int = 0,
     ) -> CalibratedReturns:
-        """Returns a model that follows the data sheet of a preset's LiDAR.
+        """Returns a model that follows the data sheet of a LiDAR.
 
         Args:
-            preset: a key of `LIDAR_PRESETS`.
+            unit: a key of `LIDAR_PRESETS`, or the file of a data sheet.
             echoes: which echoes of a beam are reported.
             weather: fog, rain and snowfall.
             seed: seed of the noise, which differs from frame to frame.
@@ -237,10 +238,10 @@ class CalibratedReturns:
 
         Raises:
             ValueError: there is no such preset, or no such choice of echoes.
+            InputError: the file cannot be read, or is no data sheet.
         """
-        check_preset(preset)
         return cls(
-            UNIT_SHEETS[preset],
+            find_sheet(unit).returns,
             Echoes(echoes),
             weather,
             seed,
@@ -274,18 +275,19 @@ class CalibratedReturns:
     def _make_receiver(self, min_range: float, max_range: float) -> Receiver:
         """Returns the receiver of the unit, with range limits [m]."""
         sheet = self.sheet
+        budget = fit_link_budget(sheet)
         scattering = None
         if not self.weather.is_clear:
             scattering = tabulate_scattering(
                 self.weather,
-                sheet.budget,
+                budget,
                 sheet.divergence,
                 sheet.resolution,
                 min_range,
             )
         return Receiver(
             sheet,
-            sheet.budget,
+            budget,
             self.weather.extinction,
             min_range,
             max_range,

@@ -1,5 +1,6 @@
 """Echoes: the points that a unit reports for the light of each beam."""
 
+from functools import lru_cache
 import math
 from typing import NamedTuple
 
@@ -19,8 +20,8 @@ from cns_drake.sensors.returns.link_budget import (
 )
 from cns_drake.sensors.returns.random_numbers import normal, uniform
 from cns_drake.sensors.returns.tables import join, select
-from cns_drake.sensors.returns.unit_sheets import UnitSheet
 from cns_drake.sensors.returns.weather import Scattering
+from cns_drake.units import Response, ReturnsSheet
 
 # The index of the weather, in place of a geometry's.
 SCATTERED = -2
@@ -55,7 +56,7 @@ class Receiver(NamedTuple):
         scattering: echoes of rain, snow and fog; None in clear air.
     """
 
-    sheet: UnitSheet
+    sheet: ReturnsSheet
     budget: LinkBudget
     extinction: float
     min_range: float
@@ -410,6 +411,18 @@ def _first_draw(pulses: _EchoTable) -> np.ndarray:
     return _FIRST_ECHO_DRAW + _DRAWS_PER_ECHO * number
 
 
+@lru_cache(maxsize=8)
+def _response_table(response: Response) -> np.ndarray:
+    """Returns the intensities of diffuse targets, at 4097 energies of the echo.
+
+    The square roots of the energies are evenly spaced from 0 to 1. Intensities
+    in between are interpolated.
+    """
+    root = np.linspace(0.0, 1.0, 4097)
+    energy = np.maximum(root, 1e-6) ** 2
+    return np.maximum(response.full + response.slope * log(energy), 0.0)
+
+
 def _reported_intensity(
     pulses: _EchoTable, receiver: Receiver, key: np.uint64, gain: np.ndarray
 ) -> np.ndarray:
@@ -427,8 +440,9 @@ def _reported_intensity(
     if unit.slope:
         root = np.sqrt(np.minimum(energy, 1.0))
         root *= np.minimum(unit.far / pulses.distance, 1.0)
-        step = (root * (len(unit.table) - 1) + 0.5).astype(np.int64)
-        intensity = unit.table[step]
+        table = _response_table(unit)
+        step = (root * (len(table) - 1) + 0.5).astype(np.int64)
+        intensity = table[step]
     part = log(energy[is_above]) / math.log(_FULL_RETRO)
     intensity[is_above] = retro_from + rest * part
     if unit.speckle:

@@ -12,7 +12,6 @@ alpha_0 follow from two rows of the unit's data sheet: the ranges at 80 % and at
 / r^2.
 """
 
-from dataclasses import dataclass
 import math
 from statistics import NormalDist
 from typing import NamedTuple, TypeVar
@@ -22,6 +21,7 @@ from numpy.typing import ArrayLike
 from scipy.special import erf
 
 from cns_drake.base import compiled
+from cns_drake.units import ReturnsSheet, SheetRow
 
 _Value = TypeVar("_Value", float, np.ndarray)
 
@@ -32,31 +32,6 @@ THRESHOLD_SNR = 9.0
 CERTAIN_SNR = 81.0
 # Below this SNR, the probability of detection is 0 in double precision.
 HOPELESS_SNR = 0.9
-
-
-@dataclass(frozen=True)
-class SheetRow:
-    """A row of a data sheet: how well a target is detected at a range.
-
-    The target is Lambertian and faces the unit.
-
-    Attributes:
-        reflectivity: reflectivity of the target, 0 to 1.
-        range: range of the target [m].
-        probability: probability that the target is detected.
-    """
-
-    reflectivity: float
-    range: float
-    probability: float
-
-    @property
-    def snr(self) -> float:
-        """SNR at which a target is detected with this row's `probability`."""
-        # `detection_probability`, solved for the root of the SNR.
-        z = NormalDist().inv_cdf(self.probability)
-        root = (z + math.sqrt(z * z + 4.0 * THRESHOLD_SNR)) / 2.0
-        return root * root
 
 
 class LinkBudget(NamedTuple):
@@ -83,30 +58,33 @@ class LinkBudget(NamedTuple):
     range_bias: float = 0.0
 
 
-def fit_link_budget(
-    rows: tuple[SheetRow, ...],
-    range_noise: float,
-    range_floor: float,
-    range_bias: float = 0.0,
-) -> LinkBudget:
-    """Returns the link budget that fits one or two data sheet rows exactly.
+def fit_link_budget(sheet: ReturnsSheet) -> LinkBudget:
+    """Returns the link budget that fits a data sheet's one or two rows exactly.
 
     Args:
-        rows: the rows; two rows must have different ranges.
-        range_noise: standard deviation of a range at an SNR of 1 [m].
-        range_floor: least standard deviation of a range, at any SNR [m].
-        range_bias: standard deviation of the range error that is constant for
-            each laser; a part of `range_floor` [m].
+        sheet: the data sheet; two rows have different ranges.
     """
+    rows = sheet.rows
     # log(snr r^2 / e) = log(S) - 2 alpha_0 r at each row.
-    logs = [math.log(row.snr * row.range**2 / row.reflectivity) for row in rows]
+    logs = [
+        math.log(stated_snr(row) * row.range**2 / row.reflectivity)
+        for row in rows
+    ]
     extinction = 0.0
     if len(rows) == 2:
         way = 2.0 * (rows[1].range - rows[0].range)
         extinction = (logs[0] - logs[1]) / way
     scale = math.exp(logs[0] + 2.0 * extinction * rows[0].range)
-    noise = range_noise, range_floor, range_bias
+    noise = sheet.range_noise, sheet.range_floor, sheet.range_bias
     return LinkBudget(scale, extinction, *noise)
+
+
+def stated_snr(row: SheetRow) -> float:
+    """Returns the SNR at which a target is detected as a row states."""
+    # `detection_probability`, solved for the root of the SNR.
+    z = NormalDist().inv_cdf(row.probability)
+    root = (z + math.sqrt(z * z + 4.0 * THRESHOLD_SNR)) / 2.0
+    return root * root
 
 
 @compiled

@@ -7,9 +7,21 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from cns_drake.base import InputError, errors_at, read_records, validated
+from cns_drake.base import (
+    InputError,
+    did_you_mean,
+    errors_at,
+    read_records,
+    validated,
+)
 from cns_drake.roads import RoadNetwork, Route, draw_route, load_road_network
-from cns_drake.scenarios import Scenario, check_files, count_frames, plan_drive
+from cns_drake.scenarios import (
+    Scenario,
+    check_files,
+    count_frames,
+    make_paths_absolute,
+    plan_drive,
+)
 from cns_drake.scene import MapFolder, load_world, structures_in
 from cns_drake.sensors import Section, WeatherConfig
 from cns_drake.simulation import load_ways
@@ -23,6 +35,7 @@ from cns_drake.studies.drives.viewpoints import (
 )
 from cns_drake.studies.experiments.nested_fields import Changes
 from cns_drake.traffic import room_for_vehicles
+from cns_drake.units import is_sheet_file
 from evaluation.results import LAST, OWN
 
 # Fields of a drive that do not change the drive itself.
@@ -136,8 +149,11 @@ class DriveChanger:
     ) -> Scenario:
         """Returns a drive with another LiDAR, or another model of returns."""
         if "lidar" in left:
+            unit = left.pop("lidar")
+            if is_sheet_file(unit):
+                unit = str(Path(self._source).parent / unit)
             with errors_at(f"{self._source}: {place}.lidar", "--lidar: "):
-                drive = drive.with_lidar_preset(left.pop("lidar"))
+                drive = drive.with_lidar(unit)
         if "returns" not in left:
             return drive
         returns, weather = left.pop("returns"), left.pop("weather", None)
@@ -306,7 +322,13 @@ class DriveChanger:
     def _with_scenario_fields(
         self, drive: Scenario, place: str, left: Changes
     ) -> Scenario:
+        if "lidars" in left:
+            # Data sheets lie beside the experiment.
+            lidars = {"lidars": left["lidars"]}
+            make_paths_absolute(lidars, Path(self._source))
+            left = {**left, **lidars}
         if left:
+            self._check_lidars(place, drive, left.get("lidars"))
             drive = drive.with_fields(left, f"{self._source}: {place}")
             self._check_map(place, drive, left)
         for name in set(_SEEDED) & set(left):
@@ -316,6 +338,26 @@ class DriveChanger:
             if getattr(drive, name).replaced(seed=plain.seed) == plain:
                 drive = drive.replaced(**{name: plain})
         return drive
+
+    def _check_lidars(self, place: str, drive: Scenario, given: object) -> None:
+        """Checks that a study changes LiDARs that the drive has.
+
+        A further LiDAR would be recorded, and read by no method. Another LiDAR
+        can replace those of the drive, whose values are then null.
+        """
+        if not isinstance(given, Mapping):
+            return
+        kept = [
+            name for name in drive.lidars if given.get(name, "") is not None
+        ]
+        for name in given:
+            if name not in drive.lidars and kept:
+                raise InputError(
+                    f"{self._source}: {place}.lidars: the drive has no LiDAR"
+                    f" {name!r} (it has: {', '.join(drive.lidars)})"
+                    f"{did_you_mean(str(name), drive.lidars)}; for a new one in"
+                    f" its place, set {kept[0]}: null"
+                )
 
     def _check_map(self, place: str, drive: Scenario, given: Changes) -> None:
         """Checks that the given fields of a drive fit its map."""
@@ -328,7 +370,11 @@ class DriveChanger:
         world = drive.world_file, drive.without
         if "without" in given and world not in self._loaded:
             with errors_at(f"{where}.without"):
-                load_world(world[0], without=drive.without)
+                load_world(
+                    world[0],
+                    without=drive.without,
+                    model_paths=drive.model_paths,
+                )
             self._loaded.add(world)
 
 
@@ -446,7 +492,9 @@ def _structures_of(base: Scenario, stage: str, source: str) -> set[str]:
     """
     scenario = base.replaced(stage=stage)
     check_files(scenario, source)
-    return structures_in(load_world(scenario.world_file))
+    return structures_in(
+        load_world(scenario.world_file, model_paths=scenario.model_paths)
+    )
 
 
 def _removal_order(

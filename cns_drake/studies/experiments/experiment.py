@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 import contextlib
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PlainValidator, model_validator
 import yaml
 
 from cns_drake.base import InputError, check_once, validated
+from cns_drake.imports import map_sources
 from cns_drake.scenarios import Name
 from cns_drake.sensors import Section
 from cns_drake.studies.experiments.conditions import Condition, conditions
@@ -25,6 +27,7 @@ from cns_drake.studies.experiments.method_variants import (
 )
 from cns_drake.studies.experiments.nested_fields import SIDES, Case
 from cns_drake.studies.experiments.spread_values import expand_spread
+from evaluation.results import FROZEN_REDRAW, SETTINGS
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -120,11 +123,13 @@ class MadeMap(Section):
         for name in ("sha256", "grow", "plain"):
             if self.age is not None and name in self.model_fields_set:
                 raise ValueError(f"{name}: it belongs to import; leave it out")
-        if self.grow is not None and str(self.import_file).endswith(".xodr"):
-            raise ValueError(
-                "grow: a road network (.xodr) has two stages anyway; leave it"
-                " out"
-            )
+        ending = Path(str(self.import_file)).suffix
+        for source in map_sources() if self.grow is not None else ():
+            if ending in source.suffixes and source.has_stages:
+                raise ValueError(
+                    f"grow: a map from {source.title} has two stages anyway;"
+                    " leave it out"
+                )
         return self
 
 
@@ -178,6 +183,9 @@ class Experiment(Section):
         methods: methods to run, as a list of names or Python files; to change
             settings, a mapping from each name to its settings. A setting with a
             list of values is a factor. By default all shipped methods.
+        metrics: metrics that the page shows, the most important first: names,
+            or Python files with metrics of your own. By default the main
+            metrics of each task. `results.csv` contains all metrics.
         seeds: seeds of all random numbers. Each condition is measured with each
             seed.
         protocol: protocol of place recognition: `fair`, `paper` or `recorded`;
@@ -228,6 +236,7 @@ class Experiment(Section):
     design: Literal["product", "one-at-a-time"] = "product"
     tasks: _Settings = Field(default={"place": {}}, min_length=1)
     methods: _Settings | None = Field(default=None, min_length=1)
+    metrics: Annotated[tuple[str, ...], BeforeValidator(_listed)] = ()
     seeds: Annotated[
         tuple[Annotated[int, Field(ge=0, lt=2**31, strict=True)], ...],
         BeforeValidator(_listed),
@@ -264,6 +273,26 @@ class Experiment(Section):
                 conditions.
         """
         return conditions(self)
+
+    @property
+    def factor_names(self) -> list[str]:
+        """The names of the factors, as in the columns of the tables.
+
+        A setting of a method in a Python file is named by the stem of the file,
+        as the file has not run yet.
+        """
+        names = dict.fromkeys(
+            name for one in self.conditions for name in one.factors
+        )
+        if self.frozen_redraws:
+            names[FROZEN_REDRAW] = None
+        for one in self.method_variants:
+            place, name = f"{SETTINGS}{one.name}.", Path(one.name)
+            stem = name.stem if name.suffix == ".py" else one.name
+            for column in one.columns:
+                setting = column.removeprefix(place)
+                names[f"{SETTINGS}{stem}.{setting}"] = None
+        return list(names)
 
     @cached_property
     def method_variants(self) -> list[MethodVariant]:

@@ -1,8 +1,12 @@
 """Reads experiments from files, with changes to single fields."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+import contextlib
 from pathlib import Path
+import re
 from typing import Any
+
+import yaml
 
 from cns_drake.base import (
     InputError,
@@ -13,8 +17,14 @@ from cns_drake.base import (
     validated,
     value_errors,
 )
-from cns_drake.studies.experiments.experiment import Experiment, in_long_form
+from cns_drake.studies.experiments.cause_files import with_cases
+from cns_drake.studies.experiments.experiment import (
+    Experiment,
+    in_long_form,
+    named_programs,
+)
 from cns_drake.studies.experiments.nested_fields import Changes, merged, nested
+from evaluation.results import SETTINGS, chart_factors, check_factors
 from evaluation.study import STAGES_FILE
 
 _FOLDER = Path(__file__).parent
@@ -24,6 +34,29 @@ def shipped_experiments() -> dict[str, Path]:
     """Returns name -> file of the shipped experiments."""
     files = [*_FOLDER.glob("*.yaml"), STAGES_FILE]
     return {path.stem: path for path in sorted(files, key=lambda p: p.stem)}
+
+
+def experiment_text(name_or_file: str | Path) -> str:
+    """Returns an experiment's file, with the cases for which its causes stand.
+
+    Raises:
+        InputError: there is no such experiment, or it cannot be used.
+    """
+    load_experiment(name_or_file)
+    path = _experiment_file(name_or_file)
+    text = path.read_text("utf-8")
+    values = read_yaml(path)
+    if "causes" not in values:
+        return text
+    cases = yaml.safe_dump(
+        {"cases": with_cases(values, path)["cases"]},
+        sort_keys=False,
+        default_flow_style=None,
+        allow_unicode=True,
+        width=79,
+    )
+    line = re.compile(r"^causes:.*\n(?:[ #].*\n)*", re.MULTILINE)
+    return line.sub(lambda _: cases, text)
 
 
 def load_experiment(
@@ -55,6 +88,7 @@ def load_experiment(
     values = read_yaml(path)
     if not isinstance(values, dict):
         raise InputError(f"{path}: not a mapping of an experiment's fields")
+    values = with_cases(values, path)
     values = in_long_form({"name": path.stem, **values})
     short = values.get("quick")
     overrides = list(overrides)
@@ -90,6 +124,7 @@ def _checked(
         overrides: see `load_experiment`.
         chosen: names of tasks and methods that replace those of the experiment.
     """
+    written = values
     for one in overrides:
         values = _overridden(values, one)
     values = in_long_form(dict(values))
@@ -100,8 +135,36 @@ def _checked(
             values[field] = {name: given.get(name, {}) for name in names}
     experiment = validated(Experiment, values, path)
     with value_errors(path):
-        _ = experiment.conditions, experiment.method_variants
+        factors = experiment.factor_names
+    if values != written:
+        # A factor whose values an option has fixed is still known.
+        with contextlib.suppress(InputError, ValueError):
+            factors += validated(Experiment, written, path).factor_names
+    _check_charts(experiment, factors, path)
     return experiment
+
+
+def _check_charts(
+    experiment: Experiment, factors: Collection[str], path: Path
+) -> None:
+    """Checks that charts name factors of an experiment.
+
+    Settings of methods, and metrics of the user, are known once their files
+    have run: `run_study` checks them.
+
+    Raises:
+        InputError: a chart names something else, or cannot be used.
+    """
+    has_own = bool(named_programs(experiment.metrics))
+    for chart in experiment.charts:
+        with errors_at(path):
+            names = [
+                name
+                for name in chart_factors(chart)
+                if not name.startswith(SETTINGS)
+                and not (has_own and name in (chart.get("x"), chart.get("y")))
+            ]
+            check_factors(chart, names, factors)
 
 
 def _experiment_file(name_or_file: str | Path) -> Path:

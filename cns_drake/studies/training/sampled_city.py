@@ -128,7 +128,7 @@ class SampledCity:
         fog = float(rng.uniform(80.0, 400.0)) if rng.random() < 0.2 else None
         seed = int(rng.integers(2**31))
         if rng.random() < 0.35:
-            drive = drive.with_lidar_preset(preset)
+            drive = drive.with_lidar(preset)
         fields: dict[str, Any] = {"seed": seed}
         if self.driver:
             fields["driver"] = {

@@ -19,6 +19,7 @@ from cns_drake.base import (
     __version__,
     check_writable,
     completing,
+    figure_style,
     fingerprint,
     make_folder,
     poses,
@@ -193,6 +194,7 @@ def write_weights(
         np.savez(stream, **arrays)
 
 
+@figure_style()
 def _draw_curve(curve: np.ndarray, stem: Path) -> None:
     """Draws the loss, and the share of right answers, over the steps."""
     from matplotlib.figure import Figure

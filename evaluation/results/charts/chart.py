@@ -7,9 +7,9 @@ import math
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from evaluation.recognition import METRICS
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.headlines import lead_by_auc
-from evaluation.results.ranges import range_of
 from evaluation.results.styles import MethodStyle
 from evaluation.results.table import QueryRows, Results, Row
 
@@ -107,8 +107,9 @@ def start_at_zero(axes: Axes, x: str = "", y: str = "") -> None:
         axes: a panel in which everything is drawn.
         x, y: name of what the axis shows; empty to leave the axis unchanged.
     """
-    limits = [range_of(name) for name in (x, y)]
-    is_least = [limit is not None and limit.least == 0.0 for limit in limits]
+    is_least = [
+        name in METRICS and METRICS[name].least == 0.0 for name in (x, y)
+    ]
     # Markers at 0 are whole.
     axes.update_datalim([(0.0, 0.0)], *is_least)
     axes.autoscale_view()

@@ -1,17 +1,17 @@
 """Checks the description of a chart, and draws a chart of any kind."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
 import re
 import textwrap
 from typing import Any, NamedTuple, TypeVar
 
-from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cns_drake.base import InputError
+from cns_drake.base import InputError, did_you_mean, figure_style
+from evaluation.recognition import METRICS, metric_named
 from evaluation.results.charts.chart import FONT, PX, ROW, WIDE, Chart
 from evaluation.results.charts.curves import draw_curves
 from evaluation.results.charts.dumbbell import draw_dumbbell
@@ -19,8 +19,8 @@ from evaluation.results.charts.lines import draw_lines
 from evaluation.results.charts.matrix import draw_matrix
 from evaluation.results.charts.scatter import draw_scatter
 from evaluation.results.figure_text import escape_dollars
-from evaluation.results.keys import SETTINGS
-from evaluation.results.method_names import in_table_order
+from evaluation.results.keys import RESERVED, SETTINGS
+from evaluation.results.method_names import in_table_order, title
 from evaluation.results.styles import MethodStyle, method_styles
 from evaluation.results.table import Answers, QueryRows, Results, Row
 
@@ -35,12 +35,14 @@ class DrawnChart:
 
     Attributes:
         message: sentence that says what the chart shows.
+        source: the rows of the table that the chart shows, in words.
         figure: the drawing.
         legend: name of a method -> its style; the mapping is empty if the
             drawing itself contains the names.
     """
 
     message: str
+    source: str
     figure: Figure
     legend: Mapping[str, MethodStyle]
 
@@ -72,10 +74,13 @@ def draw_chart(
         results = Results.of(_renamed(results.rows, names_of))
         if queries is not None:
             queries = QueryRows.of(_renamed(queries.answers, names_of))
-    rows = _selected_rows(chart, keys, results)
-    styles = method_styles(in_table_order(row.label for row in rows))
+    rows, source = _selected_rows(chart, keys, results)
+    # All charts of a table show a method in the same style.
+    of_table = method_styles(in_table_order(row.label for row in results.rows))
+    shown = {title(row.label) for row in rows}
+    styles = {name: one for name, one in of_table.items() if name in shown}
     kind = chart["kind"]
-    with rc_context({"font.size": FONT, "axes.titlesize": "medium"}):
+    with figure_style({"font.size": FONT, "axes.titlesize": "medium"}):
         message, figure = _KINDS[kind].draw(
             Chart(keys, results, rows, styles, width, queries)
         )
@@ -85,13 +90,17 @@ def draw_chart(
         if alone:
             figure.suptitle(escape_dollars(textwrap.fill(message, width // 9)))
             _add_legend(figure, legend, width)
-    return DrawnChart(message, figure, legend)
+    return DrawnChart(message, source, figure, legend)
 
 
 def _selected_rows(
     chart: Mapping[str, Any], keys: Mapping[str, str], results: Results
-) -> tuple[Row, ...]:
-    """Returns the rows of a chart's metric that its description selects."""
+) -> tuple[tuple[Row, ...], str]:
+    """Returns the rows of a chart's metric that its description selects.
+
+    Returns:
+        The rows with a defined value; and in words, which rows these are.
+    """
     kind = chart["kind"]
     metric = keys.get("metric", keys.get("y", "auc"))
     chosen = {n: v for n, v in chart.items() if n != "kind" and n not in keys}
@@ -101,11 +110,21 @@ def _selected_rows(
     tasks = results.where(metric=metric).distinct("task")
     task = "place" if "place" in tasks else tasks[:1]
     chosen = {"task": task, "gate": 0, **chosen}
-    rows = results.where(chosen, metric=metric).rows
-    rows = tuple(row for row in rows if not math.isnan(row.value))
+    known, undefined = results.where(chosen, metric=metric).defined()
+    rows = known.rows
     if not rows:
         raise InputError(f"charts: {kind}: the table has no {metric} like that")
-    return rows
+    for row in rows:
+        metric_named(metric).checked(row.value)
+    named = ", ".join(f"{name} {_listed(one)}" for name, one in chosen.items())
+    source = f"{len(rows)} rows of results.csv: metric {metric}, {named}"
+    return rows, f"{source}; {undefined}" if undefined else source
+
+
+def _listed(value: object) -> str:
+    """Returns the value of a column, or possible values, as text."""
+    some = value if isinstance(value, tuple | list | set) else [value]
+    return " or ".join(map(str, some))
 
 
 def _file_names(rows: Sequence[Row]) -> dict[tuple[str, object], str]:
@@ -175,6 +194,42 @@ def _add_legend(
     lines = math.ceil(len(handles) / columns)
     figure.set_figheight(figure.get_figheight() + lines * ROW * PX)
     figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+
+
+def chart_factors(chart: Mapping[str, Any]) -> list[str]:
+    """Returns the names in a chart's description that must be factors.
+
+    Columns that every table has are left out, and so are metrics.
+    """
+    keys = check_chart(chart)
+    names = [n for n in chart if n != "kind" and n not in keys]
+    names += [keys[n] for n in ("over", "strips") if n in keys]
+    names += [
+        keys[n] for n in ("x", "y") if n in keys and keys[n] not in METRICS
+    ]
+    return [name for name in names if name not in RESERVED]
+
+
+def check_factors(
+    chart: Mapping[str, Any], names: Iterable[str], factors: Collection[str]
+) -> None:
+    """Checks that names in a chart's description are factors.
+
+    Args:
+        chart: the description.
+        names: the names, see `chart_factors`.
+        factors: names of the experiment's factors.
+
+    Raises:
+        InputError: the experiment has no such factor.
+    """
+    for name in names:
+        if name not in factors:
+            there = ", ".join(factors) or "none"
+            raise InputError(
+                f"charts: {chart['kind']}: no factor {name!r} (there are:"
+                f" {there}){did_you_mean(name, factors)}"
+            )
 
 
 def check_chart(chart: Mapping[str, Any]) -> dict[str, str]:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from cns_drake.base import InputError
+from evaluation.recognition import metric_named
 from evaluation.results.charts.chart import (
     FONT,
     Chart,
@@ -21,7 +22,7 @@ from evaluation.results.figure_text import escape_dollars
 from evaluation.results.headlines import from_least_to_greatest
 from evaluation.results.method_names import title
 from evaluation.results.summaries import means
-from evaluation.results.table import COSTS, Row
+from evaluation.results.table import Row
 
 # Beyond this ratio of its values, an axis is logarithmic.
 _WIDE_RANGE = 50.0
@@ -47,7 +48,7 @@ def draw_lines(chart: Chart) -> tuple[str, Figure]:
             if x[-1:] == at[-1:]:
                 last.setdefault(label, []).append(y[-1])
         _spread_axis(axes, at)
-        if chart.metric in COSTS:
+        if metric_named(chart.metric).grows:
             axes.set_yscale("log")
         else:
             start_at_zero(axes, y=chart.metric)

@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 import numpy as np
 
+from evaluation.recognition import metric_named
 from evaluation.results.charts.chart import FONT, ROW, Chart
 from evaluation.results.charts.words import in_words, value_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.method_names import title
-from evaluation.results.ranges import checked
 from evaluation.results.summaries import means
 from evaluation.results.table import Row
 
@@ -54,7 +54,7 @@ def draw_matrix(chart: Chart) -> tuple[str, Figure]:
     losses = {
         (row.map, *(row[name] for name in columns))
         for row in chart.rows
-        if chart.metric.startswith("kept") and row.high < 1.0
+        if metric_named(chart.metric).share_of and row.high < 1.0
     }
     below = [textwrap.fill(name, _NAME_WIDTH) for name in names]
     longest = max(len(line) for name in below for line in name.split("\n"))
@@ -64,7 +64,7 @@ def draw_matrix(chart: Chart) -> tuple[str, Figure]:
     weakest: list[tuple[float, str, str]] = []
     most_strips = 1
     for axes, rows in zip(panels, chart.panel_rows.values(), strict=True):
-        cells = _cells(rows, columns, chart.metric, losses)
+        cells = _cells(rows, columns, losses)
         for (name, value), cell in cells.items():
             _draw_cell(axes, names.index(name), values.index(value), cell)
             most_strips = max(most_strips, len(cell.shares))
@@ -94,7 +94,6 @@ def draw_matrix(chart: Chart) -> tuple[str, Figure]:
 def _cells(
     rows: Sequence[Row],
     columns: tuple[str, str, str],
-    metric: str,
     losses: Collection[tuple[object, ...]],
 ) -> dict[tuple[str, Any], _Cell]:
     """Returns the cells of a panel, by method and value of the factor."""
@@ -103,7 +102,7 @@ def _cells(
         label, value, strip = mean.key
         is_loss = mean.number == 1 and (rows[0].map, *mean.key) in losses
         strips.setdefault((title(label), value), []).append(
-            (strip, checked(metric, mean.value), is_loss)
+            (strip, mean.value, is_loss)
         )
     found = {}
     for key, cell_strips in strips.items():

@@ -1,23 +1,12 @@
-"""Metrics, factors and their values in the words of charts."""
+"""Factors and their values in the words of charts."""
 
 import re
 
+from evaluation.recognition import METRICS
 from evaluation.results.keys import CAUSE, LAST, OWN, STAGE
 
-# Metrics and factors in words.
+# Factors in words, where these differ from the last part of their names.
 _IN_WORDS = {
-    "auc": "AUC",
-    "auc_strict": "AUC strict",
-    "r1": "R@1",
-    "kept": "retained share",
-    "tcr_sym": "TCR_sym",
-    "miou": "mean IoU",
-    "visible_change_added": "visible change without parallax",
-    "query_time": "time of a query [s]",
-    "build_time": "time to build the database [s]",
-    "memory": "memory of the descriptors [bytes]",
-    "success_03m_1deg": "success within 0.3 m and 1 deg",
-    "success_2m_5deg": "success within 2 m and 5 deg",
     "protocol.base": "protocol",
     "protocol.turn_queries": "random yaw",
 }
@@ -32,7 +21,12 @@ _CAUSES = {
 
 
 def in_words(name: str) -> str:
-    """Returns the name of a metric or a factor in words."""
+    """Returns the name of a metric or a factor in words.
+
+    A name with a dot is a factor, such as a setting of a method.
+    """
+    if name in METRICS:
+        return METRICS[name].label
     return _IN_WORDS.get(name, name.rpartition(".")[2].replace("_", " "))
 
 

@@ -38,6 +38,7 @@ def browser_section(
     return page_section(
         "browser",
         "Queries",
+        "queries.csv: the first protocol, with the change, gate 0",
         is_open=True,
         data=data,
         image_step=data["imageStep"],

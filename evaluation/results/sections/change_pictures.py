@@ -15,9 +15,10 @@ from matplotlib.patheffects import withStroke
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base import file_name
+from cns_drake.base import figure_style, file_name
 from evaluation.change import TemporalChange, judge_points
 from evaluation.maps import VoxelMap
+from evaluation.recognition import METRICS
 from evaluation.results.figure_files import PIXELS, save_figure
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import LAST, STAGE
@@ -53,13 +54,18 @@ _SETS_LEGEND: Legend = (
 )
 # TCR_sym of the control, where nothing changed.
 _CONTROL = "control"
-# Metric -> head of its column.
+# Metric or control -> head of its column.
 _HEADS = {
-    "tcr_sym": "TCR_sym",
+    "tcr_sym": METRICS["tcr_sym"].title,
     _CONTROL: "without the change",
-    "tcr_sym_masked": "where both drove",
-    "tcr_source_to_target": "TCR from first to second",
-    "tcr_target_to_source": "from second to first",
+    **{
+        name: METRICS[name].title
+        for name in (
+            "tcr_sym_masked",
+            "tcr_source_to_target",
+            "tcr_target_to_source",
+        )
+    },
 }
 # Length of the scale bar [m].
 _SCALE_BAR = 50.0
@@ -225,6 +231,7 @@ def change_section(
     return page_section(
         "change",
         "Change",
+        "results.csv: the rows of the task change; the maps of the drives",
         heads=_HEADS.values(),
         rows=[
             {
@@ -272,6 +279,7 @@ def _render_shaded(
     )
 
 
+@figure_style()
 def _draw_panels(
     titles: Sequence[str],
     pictures: Sequence[Picture],

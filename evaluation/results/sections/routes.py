@@ -124,6 +124,7 @@ def routes_section(
     return page_section(
         "routes",
         "Maps",
+        "the drives",
         drives_of_maps=drives_of_maps,
         pages=pages,
         picture=_route_picture,

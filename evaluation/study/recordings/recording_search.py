@@ -9,7 +9,7 @@ import re
 
 from cns_drake.base import InputError, listed, natural_key, one_line
 from cns_drake.drives import SCENARIO, driven_way
-from evaluation.drives import find_readers, holds_cns, holds_kitti, open_drive
+from evaluation.drives import find_data_sets, open_drive
 from evaluation.study.recordings.map_drives import RecordingInfo
 from evaluation.study.sources import RecordingSource
 
@@ -100,7 +100,7 @@ def _find_drives(folder: Path, on_note: Callable[[str], None]) -> list[Path]:
                 " folder of the recordings"
             )
         if _holds_drive(path):
-            if holds_cns(path) or holds_kitti(path):
+            if any(one.is_nested for one in find_data_sets(path)):
                 drives.append(path)
             else:
                 deeper.append(path)
@@ -129,7 +129,8 @@ def _with_scenario(
     unplaced = [
         path
         for path in drives
-        if holds_kitti(path) and not (path / SCENARIO).is_file()
+        if any(one.needs_scenario for one in find_data_sets(path))
+        and not (path / SCENARIO).is_file()
     ]
     if not unplaced:
         return list(drives)
@@ -162,7 +163,7 @@ def _folders_in(folder: Path, levels: int) -> Iterator[Path]:
 
 
 def _holds_drive(path: Path) -> bool:
-    return path.suffix != ".part" and bool(find_readers(path))
+    return path.suffix != ".part" and bool(find_data_sets(path))
 
 
 def _recording_info(

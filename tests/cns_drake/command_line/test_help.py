@@ -9,7 +9,7 @@ import typer
 import cns_drake
 from cns_drake import command_line as cli
 from cns_drake.base import Command
-from cns_drake.sensors import LIDAR_PRESETS
+from cns_drake.units import LIDAR_PRESETS
 from evaluation import command_line as evaluation_cli
 
 PROGRAMS = {
@@ -26,7 +26,7 @@ WIDTH = 60
 
 def test_all_presets_are_listed():
     options = {one.name: one for one in find("cns-drake", "simulate").params}
-    words = re.findall(r"[a-z0-9-]+", options["lidar"].help.split(":")[1])
+    words = re.findall(r"[a-z0-9-]+", options["lidar"].help.split(": ")[2])
     assert set(words) - {"or"} == set(LIDAR_PRESETS)
 
 

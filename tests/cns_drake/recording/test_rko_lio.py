@@ -23,7 +23,7 @@ SECONDS = 8
 
 
 def test_rko_lio_finds_the_drive(tmp_path, capsys):
-    base = load_scenario("metropolis_04").with_lidar_preset("os1-128")
+    base = load_scenario("metropolis_04").with_lidar("os1-128")
     lidar = base.lidars["lidar"].model_copy(
         update={"motion_distortion": True, "columns": 512, "rate": 10}
     )

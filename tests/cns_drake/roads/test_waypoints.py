@@ -8,12 +8,16 @@ from cns_drake.base import InputError
 from cns_drake.roads import load_waypoint_path, make_waypoint_path
 
 
+def level(xy):
+    return np.zeros(len(xy))
+
+
 @pytest.fixture
 def load(tmp_path):
     def _load(text, spacing=0.5):
         path = tmp_path / "drive.csv"
         path.write_bytes(text.encode())
-        return load_waypoint_path(path, spacing)
+        return load_waypoint_path(path, spacing, ground=level)
 
     return _load
 

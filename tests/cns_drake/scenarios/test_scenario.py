@@ -77,16 +77,16 @@ def test_mount_angles_are_roll_pitch_yaw_in_degrees():
 
 
 def test_preset_replaces_the_lidar_where_it_is():
-    scenario = load_scenario("metropolis_01").with_lidar_preset("os1-128")
+    scenario = load_scenario("metropolis_01").with_lidar("os1-128")
     config = scenario.lidars["lidar"]
     assert make_pattern(config).num_rings == 128
     assert config.xyz == (0.0, 0.0, 1.6)
     own = {"lidars": {"a": {"columns": 64, "range_noise": 0.02}}}
     values = scenario.model_dump() | own
-    config = make_scenario(values, "test").with_lidar_preset("vlp-16")
+    config = make_scenario(values, "test").with_lidar("vlp-16")
     assert config.lidars["a"] == LidarSection(preset="vlp-16", range_noise=0.02)
     with pytest.raises(InputError, match=r"--lidar: preset: .*os2-128.*vlp-16"):
-        scenario.with_lidar_preset("os2-128")
+        scenario.with_lidar("os2-128")
 
 
 def test_returns_and_weather_are_replaced(small_map):
@@ -220,7 +220,7 @@ def test_errors_of_the_route_name_the_file(small_map, tmp_path):
     )
     for scenario in (
         load_scenario(path),
-        load_scenario(path).with_lidar_preset("vlp-16"),
+        load_scenario(path).with_lidar("vlp-16"),
     ):
         with pytest.raises(InputError, match=r"drive\.yaml: route\.0 \(milky"):
             plan_drive(scenario)

@@ -8,7 +8,7 @@ from cns_drake.scenarios import load_scenario, write_scenarios
 
 def test_written_scenarios_are_the_same(tmp_path):
     scenarios = [
-        load_scenario("metropolis_01").with_lidar_preset("vlp-16"),
+        load_scenario("metropolis_01").with_lidar("vlp-16"),
         load_scenario("metropolis_02").replaced(without=("bench_1",)),
     ]
     paths = write_scenarios(scenarios, tmp_path / "new" / "members")

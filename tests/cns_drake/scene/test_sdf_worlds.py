@@ -165,8 +165,8 @@ def test_missing_models_are_noted_and_left_out(tmp_path, models):
     assert ranges(world) == {"ahead": pytest.approx(4.5)}
     notes = "\n".join(world.notes)
     assert (
-        "2 models not found, and left out: model://lost, model://lost_two"
-        in notes
+        "2 models not found, and left out: model://lost,"
+        " https://fuel.gazebosim.org/1.0/a/models/Lost Two" in notes
     )
     assert "1 meshes not found, and left out: model://crate/lost.dae" in notes
     assert "1 actors ignored" in notes

@@ -241,5 +241,5 @@ def test_mjcf_is_read_or_refused(tmp_path):
     assert len(read_perception_geometry(world.scene_graph.model_inspector()))
     more = f"<replicate count='3' offset='1 0 0'>{geom}</replicate>"
     path.write_text(text.format(geom + more))
-    with pytest.raises(InputError, match="<replicate> of MJCF is not read"):
+    with pytest.raises(InputError, match="<replicate> in <worldbody> of MJCF"):
         load_world(path)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cns_drake.drives import lidar_field
-from cns_drake.sensors import LIDAR_PRESETS, BeamCoverage, SpinningPattern
+from cns_drake.sensors import BeamCoverage, SpinningPattern, make_beam_pattern
+from cns_drake.units import LIDAR_PRESETS
 
 
 def direction(azimuth_deg, elevation_deg):
@@ -38,7 +39,7 @@ def test_a_beam_covers_its_cell_and_those_around_it(
 def test_the_field_of_view_of_presets(preset):
     """All near to rings is covered, and nothing 0.5 deg beyond the last."""
     field = lidar_field(preset)
-    pattern = LIDAR_PRESETS[preset].pattern
+    pattern = make_beam_pattern(preset)
     if field is None or not isinstance(pattern, SpinningPattern):
         pytest.skip("its field of view has a shape of its own")
     coverage = BeamCoverage(pattern.beams(0).d_Sset)
@@ -58,7 +59,7 @@ def test_the_field_of_view_of_presets(preset):
 
 def test_the_ends_of_a_turn():
     """A plane of 270 deg has an end on both sides, and none above."""
-    pattern = LIDAR_PRESETS["hokuyo-ust-20lx"].pattern
+    pattern = make_beam_pattern("hokuyo-ust-20lx")
     coverage = BeamCoverage(pattern.beams(0).d_Sset)
     for azimuth, elevation, is_covered in (
         (134.9, 0.0, True),
@@ -76,7 +77,7 @@ def test_the_ends_of_a_turn():
 def test_beams_cover_their_own_points():
     """Also where coordinates are rounded near the LiDAR."""
     for name in ("cns", "vlp-16", "avia", "mid-360"):
-        beams = LIDAR_PRESETS[name].pattern.beams(0).d_Sset
+        beams = make_beam_pattern(name).beams(0).d_Sset
         coverage = BeamCoverage(beams)
         points = np.rint(beams * 0.8 * 1024.0) / 1024.0
         points /= np.linalg.norm(points, axis=1, keepdims=True)

@@ -13,12 +13,13 @@ from cns_drake.scenarios import DrivePlan, make_scenario, plan_drive
 from cns_drake.scene import CLASS_IDS
 from cns_drake.sensors import (
     HOPELESS_SNR,
-    UNIT_SHEETS,
     WeatherConfig,
+    fit_link_budget,
     make_pattern,
     sensor_pose,
 )
 from cns_drake.simulation import load_drive, make_station, simulate
+from cns_drake.units import LIDAR_PRESETS
 from evaluation.drives import open_drive
 
 # A tilted sensor off the vehicle's middle, so that no transform is trivial.
@@ -281,7 +282,8 @@ def test_all_lidars_feel_the_same_weather(small_map):
     for name, unit in units.items():
         # Range of a white target that faces the unit in clear air, where even
         # the least part of an echo suffices.
-        budget = UNIT_SHEETS[unit["preset"]].budget
+        sheet = LIDAR_PRESETS[unit["preset"]]
+        budget = fit_link_budget(sheet.returns)
         reach = np.sqrt(budget.scale / HOPELESS_SNR)
         farthest = lambertw(alpha * reach).real / alpha
         r_clear, r_foggy = (

@@ -3,6 +3,7 @@
 import hashlib
 import os
 from pathlib import Path
+import shutil
 import struct
 import sys
 
@@ -170,6 +171,40 @@ def test_a_link_stands_for_its_target(tmp_path):
     first = RecordingSource(folder).identity()
     (tmp_path / "elsewhere" / "000001.bin").write_bytes(xyzi(make_points(5, 9)))
     assert RecordingSource(folder).identity() != first
+
+
+@pytest.mark.parametrize("write", EVERY, ids=lambda write: write.__name__)
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_drive_has_the_name_that_it_is_given(tmp_path, write, whole):
+    """A link to the data on another disk, which has other names.
+
+    Either the whole data set lies there, or the drive's folder alone, whose
+    tables then lie beside the link.
+    """
+    original = write(tmp_path / "plain")
+    wanted = open_drive(original)
+    here, disk = tmp_path / "here", tmp_path / "disk" / "volume" / "x"
+    shutil.copytree(tmp_path / "plain", here)
+    folder = here / original.relative_to(tmp_path / "plain")
+    moved = here if whole else folder
+    disk.parent.mkdir(parents=True)
+    moved.rename(disk)
+    moved.symlink_to(disk)
+    drive = open_drive(folder)
+    assert (drive.name, len(drive)) == (wanted.name, len(wanted))
+    assert drive.scenario == wanted.scenario
+    np.testing.assert_array_equal(drive.X_WS, wanted.X_WS)
+
+
+@pytest.mark.parametrize("write", EVERY, ids=lambda write: write.__name__)
+def test_a_link_may_have_a_name_of_its_own(tmp_path, write):
+    """Tables are then found beside the target, too."""
+    original = write(tmp_path / "plain")
+    (tmp_path / "mine").symlink_to(original)
+    drive, wanted = open_drive(tmp_path / "mine"), open_drive(original)
+    np.testing.assert_array_equal(drive.X_WS, wanted.X_WS)
+    if write not in (kitti, cns):  # Their scenarios name them.
+        assert "mine" in drive.name
 
 
 def test_digests_are_kept_until_a_file_changes(tmp_path, monkeypatch):

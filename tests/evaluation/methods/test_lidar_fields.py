@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from cns_drake.drives import LidarField, lidar_field
-from cns_drake.sensors import LIDAR_PRESETS, SpinningPattern
+from cns_drake.sensors import SpinningPattern, make_beam_pattern
+from cns_drake.units import LIDAR_PRESETS
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition import describe_drive
@@ -16,9 +17,9 @@ POINTS = np.random.default_rng(2).uniform(-40.0, 40.0, (3000, 3))
 
 
 def test_fields_are_those_of_the_presets():
-    for name, preset in LIDAR_PRESETS.items():
+    for name in LIDAR_PRESETS:
         field = lidar_field(name)
-        pattern = preset.pattern
+        pattern = make_beam_pattern(name)
         if (
             isinstance(pattern, SpinningPattern)
             and len(pattern.elevations_rad) > 1
@@ -41,6 +42,10 @@ def test_fields_are_those_of_the_presets():
             assert field is None
     assert lidar_field("os9") is None
     assert lidar_field(["cns"]) is None
+    assert lidar_field({"columns": 3}) is None
+    assert lidar_field("cns", 10**9) is None
+    assert lidar_field("cns", 48) == LidarField(48, -22.5, 22.5)
+    assert lidar_field("hdl-32e-upside-down") == LidarField(32, -10.67, 30.67)
 
 
 def descriptors(method):

@@ -73,14 +73,17 @@ def planned(recordings, output, methods=None, protocols=None, **more):
     class PlannedError(Exception):
         """All jobs are known."""
 
-    def stop(found, cluster, unit=""):
+    def keep(found, *_, **__):
+        """The jobs, and those that draw once the tables are written."""
         jobs.extend(found)
+
+    def stop(found, cluster, unit=""):
         raise PlannedError
 
     chosen = choose_methods() if methods is None else tuple(methods)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(engine, "run_jobs", stop)
-        patch.setattr(engine, "forecast", lambda *_, **__: None)
+        patch.setattr(engine, "forecast", keep)
         patch.setattr(engine, "make_folder", lambda path: None)
         with pytest.raises(PlannedError):
             study_recordings(

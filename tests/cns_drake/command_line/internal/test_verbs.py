@@ -136,12 +136,12 @@ def test_options_of_one_name_have_one_meaning():
     for option in ("--json", "--jobs", "--scheduler", "--columns"):
         texts = [t for (o, _), t in meanings.items() if o == option]
         assert len({text for named in texts for text in named.values()}) == 1
-    # A preset where a command simulates, a name where it reads.
+    # A data sheet where a command simulates, a name where it reads.
     lidars = {
         m: set(n.values()) for (o, m), n in meanings.items() if o == "--lidar"
     }
     assert {m: len(texts) for m, texts in lidars.items()} == {
-        "PRESET": 1,
+        "PRESET|FILE.yaml": 1,
         "NAME": 1,
     }
     for option, commands in {

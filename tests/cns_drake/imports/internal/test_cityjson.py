@@ -425,9 +425,7 @@ def test_members_of_objects_that_are_not_read_are_counted(tmp_path):
     city = CityWriter()
     city.box("a", 0, 0, (2, 2, 2), translation=[9, 9, 9], address=[{}])
     read = read_cityjson(city.write(tmp_path / "city.json"))
-    assert read.faults.rows() == [
-        ("translation of an object, not read", 1, "a")
-    ]
+    assert read.faults.rows() == [("translation of object, not read", 1, "a")]
 
 
 def test_faces_that_only_close_a_solid_are_not_seen(tmp_path):

@@ -436,10 +436,10 @@ def test_tags_that_are_not_read_are_counted(tmp_path):
     osm.node(5, 40, natural="tree", diameter_crown="9")
     city, _ = import_osm(osm.write(tmp_path / "a.osm"))
     assert {kind: number for kind, number, _ in city.faults.rows()} == {
-        "tag roof:orientation, not read": 1,
-        "tag placement, not read": 1,
-        "tag oneway, not read": 1,
-        "tag diameter_crown, not read": 1,
+        "tag roof:orientation of building, not read": 1,
+        "tag placement of street, not read": 1,
+        "tag oneway of street, not read": 1,
+        "tag diameter_crown of tree, not read": 1,
     }
 
 

@@ -99,7 +99,11 @@ def test_bends_are_driven_down_to_the_limit_of_steering(tmp_path):
             "{world: d.sdf, waypoints: d.csv, speeds: {cruise: 3}}"
         )
         (tmp_path / "d.sdf").write_text("<sdf version='1.9'/>")
-        path = load_waypoint_path(tmp_path / "d.csv", POINT_SPACING)
+        path = load_waypoint_path(
+            tmp_path / "d.csv",
+            POINT_SPACING,
+            ground=lambda xy: np.zeros(len(xy)),
+        )
         _, curvature = driven(Trajectory(path, Speeds()))
         tightest = 1 / np.abs(curvature).max()
         fault = None
@@ -295,7 +299,7 @@ def test_a_loop_is_smooth():
 
 
 def test_a_scenario_states_whether_it_turns_round(tmp_path):
-    (tmp_path / "d.csv").write_text("0,0\n40,0\n5,0\n")
+    (tmp_path / "d.csv").write_text("0,0,0\n40,0,0\n5,0,0\n")
     (tmp_path / "d.sdf").write_text("<sdf version='1.9'/>")
     text = "{world: d.sdf, waypoints: d.csv, speeds: {}%s}"
     (tmp_path / "d.yaml").write_text(text % "")

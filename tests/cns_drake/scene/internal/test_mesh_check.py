@@ -318,7 +318,7 @@ def test_a_mode_that_is_none_of_gltf_is_refused(tmp_path):
     ("lines", "fault"),
     [
         ("fo 1 2 3 4\n", "statement 'fo' of OBJ"),
-        ("cstype bezier\ndeg 1 1\n  surf 0 1 0 1 1 2 4 3\nend", "'surf'"),
+        ("cstype bezier\ndeg 1 1\n  surf 0 1 0 1 1 2 4 3\nend", "'cstype'"),
         ("call other.obj\n", "statement 'call'"),
         ("f 1 2 \\\n3 4\n", "line 6: a face that goes on"),
     ],

@@ -21,7 +21,6 @@ from pydrake.systems.primitives import ConstantValueSource
 import pytest
 
 from cns_drake.sensors import (
-    UNIT_SHEETS,
     CalibratedReturns,
     LidarSection,
     MeasurementModel,
@@ -29,6 +28,8 @@ from cns_drake.sensors import (
     make_beam_pattern,
     make_pattern,
 )
+from cns_drake.sensors.lidar.sheet_patterns import aimed
+from cns_drake.units import LIDAR_PRESETS
 
 INERTIA = SpatialInertia.SolidBoxWithDensity(1000.0, 1.0, 1.0, 1.0)
 
@@ -298,7 +299,7 @@ def test_calibrated_unit_has_its_own_elevations(returns):
     assert own != ideal.elevations_rad
     # Other units, and other numbers of rings, are not touched.
     for preset, other in (("vlp-16", ideal), ("hdl-64e", FORWARD)):
-        assert UNIT_SHEETS[preset].aimed(other) is other
+        assert aimed(other, LIDAR_PRESETS[preset].returns) is other
 
 
 def test_calibrated_returns_of_a_preset():

@@ -83,8 +83,8 @@ def in_this_process(monkeypatch):
     monkeypatch.setattr(pair_export, "run_jobs", run)
 
 
-def drives(folder):
-    lidar = {"preset": "vlp-16", "columns": 360}
+def drives(folder, lidar=None):
+    lidar = lidar or {"preset": "vlp-16", "columns": 360}
     return [
         tiny_scenario(
             folder, name=name, lidars={"lidar": lidar}, frames=30, seed=seed
@@ -115,6 +115,26 @@ def test_clouds_of_pointnetvlad(tmp_path, in_this_process):
         assert cloud.mean(axis=0) == pytest.approx(0.0, abs=1e-9)
     # The hall is 10 m high and the ground is left out, by factor 100.
     assert 0.03 < np.ptp(cloud[:, 2]) <= 0.1
+
+
+@pytest.mark.slow
+def test_clouds_of_a_lidar_of_ones_own(tmp_path, in_this_process):
+    """All rings look down, by 30 deg at most: nothing is near or far."""
+    sheet = tmp_path / "unit.yaml"
+    sheet.write_text(
+        "rings_deg: [[-10.0, -30.0, 5]]\ncolumns: 360\n"
+        "ranges: [0.5, 60.0]\nsource: mine\n"
+    )
+    options = ExportOptions("overlap", spacing=1.0)
+    both = drives(tmp_path, {"unit": str(sheet)})
+    export_pairs(both, [], tmp_path / "set", options, None)
+    scans = sorted((tmp_path / "set/runs/one").rglob("*.bin"))
+    points = np.fromfile(scans[0], np.float32).reshape(-1, 4)
+    x, y, z = points.T[:3]
+    elevation = np.degrees(np.arctan2(z, np.hypot(x, y)))
+    off = np.abs(elevation[:, None] - [-10, -15, -20, -25, -30]).min(axis=1)
+    assert len(points) > 100
+    assert off.max() < 0.05
 
 
 def test_exact_overlaps_of_a_drive_with_itself(tmp_path, in_this_process):

@@ -93,7 +93,7 @@ def test_a_quick_study(reproduce, code, tmp_path):
     # The code of the report's page measures nothing.
     change(code / "evaluation/results/page_template/frame.css", "{", "{ ")
     assert reproduce(with_recordings=False) == set()
-    change(code / "cns_drake/sensors/lidar/presets.yaml", "120.0", "10.0")
+    change(code / "cns_drake/units/sheets/cns.yaml", "120.0", "10.0")
     assert reproduce(with_recordings=False) == STUDY
     change(
         code / "evaluation/results/sections/change_pictures.py", "def ", "def  "
@@ -126,7 +126,7 @@ def test_recordings_pages_and_pictures(reproduce, code, tmp_path):
     change(code / "cns_drake/pictures/page_template/drive.css", "{", "{ ")
     assert reproduce() == PAGES
     assert not list((tmp_path / "out").glob("*.part"))
-    change(code / "cns_drake/sensors/lidar/presets.yaml", "120.0", "10.0")
+    change(code / "cns_drake/units/sheets/cns.yaml", "120.0", "10.0")
     # The code that runs is not the copy: the new recordings hold the same, and
     # so what was measured on them stays.
     assert reproduce(with_pages=False) == DRIVES | FEATURES | PICTURES

@@ -690,6 +690,34 @@ def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
         ({"frozen": "no.csv"}, "frozen: .*no.csv: No such file"),
         ({"charts": [{"kind": "pie"}]}, "charts: kind: 'pie' is none of"),
         ({"charts": [{"kind": "matrix"}]}, "charts: matrix: .*a name is"),
+        (
+            {"charts": [{"kind": "lines", "over": "map", "metric": "acu"}]},
+            r"charts: lines: no metric 'acu' \(there are: auc, .*mean auc",
+        ),
+        (
+            {
+                "methods": {"solid": {"ranges": [20, 40]}},
+                "charts": [
+                    {
+                        "kind": "lines",
+                        "over": "methods.solid.range",
+                        "metric": "auc",
+                    }
+                ],
+            },
+            r"charts: lines: no factor 'methods.solid.range' \(there are:"
+            r" methods.solid.ranges\)",
+        ),
+        (
+            {"metrics": ["auc", "r2"]},
+            "metrics: no metric 'r2' .there are: auc, ",
+        ),
+        ({"metrics": ["none.py"]}, "metrics: none.py: no such file"),
+        (
+            {"query": {"lidars": {"lidr": {"xyz": [[0, 0, 1], [0, 0, 2]]}}}},
+            r"query.lidars: the drive has no LiDAR 'lidr' \(it has: lidar\);"
+            " did you mean lidar",
+        ),
     ],
 )
 def test_faults_before_any_work(town, tmp_path, fields, fault):

@@ -17,7 +17,7 @@ from cns_drake.scenarios import TransientConfig
 from cns_drake.scene import load_world
 from cns_drake.sensors import make_beam_pattern
 from cns_drake.simulation import scan_world
-from cns_drake.transient import change_world, geometry_by_structure
+from cns_drake.transient import change_world, changing, geometry_by_structure
 from cns_drake.transient.parked_cars import make_bays
 from cns_drake.transient.surroundings import Surroundings
 
@@ -317,3 +317,10 @@ def test_what_a_world_lacks_is_said(tmp_path):
     )
     noted = [note.split(":")[:2] for note in world.notes]
     assert noted == [["transient", f" {name}"] for name in names]
+
+
+def test_every_field_has_one_effect():
+    fields = [effect.field for effect in changing.effects()]
+    assert sorted(fields) == sorted({*TransientConfig.model_fields} - {"seed"})
+    first, *_, last = fields
+    assert (first, last) == ("roadsides", "snow")

@@ -202,6 +202,19 @@ def test_times_between_scans(capsys, drive, tmp_path):
     assert score(capsys, drive, path)[0]["ate"] < 1e-9
 
 
+def test_an_estimate_of_another_clock(capsys, drive, tmp_path):
+    """Seconds since 1970 for a drive that begins at any other time."""
+    truth = open_drive(drive)
+    late_ns = 1_700_000_000_250_000_000
+    path = write_tum(tmp_path / "e.tum", truth.stamps_ns + late_ns, truth.X_WS)
+    words = ["localise", drive, "--estimate", path]
+    # The error prints the offset that fits.
+    assert_refused(capsys, words, "--time-offset=-1700000000.250")
+    values, err = score(capsys, drive, path, "--time-offset", "-1700000000.25")
+    assert values["ate"] < 1e-9
+    assert (values["poses"], err) == (len(truth), "")
+
+
 def test_poses_outside_are_counted(capsys, drive, tmp_path):
     truth = open_drive(drive)
     path = write_tum(

@@ -354,7 +354,7 @@ def test_a_lidar_on_any_topic(tmp_path, name, topic):
     assert len(set(drive.lidar_names)) == len(LIDARS)
     for one in drive.lidar_names:
         assert drives.open_drive(path, lidar=one).lidar_name == one
-    with pytest.raises(InputError, match=r"/roof; --lidar takes one of them"):
+    with pytest.raises(InputError, match=r"/roof; choose one as the LiDAR"):
         drives.open_drive(path)
 
 

@@ -222,3 +222,17 @@ def test_angles_by_name(tmp_path):
     assert notes == ()
     np.testing.assert_array_equal(one.X_WB, two.X_WB)
     assert one.X_WB[0, :3, 3].tolist() == [1, 2, 3]
+
+
+def test_numbered_rows_may_have_any_order(tmp_path):
+    rows = [f"{n} {n}.5 0 0 0 0 0 1" for n in (481, 26, 3528)]
+    path = tmp_path / "poses.txt"
+    path.write_text("\n".join(rows))
+    with pytest.raises(InputError, match="not later"):
+        read_quaternions(path, None)
+    found = read_quaternions(path, None, in_order=False)
+    assert found.stamps_ns.tolist() == [26, 481, 3528]
+    assert found.X_WB[:, 0, 3].tolist() == [26.5, 481.5, 3528.5]
+    path.write_text("\n".join([*rows, "26 9 9 9 0 0 0 1"]))
+    with pytest.raises(InputError, match="not later"):
+        read_quaternions(path, None, in_order=False)

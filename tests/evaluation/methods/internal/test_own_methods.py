@@ -15,7 +15,7 @@ from evaluation.study import choose_methods
 def shown_method(folder):
     """Saves the method of the documents to a file."""
     blocks = documents.fenced(documents.read("docs/how-to/own_method.md"))
-    (example,) = (block.text for block in blocks if "@register" in block.text)
+    (example,) = (block.text for block in blocks if "@register(" in block.text)
     path = folder / "shown_heights.py"
     path.write_text(example, encoding="utf-8")
     return path

@@ -97,7 +97,8 @@ def test_a_difference_has_a_sign_and_an_interval():
     assert one.value == -other.value > 0.3
     assert 0.0 < one.interval.low < one.value < one.interval.high
     assert one.p_value == pytest.approx(other.p_value)
-    assert one.p_value < 1e-6
+    # The least p-value of an exact test over 20 blocks.
+    assert one.p_value == 2.0**-19
     same = auc_difference(good, good)
     assert (same.value, same.p_value) == (0.0, 1.0)
     alone = [replace(one, blocks=0 * blocks) for one in (good, poor)]
@@ -181,3 +182,59 @@ def test_all_differences_are_one_family():
     found = [p_value for _, p_value in compared]
     assert found == pytest.approx([expected[one] for one in raw])
     assert compared_by_auc({"btc": answers["btc"]}) == {}
+
+
+def p_values_on_the_way(rng, number, num_blocks):
+    """Returns p-values while one method loses its answers, one by one."""
+    scores = rng.random(number)
+    blocks = np.sort(rng.integers(num_blocks, size=number))
+    perfect = outcomes_of(scores, np.ones(number, dtype=bool), blocks)
+    right = np.ones(number, dtype=bool)
+    found = []
+    for query in [None, *rng.permutation(number)]:
+        if query is not None:
+            right[query] = False
+        other = outcomes_of(scores, right, blocks)
+        found.append(auc_difference(perfect, other).p_value)
+    return found, len(np.unique(blocks))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_lead_without_spread_is_the_strongest_evidence(seed):
+    """Not "no difference": no p-value on the way there is less."""
+    rng = np.random.default_rng(seed)
+    found, blocks = p_values_on_the_way(rng, 24, int(rng.integers(3, 9)))
+    assert found[0] == 1.0
+    assert found[-1] == min(found) == 2.0 ** (1 - blocks)
+
+
+def test_equal_answers_give_no_evidence():
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        right = rng.random(30) < rng.random()
+        blocks = np.sort(rng.integers(6, size=30))
+        # Areas do not depend on the scale of scores.
+        one, other = (
+            outcomes_of(scale * np.linspace(0.1, 0.9, 30), right, blocks)
+            for scale in (1.0, 70.0)
+        )
+        assert auc_difference(one, other).p_value == 1.0
+
+
+def test_the_order_of_methods_does_not_matter():
+    """Also where only one of them knows the blocks of the route."""
+    rng = np.random.default_rng(6)
+    one, other = equal_methods(rng, 8)
+    for first, second in (
+        (one, other),
+        (replace(one, blocks=None), other),
+        (one, replace(other, blocks=None)),
+    ):
+        found, back = (
+            auc_difference(*pair) for pair in ((first, second), (second, first))
+        )
+        assert found.value == -back.value
+        assert found.p_value == back.p_value
+        assert found.p_value == auc_difference(one, other).p_value
+    with pytest.raises(ValueError, match="other blocks"):
+        auc_difference(one, replace(other, blocks=other.blocks[::-1]))

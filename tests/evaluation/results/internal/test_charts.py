@@ -6,6 +6,7 @@ import math
 import re
 import warnings
 
+import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 import numpy as np
@@ -18,6 +19,7 @@ from evaluation.results import (
     Results,
     Row,
     draw_chart,
+    draw_track,
     method_styles,
     save_figure,
     write_page,
@@ -597,6 +599,27 @@ def test_a_page_shows_the_markers_of_its_charts():
     assert len({*map(tuple, cross.tolist())}) == 12
 
 
+def test_a_method_has_one_style_in_all_charts():
+    """Also a method of the user, in a chart that shows some of the methods."""
+    names = {"solid": "yours"}
+    rows = [
+        replace(row, method=names.get(row.method, row.method))
+        for row in aged().rows
+    ]
+    results = Results.of(rows)
+    chart = {"kind": "lines", "over": YEARS, "metric": "auc"}
+    everything = draw_chart(chart, results).legend
+    for name in ("mine", "yours"):
+        (alone,) = draw_chart({**chart, "method": name}, results).legend.items()
+        assert alone == (name, everything[name])
+    assert len(set(everything.values())) == len(everything)
+
+
+def test_many_methods_have_different_styles():
+    styles = method_styles([f"mine_{number}" for number in range(20)])
+    assert len(set(styles.values())) == 20
+
+
 def test_a_page_stands_alone(tmp_path):
     chart = {"kind": "lines", "over": YEARS, "metric": "auc"}
     told = []
@@ -648,7 +671,7 @@ def test_a_page_stands_alone(tmp_path):
         ((0.4, 0.6), (0,), "0.500(0.400–0.600)"),
         # An interval that is unknown, and results of several seeds.
         ((math.nan, math.nan), (0,), "0.500"),
-        ((0.4, 0.6), (0, 1), "0.5000.500 to 0.500"),
+        ((0.4, 0.6), (0, 1), "0.5000.500 to 0.500 (2)"),
     ],
 )
 def test_a_single_result_has_its_interval(tmp_path, ends, seeds, cell):
@@ -693,6 +716,7 @@ def test_a_page_without_a_chart_or_a_value(tmp_path):
     path = write_page(results, None, tmp_path, title="none", charts=[chart])
     assert "<h1>none</h1>" in path.read_text()
     assert "Chart 1 is left out" in path.read_text()
+    assert "as undefined: kept (1 of 1)." in path.read_text()
     header, first, _ = (tmp_path / "summaries.csv").read_text().splitlines()
     assert header == "what,map,task,method,gate,value,low,high,n"
     # A single year without a share has no lifetime.
@@ -740,3 +764,53 @@ def test_curves_need_answers_of_one_condition():
     with pytest.raises(InputError, match="a → b: several conditions"):
         draw_chart({"kind": "curves"}, results, queries=queries)
     draw_chart({"kind": "curves", YEARS: 5}, results, queries=queries)
+
+
+# What the file matplotlibrc of a user can say.
+SETTINGS = {
+    "text.usetex": True,
+    "font.size": 31.0,
+    "axes.facecolor": "red",
+    "axes.formatter.use_locale": True,
+    "lines.linewidth": 9.0,
+    "savefig.bbox": "tight",
+    "svg.fonttype": "none",
+    "figure.autolayout": True,
+}
+
+
+def draw_all(folder):
+    """Writes a figure of each kind of chart, and of a tracked drive."""
+    rows = np.zeros(
+        9,
+        [
+            (name, "<f8")
+            for name in ("stretch", "way", "track_error", "unmapped")
+        ],
+    )
+    rows["way"] = np.arange(9.0)
+    draw_track(rows, folder / "track")
+    for chart, results in (
+        ({"kind": "lines", "over": YEARS, "metric": "auc"}, aged()),
+        ({"kind": "dumbbell", "over": YEARS, "metric": "auc"}, aged()),
+        ({"kind": "matrix", "over": "cause", "metric": "kept"}, caused()),
+        ({"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered()),
+    ):
+        drawn = draw_chart(chart, results, alone=True)
+        save_figure(drawn.figure, folder / chart["kind"], ("svg", "png"))
+
+
+@pytest.mark.slow
+def test_settings_of_the_user_do_not_reach_our_figures(tmp_path):
+    for name, settings in (("plain", {}), ("changed", SETTINGS)):
+        (tmp_path / name).mkdir()
+        with matplotlib.rc_context(settings):
+            draw_all(tmp_path / name)
+            assert matplotlib.rcParams["font.size"] == settings.get(
+                "font.size", 10.0
+            )
+    files = sorted((tmp_path / "plain").iterdir())
+    assert len(files) == 9
+    for file in files:
+        other = tmp_path / "changed" / file.name
+        assert file.read_bytes() == other.read_bytes(), file.name

@@ -17,9 +17,10 @@ from cns_drake.scene import (
     TriangleSurface,
     is_closed,
 )
-from cns_drake.sensors import UNIT_SHEETS, Echoes, make_beam_pattern
+from cns_drake.sensors import Echoes, make_beam_pattern
 from cns_drake.sensors.returns.materials import find_materials
 from cns_drake.sensors.returns.propagation import pane_shares
+from cns_drake.units import LIDAR_PRESETS
 
 TREE = StructureTable([StructureEntry(1, "tree", "vegetation")])
 HOUSE = StructureTable(
@@ -34,7 +35,7 @@ HOUSE = StructureTable(
 @pytest.mark.parametrize("part", [-0.8, -0.3, 0.01, 0.2, 0.7])
 def test_the_share_of_an_edge_is_that_of_the_beams_profile(part):
     """A dark plate covers the right of every beam up to an edge."""
-    sheet = UNIT_SHEETS["os0-128"]
+    sheet = LIDAR_PRESETS["os0-128"].returns
     distance = 10.0
     edge = part * distance * sheet.divergence
     near = plate("near", 0.4, facing(distance, edge - 5.0), (0.1, 10.0, 40.0))
@@ -270,7 +271,7 @@ def test_panes_of_vehicles_are_darker_than_trim_of_houses():
 @pytest.mark.parametrize("echoes", list(Echoes))
 def test_which_echoes_are_reported(echoes):
     """Half of each beam meets a dark plate, the rest a bright plate behind."""
-    sheet = UNIT_SHEETS["os1-64"]
+    sheet = LIDAR_PRESETS["os1-64"].returns
     near = plate("near", 0.2, facing(10.0, -4.9999), (0.1, 10.0, 40.0))
     far = plate("far", 0.9, facing(13.0))
     pattern = beside(1_000, 3.0 * sheet.divergence)

@@ -1,14 +1,13 @@
 """Echoes against a plain account of them, beam by beam."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from cns_drake.sensors import UNIT_SHEETS, Echoes, Response
+from cns_drake.sensors import Echoes, fit_link_budget
 from cns_drake.sensors.returns.echoes import Receiver, report_echoes
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.random_numbers import frame_key
+from cns_drake.units import LIDAR_PRESETS, Response
 
 BEAMS = 300
 # More are not processed.
@@ -56,8 +55,8 @@ def test_they_are_those_of_a_plain_account(choice, extinction):
         rng.integers(0, 1000, count).astype(np.int32),
     )
     # Pairs on both sides of a pulse's length.
-    sheet = replace(
-        UNIT_SHEETS["vlp-16"], range_noise=0.0, range_floor=0.0, response=EXACT
+    sheet = LIDAR_PRESETS["vlp-16"].returns.replaced(
+        range_noise=0.0, range_floor=0.0, response=EXACT
     )
     near = rng.permutation(count)[:1000]
     moved = light.distance[near] + sheet.resolution * rng.uniform(
@@ -65,7 +64,8 @@ def test_they_are_those_of_a_plain_account(choice, extinction):
     )
     light = Light(*(np.concatenate([one, one[near]]) for one in light))
     light.distance[count:] = moved
-    budget = sheet.budget._replace(scale=100.0 * sheet.budget.scale)
+    budget = fit_link_budget(sheet)
+    budget = budget._replace(scale=100.0 * budget.scale)
     receiver = Receiver(
         sheet, budget, extinction, 0.5, 200.0, Echoes(choice), None
     )

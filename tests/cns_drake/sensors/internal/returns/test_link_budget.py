@@ -7,16 +7,18 @@ import pytest
 from scipy.special import lambertw
 
 from cns_drake.scene import CLASS_IDS
-from cns_drake.sensors import HOPELESS_SNR, LIDAR_PRESETS, UNIT_SHEETS, Weather
+from cns_drake.sensors import HOPELESS_SNR, Weather
 from cns_drake.sensors.returns.link_budget import (
     CERTAIN_SNR,
-    SheetRow,
     detection_probability,
     fit_link_budget,
     target_snr,
 )
+from cns_drake.units import LIDAR_PRESETS, ReturnsSheet
 
-ROWS = [(name, row) for name, s in UNIT_SHEETS.items() for row in s.rows]
+ROWS = [
+    (name, row) for name, s in LIDAR_PRESETS.items() for row in s.returns.rows
+]
 
 
 def share(distance, reflectivity, returns, num_beams=12_000, **options):
@@ -26,10 +28,6 @@ def share(distance, reflectivity, returns, num_beams=12_000, **options):
     return np.count_nonzero(points["label"] != CLASS_IDS["outlier"]) / num_beams
 
 
-def test_each_preset_has_a_sheet():
-    assert UNIT_SHEETS.keys() == LIDAR_PRESETS.keys()
-
-
 @pytest.mark.parametrize(("preset", "row"), ROWS)
 def test_sheets_are_reproduced(preset, row):
     found = share(row.range, row.reflectivity, unit(preset))
@@ -37,7 +35,7 @@ def test_sheets_are_reproduced(preset, row):
 
 
 def test_a_tilted_plate_is_as_dark_as_its_cosine():
-    row = UNIT_SHEETS["os1-64"].rows[1]
+    row = LIDAR_PRESETS["os1-64"].returns.rows[1]
     tilt = np.arccos(0.5)
     # The beams meet the middle of the plate at the sheet's range.
     X_WG = RigidTransform(RollPitchYaw(0.0, 0.0, tilt), [row.range, 0.0, 0.0])
@@ -48,9 +46,9 @@ def test_a_tilted_plate_is_as_dark_as_its_cosine():
 
 
 def test_two_rows_fix_scale_and_extinction():
-    rows = (SheetRow(0.8, 100.0, 0.9), SheetRow(0.1, 45.0, 0.5))
-    budget = fit_link_budget(rows, 0.1, 0.01)
-    for row in rows:
+    sheet = ReturnsSheet(rows=[[0.8, 100.0, 0.9], [0.1, 45.0, 0.5]])
+    budget = fit_link_budget(sheet)
+    for row in sheet.rows:
         snr = target_snr(budget, 0.0, row.reflectivity, row.range)
         assert detection_probability(snr) == pytest.approx(row.probability)
 
@@ -71,11 +69,11 @@ def test_detection_rises_from_nothing_to_certainty():
 
 def test_ranges_scatter_by_the_root_of_the_snr():
     """Down to 1.5 cm, which the sheet states for an SNR of 250."""
-    sheet = UNIT_SHEETS["os1-64"]
+    sheet = LIDAR_PRESETS["os1-64"].returns
     for distance, rho in ((3.0, 0.8), (60.0, 0.8), (35.0, 0.1)):
         target = plate("target", rho, facing(distance))
         points = scan([target], ahead(20_000), unit())
-        snr = target_snr(sheet.budget, 0.0, rho, distance)
+        snr = target_snr(fit_link_budget(sheet), 0.0, rho, distance)
         expected = max(0.30 / np.sqrt(snr), 0.015)
         assert np.std(points["x"]) == pytest.approx(expected, rel=0.03)
         assert np.mean(points["x"]) == pytest.approx(
@@ -99,7 +97,7 @@ def test_intensity_is_reflectivity_times_cosine(tilt_deg, distance):
     [(50.0, 25.7), (100.0, 38.2), (200.0, 53.7), (500.0, 76.1)],
 )
 def test_fog_ends_sight_by_lamberts_function(visibility, farthest):
-    row = UNIT_SHEETS["vlp-16"].rows[0]
+    row = LIDAR_PRESETS["vlp-16"].returns.rows[0]
     weather = Weather(visibility)
     alpha = weather.extinction
     distance = float(np.real(lambertw(alpha * row.range)) / alpha)

@@ -12,7 +12,6 @@ from cns_drake.ray_casting import SceneHits, SurfaceFrames
 from cns_drake.scene import StructureEntry, StructureTable
 from cns_drake.sensors import (
     CalibratedReturns,
-    Response,
     describe_unit,
     make_beam_pattern,
     make_lidar_config,
@@ -21,6 +20,7 @@ from cns_drake.sensors import (
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.materials import LAMBERT, Materials
 from cns_drake.sensors.returns.surface_texture import with_texture
+from cns_drake.units import Response
 
 # Elevations of the first and the last laser of each block of an HDL-64E [deg].
 LIMITS = 2.0, -8.33, -8.83, -24.33
@@ -34,7 +34,7 @@ def offsets(seed, frame=0, name="lidar"):
     returns = CalibratedReturns.of_preset(
         "hdl-64e", seed=seed, unit_seed=7, sensor_name=name
     )
-    returns = replace(returns, sheet=replace(returns.sheet, angle_error_deg=0))
+    returns = replace(returns, sheet=returns.sheet.replaced(angle_error_deg=0))
     pattern = make_beam_pattern("hdl-64e").within((-8, 8))
     points = scan([plate("wall", 0.8, facing(8.0))], pattern, returns, frame)
     p = np.stack([points[axis] for axis in "xyz"], axis=1)
@@ -118,7 +118,7 @@ def test_some_lasers_are_dim():
     gains = {}
     for dim in (0.0, 3.0):
         response = Response(gain=0.1, dim=dim)
-        returns = replace(base, sheet=replace(base.sheet, response=response))
+        returns = replace(base, sheet=base.sheet.replaced(response=response))
         gains[dim] = returns.unit_beams(pattern.beams(0)).gain[:128]
     even, dim = gains.values()
     expected = np.where(even < 0.9, 0.9 + 4.0 * (even - 0.9), even)
@@ -130,7 +130,7 @@ def test_every_second_shot_of_a_laser_is_brighter():
     base = unit()
     pattern = make_beam_pattern("os1-128")
     response = Response(gain=0.0, flicker=0.1)
-    returns = replace(base, sheet=replace(base.sheet, response=response))
+    returns = replace(base, sheet=base.sheet.replaced(response=response))
     beams = pattern.beams(0)
     brighter = returns.unit_beams(beams).gain - 1.0
     is_odd = beams.column % 2 == 1
@@ -155,7 +155,7 @@ def test_beams_start_at_their_lasers():
     whole = make_beam_pattern("hdl-64e")
     pattern = whole.within((-8, 8))
     returns = CalibratedReturns.of_preset("hdl-64e", unit_seed=3)
-    returns = replace(returns, sheet=replace(returns.sheet, angle_error_deg=0))
+    returns = replace(returns, sheet=returns.sheet.replaced(angle_error_deg=0))
     wall = plate("wall", 0.8, facing(8.0), (0.1, 400.0, 0.4))
     points = scan([wall], pattern, returns)
     height = np.where(np.arange(64) < 32, 0.21, 0.13)
@@ -332,7 +332,7 @@ def test_texture_belongs_to_the_surface():
 def test_speckle_gain_and_floor(speckle):
     base = unit()
     response = Response(gain=0.0, speckle=speckle, floor=50.0)
-    returns = replace(base, sheet=replace(base.sheet, response=response))
+    returns = replace(base, sheet=base.sheet.replaced(response=response))
     pattern = make_beam_pattern("os1-128").within((-10, 10), (-10, 10))
     bright = scan([plate("wall", 0.6, facing(8.0))], pattern, returns)
     bright = bright["intensity"]
@@ -361,8 +361,10 @@ def test_speckle_gain_and_floor(speckle):
 )
 def test_intensity_by_the_logarithm(reflectivity, distance, expected):
     base = unit()
-    response = Response(15.0, 60.0, 10.0, 10.0, gain=0.0, speckle=0.0)
-    returns = replace(base, sheet=replace(base.sheet, response=response))
+    response = Response(
+        slope=15.0, full=60.0, far=10.0, floor=10.0, gain=0.0, speckle=0.0
+    )
+    returns = replace(base, sheet=base.sheet.replaced(response=response))
     pattern = make_beam_pattern("os1-128").within((-5, 5), (-5, 5))
     wall = plate("wall", reflectivity, facing(distance))
     points = scan([wall], pattern, returns)

@@ -7,12 +7,13 @@ import pytest
 from scipy import integrate
 
 from cns_drake.scene import CLASS_IDS, StructureEntry, StructureTable
-from cns_drake.sensors import UNIT_SHEETS, Weather
+from cns_drake.sensors import Weather, fit_link_budget
 from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
 from cns_drake.sensors.returns.weather import (
     _weighted_quantiles,
     tabulate_scattering,
 )
+from cns_drake.units import LIDAR_PRESETS
 
 OUTLIER = CLASS_IDS["outlier"]
 DIAMETERS_MM = np.linspace(0.01, 25.0, 4_000)
@@ -73,10 +74,10 @@ def test_a_sky_of_moderate_snow_is_mostly_empty():
 
 
 def test_the_table_of_drops_is_an_integral():
-    sheet = UNIT_SHEETS["os1-64"]
+    sheet = LIDAR_PRESETS["os1-64"].returns
     weather = Weather(snowfall=0.3)
     table = tabulate_scattering(
-        weather, sheet.budget, sheet.divergence, sheet.resolution, 0.5
+        weather, fit_link_budget(sheet), sheet.divergence, sheet.resolution, 0.5
     )
     rate = np.gradient(table.counts, table.distances)
     total = integrate.trapezoid(rate, table.distances)
@@ -87,11 +88,15 @@ def test_the_table_of_drops_is_an_integral():
 
 def test_nothing_is_seen_within_the_least_distance_of_the_receiver():
     """Up to 1 m, so least ranges below that change nothing."""
-    sheet = UNIT_SHEETS["os1-64"]
+    sheet = LIDAR_PRESETS["os1-64"].returns
     for weather in (Weather(50.0), Weather(rain=50.0), Weather(snowfall=5.0)):
         tables = [
             tabulate_scattering(
-                weather, sheet.budget, sheet.divergence, sheet.resolution, least
+                weather,
+                fit_link_budget(sheet),
+                sheet.divergence,
+                sheet.resolution,
+                least,
             )
             for least in (0.0, 0.3)
         ]
@@ -107,11 +112,11 @@ def test_nothing_is_seen_within_the_least_distance_of_the_receiver():
 
 
 def test_fog_sends_back_less_with_the_square_of_the_distance():
-    sheet = UNIT_SHEETS["os1-64"]
+    sheet = LIDAR_PRESETS["os1-64"].returns
     weather = Weather(visibility=100.0)
     # From 3 m on, a beam lies whole in the field of view of the receiver.
     table = tabulate_scattering(
-        weather, sheet.budget, sheet.divergence, sheet.resolution, 3.0
+        weather, fit_link_budget(sheet), sheet.divergence, sheet.resolution, 3.0
     )
     alpha = np.log(20.0) / 100.0
     parts = [
@@ -138,12 +143,12 @@ def test_weighted_quantiles_are_those_of_the_weight():
 )
 def test_counts_of_drops_are_poisson(weather):
     """Beams without a target show the first of a Poisson number of drops."""
-    sheet = UNIT_SHEETS["os1-64"]
+    sheet = LIDAR_PRESETS["os1-64"].returns
     num_beams = 40_000
     far = plate("far", 0.5, RigidTransform([0.0, 0.0, -300.0]), (1, 1, 1))
     points = scan([far], ahead(num_beams), unit(weather=weather))
     table = tabulate_scattering(
-        weather, sheet.budget, sheet.divergence, sheet.resolution, 0.3
+        weather, fit_link_budget(sheet), sheet.divergence, sheet.resolution, 0.3
     )
     expected = num_beams * (1.0 - np.exp(-table.counts[-1]))
     assert len(points) == pytest.approx(expected, abs=4.0 * expected**0.5)

@@ -1,11 +1,18 @@
 """Files of experiments: their changes, and their faults."""
 
-from helpers import documents
+import shutil
+
 import pytest
 import yaml
 
 from cns_drake.base import InputError
-from cns_drake.studies import Experiment, load_experiment, shipped_experiments
+from cns_drake.studies import (
+    Experiment,
+    experiment_text,
+    load_experiment,
+    shipped_experiments,
+)
+from cns_drake.studies.experiments import cause_files
 from cns_drake.studies.experiments.protocol_fields import protocol_from_fields
 from evaluation.methods import shipped_methods
 from evaluation.recognition import RetrievalProtocol
@@ -95,12 +102,60 @@ def test_shipped_experiments_are_read_and_written(name):
         assert experiment.about.endswith("?")
 
 
-def test_the_page_of_the_ladder_has_every_cause():
-    table = documents.table(
-        documents.read("docs/ladder.md"), "## What is compared"
+def test_a_cause_is_a_file(tmp_path, monkeypatch):
+    """A new file is in the ladder and in the levels, and nothing else is."""
+    folder = tmp_path / "causes"
+    shutil.copytree(cause_files._FOLDER, folder)
+    monkeypatch.setattr(cause_files, "_FOLDER", folder)
+    before = {name: load_experiment(name) for name in ("ladder", "levels")}
+    (folder / "hail.yaml").write_text(
+        "title: Hail\nabout: hail\norder: 99\nstrengths:\n"
+        "  ladder: {query: {transient: {snow: [0.01, 0.02]}}}\n"
+        "  levels: {database: {transient: {leaves: [1.0, 0.5]}}}\n"
     )
-    causes = [row[0].strip("`") for row in table]
-    assert causes == list(load_experiment("ladder").cases)
+    cause_files.shipped_causes.cache_clear()
+    try:
+        ladder, levels = load_experiment("ladder"), load_experiment("levels")
+        shown = tmp_path / "shown.yaml"
+        shown.write_text(experiment_text("ladder"))
+        again = load_experiment(shown)
+    finally:
+        monkeypatch.undo()
+        cause_files.shipped_causes.cache_clear()
+    old = before["ladder"].cases
+    hail = {"query": {"transient": {"snow": [0.01, 0.02]}}}
+    assert ladder.cases == {**old, "hail": hail, "all": (*old["all"], "hail")}
+    case = levels.cases["all"]
+    assert case["database"].pop("transient") == {"leaves": [1.0, 0.5]}
+    assert case == before["levels"].cases["all"]
+    assert again.conditions == ladder.conditions
+
+
+@pytest.mark.parametrize(
+    ("causes", "fault"),
+    [
+        ("ladder", "causes: not"),
+        ("{each: a, together: b}", "causes: not"),
+        ("{some: ladder}", "causes.some: neither"),
+        ("{each: lader}", "no strengths 'lader'.*did you mean ladder"),
+    ],
+)
+def test_faults_of_causes(tmp_path, causes, fault):
+    path = tmp_path / "mine.yaml"
+    path.write_text(f"causes: {causes}\n")
+    with pytest.raises(InputError, match=fault):
+        load_experiment(path)
+
+
+def test_own_cases_beside_those_of_causes(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "causes: {each: ladder}\ncases: {turn: {query: {tilt_queries: 9}}}\n"
+    )
+    cases = load_experiment(path).cases
+    wanted = {"query": {"turn_queries": True, "tilt_queries": 9}}
+    assert cases["turn"] == wanted
+    assert "snow" in cases
 
 
 FAULTS = [
@@ -183,7 +238,7 @@ FAULTS = [
     ("seeds: one", "seeds.0: "),
     (
         "maps: [{name: a, import: a.xodr, seed: 1, grow: 0.3}]",
-        r"maps\.0: .*grow: a road network \(\.xodr\) .*; leave it out",
+        r"maps\.0: .*grow: a map from OpenDRIVE .*; leave it out",
     ),
     *(
         (

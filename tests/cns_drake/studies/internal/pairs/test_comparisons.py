@@ -11,6 +11,7 @@ import shapely
 
 from cns_drake.base import InputError
 from cns_drake.scenarios import load_scenario, plan_drive
+from cns_drake.sensors import make_pattern
 from cns_drake.simulation import (
     EGO_BOX,
     SimulationSource,
@@ -64,7 +65,15 @@ def query_drive(town):
 class Conditions:
     """The drives of all conditions of an experiment on one query drive."""
 
-    def __init__(self, experiment, query, *, same_route=True, database=None):
+    def __init__(
+        self,
+        experiment,
+        query,
+        *,
+        same_route=True,
+        database=None,
+        source="mine.yaml",
+    ):
         self.notes = []
         self.made = []
         self.missing = []
@@ -72,7 +81,7 @@ class Conditions:
             database or query.replaced(name=f"{query.name}_database"),
             query,
             same_route,
-            "mine.yaml",
+            source,
             lambda drive, *given: self.make("aged", drive, given),
             lambda drive, *given: self.make("redrawn", drive, given),
             self.notes.append,
@@ -681,3 +690,41 @@ def test_faults_are_one_line_with_file_and_field(
     with pytest.raises(InputError, match=rf"^mine\.yaml: {fault}") as error:
         Conditions(load_experiment(path), query_drive)
     assert "\n" not in str(error.value)
+
+
+def test_data_sheets_as_a_factor(query_drive, tmp_path):
+    """Their paths start at the folder of the experiment."""
+    sheet = "columns: 64\nranges: [0.5, 60.0]\nsource: mine\n"
+    for name, rings in (("a", 48), ("b", 12)):
+        text = f"rings_deg: [[10.0, -10.0, {rings}]]\n{sheet}"
+        (tmp_path / f"{name}.yaml").write_text(text)
+    path = tmp_path / "mine.yaml"
+    lidars = "{lidars: {lidar: {unit: [a.yaml, b.yaml]}}}"
+    path.write_text(f"query: {lidars}\nseeds: 1\n")
+    found = Conditions(load_experiment(path), query_drive, source=str(path))
+    by_value = {f["query.lidars.lidar.unit"]: c for f, _, c in found.found}
+    for name, rings in (("a.yaml", 48), ("b.yaml", 12)):
+        lidar = by_value[name].query.lidars["lidar"]
+        assert make_pattern(lidar).num_rings == rings
+        assert by_value[name].database.lidars["lidar"].preset == "cns"
+    prints = {one.fingerprint() for one in by_value.values()}
+    # Another sheet in the same file is another pair.
+    (tmp_path / "a.yaml").write_text(f"rings_deg: [[9, -9, 48]]\n{sheet}")
+    found = Conditions(load_experiment(path), query_drive, source=str(path))
+    prints |= {one.fingerprint() for one in found.compared()}
+    assert len(prints) == 3
+    # The same for all LiDARs of a drive, beside presets.
+    path.write_text("query: {lidar: [vlp-16, b.yaml]}\nseeds: 1\n")
+    found = Conditions(load_experiment(path), query_drive, source=str(path))
+    assert [
+        make_pattern(one.query.lidars["lidar"]).num_rings
+        for one in found.compared()
+    ] == [16, 12]
+    (tmp_path / "b.yaml").write_text("columns: 64\n")
+    with pytest.raises(InputError, match=rf"^{path}: query.lidar: .*b.yaml: "):
+        Conditions(load_experiment(path), query_drive, source=str(path))
+    path.write_text(f"query: {lidars}\n")
+    with pytest.raises(
+        InputError, match=rf"^{path}: query: lidars.lidar.unit: .*b.yaml: "
+    ):
+        Conditions(load_experiment(path), query_drive, source=str(path))

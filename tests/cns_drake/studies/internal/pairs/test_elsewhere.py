@@ -12,7 +12,7 @@ from cns_drake.studies.study import distracting_drives
 
 
 def test_drives_are_of_other_cities(tmp_path):
-    query = load_scenario("metropolis_04").with_lidar_preset("vlp-16")
+    query = load_scenario("metropolis_04").with_lidar("vlp-16")
     drives = distracting_drives(query, 1000, 5.0, tmp_path, Cluster())
     # Some 250 to 350 places each.
     assert 3 <= len(drives) <= 5

@@ -1,0 +1,55 @@
+"""Figures of Matplotlib, a wall: its settings are ours, not the user's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+import contextlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cns_drake.base.complete_files import completing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Formats whose files contain the time at which they were made -> its name.
+_DATES = {"pdf": "CreationDate", "svg": "Date"}
+# TrueType fonts stay text in PDF; ids of SVG follow the salt.
+_FILES = {"pdf.fonttype": 42, "svg.hashsalt": "cns", "svg.fonttype": "path"}
+
+
+@contextlib.contextmanager
+def figure_style(changes: Mapping[str, Any] | None = None) -> Iterator[None]:
+    """Makes Matplotlib's defaults apply, as a `with` block or a decorator.
+
+    Whatever makes or saves a figure of ours is in such a block, so that neither
+    a `matplotlibrc` nor `rcParams` of the user changes the figure.
+
+    Args:
+        changes: name -> value of the parameters that differ from Matplotlib's
+            defaults.
+    """
+    # Imported here: it is slow to load.
+    from matplotlib import style
+
+    with style.context(["default", dict(changes or {})]):
+        yield
+
+
+def save_figure(figure: Figure, path: Path, dpi: float, **options: Any) -> None:
+    """Writes a figure to a file; equal figures give equal bytes.
+
+    Args:
+        figure: the figure.
+        path: the file; its ending is the format.
+        dpi: resolution [pixels/inch].
+        options: further options of `Figure.savefig`.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    kind = path.suffix.removeprefix(".")
+    if kind in _DATES:
+        options.setdefault("metadata", {_DATES[kind]: None})
+    with figure_style(_FILES), completing(path) as part:
+        figure.savefig(part, dpi=dpi, format=kind, **options)

@@ -1,0 +1,118 @@
+"""The beam patterns of LiDARs, made from their data sheets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+from pathlib import Path
+from typing import Any, TypeAlias, TypeVar
+
+import numpy as np
+
+from cns_drake.sensors.lidar.beams import BeamPattern
+from cns_drake.sensors.lidar.patterns import (
+    NoddingPattern,
+    RosettePattern,
+    SpinningPattern,
+)
+from cns_drake.units import (
+    LidarSheet,
+    NoddingSheet,
+    ReturnsSheet,
+    RosetteSheet,
+    SpinningSheet,
+    find_sheet,
+)
+
+UnitPattern: TypeAlias = SpinningPattern | RosettePattern | NoddingPattern
+_Pattern = TypeVar("_Pattern", bound=BeamPattern)
+
+
+def make_beam_pattern(
+    unit: str | Path | LidarSheet,
+    period: float | None = None,
+    *,
+    num_columns: int | None = None,
+    min_range: float | None = None,
+    max_range: float | None = None,
+) -> UnitPattern:
+    """Returns the beam pattern of a LiDAR.
+
+    Args:
+        unit: a key of `LIDAR_PRESETS`, the file of a data sheet, or a data
+            sheet.
+        period: duration of a revolution [s]; by default the duration in the
+            data sheet.
+        num_columns: columns in a revolution; by default the number in the data
+            sheet. If the lasers of a unit fire at a fixed rate, the period
+            determines this number.
+        min_range: nearest range that is measured [m]; by default the value in
+            the data sheet.
+        max_range: farthest range that is measured [m]; by default the value in
+            the data sheet.
+
+    Raises:
+        ValueError: there is no preset of that name, `num_columns` is given for
+            a LiDAR without columns, or a value is impossible.
+        InputError: the file cannot be read, or is no data sheet.
+
+    Example:
+        from cns_drake import LIDAR_PRESETS, make_beam_pattern
+
+        patterns = [make_beam_pattern(name, 0.1) for name in LIDAR_PRESETS]
+    """
+    sheet = unit if isinstance(unit, LidarSheet) else find_sheet(unit)
+    if isinstance(sheet, SpinningSheet):
+        if sheet.fires_steadily and period and not num_columns:
+            num_columns = max(round(sheet.columns * period / sheet.period), 1)
+    elif num_columns is not None:
+        raise ValueError(
+            f"columns: a LiDAR with the pattern '{sheet.pattern}' has none"
+        )
+    common: dict[str, Any] = {
+        "period": sheet.period if period is None else period,
+        "min_range": sheet.ranges[0] if min_range is None else min_range,
+        "max_range": sheet.ranges[1] if max_range is None else max_range,
+    }
+    match sheet:
+        case SpinningSheet():
+            limits = sheet.azimuths_deg
+            return SpinningPattern(
+                tuple(np.deg2rad(sheet.elevations).tolist()),
+                sheet.columns if num_columns is None else num_columns,
+                azimuths_rad=(
+                    None
+                    if limits is None
+                    else tuple(np.deg2rad(limits).tolist())
+                ),
+                **common,
+            )
+        case RosetteSheet():
+            return RosettePattern(
+                sheet.fov_deg,
+                height_deg=sheet.height_deg,
+                num_lines=sheet.num_lines,
+                points_per_second=sheet.points_per_second,
+                **common,
+            )
+        case NoddingSheet():
+            return NoddingPattern(
+                sheet.elevations_deg,
+                num_lines=sheet.num_lines,
+                points_per_second=sheet.points_per_second,
+                **common,
+            )
+    raise AssertionError(sheet)  # There is no other kind.
+
+
+def aimed(pattern: _Pattern, sheet: ReturnsSheet) -> _Pattern:
+    """Returns a pattern with the elevations that were measured on one unit.
+
+    If the elevations are not known (see `Head`), or the pattern is not spinning
+    or has another number of rings, the pattern is returned unchanged.
+    """
+    own = tuple(map(math.radians, sheet.head.elevations_deg))
+    if not isinstance(pattern, SpinningPattern):
+        return pattern
+    is_own = len(own) == pattern.num_rings
+    return replace(pattern, elevations_rad=own) if is_own else pattern

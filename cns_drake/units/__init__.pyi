@@ -1,0 +1,17 @@
+from cns_drake.units.data_sheet import MOST_BEAMS as MOST_BEAMS
+from cns_drake.units.data_sheet import MOST_RINGS as MOST_RINGS
+from cns_drake.units.data_sheet import Head as Head
+from cns_drake.units.data_sheet import LidarSheet as LidarSheet
+from cns_drake.units.data_sheet import NoddingSheet as NoddingSheet
+from cns_drake.units.data_sheet import Response as Response
+from cns_drake.units.data_sheet import ReturnsSheet as ReturnsSheet
+from cns_drake.units.data_sheet import RosetteSheet as RosetteSheet
+from cns_drake.units.data_sheet import SheetRow as SheetRow
+from cns_drake.units.data_sheet import SpinningSheet as SpinningSheet
+from cns_drake.units.data_sheet import make_sheet as make_sheet
+from cns_drake.units.data_sheet import read_sheet as read_sheet
+from cns_drake.units.presets import DEFAULT_PRESET as DEFAULT_PRESET
+from cns_drake.units.presets import LIDAR_PRESETS as LIDAR_PRESETS
+from cns_drake.units.presets import check_preset as check_preset
+from cns_drake.units.presets import find_sheet as find_sheet
+from cns_drake.units.presets import is_sheet_file as is_sheet_file

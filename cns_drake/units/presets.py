@@ -1,0 +1,92 @@
+"""The data sheets that ship with the package, by name: the presets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cns_drake.base import did_you_mean
+
+if TYPE_CHECKING:
+    from cns_drake.units.data_sheet import LidarSheet
+
+_FILES = {
+    path.stem: path
+    for path in sorted(
+        Path(__file__).with_name("sheets").glob("*.yaml"),
+        key=lambda path: path.stem,
+    )
+}
+# Endings of the names of a user's own sheets.
+_ENDINGS = (".yaml", ".yml")
+
+
+@cache
+def _read_preset(name: str) -> LidarSheet:
+    # Slow to import, and the names of the presets are known without.
+    from cns_drake.units.data_sheet import read_sheet
+
+    return read_sheet(_FILES[name])
+
+
+class _Presets(Mapping[str, "LidarSheet"]):
+    """Name of a preset -> its data sheet, which is read when asked for."""
+
+    def __getitem__(self, name: str) -> LidarSheet:
+        if name not in _FILES:
+            raise KeyError(name)
+        return _read_preset(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_FILES)
+
+    def __len__(self) -> int:
+        return len(_FILES)
+
+
+LIDAR_PRESETS: Mapping[str, LidarSheet] = _Presets()
+# The LiDAR of a drive that names none.
+DEFAULT_PRESET = "cns"
+
+
+def check_preset(name: str) -> None:
+    """Checks that there is a preset of this name.
+
+    Raises:
+        ValueError: there is no such preset; the message lists all presets.
+    """
+    if name not in LIDAR_PRESETS:
+        raise ValueError(
+            f"unknown preset '{name}'; known: {', '.join(LIDAR_PRESETS)}"
+            f"{did_you_mean(name, LIDAR_PRESETS)}"
+        )
+
+
+def is_sheet_file(unit: object) -> bool:
+    """Returns whether a LiDAR is given by a data sheet's file, not a preset."""
+    if not isinstance(unit, str):
+        return isinstance(unit, Path)
+    return unit not in LIDAR_PRESETS and (
+        unit.endswith(_ENDINGS) or os.path.isfile(unit)
+    )
+
+
+def find_sheet(unit: str | Path) -> LidarSheet:
+    """Returns the data sheet of a LiDAR.
+
+    Args:
+        unit: name of a preset, or the file of a data sheet.
+
+    Raises:
+        ValueError: there is no such preset.
+        InputError: the file cannot be read, or is no data sheet.
+    """
+    if is_sheet_file(unit):
+        from cns_drake.units.data_sheet import read_sheet
+
+        return read_sheet(Path(unit))
+    check_preset(str(unit))
+    return LIDAR_PRESETS[str(unit)]

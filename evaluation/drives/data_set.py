@@ -1,0 +1,42 @@
+"""What a member of the family of data sets says of itself."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from cns_drake.drives import Drive
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """A layout in which drives are stored.
+
+    A module of this package has a data set as its constant `DATA_SET`, and is
+    found by this.
+
+    Attributes:
+        title: name of the layout in messages.
+        holds: function that returns whether a file or folder is a drive in this
+            layout.
+        open: function that opens a drive. Its arguments are the path and the
+            name of a LiDAR (None for the usual one), if the layout
+            `has_lidars`; otherwise the path and the number of values of a
+            point in `.bin` files (None to guess it).
+        files: the path that the user gives, and what must be there.
+        has_lidars: whether a drive can have several LiDARs.
+        is_nested: whether the drives lie some folders below the folder of the
+            data set.
+        needs_scenario: whether only the file `scenario.yaml` in a drive's
+            folder says in which city the drive is.
+    """
+
+    title: str
+    holds: Callable[[Path], bool]
+    open: (
+        Callable[[Path, str | None], Drive]
+        | Callable[[Path, int | None], Drive]
+    )
+    files: str
+    has_lidars: bool = False
+    is_nested: bool = False
+    needs_scenario: bool = False

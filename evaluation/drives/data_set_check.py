@@ -1,0 +1,214 @@
+"""A public check of data sets, as Gymnasium has for environments."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from cns_drake.base import FARTHEST, InputError, poses
+from cns_drake.drives import Drive
+from evaluation.drives.opening import open_drive
+
+# How many scans are read, spread over the drive.
+_NUM_SCANS = 8
+# Greatest time between two scans that is plausible for a LiDAR [s].
+_LONGEST_STEP = 60.0
+# Least time [s].
+_SHORTEST_STEP = 1e-3
+# Greatest plausible speed of a vehicle [m/s].
+_FASTEST = 100.0
+# Plausible range of the median point [m].
+_RANGES = (0.5, 500.0)
+# The ground is looked for between these distances [m], in layers of this
+# height [m].
+_GROUND = (3.0, 30.0)
+_LAYER = 0.25
+# The ground lies at most this far above a LiDAR [m].
+_HIGHEST_GROUND = 1.0
+# Two scans are compared if the LiDAR moved or turned by this much [m], [rad].
+_LEAST_MOVE = 1.0
+_LEAST_TURN = np.radians(5.0)
+# Number of points that are compared.
+_COMPARED = 1500
+# Other poses are right if points then lie nearer by this factor.
+_NEARER = 0.5
+
+
+def check_data_set(path: Path | str) -> None:
+    """Checks that a drive of your own can be used by all programs.
+
+    The check opens the drive and reads some of its scans. Times must increase,
+    poses must be rigid, scans must have points, and a scan must be the same
+    each time it is read. The check also looks for what readers often confuse:
+    units other than metres and nanoseconds, a LiDAR frame whose z axis points
+    down, poses that are inverted, and points that are not in the LiDAR's frame.
+
+    Args:
+        path: a drive, as `open_drive` takes it.
+
+    Raises:
+        InputError: the drive cannot be read, or something is wrong or not
+            plausible. The error says in one line what it is.
+
+    Example:
+        from evaluation import check_data_set
+
+        check_data_set("recordings/downtown_01")
+    """
+    path = Path(path)
+    drive = open_drive(path)
+    for fault in _faults(drive):
+        raise InputError(f"{path}: {fault}")
+
+
+def _faults(drive: Drive) -> Iterator[str]:
+    """Yields what is wrong with a drive."""
+    if not (drive.name.strip() and drive.name.isprintable()):
+        yield f"name: {drive.name!r} is no name"
+    number = len(drive)
+    if number < 2:
+        yield f"scans: {number} instead of two at least"
+        return
+    yield from _faults_of_times(drive.stamps_ns, number)
+    yield from _faults_of_poses(drive.X_WS, number)
+    yield from _faults_of_motion(drive)
+    frames = np.unique(np.linspace(0, number - 1, _NUM_SCANS).astype(int))
+    clouds = {}
+    for frame in frames.tolist():
+        scan = drive.scan(frame)
+        names = scan.dtype.names or ()
+        if scan.ndim != 1 or not {"x", "y", "z"} <= set(names):
+            yield f"scan {frame}: no array of points with x, y and z"
+            return
+        again = drive.scan(frame)
+        if scan.dtype != again.dtype or scan.tobytes() != again.tobytes():
+            yield f"scan {frame}: other points when it is read again"
+        clouds[frame] = np.stack(
+            [scan[axis].astype(np.float64) for axis in "xyz"], axis=1
+        )
+        if not np.isfinite(clouds[frame]).all():
+            yield f"scan {frame}: a coordinate is not finite"
+            return
+    yield from _faults_of_points(clouds)
+    yield from _faults_of_frames(drive, clouds)
+
+
+def _faults_of_times(stamps_ns: np.ndarray, number: int) -> Iterator[str]:
+    if stamps_ns.shape != (number,) or stamps_ns.dtype != np.int64:
+        yield (
+            f"times: {stamps_ns.dtype} of shape {stamps_ns.shape} instead of"
+            f" int64 ({number},)"
+        )
+        return
+    steps = np.diff(stamps_ns)
+    if (steps <= 0).any():
+        frame = int((steps <= 0).argmax()) + 1
+        yield f"times: scan {frame} is not later than the scan before"
+    step = float(np.median(steps)) * 1e-9
+    if not _SHORTEST_STEP <= step <= _LONGEST_STEP:
+        yield (
+            f"times: a scan every {step:g} s; are they in nanoseconds, as they"
+            " must be?"
+        )
+
+
+def _faults_of_poses(X_WS: np.ndarray, number: int) -> Iterator[str]:
+    if X_WS.shape != (number, 4, 4):
+        yield f"poses: of shape {X_WS.shape}, not ({number}, 4, 4)"
+        return
+    for frame, X in enumerate(X_WS):
+        if not poses.is_pose(X):
+            yield f"poses: that of scan {frame} is no finite rigid pose"
+            return
+    if (np.abs(X_WS[:, :3, 3]) >= FARTHEST).any():
+        yield "poses: too far from the origin"
+
+
+def _faults_of_motion(drive: Drive) -> Iterator[str]:
+    p_WS = drive.X_WS[:, :3, 3]
+    steps = np.linalg.norm(np.diff(p_WS, axis=0), axis=1)
+    speed = float(np.median(steps / (np.diff(drive.stamps_ns) * 1e-9)))
+    if speed > _FASTEST:
+        yield (
+            f"poses: the LiDAR moves at {speed:.0f} m/s; are positions in"
+            " metres, and times in nanoseconds?"
+        )
+    if float(np.median(drive.X_WS[:, 2, 2])) < 0.0:
+        yield "poses: the LiDAR's z axis points down; it must point up"
+
+
+def _faults_of_points(clouds: dict[int, np.ndarray]) -> Iterator[str]:
+    empty = [frame for frame, cloud in clouds.items() if not len(cloud)]
+    if len(empty) == len(clouds):
+        yield f"scans: without points (scan {empty[0]} and others)"
+        return
+    points = np.concatenate(list(clouds.values()))
+    median = float(np.median(np.linalg.norm(points, axis=1)))
+    if not _RANGES[0] <= median <= _RANGES[1]:
+        yield (
+            f"scans: half of the points lie within {median:g} m; are the"
+            " coordinates in metres?"
+        )
+    distances = np.hypot(points[:, 0], points[:, 1])
+    around = points[(distances > _GROUND[0]) & (distances < _GROUND[1]), 2]
+    if not len(around):
+        return
+    layers, counts = np.unique(
+        np.floor(around / _LAYER).astype(int), return_counts=True
+    )
+    height = float(layers[counts.argmax()] * _LAYER)
+    if height > _HIGHEST_GROUND:
+        yield (
+            f"scans: most points lie {height:.1f} m above the LiDAR, where no"
+            " ground is; does the z axis point up?"
+        )
+
+
+def _faults_of_frames(
+    drive: Drive, clouds: dict[int, np.ndarray]
+) -> Iterator[str]:
+    """Compares each scan with its neighbour, as the poses place both."""
+    gaps: dict[str, list[float]] = {}
+    rng = np.random.default_rng(0)
+    for frame, cloud in clouds.items():
+        other = _moved_frame(drive.X_WS, frame)
+        if other is None or not len(cloud):
+            continue
+        scan = drive.scan(other)
+        if not len(scan):
+            continue
+        beside = np.stack(
+            [scan[axis].astype(np.float64) for axis in "xyz"], axis=1
+        )
+        some = beside[rng.permutation(len(beside))[:_COMPARED]]
+        tree = KDTree(cloud)
+        X = poses.inverse(drive.X_WS[frame]) @ drive.X_WS[other]
+        inverted = drive.X_WS[frame] @ poses.inverse(drive.X_WS[other])
+        for name, X_there in (
+            ("as given", X),
+            ("inverted: X_SW instead of X_WS?", inverted),
+            ("of scans whose points are in one frame already", np.eye(4)),
+        ):
+            moved = some @ X_there[:3, :3].T + X_there[:3, 3]
+            distance, _ = tree.query(moved)
+            gaps.setdefault(name, []).append(float(np.median(distance)))
+    means = {name: float(np.mean(some)) for name, some in gaps.items()}
+    given = means.pop("as given", 0.0)
+    for name, gap in means.items():
+        if gap < _NEARER * given:
+            yield (
+                f"poses: neighbouring scans fit better ({gap:.2f} m instead of"
+                f" {given:.2f} m) if the poses are {name}"
+            )
+
+
+def _moved_frame(X_WS: np.ndarray, frame: int) -> int | None:
+    """Returns the next scan from a pose that differs enough, or None."""
+    X = poses.inverse(X_WS[frame]) @ X_WS[frame + 1 :]
+    moves = np.linalg.norm(X[:, :3, 3], axis=1)
+    turns = np.arccos(
+        np.clip((np.trace(X[:, :3, :3], axis1=1, axis2=2) - 1) / 2, -1.0, 1.0)
+    )
+    far = np.flatnonzero((moves >= _LEAST_MOVE) | (turns >= _LEAST_TURN))
+    return frame + 1 + int(far[0]) if len(far) else None

@@ -1,0 +1,280 @@
+"""No tag, attribute or member of what an import builds is dropped in silence.
+
+For each of the most used keys on each element that is built: the triangles
+change, or the counts name the key, or the report says that the key is read or
+changes no shape.
+"""
+
+import json
+from pathlib import Path
+
+from helpers.imported_osm import import_osm, volume
+from helpers.small_opendrive import straight, write_roads
+from helpers.small_osm import OsmWriter
+import numpy as np
+import pytest
+import yaml
+
+from cns_drake.imports import import_cityjson, import_openstreetmap, opendrive
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive.road_reader import read_roads
+
+# The most used keys on ways and nodes that can describe a thing, by taginfo,
+# with a usual value.
+KEYS = {
+    "source": "survey", "name": "A", "surface": "asphalt", "access": "private",
+    "height": "7", "width": "3", "min_height": "1", "oneway": "yes",
+    "lanes": "3", "maxspeed": "30", "service": "alley", "layer": "1",
+    "bridge": "yes", "tunnel": "yes", "roof:shape": "pyramidal",
+    "operator": "B", "start_date": "1900", "end_date": "2100", "foot": "yes",
+    "bicycle": "no", "lit": "yes", "sidewalk": "both", "tracktype": "grade2",
+    "building:levels": "5", "roof:levels": "2", "roof:height": "2",
+    "roof:material": "metal", "roof:colour": "red", "building:material": "wood",
+    "building:colour": "red", "roof:orientation": "across",
+    "roof:direction": "90", "roof:angle": "30", "building:min_level": "1",
+    "material": "wood", "fence_type": "chain_link", "diameter_crown": "9",
+    "circumference": "2", "leaf_type": "needleleaved",
+    "leaf_cycle": "deciduous",
+    "species": "Tilia", "genus": "Tilia", "denotation": "avenue", "level": "1",
+    "location": "roof", "covered": "yes", "area": "yes", "incline": "10%",
+    "direction": "90", "crossing": "zebra", "cycleway": "track",
+    "parking:both": "lane", "placement": "right_of:1", "turn:lanes": "left|",
+    "junction": "roundabout", "maxheight": "3", "smoothness": "good",
+    "wheelchair": "yes", "sport": "soccer", "wall": "no", "est_height": "8",
+    "diameter": "4", "kerb": "raised", "step_count": "9", "depth": "2",
+}  # fmt: skip
+PLACES = [(0, 0), (90, 0), (180, 0), (0, 90), (90, 90), (180, 90), (0, 180)]
+
+
+def write_elements(path, more):
+    """Writes one element of each kind; returns their ids."""
+    osm = OsmWriter()
+    osm.box(-80, -80, 9, 9, building="yes", height="9")
+
+    def box(place, **tags):
+        return osm.box(*place, 12, 8, **(tags | more))
+
+    def way(place, **tags):
+        x, y = place
+        return osm.way([(x, y), (x + 30, y)], **(tags | more))
+
+    ids = [
+        f"w{box(PLACES[0], building='house', height='6')}",
+        f"w{way(PLACES[1], highway='residential')}",
+        f"w{way(PLACES[2], highway='footway')}",
+        f"w{box(PLACES[3], landuse='grass')}",
+        f"w{way(PLACES[4], barrier='hedge')}",
+        f"n{osm.node(*PLACES[5], **({'natural': 'tree'} | more))}",
+        f"w{way(PLACES[6], barrier='wall')}",
+    ]
+    osm.write(path)
+    return ids
+
+
+def triangles_by_element(path, dressed=False):
+    city = import_openstreetmap(path, None, dressed)
+    found = {}
+    for one in city.objects:
+        found.setdefault(one.structure.name.split("_")[1], []).append(
+            one.triangles
+        )
+    return city, {name: np.concatenate(parts) for name, parts in found.items()}
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_each_key_changes_the_triangles_or_is_accounted_for(tmp_path, key):
+    path = tmp_path / "a.osm"
+    ids = write_elements(path, {})
+    _, plain = triangles_by_element(path)
+    assert set(ids) <= set(plain)
+    write_elements(path, {key: KEYS[key]})
+    city, tagged = triangles_by_element(path)
+    words = {
+        word
+        for line in city.faults.parts()
+        for word in line.split(": ")[-1].split()
+    }
+    told = " ".join(fault.kind for fault in city.faults.rows())
+    for name in ids:
+        is_same = name in tagged and np.array_equal(plain[name], tagged[name])
+        if is_same:
+            assert key in words or f"tag {key} of" in told, (name, key)
+        elif name not in tagged:
+            assert "left out" in told, (name, key)
+
+
+@pytest.mark.parametrize(
+    ("element", "key"),
+    [
+        ("building", "roof:direction"),
+        ("building", "placement"),
+        ("street", "cycleway"),
+        ("street", "height"),
+        ("path", "incline"),
+        ("ground", "height"),
+        ("barrier", "fence_type"),
+        ("tree", "diameter_crown"),
+    ],
+)
+def test_what_is_not_read_is_counted_for_its_element(tmp_path, element, key):
+    path = tmp_path / "a.osm"
+    write_elements(path, {key: KEYS[key]})
+    city, _ = triangles_by_element(path)
+    kinds = {fault.kind for fault in city.faults.rows()}
+    assert f"tag {key} of {element}, not read" in kinds
+
+
+def test_barriers_are_as_thick_and_high_as_their_tags_say(tmp_path):
+    osm = OsmWriter()
+    osm.box(-50, -50, 9, 9, building="yes")
+    wall = osm.way([(0, 0), (20, 0)], barrier="wall", width="2", height="5",
+                   min_height="2")  # fmt: skip
+    filled = osm.box(0, 20, 10, 6, barrier="hedge", area="yes", height="2")
+    ring = osm.box(0, 40, 10, 6, barrier="hedge", height="2")
+    _, found = import_osm(osm.write(tmp_path / "a.osm"))
+    corners = found[f"wall_w{wall}"].triangles.reshape(-1, 3)
+    np.testing.assert_allclose(np.ptp(corners, axis=0), [20, 2, 3], atol=0.02)
+
+    def covered(one):
+        a, b, c = np.moveaxis(one.triangles[..., :2], 1, 0)
+        z = one.triangles[..., 2].min(axis=1)
+        area = np.abs(np.linalg.det(np.stack([b - a, c - a], axis=1))) / 2
+        return area[z == one.triangles[..., 2].max()].sum()
+
+    assert covered(found[f"hedge_w{filled}"]) == pytest.approx(60, rel=0.01)
+    assert covered(found[f"hedge_w{ring}"]) == pytest.approx(25.6, rel=0.1)
+
+
+def test_a_canopy_within_a_building_is_open_below(tmp_path):
+    osm = OsmWriter()
+    whole = osm.box(0, 0, 20, 20, building="yes", height="10")
+    osm.box(0, 0, 20, 5, building__part="roof", height="4")
+    _, found = import_osm(osm.write(tmp_path / "a.osm"))
+    one = found[f"building_w{whole}"]
+    expected = 20.0 * 15.0 * 10.0 + 20.0 * 5.0 * 0.5
+    assert volume(one.triangles) == pytest.approx(expected, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("date", "buildings"),
+    [("1960", 2), ("1900-05", 1), ("1960?", 1), (None, 1)],
+)
+def test_parts_of_another_year_are_buildings(tmp_path, date, buildings):
+    osm = OsmWriter()
+    osm.box(0, 0, 20, 20, building="church", start_date="1900", height="10")
+    own = {"start_date": date} if date else {}
+    osm.box(0, 0, 5, 20, building__part="yes", height="40", **own)
+    city, found = import_osm(osm.write(tmp_path / "a.osm"))
+    years = sorted(one.year for one in found.values())
+    assert years == [1900, 1960][:buildings]
+    kinds = {fault.kind for fault in city.faults.rows()}
+    is_unclear = date == "1960?"
+    assert ("date in start_date that is not understood" in kinds) == is_unclear
+
+
+SIGNAL = {"s": "50", "t": "-9", "id": "1", "type": "274", "dynamic": "no"}
+OBJECT = {"s": "80", "t": "-9", "id": "2", "type": "pole", "height": "3",
+          "radius": "0.2"}  # fmt: skip
+OF_ROADS = [
+    ("signals", "signal", SIGNAL, key)
+    for key in ("zOffset", "width", "height", "hOffset", "pitch", "roll",
+                "text", "value", "country", "subtype", "orientation",
+                "length", "new")
+] + [
+    ("objects", "object", OBJECT, key)
+    for key in ("zOffset", "width", "length", "hdg", "pitch", "roll", "subtype",
+                "dynamic", "validLength", "orientation", "perpToRoad", "new")
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("group", "tag", "given", "key"), OF_ROADS)
+def test_attributes_of_things_change_them_or_are_named(
+    tmp_path, group, tag, given, key
+):
+    def things(attributes):
+        text = " ".join(f'{k}="{v}"' for k, v in attributes.items())
+        path = write_roads(
+            tmp_path / "a.xodr",
+            straight(
+                "1", 0, 0, 200, 0, more=f"<{group}><{tag} {text}/></{group}>"
+            ),
+        )
+        faults = ImportFaults()
+        (road,) = read_roads(path, faults).roads
+        return repr(road.things), faults
+
+    before, _ = things(given)
+    after, faults = things(given | {key: "1.5"})
+    told = " ".join(fault.kind for fault in faults.rows())
+    lines = " ".join(faults.parts()).split()
+    assert (
+        before != after or f"{key} of {tag}, not read" in told or key in lines
+    )
+
+
+def test_each_element_of_opendrive_that_is_read_has_a_row():
+    page = Path(opendrive.__file__).with_name("parts.yaml")
+    elements = yaml.safe_load(page.read_text("utf-8"))["elements"]
+    children = {
+        child for row in elements.values() for child in row.get("children", ())
+    }
+    assert children <= set(elements)
+    assert {key for row in elements.values() for key in row} <= {
+        "children",
+        "read",
+        "shapeless",
+        "usual",
+    }
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value", "is_counted"),
+    [
+        ("measuredHeight", 12.5, True),
+        ("roofType", "1000", True),
+        ("identificatie", "a", False),
+        ("yearOfConstruction", 1950, False),
+        ("b3_h_max", 5.0, False),
+    ],
+)
+def test_attributes_of_cityjson_are_accounted_for(
+    tmp_path, attribute, value, is_counted
+):
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps(house({attribute: value})))
+    city = import_cityjson(path, None, None)
+    kinds = [fault.kind for fault in city.faults.rows()]
+    assert (f"{attribute} of attributes, not read" in kinds) == is_counted
+    assert is_counted or attribute in " ".join(city.faults.parts()).split()
+
+
+def test_a_demolished_house_of_cityjson_has_an_end(tmp_path):
+    path = tmp_path / "a.json"
+    dates = {"yearOfConstruction": 1900, "yearOfDemolition": "1950-05-01"}
+    path.write_text(json.dumps(house(dates)))
+    (one,) = import_cityjson(path, None, None).objects
+    assert (one.year, one.until) == (1900, 1950)
+
+
+def house(attributes):
+    corners = [[x, y, z] for z in (0, 5) for y in (0, 8) for x in (0, 10)]
+    faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3],
+             [0, 4, 6, 2], [1, 3, 7, 5]]  # fmt: skip
+    geometry = {
+        "type": "Solid",
+        "lod": "2",
+        "boundaries": [[[face] for face in faces]],
+    }
+    return {
+        "type": "CityJSON",
+        "version": "2.0",
+        "transform": {"scale": [1, 1, 1], "translate": [0, 0, 0]},
+        "CityObjects": {
+            "a": {
+                "type": "Building",
+                "attributes": attributes,
+                "geometry": [geometry],
+            }
+        },
+        "vertices": corners,
+    }

@@ -1,0 +1,181 @@
+"""The public check of data sets, on every layout and on what goes wrong."""
+
+import shutil
+
+from helpers import helipr_drive
+from helpers.dataset_folders import (
+    write_bytes,
+    write_matrices,
+    write_pcd,
+    write_quaternions,
+    xyzi,
+)
+from helpers.drive_files import make_scan, write_recording, yaw_pose
+import numpy as np
+import pytest
+
+from cns_drake.base import InputError, poses
+from evaluation import check_data_set, open_drive
+from evaluation.drives import data_sets
+
+NUM_SCANS = 8
+STAMPS_NS = 10**9 + 100_000_000 * np.arange(NUM_SCANS)
+# Poses of the vehicle: 15 m/s, in a slight bend.
+X_WB = np.array([yaw_pose(1.5 * k, 0.1 * k, 0.0, 0.04 * k) for k in range(8)])
+
+
+def scene(p_WS):
+    """Returns points of walls, poles and the ground around a place in W."""
+    rng = np.random.default_rng(3)
+    parts = [rng.uniform([-40, -40, 0], [60, 40, 0], (2500, 3))]
+    for _ in range(30):
+        foot = [*rng.uniform([-35, -30], [50, 30]), 0.0]
+        size = [*rng.choice([[9.0, 0.02], [0.02, 9.0], [0.1, 0.1]]), 6.0]
+        parts.append(rng.uniform(size=(80, 3)) * size + foot)
+    return np.concatenate(parts) + p_WS - [0.0, 0.0, 1.6]
+
+
+def scans_in(X_WS):
+    """Returns what a LiDAR measures at each pose, in its frame S."""
+    points = scene(X_WS[0, :3, 3])
+    found = []
+    for X in X_WS:
+        p_S = (points - X[:3, 3]) @ X[:3, :3]
+        found.append(p_S[np.linalg.norm(p_S, axis=1) < 60.0])
+    return found
+
+
+def mcap(folder, scans):
+    shutil.rmtree(folder, ignore_errors=True)
+    write_recording(folder, [make_scan(one) for one in scans], list(X_WB))
+
+
+def mulran(folder, scans):
+    write_matrices(folder / "global_pose.csv", STAMPS_NS, X_WB)
+    for stamp, points in zip(STAMPS_NS, scans, strict=True):
+        write_bytes(folder / "Ouster" / f"{stamp}.bin", xyzi(points))
+
+
+def helipr(folder, scans):
+    write_quaternions(folder / "LiDAR_GT" / "Ouster_gt.txt", STAMPS_NS, X_WB)
+    for stamp, points in zip(STAMPS_NS, scans, strict=True):
+        data, _ = helipr_drive.records(
+            helipr_drive.FORMATS["Ouster"], points.astype(np.float32)
+        )
+        write_bytes(folder / "LiDAR" / "Ouster" / f"{stamp}.bin", data)
+
+
+def nclt(folder, scans):
+    rows = [
+        f"{stamp // 1000},{k * 1.5},0.0,-3.0,0.0,0.0,{0.03 * k}"
+        for k, stamp in enumerate(STAMPS_NS)
+    ]
+    table = folder.parent / f"groundtruth_{folder.name}.csv"
+    write_bytes(table, "\n".join(rows).encode())
+    origin, sign = np.array([0.002, -0.004, -0.957]), [1.0, -1.0, -1.0]
+    record = np.dtype([("p", "<u2", 3), ("intensity", "u1"), ("laser", "u1")])
+    for stamp, points in zip(STAMPS_NS, scans, strict=True):
+        stored = np.zeros(len(points), record)
+        stored["p"] = np.rint((points * sign + origin + 100.0) / 0.005)
+        name = f"{stamp // 1000}.bin"
+        write_bytes(folder / "velodyne_sync" / name, stored.tobytes())
+
+
+def boreas(folder, scans):
+    rows = [
+        ",".join(
+            map(str, [stamp // 1000, 1.5 * k, *[0] * 7, -0.03 * k, 0, 0, 0])
+        )
+        for k, stamp in enumerate(STAMPS_NS)
+    ]
+    table = folder / "applanix" / "lidar_poses.csv"
+    write_bytes(table, "\n".join(rows).encode())
+    for stamp, points in zip(STAMPS_NS, scans, strict=True):
+        stored = np.zeros((len(points), 6), "<f4")
+        stored[:, :3] = points
+        name = f"{stamp // 1000}.bin"
+        write_bytes(folder / "lidar" / name, stored.tobytes())
+
+
+def kitti(folder, scans, X_WS=X_WB, times=None):
+    for k, points in enumerate(scans):
+        write_bytes(folder / "velodyne" / f"{k:06d}.bin", xyzi(points))
+    times = STAMPS_NS * 1e-9 if times is None else times
+    (folder / "times.txt").write_text("".join(f"{t:.9f}\n" for t in times))
+    write_matrices(folder / "poses.txt", None, X_WS, " ")
+
+
+def cns_folder(folder, scans):
+    write_quaternions(folder / "gt.csv", STAMPS_NS, X_WB, ",")
+    for stamp, points in zip(STAMPS_NS, scans, strict=True):
+        path = folder / "pcd" / f"{stamp}.pcd"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_pcd(path, points)
+
+
+WRITERS = {
+    one.__name__: one
+    for one in (boreas, cns_folder, helipr, kitti, mcap, mulran, nclt)
+}
+
+
+def test_every_data_set_is_checked():
+    assert set(WRITERS) == set(data_sets())
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_correct_drive_passes(tmp_path, name):
+    folder = tmp_path / "drive_01"
+    write = WRITERS[name]
+    # What the LiDAR measures follows from its poses, as the reader has them.
+    write(folder, [np.ones((50, 3))] * NUM_SCANS)
+    write(folder, scans_in(open_drive(folder).X_WS))
+    check_data_set(folder)
+    check_data_set(str(folder))
+
+
+SCANS = scans_in(X_WB)
+
+
+@pytest.mark.parametrize(
+    ("fault", "scans", "more"),
+    [
+        ("in metres", [30.0 * one for one in SCANS], {}),
+        ("in metres", [one / 1000.0 for one in SCANS], {}),
+        ("does the z axis", [one * [1, -1, -1] for one in SCANS], {}),
+        ("without points", [one[:0] for one in SCANS], {}),
+        ("inverted", SCANS, {"X_WS": poses.inverse(X_WB)}),
+        ("in one frame already", [SCANS[0]] * NUM_SCANS, {}),
+        ("every 1e-07 s", SCANS, {"times": 1e-7 * np.arange(NUM_SCANS)}),
+        (
+            "moves at 150000 m/s",
+            SCANS,
+            {"X_WS": np.array([yaw_pose(15e3 * k, 0, 0, 0) for k in range(8)])},
+        ),
+        ("instead of two", SCANS[:1], {"X_WS": X_WB[:1], "times": [0.0]}),
+        ("not later", SCANS, {"times": np.zeros(NUM_SCANS)}),
+    ],
+)
+def test_a_wrong_drive_is_refused_in_one_line(tmp_path, fault, scans, more):
+    folder = tmp_path / "00"
+    kitti(folder, scans, **more)
+    with pytest.raises(InputError, match=fault) as raised:
+        check_data_set(folder)
+    assert "\n" not in str(raised.value)
+
+
+def test_poses_that_hang_down(tmp_path):
+    """KITTI's frame is that of the first scan, so another layout shows it."""
+    folder = tmp_path / "drive"
+    mulran(folder, SCANS)
+    flipped = X_WB @ np.diag([1.0, -1.0, -1.0, 1.0])
+    write_matrices(folder / "global_pose.csv", STAMPS_NS, flipped)
+    with pytest.raises(InputError, match="z axis points down"):
+        check_data_set(folder)
+
+
+def test_what_is_no_drive(tmp_path):
+    with pytest.raises(InputError, match="not a recorded drive"):
+        check_data_set(tmp_path)
+    with pytest.raises(InputError, match="no such file"):
+        check_data_set(tmp_path / "nowhere")

@@ -1,0 +1,197 @@
+"""The public check of methods, on the shipped methods and on broken ones."""
+
+import numpy as np
+import pytest
+
+from cns_drake.base import InputError
+from evaluation import check_method, known_methods
+from evaluation.methods import (
+    Method,
+    MethodConfig,
+    find_method,
+    make_method,
+    method_facts,
+    shipped_methods,
+)
+
+
+class Heights(Method):
+    """Compares histograms of heights."""
+
+    name = "heights"
+
+    def describe(self, points):
+        return np.histogram(points[:, 2], 40, (-3.0, 20.0))[0].astype(float)
+
+    def build_database(self, places):
+        return np.array(places)
+
+    def score(self, query, database, *, exhaustive=False):
+        return -np.abs(database - query).sum(axis=1)
+
+
+def test_a_correct_method_passes():
+    check_method(Heights())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*shipped_methods(), "probe"])
+def test_shipped_methods_pass(name):
+    check_method(make_method(name, {}))
+
+
+@pytest.mark.slow
+def test_methods_that_need_weights_pass(tmp_path):
+    """With random weights, the networks keep the interface, too."""
+    rng = np.random.default_rng(5)
+    for name in ("svt-net", "dpa-net"):
+        weights = {
+            key: rng.uniform(0.5, 1.0, shape).astype(np.float32) * 0.1
+            for key, shape in find_method(name).shapes.items()
+        }
+        path = tmp_path / f"{name}.npz"
+        np.savez(path, **weights)
+        check_method(make_method(name, {"weights": path}))
+
+
+@pytest.mark.parametrize("name", known_methods())
+def test_facts_of_the_source_are_those_of_the_class(name):
+    method, facts = find_method(name), method_facts(name)
+    for field in ("title", "style", "source", "standard", "order"):
+        assert getattr(method, field) == getattr(facts, field)
+    assert facts.title
+
+
+def test_styles_of_methods_differ():
+    styles = [method_facts(name).style for name in known_methods()]
+    given = [style for style in styles if style]
+    for parts in (given, [colour for colour, *_ in given]):
+        assert len(set(parts)) == len(parts)
+
+
+def replaced(**functions):
+    return type("Broken", (Heights,), functions)()
+
+
+def in_place(self, points):
+    points -= 1.0
+    return points[:, 2].max(initial=0.0)
+
+
+def random(self, points):
+    return np.random.default_rng().uniform(size=3)
+
+
+calls = []
+
+
+def drifting(self, query, database, *, exhaustive=False):
+    calls.append(0)
+    return -np.abs(database - query).sum(axis=1) - len(calls)
+
+
+def of_whole(self, query, database, *, exhaustive=False):
+    distance = np.abs(database - query).sum(axis=1)
+    return -distance / max(distance.sum(), 1.0)
+
+
+FAULTS = {
+    "describe_place raised ValueError.*change a copy": {"describe": in_place},
+    "described twice, have different": {"describe": random},
+    "two calls with the same input": {"score": drifting},
+    "higher score must mean": {
+        "score": lambda self, query, database, *, exhaustive=False: np.abs(
+            database - query
+        ).sum(axis=1)
+    },
+    "score returned ndarray of shape": {
+        "score": lambda self, query, database, *, exhaustive=False: np.zeros(2)
+    },
+    "infinite score": {
+        "score": lambda self, query, database, *, exhaustive=False: np.full(
+            len(database), np.inf
+        )
+    },
+    "NaN, but skips_places": {
+        "score": lambda self, query, database, *, exhaustive=False: np.full(
+            len(database), np.nan
+        )
+    },
+    "describe returned an object of the type set": {
+        "describe": lambda self, points: {1, 2},
+        "describe_place": Heights.describe,
+    },
+    "an array of objects": {
+        "describe": lambda self, points: np.array([None, {}])
+    },
+    "raised ZeroDivisionError": {
+        "describe": lambda self, points: (
+            Heights.describe(self, points) if len(points) > 5 else 1 / 0
+        )
+    },
+    "instead of .4, 4. floats or None": {
+        "relative_pose": lambda self, query, database, place: np.eye(3)
+    },
+    "relative_pose returned no pose": {
+        "relative_pose": lambda self, query, database, place: 2 * np.eye(4)
+    },
+    "relative_poses returned list of length 0": {
+        "relative_poses": lambda self, query, database, places: []
+    },
+    "describe_batch returned list of length 1": {
+        "describe_batch": lambda self, clouds, *, of_places: [0]
+    },
+    "describes a cloud in another way": {
+        "describe_batch": lambda self, clouds, *, of_places: [
+            self.describe(cloud) * 2 for cloud in clouds
+        ]
+    },
+    "divides: the scores in parts": {"divides": True, "score": of_whole},
+    "divides: not with rerank": {"divides": True, "rerank_best": 2},
+    "rerank returned": {
+        "rerank_best": 2,
+        "rerank": lambda self, query, places, scores: scores[:1],
+    },
+    "scans_per_place: 0": {"scans_per_place": 0},
+    "batch_size: 1.5": {"batch_size": 1.5},
+    "style: 'red'": {"style": "red"},
+    "name: missing": {"name": ""},
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_broken_method_is_refused_in_one_line(fault):
+    with pytest.raises(InputError, match=fault) as raised:
+        check_method(replaced(**FAULTS[fault]))
+    assert "\n" not in str(raised.value)
+
+
+def test_what_is_no_method():
+    with pytest.raises(InputError, match="is no Method"):
+        check_method(Heights)
+
+
+def test_settings_that_cannot_be_pickled():
+    class Config(MethodConfig):
+        rings: int = 3
+
+    method = replaced(Config=Config)
+    with pytest.raises(InputError, match="cannot be pickled"):
+        check_method(method)
+
+
+def test_fields_of_points_are_given():
+    seen = set()
+
+    def describe(self, points):
+        seen.add(points.dtype.names)
+        return Heights.describe(self, np.stack([points[a] for a in "xyz"], 1))
+
+    check_method(replaced(point_fields=("ring", "own"), describe=describe))
+    assert seen == {("x", "y", "z", "ring", "own")}
+
+
+@pytest.mark.parametrize("kind", [True, False])
+def test_a_method_says_whether_it_estimates_poses(kind):
+    own = {"relative_pose": lambda self, *_: np.eye(4)} if kind else {}
+    assert replaced(**own).estimates_poses() is kind
