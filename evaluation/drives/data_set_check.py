@@ -1,6 +1,6 @@
 """A public check of data sets, as Gymnasium has for environments."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +8,7 @@ from scipy.spatial import KDTree
 
 from cns_drake.base import FARTHEST, InputError, poses
 from cns_drake.drives import Drive
+from cns_drake.units import check_preset
 from evaluation.drives.opening import open_drive
 
 # How many scans are read, spread over the drive.
@@ -66,6 +67,7 @@ def _faults(drive: Drive) -> Iterator[str]:
     """Yields what is wrong with a drive."""
     if not (drive.name.strip() and drive.name.isprintable()):
         yield f"name: {drive.name!r} is no name"
+    yield from _faults_of_lidar(drive)
     number = len(drive)
     if number < 2:
         yield f"scans: {number} instead of two at least"
@@ -92,6 +94,21 @@ def _faults(drive: Drive) -> Iterator[str]:
             return
     yield from _faults_of_points(clouds)
     yield from _faults_of_frames(drive, clouds)
+
+
+def _faults_of_lidar(drive: Drive) -> Iterator[str]:
+    lidars = (drive.scenario or {}).get("lidars", {})
+    if not isinstance(lidars, Mapping) or not all(
+        isinstance(one, Mapping) for one in lidars.values()
+    ):
+        yield "lidars: not a mapping of names to LiDARs"
+        return
+    preset = drive.lidar_section.get("preset")
+    if preset is not None and drive.lidar_field is None:
+        try:
+            check_preset(str(preset))
+        except ValueError as error:
+            yield f"lidars: preset: {error}"
 
 
 def _faults_of_times(stamps_ns: np.ndarray, number: int) -> Iterator[str]:
