@@ -5,7 +5,7 @@ from pathlib import Path
 import re
 
 from cns_drake.base import InputError, errors_at, is_there, read_yaml
-from cns_drake.units import read_sheet
+from cns_drake.units import make_sheet, read_sheet
 
 # Name of the file with the scenario, in the folder of an exported drive.
 SCENARIO = "scenario.yaml"
@@ -61,8 +61,15 @@ def read_scenario(folder: Path) -> Mapping | None:
         raise InputError(f"{path}: name: {name!r} is no name of a drive")
     lidars = scenario.get("lidars")
     for section in lidars.values() if isinstance(lidars, dict) else ():
-        if isinstance(section, dict) and isinstance(section.get("unit"), str):
-            with errors_at(f"{path}: lidars"):
-                sheet = read_sheet(folder / section["unit"])
-            section["unit"] = sheet.to_fields()
+        if not isinstance(section, dict) or section.get("unit") is None:
+            continue
+        with errors_at(f"{path}: lidars"):
+            if section.get("preset") is not None:
+                raise InputError("unit: give either a unit or a preset")
+            unit = section["unit"]
+            if isinstance(unit, str):
+                sheet = read_sheet(folder / unit)
+            else:
+                sheet = make_sheet(unit, "unit")
+        section["unit"] = sheet.to_fields()
     return scenario

@@ -639,7 +639,7 @@ class Scenario(Section):
             chosen = chosen.replaced(lane_changes=0.0)
         return self.replaced(driver=chosen)
 
-    def with_lidar(self, unit: str) -> Scenario:
+    def with_lidar(self, unit: str | Path) -> Scenario:
         """Returns the scenario with every LiDAR replaced by another model.
 
         The LiDARs keep their poses and all settings of the measurement.

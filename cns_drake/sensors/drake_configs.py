@@ -41,7 +41,7 @@ from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.odometry_config import OdometrySection
 from cns_drake.sensors.sensor_config import HIGHEST_RATE, Section
 from cns_drake.sensors.system_names import check_unused_names
-from cns_drake.units import DEFAULT_PRESET
+from cns_drake.units import DEFAULT_PRESET, LONGEST_PERIOD
 
 # Fields of a section that no config has: `X_PB` replaces the mount, and only
 # recordings have a layout.
@@ -75,8 +75,8 @@ class LidarConfig(LidarDescription, PublishedSensor):
     rounded by default. A relative path `unit` starts at the working directory.
 
     Attributes:
-        rate: revolutions per second, at most 1000; by default the rate of the
-            data sheet.
+        rate: revolutions per second, from 0.25 to 1000; by default the rate of
+            the data sheet.
         causal: whether a scan covers the revolution that ends at its time, so
             that a controller can use it at once.
         capture_offset: time of the first published scan [s]; the other scans
@@ -497,9 +497,11 @@ def _checked_section(
     source = _caller(config)
     rate = config.rate
     highest = sys.float_info.max if kind is ImuSection else HIGHEST_RATE
-    if rate is not None and not 0.0 < rate <= highest:
+    lowest = 1.0 / LONGEST_PERIOD if kind is LidarSection else 0.0
+    if rate is not None and not (0.0 < rate <= highest and rate >= lowest):
+        limit = f"at least {lowest:g}" if lowest else "above 0"
         raise ValueError(
-            f"{source}: rate: {rate:g} is not above 0 and up to {highest:g}"
+            f"{source}: rate: {rate:g} is not {limit} and up to {highest:g}"
         )
     given = {
         name: getattr(config, name)

@@ -1,3 +1,4 @@
+from cns_drake.units.data_sheet import LONGEST_PERIOD as LONGEST_PERIOD
 from cns_drake.units.data_sheet import MOST_BEAMS as MOST_BEAMS
 from cns_drake.units.data_sheet import MOST_RINGS as MOST_RINGS
 from cns_drake.units.data_sheet import Head as Head

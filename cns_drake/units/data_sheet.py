@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from itertools import pairwise
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
@@ -15,6 +16,7 @@ from pydantic import (
     Field,
     ValidationInfo,
     field_validator,
+    model_validator,
 )
 
 from cns_drake.base import InputError, InputModel, read_yaml, validated
@@ -30,6 +32,10 @@ MOST_RINGS = 512
 MOST_BEAMS = 2**22
 # Farthest range [m].
 _FARTHEST = 1000.0
+# Longest revolution [s]: points have room for firing times up to 4.29 s.
+LONGEST_PERIOD = 4.0
+# Shortest revolution [s]; no unit turns that fast.
+_SHORTEST = 1e-3
 
 _Elevation = Annotated[float, Field(ge=-90.0, le=90.0)]
 
@@ -129,6 +135,12 @@ class Head(_Part):
         default=(), max_length=MOST_RINGS
     )
 
+    @field_validator("blocks")
+    @classmethod
+    def _check_blocks(cls, given: tuple) -> tuple:
+        _check_descending([lowest for lowest, _, _ in given])
+        return given
+
     @field_validator("elevations_deg")
     @classmethod
     def _check_order(cls, given: tuple[float, ...]) -> tuple[float, ...]:
@@ -147,8 +159,8 @@ class SheetRow(NamedTuple):
         probability: probability that the target is detected.
     """
 
-    reflectivity: Annotated[float, Field(gt=0.0, le=1.0)]
-    range: Annotated[float, Field(gt=0.0, le=_FARTHEST)]
+    reflectivity: Annotated[float, Field(ge=1e-3, le=1.0)]
+    range: Annotated[float, Field(ge=1e-3, le=_FARTHEST)]
     probability: Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
@@ -196,6 +208,15 @@ class ReturnsSheet(_Part):
     def _check_rows(cls, rows: tuple[SheetRow, ...]) -> tuple[SheetRow, ...]:
         if len({row.range for row in rows}) < len(rows):
             raise ValueError("two rows have the same range")
+        for near, far in pairwise(sorted(rows, key=lambda row: row.range)):
+            if (
+                far.reflectivity <= near.reflectivity
+                and far.probability >= near.probability
+            ):
+                raise ValueError(
+                    f"a target of {far.reflectivity:g} cannot be detected as "
+                    f"well, and farther, than one of {near.reflectivity:g}"
+                )
         return rows
 
     @field_validator("head")
@@ -245,7 +266,7 @@ class LidarSheet(_Part, ABC):
         Annotated[float, Field(ge=0.0, le=_FARTHEST)],
         Annotated[float, Field(gt=0.0, le=_FARTHEST)],
     ]
-    period: float = Field(gt=0.0, le=4.0)
+    period: float = Field(ge=_SHORTEST, le=LONGEST_PERIOD)
     source: str = Field(min_length=1, max_length=2000)
     returns: ReturnsSheet = Field(
         default_factory=dict,
@@ -288,8 +309,8 @@ class LidarSheet(_Part, ABC):
         """Returns a sheet with evenly spaced rings between the same limits.
 
         Raises:
-            ValueError: the LiDAR does not spin, so that it has no rings, or
-                there would be too many beams.
+            ValueError: the LiDAR does not spin, so that it has no rings, its
+                limits are one elevation, or there would be too many beams.
         """
         raise ValueError("rings: only a spinning LiDAR has rings")
 
@@ -330,12 +351,17 @@ class SpinningSheet(LidarSheet):
         | None
     ) = None
     fires_steadily: bool = False
-    period: float = Field(default=0.05, gt=0.0, le=4.0)
+    period: float = Field(default=0.05, ge=_SHORTEST, le=LONGEST_PERIOD)
 
     @field_validator("rings_deg")
     @classmethod
     def _check_rings(cls, given: tuple | None) -> tuple | None:
         if given is not None:
+            for first, last, count in given:
+                if count == 1 and first != last:
+                    raise ValueError(
+                        f"one ring cannot be at {first:g} and {last:g}"
+                    )
             number = sum(count for _, _, count in given)
             if number == 0:
                 raise ValueError("there is no ring")
@@ -371,6 +397,16 @@ class SpinningSheet(LidarSheet):
         _check_num_beams(number * columns, f"{number} rings x {columns}")
         return columns
 
+    @model_validator(mode="after")
+    def _check_lasers(self) -> Self:
+        own = len(self.returns.head.elevations_deg)
+        if own not in (0, self.num_rings):
+            raise ValueError(
+                f"returns.head.elevations_deg: {own} elevations of "
+                f"{self.num_rings} rings"
+            )
+        return self
+
     @field_validator("azimuths_deg")
     @classmethod
     def _check_azimuths(
@@ -398,6 +434,10 @@ class SpinningSheet(LidarSheet):
 
     def with_rings(self, number: int) -> SpinningSheet:
         lowest, highest = self.field_deg
+        if lowest == highest:
+            raise ValueError(
+                f"rings: all rings of the data sheet are at {lowest:g} deg"
+            )
         _check_num_beams(number * self.columns, f"rings: {number}")
         # The lasers of a real unit are not those of other rings.
         head = self.returns.head.replaced(elevations_deg=())
@@ -413,7 +453,7 @@ class _TimedSheet(LidarSheet):
 
     num_lines: int = Field(default=1, ge=1, le=MOST_RINGS)
     points_per_second: float = Field(gt=0.0, le=1e8)
-    period: float = Field(default=0.1, gt=0.0, le=4.0)
+    period: float = Field(default=0.1, ge=_SHORTEST, le=LONGEST_PERIOD)
 
     @field_validator("points_per_second")
     @classmethod

@@ -1,6 +1,6 @@
 """A public check of data sets, as Gymnasium has for environments."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +8,7 @@ from scipy.spatial import KDTree
 
 from cns_drake.base import FARTHEST, InputError, poses
 from cns_drake.drives import Drive
+from cns_drake.units import check_preset
 from evaluation.drives.opening import open_drive
 
 # How many scans are read, spread over the drive.
@@ -29,8 +30,12 @@ _HIGHEST_GROUND = 1.0
 # Two scans are compared if the LiDAR moved or turned by this much [m], [rad].
 _LEAST_MOVE = 1.0
 _LEAST_TURN = np.radians(5.0)
-# Number of points that are compared.
+# Number of points that are compared, at most and at least.
 _COMPARED = 1500
+_FEWEST = 100
+# Points that are so much higher than the ground's layer are not the ground's
+# [m].
+_GROUND_MARGIN = 0.5
 # Other poses are right if points then lie nearer by this factor.
 _NEARER = 0.5
 
@@ -66,6 +71,7 @@ def _faults(drive: Drive) -> Iterator[str]:
     """Yields what is wrong with a drive."""
     if not (drive.name.strip() and drive.name.isprintable()):
         yield f"name: {drive.name!r} is no name"
+    yield from _faults_of_lidar(drive)
     number = len(drive)
     if number < 2:
         yield f"scans: {number} instead of two at least"
@@ -92,6 +98,21 @@ def _faults(drive: Drive) -> Iterator[str]:
             return
     yield from _faults_of_points(clouds)
     yield from _faults_of_frames(drive, clouds)
+
+
+def _faults_of_lidar(drive: Drive) -> Iterator[str]:
+    lidars = (drive.scenario or {}).get("lidars", {})
+    if not isinstance(lidars, Mapping) or not all(
+        isinstance(one, Mapping) for one in lidars.values()
+    ):
+        yield "lidars: not a mapping of names to LiDARs"
+        return
+    preset = drive.lidar_section.get("preset")
+    if preset is not None and drive.lidar_field is None:
+        try:
+            check_preset(str(preset))
+        except ValueError as error:
+            yield f"lidars: preset: {error}"
 
 
 def _faults_of_times(stamps_ns: np.ndarray, number: int) -> Iterator[str]:
@@ -150,19 +171,38 @@ def _faults_of_points(clouds: dict[int, np.ndarray]) -> Iterator[str]:
             f"scans: half of the points lie within {median:g} m; are the"
             " coordinates in metres?"
         )
-    distances = np.hypot(points[:, 0], points[:, 1])
-    around = points[(distances > _GROUND[0]) & (distances < _GROUND[1]), 2]
-    if not len(around):
-        return
-    layers, counts = np.unique(
-        np.floor(around / _LAYER).astype(int), return_counts=True
-    )
-    height = float(layers[counts.argmax()] * _LAYER)
-    if height > _HIGHEST_GROUND:
+    height = _fullest_height(points)
+    if height is not None and height > _HIGHEST_GROUND:
         yield (
             f"scans: most points lie {height:.1f} m above the LiDAR, where no"
             " ground is; does the z axis point up?"
         )
+
+
+def _fullest_height(points: np.ndarray) -> float | None:
+    """Returns the lower end of the layer with most points (N, 3) [m].
+
+    It is the ground as a rule. None if no point is near.
+    """
+    distances = np.hypot(points[:, 0], points[:, 1])
+    around = points[(distances > _GROUND[0]) & (distances < _GROUND[1]), 2]
+    if not len(around):
+        return None
+    layers, counts = np.unique(
+        np.floor(around / _LAYER).astype(int), return_counts=True
+    )
+    return float(layers[counts.argmax()] * _LAYER)
+
+
+def _above_ground(points: np.ndarray) -> np.ndarray:
+    """Returns the points (N, 3) that lie above the ground.
+
+    Rings on a flat ground move with the LiDAR, and so say nothing of poses.
+    """
+    height = _fullest_height(points)
+    if height is None:
+        return points
+    return points[points[:, 2] > height + _LAYER + _GROUND_MARGIN]
 
 
 def _faults_of_frames(
@@ -173,14 +213,15 @@ def _faults_of_frames(
     rng = np.random.default_rng(0)
     for frame, cloud in clouds.items():
         other = _moved_frame(drive.X_WS, frame)
-        if other is None or not len(cloud):
+        if other is None:
             continue
         scan = drive.scan(other)
-        if not len(scan):
-            continue
-        beside = np.stack(
-            [scan[axis].astype(np.float64) for axis in "xyz"], axis=1
+        beside = _above_ground(
+            np.stack([scan[axis].astype(np.float64) for axis in "xyz"], axis=1)
         )
+        cloud = _above_ground(cloud)
+        if min(len(beside), len(cloud)) < _FEWEST:
+            continue
         some = beside[rng.permutation(len(beside))[:_COMPARED]]
         tree = KDTree(cloud)
         X = poses.inverse(drive.X_WS[frame]) @ drive.X_WS[other]

@@ -4,6 +4,7 @@ import abc
 from collections.abc import Sequence
 import contextlib
 from pathlib import Path
+import re
 from typing import ClassVar, Generic, Literal, TypeVar
 
 import numpy as np
@@ -302,6 +303,61 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         than one by one.
         """
         return [self.relative_pose(query, database, place) for place in places]
+
+
+def check_class(method: type[Method]) -> None:
+    """Checks the attributes of a method's class, see `Method`.
+
+    Raises:
+        InputError: an attribute is impossible. The error begins with its name.
+    """
+    for name, least in (
+        ("scans_per_place", 1),
+        ("batch_size", 1),
+        ("rerank_best", 0),
+    ):
+        value = getattr(method, name)
+        if not isinstance(value, int) or value < least:
+            raise InputError(
+                f"{name}: {value!r} is no whole number from {least}"
+            )
+    if method.divides and method.rerank_best:
+        raise InputError(
+            "divides: a database that is searched part by part keeps no clouds"
+            " for rerank_best; set one of the two"
+        )
+    for name in ("title", "source"):
+        value = getattr(method, name)
+        if not (isinstance(value, str) and value.isprintable()):
+            raise InputError(f"{name}: {value!r} is no text of one line")
+    fields = method.point_fields
+    if not (
+        isinstance(fields, tuple | list)
+        and all(isinstance(field, str) and field for field in fields)
+        and len({*"xyz", *fields}) == 3 + len(fields)
+    ):
+        raise InputError(
+            f"point_fields: {fields!r} is no tuple of names besides x, y and z"
+        )
+    if method.style is not None and not _is_style(method.style):
+        raise InputError(
+            f"style: {method.style!r} is not a colour #RRGGBB, a line style and"
+            " a marker"
+        )
+
+
+def _is_style(style: object) -> bool:
+    # Slow to import.
+    from matplotlib.lines import Line2D
+
+    return (
+        isinstance(style, tuple)
+        and len(style) == 3
+        and all(isinstance(one, str) for one in style)
+        and re.fullmatch("#[0-9A-Fa-f]{6}", style[0]) is not None
+        and style[1] in Line2D.lineStyles
+        and style[2] in Line2D.markers
+    )
 
 
 def check_number(

@@ -3,14 +3,14 @@
 from collections.abc import Callable, Mapping, Sequence
 import dataclasses
 import pickle
-import re
 from typing import Any
 
 import numpy as np
 
-from cns_drake.base import InputError, read_only
+from cns_drake.base import InputError, errors_at, read_only
 from evaluation.methods.method import (
     Method,
+    check_class,
     check_number,
     checked_pose,
     checked_scores,
@@ -65,10 +65,11 @@ class _Check:
     def __init__(self, method: Method):
         self._method = method
         self._name = getattr(type(method), "name", "")
-        self._clouds = [self._cloud(seed) for seed in range(_NUM_PLACES)]
+        self._clouds: list[np.ndarray] = []
 
     def run(self) -> None:
         self._check_attributes()
+        self._clouds = [self._cloud(seed) for seed in range(_NUM_PLACES)]
         places, queries = self._described()
         database = self._call("build_database", places)
         places_again, queries_again = self._described()
@@ -110,7 +111,8 @@ class _Check:
             return call(*arguments, **options)
         except InputError:
             raise
-        except Exception as error:
+        # A SystemExit would end the program of the caller.
+        except (Exception, SystemExit) as error:
             advice = ""
             if "read-only" in str(error):
                 advice = " (a cloud is shared: change a copy of it)"
@@ -122,31 +124,10 @@ class _Check:
         method = self._method
         if not (isinstance(self._name, str) and self._name.strip()):
             raise self._fault("name: missing; use the decorator register")
-        for name, least in (
-            ("scans_per_place", 1),
-            ("batch_size", 1),
-            ("rerank_best", 0),
-        ):
-            value = getattr(method, name)
-            if not isinstance(value, int) or value < least:
-                raise self._fault(
-                    f"{name}: {value!r} is no whole number from {least} on"
-                )
-        style = method.style
-        if style is not None and not (
-            isinstance(style, tuple)
-            and len(style) == 3
-            and all(isinstance(one, str) for one in style)
-            and re.fullmatch("#[0-9A-Fa-f]{6}", style[0])
-        ):
-            raise self._fault(
-                f"style: {style!r} is not a colour #RRGGBB, a line style and a"
-                " marker"
-            )
+        with errors_at(self._name):
+            check_class(type(method))
         if not isinstance(method.config, method.Config):
             raise self._fault("config: no object of the class Config")
-        if method.divides and method.rerank_best:
-            raise self._fault("divides: not with rerank_best")
 
     def _cloud(self, seed: int, number: int | None = None) -> np.ndarray:
         """Returns a cloud, as a method gets it.

@@ -24,8 +24,8 @@ import traceback
 from types import ModuleType
 from typing import Any
 
-from cns_drake.base import InputError
-from evaluation.methods.method import Method, MethodConfig
+from cns_drake.base import InputError, errors_at
+from evaluation.methods.method import Method, MethodConfig, check_class
 
 # Functions of the interface that a method's author may have written.
 _WRITTEN_BY_USERS = (
@@ -103,17 +103,8 @@ def _registered_method(module: ModuleType, path: Path) -> type[Method]:
         raise InputError(
             f"{path}: {method.__name__}: Config: {kind!r} is no MethodConfig"
         )
-    scans = method.scans_per_place
-    if not isinstance(scans, int) or scans < 1:
-        raise InputError(
-            f"{path}: {method.__name__}: scans_per_place: {scans!r} is not a"
-            " positive whole number"
-        )
-    if method.divides and method.rerank_best:
-        raise InputError(
-            f"{path}: {method.__name__}: divides: a database that is searched "
-            "part by part keeps no clouds for rerank_best; set one of the two"
-        )
+    with errors_at(f"{path}: {method.__name__}"):
+        check_class(method)
     return method
 
 

@@ -95,8 +95,8 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
     """Returns a decorator that registers a Method under a name.
 
     Raises:
-        ValueError: if another method has that name, or the name is empty or has
-            unprintable characters.
+        ValueError: if another method has that name, or the name is empty, has
+            unprintable characters, or begins or ends with a space.
 
     Example:
         from evaluation import Method, register
@@ -106,7 +106,8 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
             ...
     """
 
-    if not (name.isprintable() and name.strip()):
+    # Cells of tables are read without the spaces around them.
+    if not (name.isprintable() and name and name == name.strip()):
         raise ValueError(f"{name!r} is no name of a method")
 
     def enter(method: _MethodClass) -> _MethodClass:

@@ -74,11 +74,13 @@ def _read_whole(cell: str) -> int:
 
 def _read_seed(cell: str) -> int:
     """Returns a whole number of any length."""
+    if cell.isascii() and cell.isdigit():
+        return int(cell)
     # Programs with NaN for empty cells write whole numbers with a point.
     is_number = _NUMBER.fullmatch(cell) and math.isfinite(float(cell))
     if not is_number or not float(cell) >= 0 or float(cell) % 1:
         raise ValueError(f"{cell!r} is no whole number from 0 to {_LARGEST}")
-    return int(cell) if cell.isdigit() else int(float(cell))
+    return int(float(cell))
 
 
 def _read_truth(cell: str) -> bool:

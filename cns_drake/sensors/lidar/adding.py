@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 import warnings
 
@@ -49,7 +50,7 @@ def add_lidar(
     scene_graph: SceneGraph,
     body: RigidBody | Frame | FrameId,
     X_PB: RigidTransform,
-    pattern: BeamPattern | str,
+    pattern: BeamPattern | str | Path,
     *,
     name: str = "lidar",
     unseen: Collection[RigidBody | Frame | FrameId | GeometryId] | None = None,
@@ -154,7 +155,7 @@ def add_lidar(
     check_new_sensor(builder, name, parts=(_DRAW,))
     if not isinstance(body, FrameId):
         body, X_PB = body_and_pose(body, X_PB)
-    unit = pattern if isinstance(pattern, str) else None
+    unit = pattern if isinstance(pattern, str | Path) else None
     if unit is not None:
         pattern = make_beam_pattern(unit)
     if not isinstance(pattern, BeamPattern):
@@ -361,7 +362,10 @@ def connect_lidar(
 
 
 def _returns_model(
-    returns: CalibratedReturns | str, unit: str | None, seed: int, name: str
+    returns: CalibratedReturns | str,
+    unit: str | Path | None,
+    seed: int,
+    name: str,
 ) -> CalibratedReturns | None:
     """Returns the model of calibrated returns, None for ideal returns.
 

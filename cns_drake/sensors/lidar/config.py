@@ -128,7 +128,7 @@ class LidarDescription:
 def _find_unit(given: Any) -> Any:
     """Returns the data sheet in a file, or with the given fields."""
     try:
-        if isinstance(given, str):
+        if isinstance(given, str | Path):
             return read_sheet(Path(given))
         if isinstance(given, Mapping):
             return make_sheet(given, "its data sheet")
@@ -250,16 +250,7 @@ class LidarSection(LidarDescription, Mount):
             raise ValueError(
                 f"min_range {nearest:g} is not below max_range {farthest:g}"
             )
-        pattern = make_pattern(self)
-        if isinstance(pattern, SpinningPattern):
-            number = pattern.num_beams
-        else:
-            number = pattern.num_firings * pattern.num_lines
-        if number > MOST_BEAMS:
-            raise ValueError(
-                f"{number} beams in a revolution, more than {MOST_BEAMS}; "
-                "give fewer rings or columns, or a higher rate"
-            )
+        make_pattern(self)
         return self
 
     @property
@@ -271,7 +262,7 @@ class LidarSection(LidarDescription, Mount):
             sheet = LIDAR_PRESETS[self.preset]
         return sheet if self.rings is None else sheet.with_rings(self.rings)
 
-    def with_lidar(self, unit: str) -> "LidarSection":
+    def with_lidar(self, unit: str | Path) -> "LidarSection":
         """Returns this description of a LiDAR, with another model.
 
         The data sheet, the numbers of rings and columns, and the range limits
@@ -290,7 +281,7 @@ class LidarSection(LidarDescription, Mount):
         return self.replaced(**{name: getattr(new, name) for name in names})
 
 
-def make_lidar_config(unit: str) -> LidarSection:
+def make_lidar_config(unit: str | Path) -> LidarSection:
     """Returns the description of a LiDAR of a given model.
 
     All other fields have their defaults.
@@ -316,6 +307,10 @@ def make_pattern(
     Args:
         config: description of the LiDAR.
         period: duration of a revolution [s]; by default 1 / `config.rate`.
+
+    Raises:
+        ValueError: a revolution takes too long or has too many beams, or the
+            LiDAR has no columns to choose.
     """
     pattern = make_beam_pattern(
         config.sheet,
@@ -324,6 +319,15 @@ def make_pattern(
         min_range=config.min_range,
         max_range=config.max_range,
     )
+    if isinstance(pattern, SpinningPattern):
+        number = pattern.num_beams
+    else:
+        number = pattern.num_firings * pattern.num_lines
+    if number > MOST_BEAMS:
+        raise ValueError(
+            f"{number} beams in a revolution, more than {MOST_BEAMS}; "
+            "give fewer rings or columns, or a higher rate"
+        )
     if config.returns == "ideal":
         return pattern
     return aimed(pattern, config.sheet.returns)

@@ -16,6 +16,7 @@ from cns_drake.sensors.lidar.patterns import (
     SpinningPattern,
 )
 from cns_drake.units import (
+    LONGEST_PERIOD,
     LidarSheet,
     NoddingSheet,
     ReturnsSheet,
@@ -62,6 +63,10 @@ def make_beam_pattern(
         patterns = [make_beam_pattern(name, 0.1) for name in LIDAR_PRESETS]
     """
     sheet = unit if isinstance(unit, LidarSheet) else find_sheet(unit)
+    if period is not None and not 0.0 < period <= LONGEST_PERIOD:
+        raise ValueError(
+            f"period: {period:g} s is not above 0 and up to {LONGEST_PERIOD:g}"
+        )
     if isinstance(sheet, SpinningSheet):
         if sheet.fires_steadily and period and not num_columns:
             num_columns = max(round(sheet.columns * period / sheet.period), 1)

@@ -1,5 +1,7 @@
 """Beam patterns: fields of view, rates, and exact ranges."""
 
+import dataclasses
+
 from helpers.closed_forms import box
 from helpers.lidar_stage import Stage, positions
 import numpy as np
@@ -316,7 +318,7 @@ def test_the_latest_time_that_a_point_can_have():
     assert SpinningPattern((0.0,), 10, 0.1, 9.0, 4.77).beams(0).t_ns[-1] > 4e9
     for pattern in (
         SpinningPattern((0.0,), 10, 0.1, 9.0, 4.78),
-        make_beam_pattern("mid-360", 4.4),
+        dataclasses.replace(make_beam_pattern("mid-360"), period=4.4),
     ):
         with pytest.raises(ValueError, match="a firing time"):
             pattern.beams(0)

@@ -363,7 +363,8 @@ def test_buses_by_name():
     ("change", "fault"),
     [
         ({"preset": "vlp16"}, "roof: preset: unknown preset 'vlp16'"),
-        ({"rate": 0}, "roof: rate: 0 is not above 0"),
+        ({"rate": 0}, "roof: rate: 0 is not at least 0.25"),
+        ({"rate": 0.001}, "roof: rate: 0.001 is not at least 0.25"),
         ({"rate": -7}, "roof: rate: "),
         ({"rate": 1000.1}, "roof: rate: "),
         ({"rate": np.nan}, "roof: rate: "),

@@ -46,6 +46,7 @@ FAULTS = [
     ({"rings_deg": [[10.0, -10.0]]}, r"rings_deg.0.2: Field required"),
     ({"rings_deg": [[float("nan"), -10.0, 8]]}, r"rings_deg.0.0: "),
     ({"rings_deg": ["low"]}, r"rings_deg.0: "),
+    ({"rings_deg": [[10.0, -10.0, 1]]}, "rings_deg: one ring cannot be at 10"),
     ({"rings_deg": 32}, "rings_deg: "),
     ({"rings_deg": True}, "rings_deg: "),
     (
@@ -74,6 +75,8 @@ FAULTS = [
     ({"azimuths_deg": [-200.0, 200.0]}, "azimuths_deg: "),
     ({"period": 0.0}, "period: "),
     ({"period": float("nan")}, "period: "),
+    ({"period": 1e-310, "fires_steadily": True}, "period: "),
+    ({"period": 4.1}, "period: "),
     ({"colums": 3}, "colums: Extra .* did you mean columns"),
     ({"source": ""}, "source: "),
     ({"source": 3}, "source: "),
@@ -85,6 +88,20 @@ FAULTS = [
     (
         {"returns": {"rows": [[0.8, 9, 0.9], [0.1, 9, 0.9]]}},
         "returns.rows: two",
+    ),
+    (
+        {"returns": {"rows": [[0.1, 60, 0.9], [0.8, 20, 0.9]]}},
+        "returns.rows: a target of 0.1 cannot",
+    ),
+    ({"returns": {"rows": [[1e-320, 60, 0.9]]}}, r"returns.rows.0.*: "),
+    ({"returns": {"rows": [[0.8, 1e-200, 0.9]]}}, r"returns.rows.0.*: "),
+    (
+        {"returns": {"head": {"blocks": [[0.0, 0.1, 1], [5.0, 0.0, 1]]}}},
+        "returns.head.blocks: elevations ascend",
+    ),
+    (
+        {"returns": {"head": {"elevations_deg": [10.0, 0.0, -10.0]}}},
+        ".*returns.head.elevations_deg: 3 elevations of 48 rings",
     ),
     ({"returns": {"range_noise": -1.0}}, "returns.range_noise: "),
     ({"returns": {"noise": 1.0}}, "returns.noise: Extra"),
@@ -144,6 +161,22 @@ def test_other_texts_are_no_sheets(tmp_path, text, fault):
         read_sheet(path)
     with pytest.raises(InputError, match=r"nowhere.yaml: No such file"):
         find_sheet("nowhere.yaml")
+
+
+@pytest.mark.parametrize("rings", [[3.0], [[3.0, 3.0, 2]]])
+def test_a_level_lidar_has_no_other_rings(tmp_path, rings):
+    """They would all be at one elevation."""
+    sheet = read_sheet(write(tmp_path / "u.yaml", {**GOOD, "rings_deg": rings}))
+    with pytest.raises(ValueError, match=r"rings: all .* are at 3 deg"):
+        sheet.with_rings(8)
+
+
+@pytest.mark.parametrize("period", [0.0, -1.0, 1e9, float("inf")])
+def test_periods_are_bounded(tmp_path, period):
+    """A revolution of a steady LiDAR has as many columns as it takes time."""
+    for name in ("vlp-16", write(tmp_path / "rosette.yaml", ROSETTE)):
+        with pytest.raises(ValueError, match=r"^period: "):
+            make_beam_pattern(name, period)
 
 
 def test_a_small_file_stays_cheap(tmp_path):

@@ -174,6 +174,29 @@ def test_poses_that_hang_down(tmp_path):
         check_data_set(folder)
 
 
+@pytest.mark.parametrize(
+    ("lidars", "fault"),
+    [
+        ("[vlp-16]", "lidars: not a mapping"),
+        ("{roof: vlp-16}", "lidars: not a mapping"),
+        ("{roof: {preset: vlp16}}", "lidars: preset: .* did you mean vlp-16"),
+        ("{roof: {unit: 16}}", "lidars: unit: not a mapping"),
+        ("{roof: {unit: {columns: 16}}}", "lidars: unit: ranges: "),
+        ("{roof: {unit: none.yaml}}", "lidars: .*none.yaml: No such file"),
+        ("{roof: {unit: a.yaml, preset: cns}}", "lidars: unit: give either"),
+    ],
+)
+def test_a_lidar_that_cannot_be(tmp_path, lidars, fault):
+    folder = tmp_path / "00"
+    kitti(folder, SCANS)
+    (folder / "scenario.yaml").write_text("lidars: {roof: {preset: vlp-16}}")
+    check_data_set(folder)
+    (folder / "scenario.yaml").write_text(f"lidars: {lidars}")
+    with pytest.raises(InputError, match=fault) as raised:
+        check_data_set(folder)
+    assert "\n" not in str(raised.value)
+
+
 def test_what_is_no_drive(tmp_path):
     with pytest.raises(InputError, match="not a recorded drive"):
         check_data_set(tmp_path)

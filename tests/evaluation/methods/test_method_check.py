@@ -1,5 +1,7 @@
 """The public check of methods, on the shipped methods and on broken ones."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from evaluation.methods import (
     find_method,
     make_method,
     method_facts,
+    register,
     shipped_methods,
 )
 
@@ -147,7 +150,7 @@ FAULTS = {
         ]
     },
     "divides: the scores in parts": {"divides": True, "score": of_whole},
-    "divides: not with rerank": {"divides": True, "rerank_best": 2},
+    "divides: a database that is searched": {"divides": True, "rerank_best": 2},
     "rerank returned": {
         "rerank_best": 2,
         "rerank": lambda self, query, places, scores: scores[:1],
@@ -155,6 +158,12 @@ FAULTS = {
     "scans_per_place: 0": {"scans_per_place": 0},
     "batch_size: 1.5": {"batch_size": 1.5},
     "style: 'red'": {"style": "red"},
+    "style: .*'wavy'": {"style": ("#FF0000", "wavy", "o")},
+    "style: .*'sun'": {"style": ("#FF0000", "-", "sun")},
+    "title: 7": {"title": 7},
+    "point_fields: 'intensity'": {"point_fields": "intensity"},
+    "point_fields: .*'x'": {"point_fields": ("x",)},
+    "describe_place raised SystemExit": {"describe": lambda *_: sys.exit()},
     "name: missing": {"name": ""},
 }
 
@@ -164,6 +173,12 @@ def test_a_broken_method_is_refused_in_one_line(fault):
     with pytest.raises(InputError, match=fault) as raised:
         check_method(replaced(**FAULTS[fault]))
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("name", ["", " ", " heights", "heights ", "a\nb"])
+def test_names_that_tables_do_not_keep(name):
+    with pytest.raises(ValueError, match="is no name of a method"):
+        register(name)
 
 
 def test_what_is_no_method():

@@ -132,6 +132,13 @@ def test_programs_with_floats_for_whole_numbers(tmp_path):
     assert (row.n, row.seed, row.gate) == (80, 1, True)
 
 
+@pytest.mark.parametrize("seed", [2**64, 10**400])
+def test_seeds_of_any_length(tmp_path, seed):
+    line = replaced(LINE, HEADER, "seed", str(seed))
+    (row,) = Results.read(write(tmp_path / "r.csv", HEADER, line)).rows
+    assert row.seed == seed
+
+
 @pytest.mark.parametrize(
     ("column", "cell", "words"),
     [

@@ -93,17 +93,15 @@ def test_bends_are_driven_down_to_the_limit_of_steering(tmp_path):
     angle = np.linspace(0, 3 * np.pi, 300)
     refused, driven_ = [], []
     for radius in np.arange(4.2, 4.5, 0.02):
-        circle = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        circle = np.column_stack(
+            [radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle]
+        )
         np.savetxt(tmp_path / "d.csv", circle, delimiter=",")
         (tmp_path / "d.yaml").write_text(
             "{world: d.sdf, waypoints: d.csv, speeds: {cruise: 3}}"
         )
         (tmp_path / "d.sdf").write_text("<sdf version='1.9'/>")
-        path = load_waypoint_path(
-            tmp_path / "d.csv",
-            POINT_SPACING,
-            ground=lambda xy: np.zeros(len(xy)),
-        )
+        path = load_waypoint_path(tmp_path / "d.csv", POINT_SPACING)
         _, curvature = driven(Trajectory(path, Speeds()))
         tightest = 1 / np.abs(curvature).max()
         fault = None

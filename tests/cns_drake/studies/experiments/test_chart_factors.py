@@ -30,8 +30,8 @@ def test_a_chart_is_over_a_factor_or_a_column(read, name):
         "{kind: lines, over: years, metric: auc}",
         "{kind: lines, over: solid.ranges, metric: auc}",
         "{kind: matrix, over: cause, strips: snow, metric: kept}",
-        "{kind: scatter, x: yaers, y: auc}",
-        "{kind: lines, over: level, metric: auc, query.yaers: 0}",
+        "{kind: scatter, x: yeers, y: auc}",
+        "{kind: lines, over: level, metric: auc, query.yeers: 0}",
     ],
 )
 def test_other_names_are_refused_with_all_factors(read, chart):

@@ -127,7 +127,11 @@ class Own(Method):
         ("return np.array(places)", "places.x", "line 13: AttributeError"),
         ("import numpy", "raise SystemExit(0)\nimport numpy", "line 2: System"),
         ("    def score", "    def scare", "Own: lacks score"),
-        ("    def desc", "    scans_per_place = 0\n    def desc", "0 is not a"),
+        (
+            "    def desc",
+            "    scans_per_place = 0\n    def desc",
+            "0 is no whole",
+        ),
         (
             "    def desc",
             "    divides = True\n    rerank_best = 5\n    def desc",

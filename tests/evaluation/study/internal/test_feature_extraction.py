@@ -194,9 +194,14 @@ def test_a_recording_is_identified_by_its_files(tmp_path):
     drive(folder, "01", "a")
     first = RecordingSource(folder).identity()
     assert RecordingSource(folder).identity() == first
-    link = tmp_path / "link"
+    # Also by a link, under whose name it is in tables.
+    (tmp_path / "links").mkdir()
+    link = tmp_path / "links/metropolis_01"
     link.symlink_to(folder)
     assert RecordingSource(link).identity() == first
+    other = tmp_path / "other_name"
+    other.symlink_to(folder)
+    assert RecordingSource(other).identity() != first
     (path,) = folder.glob("*.mcap")
     content = path.read_bytes()
     path.unlink()
