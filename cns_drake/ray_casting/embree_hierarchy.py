@@ -612,6 +612,7 @@ def _cast_packets(
     lanes = scenes.lanes
     packet, valid = _new_packet(lanes)
     packet_id = packet.view(np.uint32)
+    along_normal = np.empty(lanes, np.float32)
     # The error of a hit grows with the coordinates from which it follows.
     size = np.float32(np.abs(rays.p_OSset).max())
     # The last geometry that was hit, and the misses since.
@@ -654,6 +655,13 @@ def _cast_packets(
                     packet.ctypes.data,
                     scenes.arguments,
                 )
+        # In lanes, because the compiler makes few instructions of it.
+        for lane in range(lanes):
+            along_normal[lane] = abs(
+                packet[4, lane] * packet[12, lane]
+                + packet[5, lane] * packet[13, lane]
+                + packet[6, lane] * packet[14, lane]
+            )
         for lane in range(count):
             ray = begin + lane
             hit = packet_id[18, lane]
@@ -679,24 +687,38 @@ def _cast_packets(
             # The error along the ray, on a triangle that may be slender and
             # seen along its plane.
             error = (size + packet[8, lane]) * scenes.primitives[primitive].span
-            towards = np.float32(0.0)
             if row == 0:
-                for axis in range(3):
-                    towards += packet[4 + axis, lane] * packet[12 + axis, lane]
-                towards = abs(towards)
+                towards = along_normal[lane]
             elif error > 0.0:
-                length = np.float32(0.0)
-                for axis in range(3):
-                    length += abs(packet[12 + axis, lane])
-                    for other in range(3):
-                        towards += (
-                            packet[12 + axis, lane]
-                            * packet[4 + other, lane]
-                            * scenes.places.X_OLs[group, other, axis]
-                        )
-                towards = abs(towards) - scenes.places.turns[group] * length
+                towards = _along_moved_normal(
+                    scenes.places, group, packet, lane
+                )
+            else:
+                continue
             if error > _SURE * towards:
                 hits.doubt[ray] = primitive
+
+
+@compiled
+def _along_moved_normal(
+    places: _Places, group: int, packet: np.ndarray, lane: int
+) -> np.float32:
+    """Returns a lower limit of how far a ray's direction points to the surface.
+
+    That is the size of the product of the direction and the normal, wherever
+    the group is during the revolution.
+    """
+    X_OL = places.X_OLs[group]
+    towards = length = np.float32(0.0)
+    for axis in range(3):
+        length += abs(packet[12 + axis, lane])
+        for other in range(3):
+            towards += (
+                packet[12 + axis, lane]
+                * packet[4 + other, lane]
+                * X_OL[other, axis]
+            )
+    return np.float32(abs(towards) - places.turns[group] * length)
 
 
 @compiled
