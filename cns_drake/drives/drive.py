@@ -199,15 +199,17 @@ class Drive(abc.ABC):
         """Settings of the drive's LiDAR; empty if no scenario contains them.
 
         A scenario may have several LiDARs. If the name of the drive ends in
-        `_<lidar>`, the settings of that LiDAR are returned, otherwise the
+        `_<lidar>`, by the longest such name, the settings of that LiDAR are returned, otherwise the
         settings of the first LiDAR.
         """
         lidars = (self.scenario or {}).get("lidars")
         if not isinstance(lidars, dict) or not lidars:
             return {}
-        name = next(
+        # The name of a LiDAR can be the end of another's.
+        name = max(
             (name for name in lidars if self.name.endswith(f"_{name}")),
-            next(iter(lidars)),
+            key=len,
+            default=next(iter(lidars)),
         )
         return lidars[name] if isinstance(lidars[name], dict) else {}
 

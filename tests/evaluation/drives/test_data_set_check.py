@@ -202,3 +202,16 @@ def test_what_is_no_drive(tmp_path):
         check_data_set(tmp_path)
     with pytest.raises(InputError, match="no such file"):
         check_data_set(tmp_path / "nowhere")
+
+
+def test_the_lidar_whose_name_is_the_longest_end(tmp_path):
+    """A drive `town_roof_b` is of the LiDAR `roof_b`, not of `b`."""
+    folder = tmp_path / "00"
+    kitti(folder, SCANS)
+    (folder / "scenario.yaml").write_text(
+        "name: town_roof_b\n"
+        "lidars: {b: {preset: cns}, roof_b: {preset: vlp-16}, roof: {}}"
+    )
+    drive = open_drive(folder)
+    assert drive.lidar_section == {"preset": "vlp-16"}
+    assert drive.lidar_field == (16, -15.0, 15.0)
