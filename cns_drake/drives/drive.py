@@ -199,8 +199,8 @@ class Drive(abc.ABC):
         """Settings of the drive's LiDAR; empty if no scenario contains them.
 
         A scenario may have several LiDARs. If the name of the drive ends in
-        `_<lidar>`, by the longest such name, the settings of that LiDAR are returned, otherwise the
-        settings of the first LiDAR.
+        `_<lidar>`, by the longest such name, the settings of that LiDAR are
+        returned, otherwise the settings of the first LiDAR.
         """
         lidars = (self.scenario or {}).get("lidars")
         if not isinstance(lidars, dict) or not lidars:
