@@ -166,7 +166,19 @@ class SeenGeometry:
 
         Args:
             moving: instance ids of the structures that are moving.
+
+        Raises:
+            ValueError: a number is no instance id.
         """
+        moving = np.asarray(moving)
+        if len(moving) and not (
+            moving.dtype.kind in "iu"
+            and 0 <= moving.min() <= moving.max() <= MAX_INSTANCE
+        ):
+            raise ValueError(
+                f"moving_instances: {moving.tolist()} are no instance ids,"
+                f" whole numbers from 0 to {MAX_INSTANCE}"
+            )
         moves = np.zeros(MAX_INSTANCE + 1, bool)
         moves[moving] = True
         return np.where(moves[self.instance], self.moving_label, self.label)

@@ -129,3 +129,17 @@ def test_labels_change_without_another_measurement():
     made.context.SetTime(1.0)
     assert (made.eval()["x"] != scans[0]["x"]).any()
     assert CountedMeasurement.calls == 2
+
+
+@pytest.mark.parametrize("moving", [[-1], [65_536], [1.0]])
+def test_only_instance_ids_can_move(moving):
+    made, arguments = stage()
+    made.finish(**arguments, X_PS=RigidTransform())
+    port = made.lidar.GetInputPort("moving_instances")
+    context = made.lidar.GetMyMutableContextFromRoot(made.context)
+    for valid in ([0], [65_535], []):
+        port.FixValue(context, Value(np.array(valid, int)))
+        made.eval()
+    port.FixValue(context, Value(np.array(moving)))
+    with pytest.raises(ValueError, match=r"moving_instances: \[.*no instance"):
+        made.eval()
