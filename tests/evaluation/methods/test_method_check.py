@@ -44,6 +44,7 @@ def test_shipped_methods_pass(name):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_methods_that_need_weights_pass(tmp_path):
     """With random weights, the networks keep the interface, too."""
     rng = np.random.default_rng(5)
