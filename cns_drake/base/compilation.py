@@ -1,6 +1,6 @@
 """Compilation of the few loops that NumPy cannot express."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 import contextlib
 import fcntl
 import functools
@@ -38,26 +38,22 @@ def compiled(function: _Function) -> _Function:
     assigned to a slice of another, numba also compiles an error message about
     shapes, which takes seconds.
     """
-    # Numba reads this setting while it decorates, and only from here.
-    before = numba.config.CACHE_LOCATOR_CLASSES
-    numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.{_ByContent.__name__}"
     # No C code calls these functions.
     options = {"nogil": True, "no_cfunc_wrapper": True}
     try:
-        dispatcher = numba.njit(cache=True, **options)(function)
-        lock = f"{function.__module__}.{function.__qualname__}.lock"
-        dispatcher.compile = _compiling_once(
-            dispatcher.compile,
-            function.__name__,
-            Path(dispatcher.stats.cache_path) / lock,
-        )
-        return dispatcher
+        with _cached_by_content():
+            dispatcher = numba.njit(cache=True, **options)(function)
     except RuntimeError:
         # Numba raises this error if no locator finds a cache folder: here, if
         # `_ByContent.from_function` returns None.
         return numba.njit(**options)(function)
-    finally:
-        numba.config.CACHE_LOCATOR_CLASSES = before
+    lock = f"{function.__module__}.{function.__qualname__}.lock"
+    dispatcher.compile = _compiling_once(
+        dispatcher.compile,
+        function.__name__,
+        Path(dispatcher.stats.cache_path) / lock,
+    )
+    return dispatcher
 
 
 @functools.cache
@@ -68,23 +64,32 @@ def compiled_callback(function: Callable) -> int:
     It may call compiled functions. Its machine code is kept as that of
     `compiled`.
     """
-    before = numba.config.CACHE_LOCATOR_CLASSES
-    numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.{_ByContent.__name__}"
     signature = numba.void(numba.types.CPointer(numba.int64))
     options = {"nopython": True}
     with interlude(f"compiling {function.__name__}"), uninterrupted():
         try:
-            made = numba.cfunc(signature, cache=True, **options)(function)
+            with _cached_by_content():
+                made = numba.cfunc(signature, cache=True, **options)(function)
         except RuntimeError:  # See `compiled`.
             made = numba.cfunc(signature, **options)(function)
-        finally:
-            numba.config.CACHE_LOCATOR_CLASSES = before
     _CALLBACKS.append(made)
     return int(made.address)
 
 
 # The machine code lives as long as these.
 _CALLBACKS: list[object] = []
+
+
+@contextlib.contextmanager
+def _cached_by_content() -> Iterator[None]:
+    """Makes `_ByContent` find the folders of functions that are decorated."""
+    # Numba reads this setting while it decorates, and only from here.
+    before = numba.config.CACHE_LOCATOR_CLASSES
+    numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.{_ByContent.__name__}"
+    try:
+        yield
+    finally:
+        numba.config.CACHE_LOCATOR_CLASSES = before
 
 
 class _ByContent:

@@ -203,10 +203,12 @@ def list_geometry(inspector: SceneGraphInspector, role: Role) -> GeometryList:
             RigidTransform(inspector.GetPoseInFrame(geometry_id)),
             inspector.GetShape(geometry_id).Clone(),
             inspector.IsDeformableGeometry(geometry_id),
-            *_appearance(inspector, geometry_id, role),
+            *_appearance(properties),
         )
         for geometry_id in inspector.GetAllGeometryIds(role)
-        if not _is_hidden(inspector.GetProperties(geometry_id, role))
+        if not _is_hidden(
+            properties := inspector.GetProperties(geometry_id, role)
+        )
     )
 
 
@@ -218,10 +220,9 @@ def _is_hidden(properties: GeometryProperties) -> bool:
 
 
 def _appearance(
-    inspector: SceneGraphInspector, geometry_id: GeometryId, role: Role
+    properties: GeometryProperties,
 ) -> tuple[tuple[float, float, float] | None, float | None]:
     """Returns colour and reflectivity, each None if the model has none."""
-    properties = inspector.GetProperties(geometry_id, role)
     rgb = reflectivity = None
     if properties.HasProperty("lidar", "reflectivity"):
         reflectivity = float(properties.GetProperty("lidar", "reflectivity"))

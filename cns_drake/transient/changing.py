@@ -9,7 +9,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base import family_members
 from cns_drake.scenarios import TransientConfig
 from cns_drake.scene import World
-from cns_drake.transient.effect import Effect, Step
+from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.scene_editing import SceneEditing
 from cns_drake.transient.structure_geometry import geometry_by_structure
 from cns_drake.transient.surroundings import Surroundings
@@ -42,7 +42,7 @@ def change_world(
         if getattr(config, effect.field)
         != TransientConfig.model_fields[effect.field].default
     ]
-    for step, some in itertools.groupby(wanted, key=lambda one: one.step):
+    for phase, some in itertools.groupby(wanted, key=lambda one: one.phase):
         around = Surroundings(
             SceneEditing(world),
             geometry_by_structure(world),
@@ -51,7 +51,7 @@ def change_world(
             config.seed,
             bare,
         )
-        if step == Step.OBJECTS:
+        if phase == Phase.OBJECTS:
             bare = around
         for effect in some:
             effect.apply(around, getattr(config, effect.field))
@@ -64,4 +64,4 @@ def effects() -> tuple[Effect, ...]:
     """Returns all effects, in the order in which they are applied."""
     modules = family_members(str(__package__), "EFFECT = ")
     found = (importlib.import_module(m).EFFECT for m in modules.values())
-    return tuple(sorted(found, key=lambda one: (one.step, one.order)))
+    return tuple(sorted(found, key=lambda one: (one.phase, one.order)))

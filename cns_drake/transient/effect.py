@@ -8,8 +8,8 @@ from typing import Any
 from cns_drake.transient.surroundings import Surroundings
 
 
-class Step(enum.IntEnum):
-    """When an effect is applied: each step sees the changes of the former."""
+class Phase(enum.IntEnum):
+    """When an effect is applied: each phase sees the changes of the former."""
 
     # Objects that all other effects change like any other.
     MORE_OBJECTS = 1
@@ -32,14 +32,14 @@ class Effect:
         field: field of the scenario's section `transient`
             (`cns_drake.scenarios.TransientConfig`). With the field's default,
             the effect is off.
-        step: when the effect is applied.
+        phase: when the effect is applied.
         apply: changes the surroundings of a drive; the arguments are these
             surroundings and the value of the field.
-        order: place among the effects of its step, on which the numbers of new
+        order: place among the effects of its phase, on which the numbers of new
             structures depend.
     """
 
     field: str
-    step: Step
+    phase: Phase
     apply: Callable[[Surroundings, Any], None]
     order: int = 0

@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 
 from cns_drake.scene import GROUND_CLASSES
-from cns_drake.transient.effect import Effect, Step
+from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.surroundings import Surroundings
 
 # Cause of these changes in the structure table.
@@ -56,4 +56,4 @@ def move_furniture(around: Surroundings, share: float) -> None:
                 break
 
 
-EFFECT = Effect("furniture", Step.OBJECTS, move_furniture, order=3)
+EFFECT = Effect("furniture", Phase.OBJECTS, move_furniture, order=3)

@@ -18,7 +18,7 @@ from cns_drake.city import (
     top_of,
 )
 from cns_drake.scene import tessellate
-from cns_drake.transient.effect import Effect, Step
+from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.scene_editing import SceneEditing
 from cns_drake.transient.structure_geometry import (
     PartGeometry,
@@ -72,7 +72,7 @@ def limit_heights(around: Surroundings, limit: float) -> None:
         )
 
 
-EFFECT = Effect("height_limit", Step.SHAPES, limit_heights)
+EFFECT = Effect("height_limit", Phase.SHAPES, limit_heights)
 
 
 def _as_model(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from cns_drake.scene import TriangleSurface
-from cns_drake.transient.effect import Effect, Step
+from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.surroundings import Surroundings, change_rng
 
 # Cause of these changes in the structure table.
@@ -51,4 +51,4 @@ def thin_leaves(around: Surroundings, share: float) -> None:
         )
 
 
-EFFECT = Effect("leaves", Step.OBJECTS, thin_leaves, order=2)
+EFFECT = Effect("leaves", Phase.OBJECTS, thin_leaves, order=2)

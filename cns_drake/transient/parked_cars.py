@@ -10,7 +10,7 @@ from shapely import Polygon
 from cns_drake.base import product
 from cns_drake.city import PARKED_CARS, Model, part_triangles
 from cns_drake.scene import GROUND_CLASSES
-from cns_drake.transient.effect import Effect, Step
+from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.structure_geometry import StructureGeometry
@@ -187,7 +187,7 @@ def change_parked_cars(around: Surroundings, share: float) -> None:
             _replace_car(around, car, bay, rng)
 
 
-EFFECT = Effect("parked_cars", Step.OBJECTS, change_parked_cars, order=1)
+EFFECT = Effect("parked_cars", Phase.OBJECTS, change_parked_cars, order=1)
 
 
 def _random_move(

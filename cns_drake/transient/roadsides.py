@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base import parse_yaml
 from cns_drake.city import OBJECTS
 from cns_drake.scene import GROUND_CLASSES
-from cns_drake.transient.effect import Effect, Step
+from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.kerb_stretches import straight_kerbs
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings, change_rng
@@ -102,7 +102,7 @@ def fill_roadsides(around: Surroundings, share: float) -> None:
                 )
 
 
-EFFECT = Effect("roadsides", Step.MORE_OBJECTS, fill_roadsides)
+EFFECT = Effect("roadsides", Phase.MORE_OBJECTS, fill_roadsides)
 
 
 def _first_free(

@@ -7,7 +7,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city import OBJECTS, assemble, block, pick_key
 from cns_drake.scene import GROUND_CLASSES
-from cns_drake.transient.effect import Effect, Step
+from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.kerb_stretches import KerbStretch, straight_kerbs
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings
@@ -63,7 +63,7 @@ def put_up_works(around: Surroundings, share: float) -> None:
                 break
 
 
-EFFECT = Effect("works", Step.OBJECTS, put_up_works, order=5)
+EFFECT = Effect("works", Phase.OBJECTS, put_up_works, order=5)
 
 
 @dataclass

@@ -8,7 +8,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city import Model, Part, assemble, bar, block, post
-from cns_drake.transient.effect import Effect, Step
+from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.structure_geometry import StructureGeometry
 from cns_drake.transient.surroundings import FARTHEST, Surroundings
 
@@ -86,7 +86,7 @@ def put_up_scaffolds(around: Surroundings, share: float) -> None:
             )
 
 
-EFFECT = Effect("scaffolds", Step.OBJECTS, put_up_scaffolds, order=4)
+EFFECT = Effect("scaffolds", Phase.OBJECTS, put_up_scaffolds, order=4)
 
 
 def _front(

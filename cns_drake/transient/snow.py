@@ -8,7 +8,7 @@ import shapely
 from cns_drake.base import sin
 from cns_drake.city import from_above, quartered, turned_up, unit_normals
 from cns_drake.scene import GROUND_CLASSES
-from cns_drake.transient.effect import Effect, Step
+from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.scene_editing import SceneEditing, SurfaceLook
 from cns_drake.transient.structure_geometry import (
@@ -83,7 +83,7 @@ def lay_snow(around: Surroundings, depth: float) -> None:
         _lay_banks(around, ground, depth)
 
 
-EFFECT = Effect("snow", Step.COVER, lay_snow)
+EFFECT = Effect("snow", Phase.COVER, lay_snow)
 
 
 def _is_below_road(part: PartGeometry, ground: GroundSurface) -> bool:

@@ -20,9 +20,9 @@ from cns_drake.base import Cluster, InputError, Reporter
 from evaluation.clouds import OnNote
 from evaluation.localisation import METHODS
 from evaluation.methods import MethodConfig, run_module, shipped_methods
-from evaluation.real.data_sets import (
+from evaluation.real.excerpts import (
     RealScans,
-    open_data_sets,
+    open_excerpts,
     simulated_drives,
 )
 from evaluation.real.image_sequences import (
@@ -128,9 +128,9 @@ def measure_real(
         output.absolute(),
         on_note,
     )
-    found = open_data_sets(folder, on_note)
+    found = open_excerpts(folder, on_note)
     images = open_sequences(folder / FOLDER, on_note, queries)
-    units = dict.fromkeys(scans.data_set.unit for scans in found)
+    units = dict.fromkeys(scans.excerpt.unit for scans in found)
     if images:
         units[UNIT] = None
     made_of = {
@@ -140,7 +140,7 @@ def measure_real(
     made_images = open_images(simulated / FOLDER) if simulated else []
     _add_images(engine, images, made_of.get(UNIT, []) + made_images, choices)
     for unit, made in made_of.items():
-        sets = [scans for scans in found if scans.data_set.unit == unit]
+        sets = [scans for scans in found if scans.excerpt.unit == unit]
         if made_images and not sets:
             continue
         _add_unit(engine, sets, made, choices)
@@ -246,10 +246,10 @@ def _add_unit(
         )
         for scans in sets
     }
-    asked = [scans for scans in sets if scans.data_set.poses]
+    asked = [scans for scans in sets if scans.excerpt.poses]
     methods: tuple[MethodChoice, ...] = ()
     if asked:
-        height = asked[0].data_set.height
+        height = asked[0].excerpt.height
         methods = tuple(choice.at_height(height) for choice in choices)
         for choice, given in zip(methods, choices, strict=True):
             # The height is in the protocol's digest.
@@ -264,11 +264,11 @@ def _add_unit(
             tuple(
                 drives[id(other)]
                 for other in others
-                if (other.data_set.world == scans.data_set.world) == is_here
+                if (other.excerpt.world == scans.excerpt.world) == is_here
             )
             for is_here in (True, False)
         )
-        if scans.data_set.poses:
+        if scans.excerpt.poses:
             jobs = _RealJobs.of(methods, (*elsewhere, *made), frozenset(made))
             engine.add([_data_set_pair(scans, own, own, here)], (), jobs, tasks)
         if made and _can_be_judged(scans, engine.on_note):
@@ -285,16 +285,16 @@ def _data_set_pair(
     query: NamedDrive,
     beside: tuple[NamedDrive, ...] = (),
 ) -> Pair:
-    height = scans.data_set.height
+    height = scans.excerpt.height
     is_usual = height == MethodConfig().sensor_height
     return Pair(
-        map_name=scans.data_set.world,
+        map_name=scans.excerpt.world,
         names=(database.name, query.name),
         factors={},
         seed=_REAL.seed,
         is_baseline=False,
         stated=_REAL,
-        key=f"{database.name} {query.name} {scans.data_set.unit}",
+        key=f"{database.name} {query.name} {scans.excerpt.unit}",
         database=database,
         query=query,
         way=database,
@@ -307,7 +307,7 @@ def _data_set_pair(
 
 
 def _can_be_judged(scans: RealScans, on_note: OnNote) -> bool:
-    if not scans.data_set.whole:
+    if not scans.excerpt.whole:
         on_note(f"{scans.name}: thinned scans, not judged")
         return False
     return _has_classifier(scans.name, on_note)

@@ -139,7 +139,8 @@ def _checked(
     if values != written:
         # A factor whose values an option has fixed is still known.
         with contextlib.suppress(InputError, ValueError):
-            factors += validated(Experiment, written, path).factor_names
+            known = validated(Experiment, written, path).factor_names
+            factors = [*dict.fromkeys([*factors, *known])]
     _check_charts(experiment, factors, path)
     return experiment
 

@@ -225,7 +225,7 @@ def check_factors(
     """
     for name in names:
         if name not in factors:
-            there = ", ".join(dict.fromkeys(factors)) or "none"
+            there = ", ".join(factors) or "none"
             raise InputError(
                 f"charts: {chart['kind']}: no factor {name!r} (there are:"
                 f" {there}){did_you_mean(name, factors)}"

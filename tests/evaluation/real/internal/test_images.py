@@ -13,7 +13,7 @@ from cns_drake.base import InputError, Reporter
 from cns_drake.command_line import main
 from evaluation.clouds import image_points, read_image
 from evaluation.real import image_sequences
-from evaluation.real.data_sets import simulated_drives
+from evaluation.real.excerpts import simulated_drives
 from evaluation.real.image_sequences import (
     ImageSource,
     open_images,

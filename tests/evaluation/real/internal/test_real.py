@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError, Reporter, choose_cluster
-from evaluation.real import data_sets, measure_real
+from evaluation.real import excerpts, measure_real
 from evaluation.results import QueryRows, Results
 from evaluation.study import engine
 
@@ -200,18 +200,18 @@ def test_the_digest_is_that_of_all_scans(tmp_path, monkeypatch):
     files = sorted((folder / "kitti_00_revisits").glob("*.npy"))
     whole = b"".join(file.read_bytes() for file in files)
     known = next(
-        one for one in data_sets.DATA_SETS if one.folder == "kitti_00_revisits"
+        one for one in excerpts.EXCERPTS if one.folder == "kitti_00_revisits"
     )._replace(digest=hashlib.sha256(whole).hexdigest())
-    monkeypatch.setattr(data_sets, "DATA_SETS", (known,))
+    monkeypatch.setattr(excerpts, "EXCERPTS", (known,))
     notes = []
-    (found,) = data_sets.open_data_sets(folder, notes.append)
+    (found,) = excerpts.open_excerpts(folder, notes.append)
     assert notes == []
     X_WS = found.drive.X_WS[3]
     np.testing.assert_allclose(X_WS[:3, 3], [401.0, 2.0, 1.6])
     np.testing.assert_allclose(X_WS[:3, :3], matrix(1.2), atol=1e-12)
     files[0].write_bytes(files[1].read_bytes())
     (folder / "more").mkdir()
-    data_sets.open_data_sets(folder, notes.append)
+    excerpts.open_excerpts(folder, notes.append)
     assert [note.rpartition(": ")[2] for note in notes] == [
         "other scans than known, still used",
         "not known, left out",
@@ -228,7 +228,7 @@ def test_matrices_and_scans_without_times(tmp_path, capsys):
         four.tofile(folder / "velodyne" / f"{k:06d}.bin")
         rows.append(f"1 0 0 {4 * k} 0 1 0 0 0 0 1 1.84")
     (folder / "poses.txt").write_text("\n".join(rows))
-    (one,) = data_sets.open_data_sets(tmp_path, lambda note: None)
+    (one,) = excerpts.open_excerpts(tmp_path, lambda note: None)
     np.testing.assert_array_equal(one.drive.X_WS[:, 0, 3], [0.0, 4.0, 8.0])
     assert one.drive.scan(2).dtype.names == ("x", "y", "z", "intensity")
     assert one.drive.lidar_field.rings == 32
@@ -288,7 +288,7 @@ def test_other_formats_without_poses(tmp_path, capsys):
     for number in (0, 1, 10):
         (folder / f"avia_{number:06d}.bin").write_bytes(avia)
         (folder / f"aeva_{number:06d}.bin").write_bytes(aeva)
-    found = data_sets.open_data_sets(tmp_path, lambda note: None)
+    found = excerpts.open_excerpts(tmp_path, lambda note: None)
     z = [one.drive.scan(0)["z"][0] for one in found]
     np.testing.assert_allclose(z, [-0.2 - 0.957, 3.0, 4.0], atol=1e-5)
     assert [len(one.drive) for one in found] == [1, 3, 3]
@@ -351,7 +351,7 @@ def test_scans_are_in_the_order_of_their_numbers(tmp_path):
         (folder / "velodyne" / f"._{k}.bin").write_bytes(b"apple")
         rows.append(f"1 0 0 {4 * k} 0 1 0 0 0 0 1 1.84")
     (folder / "poses.txt").write_text("\n".join(rows))
-    (one,) = data_sets.open_data_sets(tmp_path, lambda note: None)
+    (one,) = excerpts.open_excerpts(tmp_path, lambda note: None)
     for k in range(12):
         assert len(one.drive.scan(k)) == 500 + k
         assert one.drive.X_WS[k, 0, 3] == 4.0 * k
@@ -367,7 +367,7 @@ def test_columns_of_other_scans_are_found(tmp_path):
     points.astype("<f4").tofile(folder / "0.bin")
     (folder.parent / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0")
     notes = []
-    (one,) = data_sets.open_data_sets(tmp_path, notes.append)
+    (one,) = excerpts.open_excerpts(tmp_path, notes.append)
     np.testing.assert_array_equal(
         one.drive.scan(0)["z"], scan[:, 2].astype("f4")
     )

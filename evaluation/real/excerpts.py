@@ -33,7 +33,7 @@ from evaluation.study import NamedDrive, RecordingSource
 _APART = 1000.0
 
 
-class DataSet(NamedTuple):
+class Excerpt(NamedTuple):
     """A public data set, or one LiDAR of a public data set.
 
     Attributes:
@@ -73,8 +73,8 @@ class DataSet(NamedTuple):
 
 
 _NC = "CC BY-NC-SA 3.0"
-DATA_SETS = (
-    DataSet(
+EXCERPTS = (
+    Excerpt(
         "kitti_00",
         "velodyne/*.bin",
         "kitti_00",
@@ -85,7 +85,7 @@ DATA_SETS = (
         "cbe2592584f33df2992d10ebf203b699dff3e19883c19646cc5825c6d0a9ebb6",
         "drive",
     ),
-    DataSet(
+    Excerpt(
         "kitti_00_revisits",
         "*.npy",
         "kitti_00",
@@ -97,7 +97,7 @@ DATA_SETS = (
         "named",
         whole=False,
     ),
-    DataSet(
+    Excerpt(
         "nuscenes_1072",
         "velodyne/*.bin",
         "nuscenes_1072",
@@ -109,7 +109,7 @@ DATA_SETS = (
         "matrices",
         columns=4,
     ),
-    DataSet(
+    Excerpt(
         "newer_06",
         "deskewed_*.bin",
         "newer_06",
@@ -121,7 +121,7 @@ DATA_SETS = (
         "",
         columns=3,
     ),
-    DataSet(
+    Excerpt(
         "nclt",
         "*.bin",
         "nclt",
@@ -133,7 +133,7 @@ DATA_SETS = (
         "",
         read_nclt_scan,
     ),
-    DataSet(
+    Excerpt(
         "helipr_two_lidars",
         "avia_*.bin",
         "helipr",
@@ -145,7 +145,7 @@ DATA_SETS = (
         "",
         partial(read_helipr_scan, "Avia"),
     ),
-    DataSet(
+    Excerpt(
         "helipr_two_lidars",
         "aeva_*.bin",
         "helipr",
@@ -161,23 +161,23 @@ DATA_SETS = (
 
 
 @dataclass(frozen=True)
-class DataSetSource:
+class ExcerptSource:
     """A function that opens a data set, and that any process can call.
 
     Attributes:
         folder: folder of the data set.
-        data_set: its name and layout.
+        excerpt: its name and layout.
         columns: number of columns of the data set's `.bin` files; None to find
             the number from the values.
     """
 
     folder: Path
-    data_set: DataSet
+    excerpt: Excerpt
     columns: int | None
 
     def __call__(self) -> Drive:
-        files = listed(self.folder, self.data_set.scans)
-        return _open_files(self.folder, self.data_set, files, self.columns)
+        files = listed(self.folder, self.excerpt.scans)
+        return _open_files(self.folder, self.excerpt, files, self.columns)
 
     def identity(self) -> list[list]:
         """Returns what identifies the data set: its name and its files."""
@@ -185,7 +185,7 @@ class DataSetSource:
         digests = file_digests(drive.files)
         names = [file.name for file in drive.files]
         return [
-            [drive.name, self.data_set.scans, self.columns],
+            [drive.name, self.excerpt.scans, self.columns],
             *map(list, zip(names, digests, strict=True)),
         ]
 
@@ -194,21 +194,21 @@ class RealScans(NamedTuple):
     """A data set of real scans that was found on the disk.
 
     Attributes:
-        data_set: name and origin of the data set.
+        excerpt: name and origin of the data set.
         drive: scans and poses of the data set.
         source: opens the data set in any process.
     """
 
-    data_set: DataSet
+    excerpt: Excerpt
     drive: Drive
-    source: DataSetSource
+    source: ExcerptSource
 
     @property
     def name(self) -> str:
-        return self.data_set.folder
+        return self.excerpt.folder
 
 
-def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
+def open_excerpts(folder: Path, on_note: OnNote) -> list[RealScans]:
     """Returns the drives of the data sets in a folder.
 
     Notes name missing data sets, data sets with a wrong digest, and unknown
@@ -219,36 +219,34 @@ def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
-    known = {data_set.folder for data_set in DATA_SETS} | {IMAGES}
+    known = {excerpt.folder for excerpt in EXCERPTS} | {IMAGES}
     scans = [
-        listed(folder / data_set.folder, data_set.scans)
-        for data_set in DATA_SETS
+        listed(folder / excerpt.folder, excerpt.scans) for excerpt in EXCERPTS
     ]
     if not any(scans) and not (folder / IMAGES).is_dir():
         names = ", ".join(sorted(known))
         raise InputError(f"{folder}: no data set that is known ({names})")
     found = []
-    for data_set, files in zip(DATA_SETS, scans, strict=True):
+    for excerpt, files in zip(EXCERPTS, scans, strict=True):
         if not files:
-            on_note(f"{data_set.folder}/{data_set.scans}: not there, skipped")
+            on_note(f"{excerpt.folder}/{excerpt.scans}: not there, skipped")
             continue
         digest = hashlib.sha256()
         for file in files:
             digest.update(read_bytes(file))
-        columns = data_set.columns
-        if digest.hexdigest() != data_set.digest:
+        columns = excerpt.columns
+        if digest.hexdigest() != excerpt.digest:
             columns = None
             on_note(
-                f"{folder / data_set.folder}: other scans than known, still"
-                " used"
+                f"{folder / excerpt.folder}: other scans than known, still used"
             )
-        source = DataSetSource(
-            (folder / data_set.folder).absolute(), data_set, columns
+        source = ExcerptSource(
+            (folder / excerpt.folder).absolute(), excerpt, columns
         )
         drive = source()
         for note in drive.notes:
             on_note(note)
-        found.append(RealScans(data_set, drive, source))
+        found.append(RealScans(excerpt, drive, source))
     for path in listed(folder):
         if path.is_dir() and path.name not in known:
             on_note(f"{path}: not known, left out")
@@ -256,32 +254,32 @@ def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
 
 
 def _open_files(
-    folder: Path, data_set: DataSet, files: Sequence[Path], columns: int | None
+    folder: Path, excerpt: Excerpt, files: Sequence[Path], columns: int | None
 ) -> Drive:
-    if data_set.poses == "drive":
+    if excerpt.poses == "drive":
         return open_drive(folder)
     number = len(files)
     table = folder / "poses.txt"
     X_WS = np.tile(np.eye(4), (number, 1, 1))
     X_WS[:, 0, 3] = _APART * np.arange(number)
-    if data_set.poses == "matrices":
+    if excerpt.poses == "matrices":
         X_WS = read_poses(table)
         if len(X_WS) != number:
             raise InputError(f"{table}: {len(X_WS)} rows for {number} scans")
-    elif data_set.poses:
+    elif excerpt.poses:
         X_WS = _named_poses(table, files)
     options: dict = {
-        "name": data_set.folder,
-        "world_frame": data_set.world,
+        "name": excerpt.folder,
+        "world_frame": excerpt.world,
         "files": list(files),
         "stamps_ns": np.arange(number),
         "X_WS": X_WS,
         "tables": [table],
-        "unit": data_set.unit,
+        "unit": excerpt.unit,
     }
-    if data_set.read is None and files[0].suffix == ".bin":
+    if excerpt.read is None and files[0].suffix == ".bin":
         return BinDrive(columns, **options)
-    read = data_set.read
+    read = excerpt.read
     notes: list[str] = []
     if read is None:
         read = read_cloud
