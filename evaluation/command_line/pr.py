@@ -12,8 +12,11 @@ import typer
 
 from cns_drake.base import (
     InputError,
+    check_regular,
+    check_writable,
     commands,
     errors_at_option,
+    make_folder,
     number_text,
     shared_options,
     terminal,
@@ -125,60 +128,29 @@ def pr(
         chosen = _made(choice)
         _write_scores(chosen, database, query, scores, protocol, columns)
         return
-    from cns_drake.base import make_folder
-    from cns_drake.drives import check_same_map, check_same_world
-    from evaluation.drives import CountedDrive
-    from evaluation.recognition import (
-        check_has_match,
-        write_overlaps,
-    )
-
-    if turn_queries is not None:
-        protocol = replace(protocol, turn_queries=turn_queries)
-    if tilt_queries is not None:
-        protocol = replace(protocol, tilt_queries=tilt_queries)
     protocol = replace(
-        protocol,
+        _rotated(protocol, turn_queries, tilt_queries),
         overlap=options.overlap_of(truth),
         hide_sector=hide_sector,
         seed=seed,
     )
-    is_itself = database.resolve() == query.resolve()
     _check_together(protocol, database, query, overlaps, exact_overlaps)
     if output is not None:
         make_folder(output)
     given = _choice_of(method, parameter)
     choice = given.at_height(sensor_height)
     chosen = _made(choice)
-    opened = options.open_noted(database, query, lidar=lidar, columns=columns)
-    if not across_maps:
-        try:
-            check_same_map(*opened)
-        except InputError as error:
-            raise InputError(
-                f"{error} (--across-maps allows this, for cities along the same"
-                " streets)"
-            ) from None
-    drives = options.aligned(opened, align, across_maps=across_maps)
-    check_same_world(*drives, across_maps=across_maps)
-    places, queries = counted = [CountedDrive(drive) for drive in drives]
-    shares = _overlaps(places, queries, protocol, exact_overlaps)
+    drives = _drives(database, query, lidar, columns, align, across_maps)
+    shares = _overlaps(*drives, protocol, exact_overlaps)
     # The height is in the protocol's digest.
     engine, outcome = _measured(
-        places, queries, protocol, shares, (choice, given.columns), output
+        *drives, protocol, shares, (choice, given.columns), output
     )
-    check_has_match(outcome)
-    _show_notes(chosen, counted)
+    _show_notes(chosen, drives)
     if overlaps is not None:
         assert shares is not None
-        write_overlaps(
-            overlaps,
-            outcome.columns["query_frame"],
-            outcome.place_frames,
-            shares,
-        )
-        terminal.note(f"wrote {overlaps}")
-    if protocol.exclude_recent is None and is_itself:
+        _write_overlaps(overlaps, outcome, shares)
+    if protocol.exclude_recent is None and _is_itself(database, query):
         terminal.note(
             f"{query}: every scan finds itself (--exclude-recent leaves out "
             "recent places)"
@@ -188,6 +160,53 @@ def pr(
     values = outcome.to_json(mode)
     values["parameters"] = chosen.config.model_dump(mode="json")
     terminal.show(values, _recognition_rows(outcome, mode), json=json)
+
+
+def _rotated(
+    protocol: RetrievalProtocol,
+    turn_queries: bool | None,
+    tilt_queries: float | None,
+) -> RetrievalProtocol:
+    """Returns a protocol with what the command line says of its rotations."""
+    if turn_queries is not None:
+        protocol = replace(protocol, turn_queries=turn_queries)
+    if tilt_queries is not None:
+        protocol = replace(protocol, tilt_queries=tilt_queries)
+    return protocol
+
+
+def _is_itself(database: Path, query: Path) -> bool:
+    return database.resolve() == query.resolve()
+
+
+def _drives(
+    database: Path,
+    query: Path,
+    lidar: str | None,
+    columns: int | None,
+    align: options.When,
+    across_maps: bool,
+) -> tuple[CountedDrive, CountedDrive]:
+    """Returns both drives in one world, and counts what is ignored of them.
+
+    Raises:
+        InputError: a drive cannot be read, or both are not of one map.
+    """
+    from cns_drake.drives import check_same_map, check_same_world
+    from evaluation.drives import CountedDrive
+
+    opened = options.open_noted(database, query, lidar=lidar, columns=columns)
+    if not across_maps:
+        try:
+            check_same_map(*opened)
+        except InputError as error:
+            raise InputError(
+                f"{error} (--across-maps allows this, for cities along the same"
+                " streets)"
+            ) from None
+    places, queries = options.aligned(opened, align, across_maps=across_maps)
+    check_same_world(places, queries, across_maps=across_maps)
+    return CountedDrive(places), CountedDrive(queries)
 
 
 def _measured(
@@ -208,7 +227,11 @@ def _measured(
             by overlap.
         method: the method, and its columns in the tables.
         output: folder for the tables; None if there is none.
+
+    Raises:
+        InputError: no query has a match.
     """
+    from evaluation.recognition import check_has_match
     from evaluation.study import (
         OpenSource,
         PlaceTask,
@@ -237,7 +260,19 @@ def _measured(
         for outcome in engine.found(pair, PlaceTask.name)
         if outcome.is_gated == protocol.gate
     )
+    check_has_match(outcome)
     return engine, outcome
+
+
+def _write_overlaps(
+    file: Path, outcome: PlaceOutcome, overlaps: np.ndarray
+) -> None:
+    """Writes the overlaps (Q, D) of the queries and places of an outcome."""
+    from evaluation.recognition import write_overlaps
+
+    frames = outcome.columns["query_frame"], outcome.place_frames
+    write_overlaps(file, *frames, overlaps)
+    terminal.note(f"wrote {file}")
 
 
 def _show_notes(method: Method, drives: Sequence[CountedDrive]) -> None:
@@ -263,16 +298,13 @@ def _check_together(
     Raises:
         InputError: an option needs another one, or a file cannot be used.
     """
-    from cns_drake.base import check_regular, check_writable
-
     for option, file in (
         ("--overlaps", overlaps),
         ("--exact-overlaps", exact_overlaps),
     ):
         if file is not None and protocol.overlap is None:
             raise InputError(f"{option}: add --truth overlap:PART")
-    is_itself = database.resolve() == query.resolve()
-    if protocol.exclude_recent is not None and not is_itself:
+    if protocol.exclude_recent is not None and not _is_itself(database, query):
         raise InputError(
             f"--exclude-recent: it is for a drive against itself, but {query} "
             f"is not {database}"
