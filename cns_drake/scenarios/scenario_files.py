@@ -117,8 +117,39 @@ def _read_fields(file: Path) -> dict:
             f"{file}: name: {name!r}, from its path, has more than letters,"
             " digits and underscores; give a name"
         )
+    _check_own_map(values, file)
     make_paths_absolute(values, file)
     return values
+
+
+def _check_own_map(values: dict, file: Path) -> None:
+    """Checks that a drive in a map's folder goes through this map.
+
+    The drives of a shipped map name it. Copied with its folder, such a drive
+    would go through the shipped map, whatever was changed in the copy. A copy
+    under the same name, such as a checkout of this project, is what is meant.
+
+    Args:
+        values: the fields, in which a map of the folder's name becomes `.`.
+        file: the file that contains the fields.
+
+    Raises:
+        InputError: the drive goes through a shipped map, and its folder has
+            another name and stages of its own.
+    """
+    name, folder = values.get("map"), MapFolder(file.parent.resolve())
+    if not isinstance(name, str) or file.resolve() not in folder.drives():
+        return
+    shipped = shipped_maps().get(name)
+    is_copy = shipped is not None and not shipped.samefile(folder.path)
+    if not (is_copy and folder.stages()):
+        return
+    if name != folder.name:
+        raise InputError(
+            f"{file}: map: '{name}' is the shipped map, not this folder, which"
+            " has stages of its own; write 'map: .'"
+        )
+    values["map"] = "."
 
 
 def _find_base(

@@ -46,6 +46,9 @@ from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
 from evaluation.results import CAUSE, LEVEL, NO_CAUSE, OWN
 from evaluation.study import USUAL_LENGTH
 
+# Greatest length of a value in the name of a drive, which names its folder.
+_LONGEST_LABEL = 48
+
 
 @dataclass(frozen=True)
 class ComparedDrives:
@@ -612,6 +615,15 @@ class _UniqueNames:
         return drive.replaced(name=f"{drive.name}_{suffix}")
 
 
+def _value_label(value: object) -> str:
+    """Returns a short name for the value of a factor, such as `0p5`."""
+    text = str(value).replace(".", "p").replace("-", "m")
+    label = re.sub(r"[^A-Za-z0-9]+", "_", text)
+    if len(label) <= _LONGEST_LABEL:
+        return label
+    return f"{label[:20]}_{fingerprint({'value': value})[:8]}"
+
+
 def _name_suffix(side: str, given: Changes, seed: int) -> str:
     factors = dict(given)
     labels = []
@@ -621,8 +633,7 @@ def _name_suffix(side: str, given: Changes, seed: int) -> str:
         is_own = path.partition(".")[0] in (side, "both")
         # The years of a drive age the city of the other side.
         if is_own != (name in ("years", "rates")) or path.startswith("both."):
-            text = str(value).replace(".", "p").replace("-", "m")
-            labels.append(f"{name}_{re.sub(r'[^A-Za-z0-9]+', '_', text)}")
+            labels.append(f"{name}_{_value_label(value)}")
     if cause != NO_CAUSE:
         labels.append(f"{cause}_{level}")
     return "_".join([*labels, str(seed)])

@@ -18,6 +18,8 @@ _CAUSES = {
     "lateral": "lateral offset",
     "turn": "random yaw",
 }
+# Number of characters from which on a list is shortened.
+_LONG = 60
 
 
 def in_words(name: str) -> str:
@@ -31,7 +33,10 @@ def in_words(name: str) -> str:
 
 
 def value_words(value: object, factor: str = "") -> str:
-    """Returns the value of a factor in words; lists have no brackets."""
+    """Returns the value of a factor in words; lists have no brackets.
+
+    Of a long list the first two values are named.
+    """
     if factor == STAGE:
         return _STAGES.get(str(value), str(value))
     if factor == CAUSE and value in _CAUSES:
@@ -39,4 +44,8 @@ def value_words(value: object, factor: str = "") -> str:
     if isinstance(value, float):
         return f"{value:g}"
     text = re.sub(r"[\[\]]", "", str(value).replace("_", " "))
-    return re.sub(r",(?! )", ", ", text)
+    text = re.sub(r",(?! )", ", ", text)
+    values = text.split(", ")
+    if len(text) <= _LONG or len(values) < 4:
+        return text
+    return f"{values[0]}, {values[1]} and {len(values) - 2} more"

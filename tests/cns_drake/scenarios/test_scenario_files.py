@@ -1,9 +1,17 @@
 """Scenarios that are written to files."""
 
+import shutil
+
 from helpers.small_map import scenario_values, write_small_map
+import pytest
 import yaml
 
-from cns_drake.scenarios import load_scenario, write_scenarios
+from cns_drake.base import InputError
+from cns_drake.scenarios import (
+    load_scenario,
+    shipped_maps,
+    write_scenarios,
+)
 
 
 def test_written_scenarios_are_the_same(tmp_path):
@@ -35,3 +43,25 @@ def test_a_folder_of_cities_and_scenarios_can_be_moved(tmp_path):
         [load_scenario("metropolis_02")], moved / "scenarios"
     )
     assert yaml.safe_load(path.read_text())["map"] == "metropolis"
+
+
+def test_the_drives_of_a_copied_map_go_through_the_copy(tmp_path):
+    shipped = shipped_maps()["metropolis"]
+    same, other = tmp_path / "metropolis", tmp_path / "mine"
+    for copy in (same, other):
+        copy.mkdir()
+        for name in ("roads.yaml", "sequence_04.yaml"):
+            shutil.copy(shipped / name, copy)
+        (copy / "stage_04.sdf").touch()
+    scenario = load_scenario(same / "sequence_04.yaml")
+    assert scenario.folder.path == same
+    assert load_scenario("metropolis_04").folder.path == shipped
+    drive = other / "sequence_04.yaml"
+    with pytest.raises(InputError, match=r"map: 'metropolis' is the shipped"):
+        load_scenario(drive)
+    drive.write_text(drive.read_text().replace("map: metropolis", "map: ."))
+    assert load_scenario(drive).folder.path == other
+    # A drive of one's own in any other folder goes where it says.
+    alone = tmp_path / "sequence_04.yaml"
+    shutil.copy(shipped / "sequence_04.yaml", alone)
+    assert load_scenario(alone).folder.path == shipped

@@ -551,6 +551,9 @@ def test_values_of_factors_are_words():
     assert value_words(0.30) == "0.3"
     assert value_words("own", "both.stage") == "with the change"
     assert value_words("own", "query.kind") == "own"
+    many = [f"tree_{k:03d}" for k in range(450)]
+    assert value_words(many) == "'tree 000', 'tree 001' and 448 more"
+    assert value_words(",".join(many)) == "tree 000, tree 001 and 448 more"
 
 
 def test_a_picture_for_print_has_its_legend(tmp_path):

@@ -303,6 +303,22 @@ def test_seeds_are_those_of_what_is_drawn(query_drive):
         assert compared.protocol.seed == seed
 
 
+def test_many_names_have_a_short_name(query_drive):
+    names = [f"tower_{k:03d}" for k in range(40)]
+    experiment = Experiment.model_validate(
+        {
+            "name": "mine",
+            "maps": ["town"],
+            "database": {"without": [names[:2], names, names[:-1]]},
+        }
+    )
+    made = Conditions(experiment, query_drive)
+    found = {one.database.name for one in made.compared()}
+    assert len(found) == 3
+    assert "town_04_database_without__tower_000_tower_001__1" in found
+    assert all(len(name) < 80 for name in found)
+
+
 @pytest.mark.parametrize(
     ("fields", "draws"),
     [
