@@ -7,6 +7,9 @@ from evaluation.alignment.estimated_trajectories import (
 from evaluation.alignment.estimated_trajectories import (
     trajectory_errors as trajectory_errors,
 )
+from evaluation.alignment.registration import NUM_NEIGHBOURS as NUM_NEIGHBOURS
 from evaluation.alignment.registration import Surface as Surface
 from evaluation.alignment.registration import covariances as covariances
 from evaluation.alignment.registration import make_surface as make_surface
+from evaluation.alignment.registration import register as register
+from evaluation.alignment.registration import registration_at as registration_at

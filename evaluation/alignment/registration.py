@@ -153,7 +153,7 @@ def register(
         )
         if found.num_inliers >= _FEWEST_PAIRS:
             X = found.T_target_source
-    return _registration_at(source, target, X)
+    return registration_at(source, target, X)
 
 
 class _Pairs(NamedTuple):
@@ -197,10 +197,16 @@ def _nearest_pairs(
     return _Pairs(sample, is_paired, p_T, nearest)
 
 
-def _registration_at(
+def registration_at(
     source: Surface, target: Surface, X_TS: np.ndarray
 ) -> Registration:
-    """Returns the quality of the fit of two clouds at a pose (4, 4)."""
+    """Returns the quality of the fit of two clouds at a pose, as it is.
+
+    Args:
+        source: the cloud S.
+        target: the cloud T.
+        X_TS: (4, 4) pose of S in T.
+    """
     forth = _nearest_pairs(source, target, X_TS)
     back = _nearest_pairs(target, source, poses.inverse(X_TS))
     return Registration(

@@ -1,5 +1,9 @@
 from evaluation.change.drive_change import ChangeReport as ChangeReport
+from evaluation.change.drive_change import RegisteredChange as RegisteredChange
 from evaluation.change.drive_change import change_between as change_between
+from evaluation.change.drive_change import (
+    registered_change as registered_change,
+)
 from evaluation.change.drive_change import (
     same_stage_partner as same_stage_partner,
 )

@@ -40,7 +40,9 @@ def tcr(
     (.pcd .ply .npy .bin). The main result, TCR_sym, is 0 if nothing changed and
     1 if everything changed. The command also prints two directed ratios: the
     share of A that is missing in B, and the share of B that is missing in A.
-    Drives in different world frames are aligned first.
+    Drives in different world frames are aligned first. A yaw or an offset
+    between two frames looks like change, so the command also registers B to A,
+    and prints TCR_sym after this registration.
 
     Args:
         source: Drive or map before the change.
@@ -68,6 +70,7 @@ def tcr(
     from cns_drake.base import make_folder
     from evaluation.change import (
         maps_in_one_world,
+        registered_change,
         same_stage_partner,
         spread_over_grids,
     )
@@ -100,6 +103,7 @@ def tcr(
         report,
         spread=spread_over_grids(before, after, report.change),
         alignment=alignments[0] if alignments else None,
+        registered=registered_change(before, after),
     )
     for drive_map in maps:
         for note in drive_map.notes:
@@ -109,6 +113,8 @@ def tcr(
             terminal.note(f"{drive_map.name}: {ignored} {NOT_FINITE}")
     for alignment in alignments:
         terminal.note(alignment.to_text())
+    if report.note is not None:
+        terminal.note(report.note)
     if output is not None:
         options.write_tables(engine)
     terminal.show(report.to_json(), _change_rows(report), json=json)
@@ -125,6 +131,14 @@ def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
     yield "  on shifted grids", " to ".join(map(number_text, report.spread))
     if change.undefined_because:
         yield "  because", change.undefined_because
+    if (registered := report.registered) is not None:
+        x, y, z = registered.offset
+        yield (
+            "  after registration",
+            f"{number_text(registered.symmetric)}"
+            f"  (yaw {registered.yaw_deg:.2f} deg,"
+            f" offset {x:.2f}, {y:.2f}, {z:.2f} m)",
+        )
     for names, side in (
         (f"{source} -> {target}", change.source_to_target),
         (f"{target} -> {source}", change.target_to_source),

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.base import compiled, from_xyz, track
+from cns_drake.base import compiled, from_xyz, poses, track
 from cns_drake.drives import Drive
 
 # Side of a voxel [m].
@@ -71,6 +71,7 @@ class VoxelMap:
         self,
         voxel_size: float = VOXEL_SIZE,
         shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        X_NW: np.ndarray | None = None,
     ) -> VoxelMap:
         """Returns the map on a grid of larger voxels.
 
@@ -81,10 +82,15 @@ class VoxelMap:
             voxel_size: length of a larger voxel's side [m].
             shift: distances along x, y and z from the origin of this map's grid
                 to the origin of the grid of larger voxels [m].
+            X_NW: (4, 4) pose of the world in another frame, the world of the
+                result; by default both are one.
         """
         x, y, z = np.add(self.origin_W, shift).tolist()
         origin = x, y, z
-        found = np.floor((self.centroids_W - origin) / voxel_size)
+        centroids = self.centroids_W
+        if X_NW is not None:
+            centroids = poses.transform(X_NW, centroids)
+        found = np.floor((centroids - origin) / voxel_size)
         order = np.lexsort(found.T[::-1])
         indices = found[order].astype(np.int32)
         # NaN counts as a difference: the first row belongs to a new voxel.
@@ -94,7 +100,7 @@ class VoxelMap:
         np.add.at(counts, rows, self.counts[order])
         corners = _corners(indices, voxel_size, origin)
         sums = np.zeros((len(counts), 3))
-        offsets = self.centroids_W[order] - corners
+        offsets = centroids[order] - corners
         np.add.at(sums, rows, offsets * self.counts[order, None])
         return VoxelMap(
             indices[is_first],
