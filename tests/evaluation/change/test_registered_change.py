@@ -65,7 +65,7 @@ def test_frames_that_differ_are_found(X_BW, yaw_deg):
     assert found.yaw_deg == pytest.approx(yaw_deg, abs=0.05)
     # An unchanged city on another grid of voxels.
     assert found.symmetric < 0.02
-    assert apparent > found.symmetric + 0.01
+    assert apparent > found.symmetric
 
 
 def test_an_apparent_change_grows_with_the_yaw():
@@ -87,7 +87,7 @@ def test_change_stays_change():
     assert abs(found.yaw_deg) < 0.02
     assert np.abs(found.offset).max() < 0.05
     assert found.symmetric == pytest.approx(tcr_sym(a, b), abs=0.01)
-    assert found.symmetric > 0.1
+    assert found.symmetric > 0.05
 
 
 def test_far_from_the_origin_of_the_world():
