@@ -136,6 +136,7 @@ from cns_drake.base.shared_options import Json as Json
 from cns_drake.base.shared_options import Scheduler as Scheduler
 from cns_drake.base.system_libraries import missing_library as missing_library
 from cns_drake.base.terminal import next_command as next_command
+from cns_drake.base.terminal import next_page as next_page
 from cns_drake.base.terminal import note as note
 from cns_drake.base.terminal import number_text as number_text
 from cns_drake.base.terminal import resumable as resumable

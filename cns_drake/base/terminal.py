@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 import contextlib
 from json import dumps
 import math
+from pathlib import Path
 import shlex
 import shutil
 import sys
@@ -48,9 +49,25 @@ def resumable() -> Iterator[None]:
         raise KeyboardInterrupt(told) from None
 
 
-def next_command(*words: object) -> None:
-    """Prints the command that usually comes next, on stderr."""
-    note(f"next: {shlex.join(map(str, words))}")
+def next_command(program: str, *words: object) -> None:
+    """Prints the command that usually comes next, on stderr.
+
+    It works as printed in the shell that runs this program.
+
+    Args:
+        program: `cns-drake` or `cns-eval`.
+        words: the words of the command.
+    """
+    beside = Path(sys.argv[0]).with_name(program)
+    found = shutil.which(program)
+    if beside.is_file() and not (found and beside.samefile(found)):
+        program = str(beside)
+    note(f"next: {shlex.join(map(str, (program, *words)))}")
+
+
+def next_page(page: Path) -> None:
+    """Prints that a page is what to open next, on stderr."""
+    note(f"next: open {page} in a browser")
 
 
 def print_json(values: dict) -> None:

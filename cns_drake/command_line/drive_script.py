@@ -121,7 +121,10 @@ def run_drive(
     for file in (recording, graphviz):
         if file is not None:
             terminal.note(f"wrote {file}")
-    suggest_export(run.folder, scenario)
+    if recording is not None:
+        terminal.next_page(recording)
+    else:
+        suggest_export(run.folder, scenario)
     return run
 
 

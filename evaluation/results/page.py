@@ -97,7 +97,8 @@ def write_page(
         experiment_text: the experiment as YAML.
         notes: further sentences for the page, such as on settings.
         sections: further sections, such as those of recordings.
-        on_note: is called with a note on each chart that is left out.
+        on_note: is called with a note on each chart that is left out, and last
+            with the headline.
 
     Returns:
         The path of the page.
@@ -120,9 +121,10 @@ def write_page(
         on_note(note)
     protocols = ", ".join(filter(None, results.distinct("protocol")))
     about = f". {about}" if about else ""
+    headline = str(shown[0]["message"]) if shown else title
     text = framed_page(
         title,
-        str(shown[0]["message"]) if shown else title,
+        headline,
         Markup("<p><strong>{}</strong>{}</p>").format(title, about),
         [
             *_first_sections(known, shown, metrics),
@@ -134,6 +136,8 @@ def write_page(
     )
     path = folder / "index.html"
     write_text(path, text)
+    if shown:
+        on_note(headline)
     return path
 
 

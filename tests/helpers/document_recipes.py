@@ -217,11 +217,8 @@ RECIPES = {
         after=("start a city",),
     ),
     "reproduce": Recipe(
-        "python3 -m venv .venv && .venv/bin/pip install . &&",
-        changes=(
-            ("python3 -m venv .venv && .venv/bin/pip install . && ", ""),
-            ("reproduce metropolis", "reproduce town"),
-        ),
+        ".venv/bin/cns-drake reproduce metropolis --output output",
+        changes=(("reproduce metropolis", "reproduce town"),),
         after=("own city",),
         all_methods=True,
     ),
@@ -528,6 +525,14 @@ RECIPES = {
         after=("start a city",),
         prints=("first/town_01: 2 frames",),
         makes=("drive.html",),
+    ),
+    "a first scan": Recipe(
+        "from matplotlib import pyplot as plt\n\nfrom evaluation",
+        changes=(("riverside_01", "town_01"), ("100", "1")),
+        after=("a look first",),
+        file="scan.py",
+        command=".venv/bin/python scan.py",
+        makes=("scan.png",),
     ),
     "decay": Recipe(
         "maps: riverside\ndrives: stages",
@@ -880,8 +885,8 @@ RECIPES = {
         makes=("localisation/localisation.csv",),
     ),
     "home: place recognition": Recipe(
-        ".venv/bin/cns-drake reproduce metropolis --output output",
-        changes=(("reproduce metropolis", "reproduce town"),),
+        ".venv/bin/cns-drake reproduce suburbia --output output",
+        changes=(("reproduce suburbia", "reproduce town"),),
         after=("own city",),
         all_methods=True,
     ),

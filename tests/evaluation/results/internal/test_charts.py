@@ -646,7 +646,7 @@ def test_a_page_stands_alone(tmp_path):
     outside = {link for link in page.links if not link.startswith("#")}
     assert outside == {"results.csv", "data:,"}
     assert "name: &lt;age&gt;" in text
-    (note,) = told
+    note, headline = told
     assert note.startswith(
         "Chart 2 is left out: charts: lines: the table has no r1"
     )

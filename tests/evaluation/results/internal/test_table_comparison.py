@@ -4,6 +4,7 @@ import csv
 from dataclasses import replace
 import itertools
 import json
+import sys
 
 from helpers.internal.eval_program import assert_refused, run
 import numpy as np
@@ -479,8 +480,11 @@ def test_the_command(tmp_path, capsys):
     assert found["agreements"][0]["kendall_tau"] == pytest.approx(1.0)
 
 
-def test_a_comparison_is_suggested_if_it_can_be_made(tmp_path, capsys):
+def test_a_comparison_is_suggested_if_it_can_be_made(
+    tmp_path, capsys, monkeypatch
+):
     """Results of the shipped cities, of another city, of another metric."""
+    monkeypatch.setattr(sys, "argv", ["cns-eval"])
     folder = tmp_path / "of shipped"
     folder.mkdir()
     table = folder / "results.csv"
