@@ -107,7 +107,7 @@ def pytest_addoption(parser):
     parser.addoption(
         "--fuzz",
         type=int,
-        default=100,
+        default=60,
         help="how many files test_fuzz damages (default: %(default)s)",
     )
     parser.addoption(
