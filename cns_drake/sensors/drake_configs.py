@@ -357,6 +357,9 @@ def ApplyLidarConfig(
         period=period,
         motion_distortion=section.motion_distortion,
         causal=config.causal,
+        rate=config.rate,
+        # Without a rate, it concerns the messages only.
+        capture_offset=config.capture_offset if config.rate else 0.0,
     )
     _publish_measurements(
         builder,

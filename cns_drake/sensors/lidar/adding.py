@@ -27,7 +27,7 @@ from cns_drake.sensors.lidar.config import (
     make_pattern,
     make_returns,
 )
-from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar.lidar import Lidar, sampling_period
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.seen_geometry import Structures
 from cns_drake.sensors.lidar.sheet_patterns import aimed, make_beam_pattern
@@ -67,6 +67,8 @@ def add_lidar(
     moving_bodies: Mapping[FrameId, int] | None = None,
     num_threads: int = 1,
     causal: bool = False,
+    rate: float | None = None,
+    capture_offset: float = 0.0,
 ) -> Lidar:
     """Adds a LiDAR to a diagram and connects it to the SceneGraph.
 
@@ -81,8 +83,9 @@ def add_lidar(
         X_PB: pose of the sensor B in P, as in Drake's RgbdSensor. In outputs,
             the frame of the sensor is S.
         pattern: beams of the LiDAR, the name of a preset, or the file of a data
-            sheet. With a name or file, the LiDAR makes as many revolutions per
-            second as its data sheet states, and coordinates are not rounded.
+            sheet. With a name or file, the LiDAR makes `rate` revolutions per
+            second, by default as many as its data sheet states, and coordinates
+            are not rounded.
         name: name of the system, and of the LiDAR's frame and topics in a
             recording.
         unseen: bodies, frames and geometries that the LiDAR does not see; by
@@ -120,6 +123,11 @@ def add_lidar(
         num_threads: number of threads that share the LiDAR's rays.
         causal: whether a scan is the revolution that ends at the time of the
             output.
+        rate: scans per second of a sampled LiDAR, which computes a scan once
+            per period and holds it (see `Lidar`). By default the LiDAR is
+            continuous: its ports have a scan for each time at which they are
+            evaluated.
+        capture_offset: time of a sampled LiDAR's first scan [s].
 
     Returns:
         The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W` and
@@ -132,8 +140,9 @@ def add_lidar(
         TypeError: an argument is of the wrong type.
         ValueError: there is no preset of that name, the name of the LiDAR is
             taken, reserved or cannot be a part of a ROS 2 topic, the noise is
-            out of range or given twice, motion distortion needs a body, or
-            calibrated returns need a preset or a data sheet.
+            out of range or given twice, motion distortion needs a body,
+            calibrated returns need a preset or a data sheet, or the rate is not
+            positive or higher than that of the revolutions.
         InputError: the file cannot be read, or is no data sheet.
 
     Warns:
@@ -157,7 +166,7 @@ def add_lidar(
         body, X_PB = body_and_pose(body, X_PB)
     unit = pattern if isinstance(pattern, str | Path) else None
     if unit is not None:
-        pattern = make_beam_pattern(unit)
+        pattern = make_beam_pattern(unit, sampling_period(rate))
     if not isinstance(pattern, BeamPattern):
         raise TypeError(
             f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "
@@ -203,6 +212,8 @@ def add_lidar(
             anchored_frames=anchored_frames or (),
             num_threads=num_threads,
             causal=causal,
+            rate=rate,
+            capture_offset=capture_offset,
         ),
     )
     _warn_of_no_geometry(scene_graph, role)
@@ -246,13 +257,16 @@ def add_described_lidar(
     seed: int = 0,
     weather: WeatherConfig = _CLEAR,
     period: float | None = None,
-    unseen: Collection[RigidBody] | None = None,
+    unseen: Collection[RigidBody | Frame | GeometryId] | None = None,
     motion_distortion: bool = False,
     structures: Structures | None = None,
     anchored_frames: Collection[FrameId] | None = None,
     moving_bodies: Mapping[FrameId, int] | None = None,
     num_threads: int = 1,
     causal: bool = False,
+    role: Role = Role.kPerception,
+    rate: float | None = None,
+    capture_offset: float = 0.0,
 ) -> Lidar:
     """Adds a LiDAR to a diagram, given its description in a scenario.
 
@@ -268,8 +282,8 @@ def add_described_lidar(
         weather: weather of calibrated returns.
         period: duration of a revolution [s]; by default it follows from the
             rate in the description.
-        unseen: bodies that the LiDAR does not see. This argument and all
-            further arguments are the same as for `add_lidar`.
+        unseen: what the LiDAR does not see. This argument and all further
+            arguments are the same as for `add_lidar`.
         motion_distortion: whether the bodies of the LiDAR's plant keep moving
             during a revolution. A recorded drive connects a `Sweep` instead of
             setting this argument.
@@ -279,6 +293,10 @@ def add_described_lidar(
         num_threads: number of threads that share the LiDAR's rays.
         causal: whether a scan is the revolution that ends at the time of the
             output.
+        role: role of the geometry that the LiDAR sees.
+        rate: scans per second of a sampled LiDAR; by default the LiDAR is
+            continuous, whatever the rate of its revolutions.
+        capture_offset: time of a sampled LiDAR's first scan [s].
     """
     return add_lidar(
         builder,
@@ -303,6 +321,9 @@ def add_described_lidar(
         moving_bodies=moving_bodies,
         num_threads=num_threads,
         causal=causal,
+        role=role,
+        rate=rate,
+        capture_offset=capture_offset,
     )
 
 
