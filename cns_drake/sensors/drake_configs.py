@@ -38,11 +38,11 @@ from pydrake.systems.primitives import ZeroOrderHold
 from cns_drake.base import describe_validation_error, one_line
 from cns_drake.scene import find_bus
 from cns_drake.sensors import odometry
+from cns_drake.sensors.described_lidar import add_described_lidar
 from cns_drake.sensors.imu.config import ImuDescription, ImuSection
 from cns_drake.sensors.imu.imu import Imu, add_imu
-from cns_drake.sensors.lidar.adding import add_described_lidar
-from cns_drake.sensors.lidar.config import LidarDescription, LidarSection
 from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar_config import LidarDescription, LidarSection
 from cns_drake.sensors.odometry_config import OdometrySection
 from cns_drake.sensors.sensor_config import HIGHEST_RATE, Section
 from cns_drake.sensors.system_names import check_unused_names

@@ -21,16 +21,9 @@ from cns_drake.scene import anchored_frames as find_anchored_frames
 from cns_drake.scene import geometry_port
 from cns_drake.sensors.carriers import body_and_pose, connect_motion
 from cns_drake.sensors.lidar.beams import BeamPattern
-from cns_drake.sensors.lidar.config import (
-    LidarSection,
-    WeatherConfig,
-    make_pattern,
-    make_returns,
-)
 from cns_drake.sensors.lidar.lidar import Lidar, sampling_period
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.seen_geometry import Structures
-from cns_drake.sensors.lidar.sheet_patterns import aimed, make_beam_pattern
 from cns_drake.sensors.system_names import check_new_sensor, check_unused_names
 
 if TYPE_CHECKING:
@@ -38,7 +31,6 @@ if TYPE_CHECKING:
     from cns_drake.sensors.returns.calibrated import CalibratedReturns
 
 _VIEW_COLOR = Rgba(0.9, 0.2, 0.1, 1.0)
-_CLEAR = WeatherConfig()
 # Ending of the name of the system that chooses a LiDAR's random numbers.
 _DRAW = "noise_draw"
 # Period of a system that never changes its state [s].
@@ -166,6 +158,9 @@ def add_lidar(
         body, X_PB = body_and_pose(body, X_PB)
     unit = pattern if isinstance(pattern, str | Path) else None
     if unit is not None:
+        # Imported here: patterns of the caller's own need no data sheets.
+        from cns_drake.sensors.sheet_patterns import make_beam_pattern
+
         pattern = make_beam_pattern(unit, sampling_period(rate))
     if not isinstance(pattern, BeamPattern):
         raise TypeError(
@@ -174,6 +169,8 @@ def add_lidar(
         )
     model = _returns_model(returns, unit, seed, name)
     if model is not None and unit is not None:
+        from cns_drake.sensors.sheet_patterns import aimed
+
         pattern = aimed(pattern, model.sheet)
     if model is not None:
         _check_no_noise(measurement, range_noise, dropout)
@@ -244,87 +241,6 @@ def _make_noise_draw() -> LinearSystem:
     )
     constant.configure_random_state(np.eye(1))
     return constant
-
-
-def add_described_lidar(
-    config: LidarSection,
-    builder: DiagramBuilder,
-    scene_graph: SceneGraph,
-    body: RigidBody | Frame,
-    X_PB: RigidTransform,
-    *,
-    name: str = "lidar",
-    seed: int = 0,
-    weather: WeatherConfig = _CLEAR,
-    period: float | None = None,
-    unseen: Collection[RigidBody | Frame | GeometryId] | None = None,
-    motion_distortion: bool = False,
-    structures: Structures | None = None,
-    anchored_frames: Collection[FrameId] | None = None,
-    moving_bodies: Mapping[FrameId, int] | None = None,
-    num_threads: int = 1,
-    causal: bool = False,
-    role: Role = Role.kPerception,
-    rate: float | None = None,
-    capture_offset: float = 0.0,
-) -> Lidar:
-    """Adds a LiDAR to a diagram, given its description in a scenario.
-
-    Args:
-        config: the description, a section of a scenario.
-        builder: builder of a diagram with `scene_graph`.
-        scene_graph: the SceneGraph to scan.
-        body: the carrier P: a body of a finalized plant, or a frame that is
-            fixed on such a body.
-        X_PB: pose of the sensor B in P.
-        name: name of the system.
-        seed: seed of noise and returns.
-        weather: weather of calibrated returns.
-        period: duration of a revolution [s]; by default it follows from the
-            rate in the description.
-        unseen: what the LiDAR does not see. This argument and all further
-            arguments are the same as for `add_lidar`.
-        motion_distortion: whether the bodies of the LiDAR's plant keep moving
-            during a revolution. A recorded drive connects a `Sweep` instead of
-            setting this argument.
-        structures: table of the structures.
-        anchored_frames: frames that never move.
-        moving_bodies: frames that move during a revolution.
-        num_threads: number of threads that share the LiDAR's rays.
-        causal: whether a scan is the revolution that ends at the time of the
-            output.
-        role: role of the geometry that the LiDAR sees.
-        rate: scans per second of a sampled LiDAR; by default the LiDAR is
-            continuous, whatever the rate of its revolutions.
-        capture_offset: time of a sampled LiDAR's first scan [s].
-    """
-    return add_lidar(
-        builder,
-        scene_graph,
-        body,
-        X_PB,
-        make_pattern(config, period),
-        name=name,
-        measurement=MeasurementModel(
-            resolution=config.resolution,
-            range_noise=config.range_noise,
-            dropout=config.dropout,
-            faint_dropout=config.faint_dropout,
-            seed=seed,
-            sensor_name=name,
-        ),
-        returns=make_returns(config, weather, name, seed) or "ideal",
-        unseen=unseen,
-        motion_distortion=motion_distortion,
-        structures=structures,
-        anchored_frames=anchored_frames,
-        moving_bodies=moving_bodies,
-        num_threads=num_threads,
-        causal=causal,
-        role=role,
-        rate=rate,
-        capture_offset=capture_offset,
-    )
 
 
 def add_lidar_view(
