@@ -53,7 +53,7 @@ def add_described_lidar(
         scene_graph: the SceneGraph to scan.
         body: the carrier P: a body of a finalized plant, or a frame that is
             fixed on such a body.
-        X_PB: pose of the sensor B in P.
+        X_PB: pose of the sensor's body B in P.
         name: name of the system.
         seed: seed of noise and returns.
         weather: weather of calibrated returns.
@@ -71,9 +71,9 @@ def add_described_lidar(
         causal: whether a scan is the revolution that ends at the time of the
             output.
         role: role of the geometry that the LiDAR sees.
-        rate: scans per second of a sampled LiDAR; by default the LiDAR is
+        rate: scans per second of a discrete LiDAR; by default the LiDAR is
             continuous, whatever the rate of its revolutions.
-        capture_offset: time of a sampled LiDAR's first scan [s].
+        capture_offset: time of a discrete LiDAR's first scan [s].
     """
     return add_lidar(
         builder,

@@ -161,7 +161,7 @@ class LidarConfig(LidarDescription, PublishedSensor):
 
     Attributes:
         rate: scans (revolutions) per second, from 0.25 to 1000. With a rate,
-            the LiDAR is sampled: it computes a scan once per period and holds
+            the LiDAR is discrete: it computes a scan once per period and holds
             it. By default, the LiDAR is continuous, and publishes at the rate
             of the data sheet.
         causal: whether a scan covers the revolution that ends at its time, so

@@ -21,7 +21,7 @@ from cns_drake.scene import anchored_frames as find_anchored_frames
 from cns_drake.scene import geometry_port
 from cns_drake.sensors.carriers import body_and_pose, connect_motion
 from cns_drake.sensors.lidar.beams import BeamPattern
-from cns_drake.sensors.lidar.lidar import Lidar, sampling_period
+from cns_drake.sensors.lidar.lidar import Lidar, period_of_rate
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.seen_geometry import Structures
 from cns_drake.sensors.system_names import check_new_sensor, check_unused_names
@@ -72,8 +72,8 @@ def add_lidar(
             that any other source has registered with `scene_graph`. A frame on
             a body keeps its pose in the model, even if a Context gives the
             frame another pose. Drake's cameras behave in the same way.
-        X_PB: pose of the sensor B in P, as in Drake's RgbdSensor. In outputs,
-            the frame of the sensor is S.
+        X_PB: pose of the sensor's body B in P, as in Drake's RgbdSensor. The
+            frame S of the measurements coincides with B.
         pattern: beams of the LiDAR, the name of a preset, or the file of a data
             sheet. With a name or file, the LiDAR makes `rate` revolutions per
             second, by default as many as its data sheet states, and coordinates
@@ -115,11 +115,11 @@ def add_lidar(
         num_threads: number of threads that share the LiDAR's rays.
         causal: whether a scan is the revolution that ends at the time of the
             output.
-        rate: scans per second of a sampled LiDAR, which computes a scan once
+        rate: scans per second of a discrete LiDAR, which computes a scan once
             per period and holds it (see `Lidar`). By default the LiDAR is
             continuous: its ports have a scan for each time at which they are
             evaluated.
-        capture_offset: time of a sampled LiDAR's first scan [s].
+        capture_offset: time of a discrete LiDAR's first scan [s].
 
     Returns:
         The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W` and
@@ -143,7 +143,7 @@ def add_lidar(
     Example:
         from cns_drake import add_lidar
 
-        lidar = add_lidar(builder, scene_graph, body, X_BS, "os1-64")
+        lidar = add_lidar(builder, scene_graph, body, X_PB, "os1-64")
         builder.ExportOutput(lidar.GetOutputPort("scan"), "scan")
     """
     if not isinstance(scene_graph, SceneGraph):
@@ -161,7 +161,7 @@ def add_lidar(
         # Imported here: patterns of the caller's own need no data sheets.
         from cns_drake.sensors.sheet_patterns import make_beam_pattern
 
-        pattern = make_beam_pattern(unit, sampling_period(rate))
+        pattern = make_beam_pattern(unit, period_of_rate(rate))
     if not isinstance(pattern, BeamPattern):
         raise TypeError(
             f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "

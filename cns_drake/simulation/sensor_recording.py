@@ -88,8 +88,8 @@ def add_mcap_recorder(
         ValueError: `rates` names an unknown sensor, neither a period nor a
             LiDAR is given, a LiDAR is causal (its scan covers the revolution
             before its time stamp), scans or poses are recorded between the
-            scans that a sampled LiDAR takes, or names of sensors are not unique
-            or cannot be parts of ROS 2 topics.
+            scans of a discrete LiDAR, or names of sensors are not unique or
+            cannot be parts of ROS 2 topics.
 
     Example:
         from cns_drake import add_mcap_recorder
@@ -103,7 +103,7 @@ def add_mcap_recorder(
     check_unused_names(builder, name)
     _check_sensors(lidars, cameras)
     periods = _message_periods(period, rates or {}, lidars, cameras, imu)
-    _check_sampled(lidars, periods)
+    _check_captures(lidars, periods)
     X_BSs = {
         lidar.get_name(): _pose_at_odometry(lidar, odometry) for lidar in lidars
     }
@@ -170,12 +170,12 @@ def _check_sensors(
     check_sensor_names((*(lidar.get_name() for lidar in lidars), *camera_names))
 
 
-def _check_sampled(
+def _check_captures(
     lidars: Iterable[Lidar], periods: Mapping[str, float]
 ) -> None:
-    """Checks that all that is recorded is from times of sampled scans.
+    """Checks that discrete LiDARs are recorded only when they take scans.
 
-    Between two of its scans, a sampled LiDAR shows a former scan and pose.
+    Between two of its scans, a discrete LiDAR shows a former scan and pose.
 
     Args:
         lidars: the LiDARs.
@@ -192,7 +192,7 @@ def _check_sampled(
         whole = np.maximum(np.rint(scans), 1.0)
         if lidar.capture_offset or np.abs(scans - whole).max() > 1e-9:
             raise ValueError(
-                f"lidars: '{lidar.get_name()}' is sampled at "
+                f"lidars: '{lidar.get_name()}' takes "
                 f"{1.0 / lidar.capture_period:g} scans per second from "
                 f"{lidar.capture_offset:g} s on, and would be recorded at "
                 "other times; add it without rate"

@@ -60,10 +60,10 @@ _POSE_SIZE = 12
 
 
 class _Capture(NamedTuple):
-    """A scan that a sampled LiDAR has taken and holds.
+    """A scan that a discrete LiDAR has taken and holds.
 
     Attributes:
-        number: number of the capture; see `_Sampling`.
+        number: number of the capture; see `_CaptureTimes`.
         points: points of the scan.
         measured: returns, with the geometry that each comes from.
         instance: (num_geometries,) uint16 structure of each geometry.
@@ -83,8 +83,8 @@ class _Capture(NamedTuple):
         return self
 
 
-class _Sampling(NamedTuple):
-    """The times at which a sampled LiDAR takes scans: offset + k * period.
+class _CaptureTimes(NamedTuple):
+    """The times at which a discrete LiDAR takes scans: offset + k * period.
 
     Attributes:
         period: time between two captures [s].
@@ -138,8 +138,9 @@ class Lidar(LeafSystem):
         - positions_W
         - X_WS
 
-    Frames: W is the world, P the parent frame, S the sensor frame (x forward, y
-    left, z up). `scan` is a structured array of `POINT_DTYPE`, one record per
+    Frames: W is the world, P the parent frame, B the body of the sensor, and S
+    the frame of the measurements, which coincides with B (x forward, y left, z
+    up). `scan` is a structured array of `POINT_DTYPE`, one record per
     return in firing order; beams whose nearest surface is closer than the
     minimum range or farther than the maximum range return nothing.
     `point_cloud_S` holds the same positions as a Drake point cloud, whose
@@ -154,7 +155,7 @@ class Lidar(LeafSystem):
     from a single pose of S, the pose at the time of the output (a deskewed
     scan). This pose follows from the pose of P in the SceneGraph.
 
-    A LiDAR with a `rate` is sampled: it computes a scan once per period and
+    A LiDAR with a `rate` is discrete: it computes a scan once per period and
     holds it, like Drake's RgbdSensorDiscrete. At time t, all output ports,
     `EvalGeometryIds` and `EvalInstances` show the last capture up to t. At the
     time of a capture itself, they show the new scan even before the update of
@@ -208,7 +209,7 @@ class Lidar(LeafSystem):
 
     Attributes:
         parent_frame_id: the frame P that carries the LiDAR.
-        X_PB: the pose of the LiDAR in P, named as in Drake's RgbdSensor.
+        X_PB: the pose of B in P, named as in Drake's RgbdSensor.
         pattern: the beams of a revolution.
         role: the role of the geometry that the LiDAR sees.
         causal: whether a scan is the revolution that ends at the time of the
@@ -242,7 +243,7 @@ class Lidar(LeafSystem):
 
         Args:
             parent_frame_id: the frame P that carries the sensor.
-            X_PB: pose of the sensor in P.
+            X_PB: pose of the sensor's body B in P.
             pattern: the beams.
             measurement: the model of noise, losses and rounding.
             returns: the model of a real unit; None for ideal returns. With a
@@ -264,10 +265,10 @@ class Lidar(LeafSystem):
                 does not depend on this number.
             causal: whether a scan is the revolution that ends at the time of
                 the output; by default the revolution starts at that time.
-            rate: scans per second of a sampled LiDAR, at most one scan per
+            rate: scans per second of a discrete LiDAR, at most one scan per
                 revolution; by default the LiDAR is continuous: it has a scan
                 for each time.
-            capture_offset: time of a sampled LiDAR's first scan [s].
+            capture_offset: time of a discrete LiDAR's first scan [s].
 
         Raises:
             TypeError: the role is no role of geometry, `unseen` has an element
@@ -291,7 +292,7 @@ class Lidar(LeafSystem):
         self.pattern = pattern
         self.causal = bool(causal)
         self.role = role
-        self._sampling = _sampling(rate, capture_offset, pattern.period)
+        self._captures = _capture_times(rate, capture_offset, pattern.period)
         self._scanner = Scanner(pattern, measurement, returns)
         self._moving_bodies = dict(moving_bodies or {})
         self._declare_inputs(has_velocities=moving_bodies is not None)
@@ -320,9 +321,9 @@ class Lidar(LeafSystem):
             )
 
     def _declare_captures(self) -> None:
-        """Declares the scan that a sampled LiDAR holds."""
+        """Declares the scan that a discrete LiDAR holds."""
         self._held_inputs = set()
-        if self._sampling is None:
+        if self._captures is None:
             return
         self._held_state = self.DeclareAbstractState(
             # Of any Python type; no scan is held at first.
@@ -333,8 +334,8 @@ class Lidar(LeafSystem):
             self.abstract_state_ticket(self._held_state),
         }
         self.DeclarePeriodicUnrestrictedUpdateEvent(
-            period_sec=self._sampling.period,
-            offset_sec=self._sampling.offset,
+            period_sec=self._captures.period,
+            offset_sec=self._captures.offset,
             update=self._capture,
         )
         self.DeclareInitializationUnrestrictedUpdateEvent(self._initialize)
@@ -444,7 +445,7 @@ class Lidar(LeafSystem):
             points = self._eval_points(context)
             self._set_cloud(output.get_mutable_value(), points, poses)
 
-        if self._sampling is not None:
+        if self._captures is not None:
             calc_now, held = calc, self._declare_held_cloud(allocate, in_world)
 
             def calc(context: Context, output: AbstractValue) -> None:
@@ -463,7 +464,7 @@ class Lidar(LeafSystem):
     def _declare_held_cloud(
         self, allocate: Callable[[], AbstractValue], in_world: bool
     ) -> CacheEntry:
-        """Declares the cloud of the scan that a sampled LiDAR holds."""
+        """Declares the cloud of the scan that a discrete LiDAR holds."""
 
         def calc(context: Context, output: AbstractValue) -> None:
             capture = self._last_capture(context)
@@ -481,13 +482,13 @@ class Lidar(LeafSystem):
 
     @property
     def capture_period(self) -> float | None:
-        """The time between two scans of a sampled LiDAR [s], or else None."""
-        return None if self._sampling is None else self._sampling.period
+        """The time between two scans of a discrete LiDAR [s], or else None."""
+        return None if self._captures is None else self._captures.period
 
     @property
     def capture_offset(self) -> float:
-        """The time of a sampled LiDAR's first scan [s]."""
-        return 0.0 if self._sampling is None else self._sampling.offset
+        """The time of a discrete LiDAR's first scan [s]."""
+        return 0.0 if self._captures is None else self._captures.offset
 
     @property
     def is_random(self) -> bool:
@@ -639,11 +640,11 @@ class Lidar(LeafSystem):
 
     def _capture(self, context: Context, state: State) -> None:
         """Takes a scan and holds it."""
-        assert self._sampling is not None
+        assert self._captures is not None
         self._hold(
             state,
             _Capture(
-                self._sampling.number(context.get_time()),
+                self._captures.number(context.get_time()),
                 self._points.Eval(context),
                 self._measured.Eval(context),
                 _eval_seen(self._seen_in_reach, context).instance,
@@ -658,8 +659,8 @@ class Lidar(LeafSystem):
         Between two captures, a scan is taken at once: until the next capture,
         it would be computed for each time.
         """
-        assert self._sampling is not None
-        if self._sampling.is_capture(context.get_time()):
+        assert self._captures is not None
+        if self._captures.is_capture(context.get_time()):
             self._hold(state, None)
         else:
             self._capture(context, state)
@@ -668,15 +669,15 @@ class Lidar(LeafSystem):
         state.get_mutable_abstract_state(self._held_state).set_value(capture)
 
     def _last_capture(self, context: Context) -> _Capture | None:
-        """Returns the scan that a sampled LiDAR took last, if any."""
+        """Returns the scan that a discrete LiDAR took last, if any."""
         return context.get_abstract_state(self._held_state).get_value()
 
     def _held(self, context: Context) -> _Capture | None:
         """Returns what the outputs show; None if they are to be computed."""
-        if self._sampling is None:
+        if self._captures is None:
             return None
         capture = self._last_capture(context)
-        number = self._sampling.number(context.get_time())
+        number = self._captures.number(context.get_time())
         if capture is None or capture.number != number:
             return None
         return capture
@@ -865,9 +866,9 @@ class Lidar(LeafSystem):
         set_points(cloud, (p_WSset[pose] + p_SRset_W).T, greys)
 
 
-def _sampling(
+def _capture_times(
     rate: float | None, offset: float, revolution: float
-) -> _Sampling | None:
+) -> _CaptureTimes | None:
     """Returns when a LiDAR takes scans; None for a continuous LiDAR.
 
     Args:
@@ -879,7 +880,7 @@ def _sampling(
         ValueError: the rate is not positive or too high, or the offset is
             negative or without a rate.
     """
-    period = sampling_period(rate)
+    period = period_of_rate(rate)
     if not (_is_number(offset) and offset >= 0.0):
         raise ValueError(f"capture_offset: {offset!r} is not a time from 0 on")
     if period is None:
@@ -892,10 +893,10 @@ def _sampling(
             f"rate: {rate:g} scans per second, but a revolution takes "
             f"{revolution:g} s; give a pattern with a shorter period"
         )
-    return _Sampling(period, float(offset))
+    return _CaptureTimes(period, float(offset))
 
 
-def sampling_period(rate: float | None) -> float | None:
+def period_of_rate(rate: float | None) -> float | None:
     """Returns the time between two scans [s]; None without a rate.
 
     Raises:

@@ -271,7 +271,7 @@ def test_advancing_in_pieces_changes_nothing(casts):
     np.testing.assert_array_equal(*found)
 
 
-def test_a_lidar_config_with_a_rate_is_sampled(casts):
+def test_a_lidar_config_with_a_rate_is_discrete(casts):
     for rate, expected in ((10.0, 11), (None, 101)):
         casts[0] = 0
         builder = DiagramBuilder()
@@ -325,7 +325,7 @@ def test_a_rate_sets_the_revolutions_of_a_preset():
 def test_a_recording_needs_the_pose_at_its_own_times(tmp_path):
     site = Site()
     odometry = add_odometry(site.builder, site.cart)
-    fault = r"^lidars: 'lidar' is sampled at 10 .*; add it without rate"
+    fault = r"^lidars: 'lidar' takes 10 scans .*; add it without rate"
     for rates in ({"odometry": 100}, {"lidar": 20}):
         with pytest.raises(ValueError, match=fault):
             add_mcap_recorder(
