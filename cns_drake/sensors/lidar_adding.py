@@ -122,9 +122,9 @@ def add_lidar(
         capture_offset: time of a discrete LiDAR's first scan [s].
 
     Returns:
-        The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W` and
-        `X_WS`, and the methods `EvalGeometryIds`, `EvalInstances` and
-        `CastRays` of a Context.
+        The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W`,
+        `X_WS` and `scan_time`, and the methods `EvalGeometryIds`,
+        `EvalInstances` and `CastRays` of a Context.
 
     Raises:
         RuntimeError: the plant is not finalized, or not registered with the

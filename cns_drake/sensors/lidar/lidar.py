@@ -14,6 +14,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.perception import BaseField, Fields, PointCloud
 from pydrake.systems.framework import (
+    BasicVector,
     CacheEntry,
     Context,
     DependencyTicket,
@@ -64,6 +65,7 @@ class _Capture(NamedTuple):
 
     Attributes:
         number: number of the capture; see `_CaptureTimes`.
+        time: time of the capture [s].
         points: points of the scan.
         measured: returns, with the geometry that each comes from.
         instance: (num_geometries,) uint16 structure of each geometry.
@@ -72,6 +74,7 @@ class _Capture(NamedTuple):
     """
 
     number: int
+    time: float
     points: np.ndarray
     measured: MeasuredReturns
     instance: np.ndarray
@@ -137,6 +140,7 @@ class Lidar(LeafSystem):
         - point_cloud_W
         - positions_W
         - X_WS
+        - scan_time
 
     Frames: W is the world, P the parent frame, B the body of the sensor, and S
     the frame of the measurements, which coincides with B (x forward, y left, z
@@ -147,7 +151,8 @@ class Lidar(LeafSystem):
     colours are the intensities as greys. Grey 255 stands for an intensity of 1,
     or of 255 with calibrated returns. `point_cloud_W` has the same points in
     the world frame; `positions_W` is `point_cloud_W` without the colours.
-    `X_WS` is the pose of S at the time of the output.
+    `X_WS` is the pose of S at the time of the output. `scan_time` is this time
+    [s], like RgbdSensor's `image_time`.
 
     A scan is one revolution of the LiDAR. The revolution starts at the time of
     the output. With a causal LiDAR, the revolution ends at this time instead,
@@ -420,6 +425,12 @@ class Lidar(LeafSystem):
             calc=self._calc_X_WS,
             prerequisites_of_calc=self._pose_inputs | self._held_inputs,
         )
+        self.DeclareVectorOutputPort(
+            "scan_time",
+            1,
+            self._calc_scan_time,
+            prerequisites_of_calc={self.time_ticket()} | self._held_inputs,
+        )
 
     def _declare_cloud(
         self,
@@ -518,6 +529,10 @@ class Lidar(LeafSystem):
     def X_WS_output_port(self) -> OutputPort:
         """Returns the port `X_WS`."""
         return self.GetOutputPort("X_WS")
+
+    def scan_time_output_port(self) -> OutputPort:
+        """Returns the port `scan_time`."""
+        return self.GetOutputPort("scan_time")
 
     def EvalScene(self, context: Context) -> RayCastingScene:
         """Returns the scene of all geometry that the LiDAR sees in a Context.
@@ -645,6 +660,7 @@ class Lidar(LeafSystem):
             state,
             _Capture(
                 self._captures.number(context.get_time()),
+                context.get_time(),
                 self._points.Eval(context),
                 self._measured.Eval(context),
                 _eval_seen(self._seen_in_reach, context).instance,
@@ -838,6 +854,10 @@ class Lidar(LeafSystem):
         output.set_value(
             self._calc_pose(context) if held is None else held.X_WS
         )
+
+    def _calc_scan_time(self, context: Context, output: BasicVector) -> None:
+        held = self._held(context)
+        output[0] = context.get_time() if held is None else held.time
 
     def _set_cloud(
         self,

@@ -208,6 +208,7 @@ def test_without_a_simulator_there_is_a_scan_at_each_time():
         site.start(context, x)
         assert distance(site.eval(context)) == pytest.approx(50.0 - x)
         assert site.eval(context, "X_WS").translation()[0] == x
+        assert site.eval(context, "scan_time") == [time]
 
 
 def test_contexts_hold_scans_of_their_own(casts):
@@ -222,6 +223,7 @@ def test_contexts_hold_scans_of_their_own(casts):
     # A change between two captures is not seen, but rays see it.
     site.start(context, 20.0)
     assert site.eval(context) is held
+    assert site.eval(context, "scan_time") == [0.2]
     own = site.lidar.GetMyContextFromRoot(context)
     ids = site.lidar.EvalGeometryIds(own)
     assert len(ids) == len(held)

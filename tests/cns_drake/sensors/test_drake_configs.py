@@ -373,7 +373,7 @@ def test_buses_by_name():
         ({"dropout": 1.5}, "roof: dropout: "),
         ({"returns": "calibrated"}, "roof: .*range_noise"),
         ({"echoes": "some"}, "roof: echoes: "),
-        ({"role": "proximty"}, "roof: role: 'proximty' is not one of"),
+        ({"role": "nothing"}, "roof: role: 'nothing' is not one of"),
         ({"num_threads": 0}, "roof: num_threads: 0 is not at least 1"),
         ({"unseen": ["robt"]}, "roof: unseen: no body.* 'robt': .*robot"),
     ],
