@@ -19,7 +19,7 @@ from cns_drake import add_lidar, save_meshcat_page
 ROOT = Path(__file__).parents[1]
 MODELS = "worlds/downtown/stage_04.sdf", "diagrams/models/drone.sdf"
 X_WB = RigidTransform(RollPitchYaw(0.0, 0.1, 0.0), [-110.0, 0.0, 15.0])
-X_BS = RigidTransform(RollPitchYaw(np.pi, 0, 0), [0, 0, -0.1])  # Head down.
+X_PB = RigidTransform(RollPitchYaw(np.pi, 0, 0), [0, 0, -0.1])  # Head down.
 _FIELDS = Fields(BaseField.kXYZs | BaseField.kRGBs)
 V_WB = SpatialVelocity(w=[0.0, 0.0, 0.2], v=[15.0, 0.0, 0.0])
 
@@ -33,7 +33,7 @@ def main(page: Path = Path("drone.html"), duration: float = 6.0) -> None:
     plant.Finalize()
     body = plant.GetBodyByName("body")
     options = {"motion_distortion": True}
-    lidar = add_lidar(builder, scene_graph, body, X_BS, "mid-360", **options)
+    lidar = add_lidar(builder, scene_graph, body, X_PB, "mid-360", **options)
     MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat := Meshcat())
     context = (simulator := Simulator(builder.Build())).get_mutable_context()
     of_plant = plant.GetMyMutableContextFromRoot(context)

@@ -5,14 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from pydrake.common.value import AbstractValue, Value
-from pydrake.math import RigidTransform
-from pydrake.systems.framework import (
-    Context,
-    LeafSystem,
-)
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from cns_drake.base import product, rotated
 from cns_drake.motion.trajectory import Trajectory
 
 
@@ -27,12 +21,15 @@ class Sweep(NamedTuple):
     R_WPset: np.ndarray
     p_WPset: np.ndarray
 
-    def of_frame(self, X_PS: RigidTransform) -> Sweep:
-        """Returns the poses of a frame S that is fixed in P at X_PS."""
-        return Sweep(
-            product(self.R_WPset, X_PS.rotation().matrix()),
-            self.p_WPset + rotated(self.R_WPset, X_PS.translation()),
-        )
+    def numbers(self) -> np.ndarray:
+        """Returns the value of a port `sweep`.
+
+        Returns:
+            (12 N,): for each pose, the three rows of the matrix [R_WP p_WP].
+        """
+        return np.concatenate(
+            [self.R_WPset, self.p_WPset[:, :, None]], axis=2
+        ).ravel()
 
 
 class VehicleSweep(LeafSystem):
@@ -48,9 +45,9 @@ class VehicleSweep(LeafSystem):
         output_ports:
         - sweep
 
-    `sweep` is abstract: a `Sweep` of the vehicle frame B at the current time
-    plus each of the given offsets. After the end of the trajectory, B stays at
-    its last pose.
+    `sweep` is a vector, the `numbers` of a `Sweep`: poses of the vehicle frame
+    B at the current time plus each of the given offsets. After the end of the
+    trajectory, B stays at its last pose.
     """
 
     def __init__(self, trajectory: Trajectory, offsets: np.ndarray):
@@ -58,13 +55,13 @@ class VehicleSweep(LeafSystem):
         super().__init__()
         self._trajectory = trajectory
         self._offsets = np.array(offsets, dtype=float)
-        self.DeclareAbstractOutputPort(
+        self.DeclareVectorOutputPort(
             "sweep",
-            alloc=lambda: Value(object()),
+            12 * len(self._offsets),
             calc=self._calc_sweep,
             prerequisites_of_calc={self.time_ticket()},
         )
 
-    def _calc_sweep(self, context: Context, output: AbstractValue) -> None:
+    def _calc_sweep(self, context: Context, output: BasicVector) -> None:
         times = context.get_time() + self._offsets
-        output.set_value(Sweep(*self._trajectory.poses(times)))
+        output.SetFromVector(Sweep(*self._trajectory.poses(times)).numbers())

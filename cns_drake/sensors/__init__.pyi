@@ -4,6 +4,9 @@ from cns_drake.sensors.camera.camera_scene import CameraScene as CameraScene
 from cns_drake.sensors.camera.config import CameraSection as CameraSection
 from cns_drake.sensors.camera.renderer import check_renderer as check_renderer
 from cns_drake.sensors.carriers import sensor_pose as sensor_pose
+from cns_drake.sensors.described_lidar import (
+    add_described_lidar as add_described_lidar,
+)
 from cns_drake.sensors.drake_configs import ApplyImuConfig as ApplyImuConfig
 from cns_drake.sensors.drake_configs import ApplyLidarConfig as ApplyLidarConfig
 from cns_drake.sensors.drake_configs import (
@@ -22,22 +25,8 @@ from cns_drake.sensors.imu.noise import ImuNoise as ImuNoise
 from cns_drake.sensors.imu.vehicle_imu import (
     add_described_imu as add_described_imu,
 )
-from cns_drake.sensors.lidar.adding import (
-    add_described_lidar as add_described_lidar,
-)
-from cns_drake.sensors.lidar.adding import add_lidar as add_lidar
-from cns_drake.sensors.lidar.adding import add_lidar_view as add_lidar_view
-from cns_drake.sensors.lidar.adding import connect_lidar as connect_lidar
 from cns_drake.sensors.lidar.beam_coverage import BeamCoverage as BeamCoverage
 from cns_drake.sensors.lidar.beams import BeamPattern as BeamPattern
-from cns_drake.sensors.lidar.config import LidarSection as LidarSection
-from cns_drake.sensors.lidar.config import WeatherConfig as WeatherConfig
-from cns_drake.sensors.lidar.config import describe_unit as describe_unit
-from cns_drake.sensors.lidar.config import (
-    make_lidar_config as make_lidar_config,
-)
-from cns_drake.sensors.lidar.config import make_pattern as make_pattern
-from cns_drake.sensors.lidar.config import make_returns as make_returns
 from cns_drake.sensors.lidar.lidar import Lidar as Lidar
 from cns_drake.sensors.lidar.measurement import Echoes as Echoes
 from cns_drake.sensors.lidar.measurement import (
@@ -54,9 +43,17 @@ from cns_drake.sensors.lidar.patterns import (
 )
 from cns_drake.sensors.lidar.ray_queries import RayHits as RayHits
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE as POINT_DTYPE
-from cns_drake.sensors.lidar.sheet_patterns import (
-    make_beam_pattern as make_beam_pattern,
+from cns_drake.sensors.lidar_adding import add_lidar as add_lidar
+from cns_drake.sensors.lidar_adding import add_lidar_view as add_lidar_view
+from cns_drake.sensors.lidar_adding import connect_lidar as connect_lidar
+from cns_drake.sensors.lidar_config import LidarSection as LidarSection
+from cns_drake.sensors.lidar_config import WeatherConfig as WeatherConfig
+from cns_drake.sensors.lidar_config import describe_unit as describe_unit
+from cns_drake.sensors.lidar_config import (
+    make_lidar_config as make_lidar_config,
 )
+from cns_drake.sensors.lidar_config import make_pattern as make_pattern
+from cns_drake.sensors.lidar_config import make_returns as make_returns
 from cns_drake.sensors.noise_draws import noise_generator as noise_generator
 from cns_drake.sensors.odometry import Odometry as Odometry
 from cns_drake.sensors.odometry import OdometrySensor as OdometrySensor
@@ -80,6 +77,9 @@ from cns_drake.sensors.sensor_config import Triple as Triple
 from cns_drake.sensors.sensor_config import check_rate as check_rate
 from cns_drake.sensors.sensor_config import (
     field_off_by_default as field_off_by_default,
+)
+from cns_drake.sensors.sheet_patterns import (
+    make_beam_pattern as make_beam_pattern,
 )
 from cns_drake.sensors.system_names import (
     check_unused_names as check_unused_names,

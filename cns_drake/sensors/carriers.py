@@ -1,12 +1,16 @@
 """Poses of sensors on their carriers, and the motion of the carriers."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.tree import Frame, RigidBody
 from pydrake.systems.framework import DiagramBuilder, InputPort, System
 
-from cns_drake.sensors.sensor_config import Mount
+if TYPE_CHECKING:
+    from cns_drake.sensors.sensor_config import Mount
 
 
 def sensor_pose(mount: Mount) -> RigidTransform:

@@ -6,18 +6,23 @@ publishes its measurements on LCM. The sections of scenarios define which values
 the fields can have.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+import copy
 from dataclasses import dataclass, field
 import math
+import numbers
+import os
 import sys
-from typing import Any, TypeAlias
+import types
+import typing
+from typing import Any, TypeAlias, TypeVar
 
 from drake import lcmt_drake_signal, lcmt_point_cloud
 import numpy as np
 from pydantic import ValidationError
 from pydrake.common.schema import Transform
 from pydrake.common.value import AbstractValue, Value
-from pydrake.geometry import SceneGraph
+from pydrake.geometry import GeometryId, Role, SceneGraph
 from pydrake.lcm import DrakeLcm, DrakeLcmInterface
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import GetScopedFrameByName
@@ -30,14 +35,14 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
 from pydrake.systems.primitives import ZeroOrderHold
 
-from cns_drake.base import describe_validation_error
+from cns_drake.base import describe_validation_error, one_line
 from cns_drake.scene import find_bus
 from cns_drake.sensors import odometry
+from cns_drake.sensors.described_lidar import add_described_lidar
 from cns_drake.sensors.imu.config import ImuDescription, ImuSection
 from cns_drake.sensors.imu.imu import Imu, add_imu
-from cns_drake.sensors.lidar.adding import add_described_lidar
-from cns_drake.sensors.lidar.config import LidarDescription, LidarSection
 from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar_config import LidarDescription, LidarSection
 from cns_drake.sensors.odometry_config import OdometrySection
 from cns_drake.sensors.sensor_config import HIGHEST_RATE, Section
 from cns_drake.sensors.system_names import check_unused_names
@@ -48,6 +53,85 @@ from cns_drake.units import DEFAULT_PRESET, LONGEST_PERIOD
 _LEFT_OUT = ("xyz", "rpy_deg", "layout")
 # Messages per second of an IMU or odometry that names no rate.
 _RATE = 20
+_ROLES = {
+    "perception": Role.kPerception,
+    "illustration": Role.kIllustration,
+    "proximity": Role.kProximity,
+}
+_KINDS = {
+    bool: "true or false",
+    float: "a number",
+    int: "a whole number",
+    str: "a text",
+}
+_Struct = TypeVar("_Struct")
+
+
+def _names_of_fields_in_errors(struct: type[_Struct]) -> type[_Struct]:
+    """Makes a dataclass refuse values of a wrong type by the field's name.
+
+    Drake's reader of YAML itself refuses `rate: fast` without the name of the
+    field. It accepts any scalar where the type of a field admits any; then the
+    dataclass refuses the value, also in Python.
+    """
+    fields: dict[str, Any] = struct.__dataclass_fields__  # type: ignore[attr-defined]  # A dataclass.
+    hints = {name: one.type for name, one in fields.items()}
+    for name, hint in hints.items():
+        # A copy: base classes share the field.
+        fields[name] = copy.copy(fields[name])
+        fields[name].type = typing.Union[(hint, *_KINDS)]
+
+    def set_field(self: _Struct, name: str, value: Any) -> None:
+        if name in hints:
+            value = _of_type(value, hints[name], f"{struct.__name__}.{name}")
+        object.__setattr__(self, name, value)
+
+    struct.__setattr__ = set_field  # type: ignore[method-assign, assignment]  # Of this class.
+    return struct
+
+
+def _of_type(value: Any, hint: Any, name: str) -> Any:
+    """Returns a value as the type of a field; converts as Drake's reader does.
+
+    Raises:
+        ValueError: the value is of another type; the message begins with
+            `name`.
+    """
+    options = [hint]
+    if isinstance(hint, types.UnionType):
+        options = list(typing.get_args(hint))
+    if value is None and type(None) in options:
+        return None
+    kind = options[0]
+    fault = f"{name}: {value!r} is not {_KINDS.get(kind, 'a pose')}"
+    if typing.get_origin(kind) is list:
+        if isinstance(value, str) or not (
+            isinstance(value, Collection)
+            and all(isinstance(one, str) for one in value)
+        ):
+            raise ValueError(f"{name}: {value!r} is not a list of names")
+        return list(value)
+    if kind is bool:
+        if value in ("true", "false"):  # Quoted in YAML.
+            return value == "true"
+    elif kind is str and isinstance(value, os.PathLike):
+        return os.fspath(value)
+    elif kind in (int, float) and not isinstance(value, bool):
+        if isinstance(value, str):
+            try:
+                value = float(value)
+            except ValueError:
+                raise ValueError(fault) from None
+        if isinstance(value, numbers.Real) and (
+            kind is float or float(value).is_integer()
+        ):
+            return kind(value)
+        raise ValueError(fault)
+    if not isinstance(value, kind) or (
+        kind in (int, float) and isinstance(value, bool)
+    ):
+        raise ValueError(fault)
+    return value
 
 
 @dataclass
@@ -56,7 +140,7 @@ class PublishedSensor:
 
     Attributes:
         name: name of the system, and part of the channel's name.
-        X_PB: pose of the sensor B in a frame P of the plant. The field
+        X_PB: pose of the sensor's body B in a frame P of the plant. The field
             `base_frame` of this pose names P; by default P is the world frame.
         lcm_bus: name of the bus on which the measurements are published.
     """
@@ -66,6 +150,7 @@ class PublishedSensor:
     lcm_bus: str = "default"
 
 
+@_names_of_fields_in_errors
 @dataclass
 class LidarConfig(LidarDescription, PublishedSensor):
     """The configuration of a LiDAR, for YAML and `ApplyLidarConfig`.
@@ -75,8 +160,10 @@ class LidarConfig(LidarDescription, PublishedSensor):
     rounded by default. A relative path `unit` starts at the working directory.
 
     Attributes:
-        rate: revolutions per second, from 0.25 to 1000; by default the rate of
-            the data sheet.
+        rate: scans (revolutions) per second, from 0.25 to 1000. With a rate,
+            the LiDAR is discrete: it computes a scan once per period and holds
+            it. By default, the LiDAR is continuous, and publishes at the rate
+            of the data sheet.
         causal: whether a scan covers the revolution that ends at its time, so
             that a controller can use it at once.
         capture_offset: time of the first published scan [s]; the other scans
@@ -86,6 +173,14 @@ class LidarConfig(LidarDescription, PublishedSensor):
             than a revolution. The message keeps the time of the capture. The
             ports of the `Lidar` are not delayed.
         seed: seed of the noise.
+        role: role of the geometry that the LiDAR sees: `perception`,
+            `illustration` or `proximity`.
+        unseen: names of bodies, frames on bodies, and geometries that the LiDAR
+            does not see, such as `robot::arm`. A geometry has the name that the
+            SceneGraph's inspector gives; a name stands for all geometries that
+            have it. By default, the LiDAR's body and all bodies that are welded
+            to it; `[]` if the LiDAR sees all bodies.
+        num_threads: number of threads that share the LiDAR's rays.
 
     Example:
         from pydrake.common.yaml import yaml_load_typed
@@ -102,8 +197,12 @@ class LidarConfig(LidarDescription, PublishedSensor):
     capture_offset: float = 0.0
     output_delay: float = 0.0
     seed: int = 0
+    role: str = "perception"
+    unseen: list[str] | None = None
+    num_threads: int = 1
 
 
+@_names_of_fields_in_errors
 @dataclass
 class ImuConfig(ImuDescription, PublishedSensor):
     """The configuration of an IMU, for YAML and `ApplyImuConfig`.
@@ -127,6 +226,7 @@ class ImuConfig(ImuDescription, PublishedSensor):
     seed: int = 0
 
 
+@_names_of_fields_in_errors
 @dataclass
 class OdometryConfig(PublishedSensor):
     """The configuration of exact odometry, for YAML and `ApplyOdometryConfig`.
@@ -346,7 +446,18 @@ def ApplyLidarConfig(
         period = 1.0 / config.rate
     _check_timing(config, period)
     _check_publisher_names(builder, config.name)
+    if config.role not in _ROLES:
+        raise ValueError(
+            f"{_caller(config)}: role: {config.role!r} is not one of"
+            f" {', '.join(_ROLES)}"
+        )
+    if config.num_threads < 1:
+        raise ValueError(
+            f"{_caller(config)}: num_threads: {config.num_threads} is not at"
+            " least 1"
+        )
     scene_graph = scene_graph or builder.GetSubsystemByName("scene_graph")
+    plant = plant or builder.GetSubsystemByName("plant")
     lidar = add_described_lidar(
         section,
         builder,
@@ -357,6 +468,12 @@ def ApplyLidarConfig(
         period=period,
         motion_distortion=section.motion_distortion,
         causal=config.causal,
+        rate=config.rate,
+        # Without a rate, it concerns the messages only.
+        capture_offset=config.capture_offset if config.rate else 0.0,
+        role=_ROLES[config.role],
+        unseen=_unseen(config, plant, scene_graph),
+        num_threads=config.num_threads,
     )
     _publish_measurements(
         builder,
@@ -515,6 +632,37 @@ def _checked_section(
     except ValidationError as error:
         text = describe_validation_error(source, error, kind)
         raise ValueError(text) from None
+
+
+def _unseen(
+    config: LidarConfig, plant: MultibodyPlant, scene_graph: SceneGraph
+) -> list[Frame | GeometryId] | None:
+    """Returns what a LiDAR does not see; None for its own body.
+
+    Raises:
+        ValueError: nothing has one of the names.
+    """
+    if config.unseen is None:
+        return None
+    inspector = scene_graph.model_inspector()
+    geometries: dict[str, list[GeometryId]] = {}
+    for geometry_id in inspector.GetAllGeometryIds(_ROLES[config.role]):
+        name = inspector.GetName(geometry_id)
+        geometries.setdefault(name, []).append(geometry_id)
+    unseen: list[Frame | GeometryId] = []
+    for name in config.unseen:
+        found: list[Frame | GeometryId] = [*geometries.get(name, ())]
+        # Drake says of a frame that is missing or ambiguous which there are.
+        try:
+            found.append(GetScopedFrameByName(plant, name))
+        except RuntimeError as error:
+            if not found:
+                raise ValueError(
+                    f"{_caller(config)}: unseen: no body, frame or geometry"
+                    f" {name!r}: {one_line(error)}"
+                ) from None
+        unseen += found
+    return unseen
 
 
 def _check_timing(config: LidarConfig, period: float) -> None:

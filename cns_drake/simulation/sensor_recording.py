@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
+import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.sensors import RgbdSensor
@@ -86,8 +87,9 @@ def add_mcap_recorder(
         InputError: the folder contains a finished recording or other files.
         ValueError: `rates` names an unknown sensor, neither a period nor a
             LiDAR is given, a LiDAR is causal (its scan covers the revolution
-            before its time stamp), or names of sensors are not unique or cannot
-            be parts of ROS 2 topics.
+            before its time stamp), scans or poses are recorded between the
+            scans of a discrete LiDAR, or names of sensors are not unique or
+            cannot be parts of ROS 2 topics.
 
     Example:
         from cns_drake import add_mcap_recorder
@@ -100,6 +102,8 @@ def add_mcap_recorder(
     cameras = cameras or {}
     check_unused_names(builder, name)
     _check_sensors(lidars, cameras)
+    periods = _message_periods(period, rates or {}, lidars, cameras, imu)
+    _check_captures(lidars, periods)
     X_BSs = {
         lidar.get_name(): _pose_at_odometry(lidar, odometry) for lidar in lidars
     }
@@ -137,10 +141,7 @@ def add_mcap_recorder(
             X_BSs=X_BSs,
             X_BI=X_BI,
             cameras=recorded,
-            schedule=_make_schedule(
-                _message_periods(period, rates or {}, lidars, cameras, imu),
-                topics,
-            ),
+            schedule=_make_schedule(periods, topics),
             imu_variances=variances,
             start_ns=start_ns,
         ),
@@ -167,6 +168,35 @@ def _check_sensors(
                 "revolution before the time with which a recording stamps it"
             )
     check_sensor_names((*(lidar.get_name() for lidar in lidars), *camera_names))
+
+
+def _check_captures(
+    lidars: Iterable[Lidar], periods: Mapping[str, float]
+) -> None:
+    """Checks that discrete LiDARs are recorded only when they take scans.
+
+    Between two of its scans, a discrete LiDAR shows a former scan and pose.
+
+    Args:
+        lidars: the LiDARs.
+        periods: sensor name -> time between its messages [s].
+
+    Raises:
+        ValueError: a LiDAR takes its scans at other times.
+    """
+    for lidar in lidars:
+        if lidar.capture_period is None:
+            continue
+        messages = periods[lidar.get_name()], _moving_period(periods)
+        scans = np.array(messages) / lidar.capture_period
+        whole = np.maximum(np.rint(scans), 1.0)
+        if lidar.capture_offset or np.abs(scans - whole).max() > 1e-9:
+            raise ValueError(
+                f"lidars: '{lidar.get_name()}' takes "
+                f"{1.0 / lidar.capture_period:g} scans per second from "
+                f"{lidar.capture_offset:g} s on, and would be recorded at "
+                "other times; add it without rate"
+            )
 
 
 def _recorded_ports(
@@ -239,6 +269,14 @@ def _message_periods(
     return periods
 
 
+def _moving_period(periods: Mapping[str, float]) -> float:
+    """Returns the time between two messages of `/tf` [s].
+
+    `/tf` has all moving frames, at the highest rate of any of them.
+    """
+    return min(period for name, period in periods.items() if name != "imu")
+
+
 def _make_schedule(
     periods: Mapping[str, float], topics: Collection[Topic]
 ) -> Schedule:
@@ -249,8 +287,7 @@ def _make_schedule(
         for kind in (*ENCODINGS, "camera_info"):
             sensor_of[camera_topic(name, kind)] = name
         sensor_of[depth_info_topic(name)] = name
-    # `/tf` has all moving frames, at the highest rate of any of them.
-    moving = min(period for name, period in periods.items() if name != "imu")
+    moving = _moving_period(periods)
     return make_schedule(
         {
             topic.name: moving

@@ -11,11 +11,11 @@ import numpy as np
 from cns_drake.base import (
     Cluster,
     InputError,
+    check_outputs,
     did_you_mean,
     doing,
     errors_at,
     fingerprint,
-    is_there,
     read_records,
     whole_number,
 )
@@ -197,8 +197,7 @@ def plan_study(
     if experiment.frozen is not None:
         with errors_at(f"{run.source}: frozen"):
             frozen_drives(experiment.frozen)
-    for name in (RESULTS, QUERIES, "index.html"):
-        is_there(run.output / name)  # Nothing else may have its name.
+    check_outputs(run.output, (RESULTS, QUERIES, "index.html"))
     _note_lower_levels(run)
     found = list(pairs_by_map(run, maps))
     doing("looking at all conditions")

@@ -113,7 +113,12 @@ def localise(
             localisation.csv contains all values of each query. With --track,
             the folder also contains a picture.
     """
-    from cns_drake.base import InputError, choose_cluster, make_folder
+    from cns_drake.base import (
+        InputError,
+        check_outputs,
+        choose_cluster,
+        make_folder,
+    )
     from evaluation.localisation import (
         FEWEST_POINTS,
         Starts,
@@ -150,6 +155,7 @@ def localise(
     make_estimator(method, chosen)
     source, drive = _opened(place, query, align, lidar, columns)
     if output is not None:
+        check_outputs(output, ["localisation.csv"])
         make_folder(output)
     settings: dict = {
         "methods": [method],

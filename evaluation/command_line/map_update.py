@@ -50,7 +50,7 @@ def map_update(
             labels that were scored, A.npy and B.npy; created if it does not
             exist.
     """
-    from cns_drake.base import InputError, make_folder
+    from cns_drake.base import InputError, check_outputs, make_folder
     from evaluation.map_update import read_pair, write_labels
     from evaluation.study import (
         GIVEN,
@@ -66,6 +66,8 @@ def map_update(
     if output is not None:
         make_folder(output)
     pair = read_pair(folder)
+    if output is not None:
+        check_outputs(output, (f"{session.side}.npy" for session in pair))
     given = [file for file in (labels_a, labels_b) if file is not None]
     method = (baseline or BaselineName.FREE_SPACE).value
     name = GIVEN if given else method

@@ -16,7 +16,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Cluster, InputError, Reporter
+from cns_drake.base import Cluster, InputError, Reporter, check_outputs
 from evaluation.clouds import OnNote
 from evaluation.localisation import METHODS
 from evaluation.methods import MethodConfig, run_module, shipped_methods
@@ -41,7 +41,13 @@ from evaluation.recognition import (
     RetrievalProtocol,
     Role,
 )
-from evaluation.results import QueryRows, Results, write_page
+from evaluation.results import (
+    QUERIES,
+    RESULTS,
+    QueryRows,
+    Results,
+    write_page,
+)
 from evaluation.study import (
     SHIPPED,
     DescribedSource,
@@ -109,6 +115,7 @@ def measure_real(
             contains no data set that can be measured, or a data set cannot be
             read.
     """
+    check_outputs(output, (RESULTS, QUERIES, "index.html"))
     chosen = list(names) or [*shipped_methods(), *SHIPPED]
     aligning = [name for name in chosen if _is_estimator(name)]
     recognising = [name for name in chosen if name not in aligning]

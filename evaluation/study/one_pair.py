@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Reporter, one_line
+from cns_drake.base import Reporter, check_outputs, one_line
 from cns_drake.drives import Drive
 from evaluation.change import DriveMap
 from evaluation.recognition import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.results import QUERIES, RESULTS
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine
 from evaluation.study.parts import Part
@@ -122,6 +123,8 @@ def measure_pairs(
             files, methods, distractors, processes=processes, on_note=on_note
         )
 
+    if output is not None:
+        check_outputs(output, (RESULTS, QUERIES))
     engine = Engine(
         experiment,
         {one.name: one for one in tasks},

@@ -15,7 +15,15 @@ from typing import Any
 import numpy as np
 import yaml
 
-from cns_drake.base import Cluster, InputError, Job, Reporter, Space, read_yaml
+from cns_drake.base import (
+    Cluster,
+    InputError,
+    Job,
+    Reporter,
+    Space,
+    check_outputs,
+    read_yaml,
+)
 from evaluation.drives import MovedDrive, cloud_at
 from evaluation.paper import paper, paper_section
 from evaluation.recognition import (
@@ -30,6 +38,8 @@ from evaluation.results import (
     LAST,
     OWN,
     PROTOCOL_BASE,
+    QUERIES,
+    RESULTS,
     STAGE,
     PageDrive,
     PageSection,
@@ -114,6 +124,7 @@ def study_recordings(
         InputError: two recordings have the same map and stage, there is nothing
             to compare, a step failed, or a file cannot be written.
     """
+    check_outputs(output, (RESULTS, QUERIES, "index.html"))
     experiment = read_yaml(STAGES_FILE)
     engine = Engine(
         STAGES_FILE.stem,

@@ -87,7 +87,7 @@ class Imu:
     Example:
         from cns_drake import add_imu
 
-        imu = add_imu(builder, body, X_BI)
+        imu = add_imu(builder, body, X_PB)
         port = imu.ports()["angular_velocity"]
     """
 
@@ -147,7 +147,7 @@ def add_imu(
     Example:
         from cns_drake import add_imu
 
-        imu = add_imu(builder, body, X_BI)
+        imu = add_imu(builder, body, X_PB)
         builder.ExportOutput(imu.ports()["specific_force"], "specific_force")
     """
     if rate is not None and not 0.0 < rate < math.inf:

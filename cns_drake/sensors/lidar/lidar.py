@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Mapping
+import math
+import numbers
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -12,11 +14,14 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.perception import BaseField, Fields, PointCloud
 from pydrake.systems.framework import (
+    BasicVector,
     CacheEntry,
     Context,
+    DependencyTicket,
     InputPort,
     LeafSystem,
     OutputPort,
+    State,
     ValueProducer,
 )
 
@@ -38,7 +43,7 @@ from cns_drake.sensors.lidar.ray_queries import (
     geometry_ids,
 )
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE, set_points
-from cns_drake.sensors.lidar.scanner import Scanner
+from cns_drake.sensors.lidar.scanner import MeasuredReturns, Scanner
 from cns_drake.sensors.lidar.seen_geometry import (
     GeometryView,
     SeenGeometry,
@@ -51,6 +56,68 @@ if TYPE_CHECKING:
 
 _WITHOUT_GREY = Fields(BaseField.kXYZs)
 _WITH_GREY = Fields(BaseField.kXYZs | BaseField.kRGBs)
+# A pose in the port `sweep`: three rows of four numbers.
+_POSE_SIZE = 12
+
+
+class _Capture(NamedTuple):
+    """A scan that a discrete LiDAR has taken and holds.
+
+    Attributes:
+        number: number of the capture; see `_CaptureTimes`.
+        time: time of the capture [s].
+        points: points of the scan.
+        measured: returns, with the geometry that each comes from.
+        instance: (num_geometries,) uint16 structure of each geometry.
+        poses: positions (K, 3) and rotations (K, 3, 3) of S.
+        X_WS: pose of S.
+    """
+
+    number: int
+    time: float
+    points: np.ndarray
+    measured: MeasuredReturns
+    instance: np.ndarray
+    poses: tuple[np.ndarray, np.ndarray]
+    X_WS: RigidTransform
+
+    def __deepcopy__(self, memo: dict) -> _Capture:
+        # A Context is cloned together with this value, which never changes.
+        return self
+
+
+class _CaptureTimes(NamedTuple):
+    """The times at which a discrete LiDAR takes scans: offset + k * period.
+
+    Attributes:
+        period: time between two captures [s].
+        offset: time of capture 0 [s].
+    """
+
+    period: float
+    offset: float
+
+    def time(self, number: int) -> float:
+        """Returns the time of a capture [s], rounded as Drake rounds it."""
+        return self.offset + number * self.period
+
+    def number(self, time: float) -> int:
+        """Returns the number of the last capture up to a time [s].
+
+        Before capture 0, it is -1.
+        """
+        number = math.floor((time - self.offset) / self.period)
+        # The division rounds.
+        if self.time(number + 1) <= time:
+            number += 1
+        elif self.time(number) > time:
+            number -= 1
+        return max(number, -1)
+
+    def is_capture(self, time: float) -> bool:
+        """Returns whether a scan is taken at a time [s]."""
+        number = self.number(time)
+        return number >= 0 and self.time(number) == time
 
 
 class Lidar(LeafSystem):
@@ -73,16 +140,19 @@ class Lidar(LeafSystem):
         - point_cloud_W
         - positions_W
         - X_WS
+        - scan_time
 
-    Frames: W is the world, P the parent frame, S the sensor frame (x forward, y
-    left, z up). `scan` is a structured array of `POINT_DTYPE`, one record per
+    Frames: W is the world, P the parent frame, B the body of the sensor, and S
+    the frame of the measurements, which coincides with B (x forward, y left, z
+    up). `scan` is a structured array of `POINT_DTYPE`, one record per
     return in firing order; beams whose nearest surface is closer than the
     minimum range or farther than the maximum range return nothing.
     `point_cloud_S` holds the same positions as a Drake point cloud, whose
     colours are the intensities as greys. Grey 255 stands for an intensity of 1,
     or of 255 with calibrated returns. `point_cloud_W` has the same points in
     the world frame; `positions_W` is `point_cloud_W` without the colours.
-    `X_WS` is the pose of S at the time of the output.
+    `X_WS` is the pose of S at the time of the output. `scan_time` is this time
+    [s], like RgbdSensor's `image_time`.
 
     A scan is one revolution of the LiDAR. The revolution starts at the time of
     the output. With a causal LiDAR, the revolution ends at this time instead,
@@ -90,13 +160,25 @@ class Lidar(LeafSystem):
     from a single pose of S, the pose at the time of the output (a deskewed
     scan). This pose follows from the pose of P in the SceneGraph.
 
-    If the port `sweep` is connected, the poses of P come from a `Sweep` and not
-    from the SceneGraph: one pose for the whole revolution or, with motion
-    distortion, one pose for each column at the column's firing time. With
-    motion distortion, a point is expressed in S at the firing time t of its
-    beam, as a real unit reports the point: X_WS(start of the revolution + t)
-    transforms it to the world. During the revolution, all other moving geometry
-    stays where it is at the time of the output.
+    A LiDAR with a `rate` is discrete: it computes a scan once per period and
+    holds it, like Drake's RgbdSensorDiscrete. At time t, all output ports,
+    `EvalGeometryIds` and `EvalInstances` show the last capture up to t. At the
+    time of a capture itself, they show the new scan even before the update of
+    the state, so that a message that is published at this time has this scan.
+    If the state does not contain the last capture, because no Simulator was
+    there to take it, they show a scan at time t, as without a rate. A Simulator
+    also takes a scan when it is initialized between two captures or before the
+    first; the ports show it until the next capture. `CastRays` and `EvalScene`
+    always use the present geometry.
+
+    If the port `sweep` is connected, the poses of P come from this port and not
+    from the SceneGraph: one pose for each column, at the column's firing time,
+    for motion distortion. The port is a vector of 12 numbers per column: the
+    three rows of the matrix [R_WP p_WP]. With motion distortion, a point is
+    expressed in S at the firing time t of its beam, as a real unit reports the
+    point: X_WS(start of the revolution + t) transforms it to the world. During
+    the revolution, all other moving geometry stays where it is at the time of
+    the output.
 
     If the LiDAR was made with the argument `moving_bodies`, P and all other
     bodies of a plant move during the revolution, with the velocities that they
@@ -132,7 +214,7 @@ class Lidar(LeafSystem):
 
     Attributes:
         parent_frame_id: the frame P that carries the LiDAR.
-        X_PB: the pose of the LiDAR in P, named as in Drake's RgbdSensor.
+        X_PB: the pose of B in P, named as in Drake's RgbdSensor.
         pattern: the beams of a revolution.
         role: the role of the geometry that the LiDAR sees.
         causal: whether a scan is the revolution that ends at the time of the
@@ -159,12 +241,14 @@ class Lidar(LeafSystem):
         anchored_frames: Collection[FrameId] = (),
         num_threads: int = 1,
         causal: bool = False,
+        rate: float | None = None,
+        capture_offset: float = 0.0,
     ):
         """Constructs the LiDAR.
 
         Args:
             parent_frame_id: the frame P that carries the sensor.
-            X_PB: pose of the sensor in P.
+            X_PB: pose of the sensor's body B in P.
             pattern: the beams.
             measurement: the model of noise, losses and rounding.
             returns: the model of a real unit; None for ideal returns. With a
@@ -186,12 +270,17 @@ class Lidar(LeafSystem):
                 does not depend on this number.
             causal: whether a scan is the revolution that ends at the time of
                 the output; by default the revolution starts at that time.
+            rate: scans per second of a discrete LiDAR, at most one scan per
+                revolution; by default the LiDAR is continuous: it has a scan
+                for each time.
+            capture_offset: time of a discrete LiDAR's first scan [s].
 
         Raises:
             TypeError: the role is no role of geometry, `unseen` has an element
                 of another type, or the number of threads is no integer.
-            ValueError: limits or period of the pattern are impossible, or there
-                is no thread.
+            ValueError: limits or period of the pattern are impossible, there is
+                no thread, the rate is not positive or higher than that of the
+                revolutions, or the offset is negative or without a rate.
         """
         super().__init__()
         view = GeometryView(
@@ -208,9 +297,11 @@ class Lidar(LeafSystem):
         self.pattern = pattern
         self.causal = bool(causal)
         self.role = role
+        self._captures = _capture_times(rate, capture_offset, pattern.period)
         self._scanner = Scanner(pattern, measurement, returns)
         self._moving_bodies = dict(moving_bodies or {})
         self._declare_inputs(has_velocities=moving_bodies is not None)
+        self._declare_captures()
         self._declare_caches(view)
         self._declare_outputs()
 
@@ -222,7 +313,9 @@ class Lidar(LeafSystem):
         self._moving = declare(
             "moving_instances", Value(np.zeros(0, np.uint16))
         )
-        self._sweep = declare("sweep", Value(object()))
+        self._sweep = self.DeclareVectorInputPort(
+            "sweep", _POSE_SIZE * len(self._scanner.column_times)
+        )
         self._frame_poses = declare("frame_poses", Value(object()))
         self._noise_draw = self.DeclareVectorInputPort("noise_draw", 1)
         self._velocities: InputPort | None = None
@@ -231,6 +324,26 @@ class Lidar(LeafSystem):
                 "body_spatial_velocities",
                 AbstractValue.Make([SpatialVelocity()]),
             )
+
+    def _declare_captures(self) -> None:
+        """Declares the scan that a discrete LiDAR holds."""
+        self._held_inputs = set()
+        if self._captures is None:
+            return
+        self._held_state = self.DeclareAbstractState(
+            # Of any Python type; no scan is held at first.
+            Value[object](None)
+        )
+        self._held_inputs = {
+            self.time_ticket(),
+            self.abstract_state_ticket(self._held_state),
+        }
+        self.DeclarePeriodicUnrestrictedUpdateEvent(
+            period_sec=self._captures.period,
+            offset_sec=self._captures.offset,
+            update=self._capture,
+        )
+        self.DeclareInitializationUnrestrictedUpdateEvent(self._initialize)
 
     def _declare_caches(self, view: GeometryView) -> None:
         """Declares the scenes for ray casting, the returns, and the scan."""
@@ -286,33 +399,107 @@ class Lidar(LeafSystem):
 
     def _declare_outputs(self) -> None:
         """Declares the output ports, in the order of their indices."""
-        scan = {self._points.ticket()}
+        scan = {self._points.ticket()} | self._held_inputs
         self.DeclareAbstractOutputPort(
             "scan",
             alloc=lambda: Value(np.empty(0, POINT_DTYPE)),
             calc=lambda context, output: output.set_value(
-                self._points.Eval(context)
+                self._eval_points(context)
             ),
             prerequisites_of_calc=scan,
         )
-        in_world = scan | self._poses_inputs
-        for name, calc, prerequisites, fields in (
-            ("point_cloud_S", self._calc_point_cloud_S, scan, _WITH_GREY),
-            ("point_cloud_W", self._calc_point_cloud_W, in_world, _WITH_GREY),
-            ("positions_W", self._calc_point_cloud_W, in_world, _WITHOUT_GREY),
+        for name, in_world, fields in (
+            ("point_cloud_S", False, _WITH_GREY),
+            ("point_cloud_W", True, _WITH_GREY),
+            ("positions_W", True, _WITHOUT_GREY),
         ):
-            self.DeclareAbstractOutputPort(
+            self._declare_cloud(
                 name,
-                alloc=lambda fields=fields: Value(PointCloud(0, fields)),
-                calc=calc,
-                prerequisites_of_calc=prerequisites,
+                in_world,
+                fields,
+                scan | (self._poses_inputs if in_world else set()),
             )
         self.DeclareAbstractOutputPort(
             "X_WS",
             alloc=lambda: Value(RigidTransform()),
             calc=self._calc_X_WS,
-            prerequisites_of_calc=self._pose_inputs,
+            prerequisites_of_calc=self._pose_inputs | self._held_inputs,
         )
+        self.DeclareVectorOutputPort(
+            "scan_time",
+            1,
+            self._calc_scan_time,
+            prerequisites_of_calc={self.time_ticket()} | self._held_inputs,
+        )
+
+    def _declare_cloud(
+        self,
+        name: str,
+        in_world: bool,
+        fields: Fields,
+        prerequisites: set[DependencyTicket],
+    ) -> None:
+        """Declares an output port with the points of a scan as a cloud.
+
+        Args:
+            name: name of the port.
+            in_world: whether the cloud is expressed in the world.
+            fields: fields of the cloud.
+            prerequisites: what a scan and its poses depend on.
+        """
+
+        def allocate() -> AbstractValue:
+            return Value(PointCloud(0, fields))
+
+        def calc(context: Context, output: AbstractValue) -> None:
+            poses = self._eval_poses(context) if in_world else None
+            points = self._eval_points(context)
+            self._set_cloud(output.get_mutable_value(), points, poses)
+
+        if self._captures is not None:
+            calc_now, held = calc, self._declare_held_cloud(allocate, in_world)
+
+            def calc(context: Context, output: AbstractValue) -> None:
+                if self._held(context) is None:
+                    calc_now(context, output)
+                else:
+                    output.SetFrom(held.EvalAbstract(context))
+
+        self.DeclareAbstractOutputPort(
+            name,
+            alloc=allocate,
+            calc=calc,
+            prerequisites_of_calc=prerequisites,
+        )
+
+    def _declare_held_cloud(
+        self, allocate: Callable[[], AbstractValue], in_world: bool
+    ) -> CacheEntry:
+        """Declares the cloud of the scan that a discrete LiDAR holds."""
+
+        def calc(context: Context, output: AbstractValue) -> None:
+            capture = self._last_capture(context)
+            assert capture is not None  # The port looks first.
+            poses = capture.poses if in_world else None
+            self._set_cloud(output.get_mutable_value(), capture.points, poses)
+
+        return self.DeclareCacheEntry(
+            description="cloud of the scan that is held",
+            value_producer=ValueProducer(allocate=allocate, calc=calc),
+            prerequisites_of_calc={
+                self.abstract_state_ticket(self._held_state)
+            },
+        )
+
+    @property
+    def capture_period(self) -> float | None:
+        """The time between two scans of a discrete LiDAR [s], or else None."""
+        return None if self._captures is None else self._captures.period
+
+    @property
+    def capture_offset(self) -> float:
+        """The time of a discrete LiDAR's first scan [s]."""
+        return 0.0 if self._captures is None else self._captures.offset
 
     @property
     def is_random(self) -> bool:
@@ -343,6 +530,10 @@ class Lidar(LeafSystem):
         """Returns the port `X_WS`."""
         return self.GetOutputPort("X_WS")
 
+    def scan_time_output_port(self) -> OutputPort:
+        """Returns the port `scan_time`."""
+        return self.GetOutputPort("scan_time")
+
     def EvalScene(self, context: Context) -> RayCastingScene:
         """Returns the scene of all geometry that the LiDAR sees in a Context.
 
@@ -366,7 +557,10 @@ class Lidar(LeafSystem):
             RuntimeError: the Context does not belong to this LiDAR.
         """
         self._check_context(context)
-        measured = self._measured.Eval(context)
+        held = self._held(context)
+        measured = (
+            self._measured.Eval(context) if held is None else (held.measured)
+        )
         return geometry_ids(measured.geometries, measured.geometry)
 
     def EvalInstances(
@@ -384,11 +578,14 @@ class Lidar(LeafSystem):
             print(plant.GetModelInstanceName(body.model_instance()))
         """
         self._check_context(context)
-        seen = _eval_seen(self._seen_in_reach, context)
+        held = self._held(context)
+        if held is None:
+            seen = _eval_seen(self._seen_in_reach, context)
+            instances, shapes = seen.instance, seen.built
+        else:
+            instances, shapes = held.instance, held.measured.geometries
         found: dict[int, tuple[GeometryId, ...]] = {}
-        for instance, shape in zip(
-            seen.instance.tolist(), seen.built, strict=True
-        ):
+        for instance, shape in zip(instances.tolist(), shapes, strict=True):
             found[instance] = (*found.get(instance, ()), shape.geometry_id)
         return found
 
@@ -456,6 +653,61 @@ class Lidar(LeafSystem):
             context,
         )
 
+    def _capture(self, context: Context, state: State) -> None:
+        """Takes a scan and holds it."""
+        assert self._captures is not None
+        self._hold(
+            state,
+            _Capture(
+                self._captures.number(context.get_time()),
+                context.get_time(),
+                self._points.Eval(context),
+                self._measured.Eval(context),
+                _eval_seen(self._seen_in_reach, context).instance,
+                self._calc_poses(context),
+                self._calc_pose(context),
+            ),
+        )
+
+    def _initialize(self, context: Context, state: State) -> None:
+        """Forgets the scan of an earlier simulation.
+
+        Between two captures, a scan is taken at once: until the next capture,
+        it would be computed for each time.
+        """
+        assert self._captures is not None
+        if self._captures.is_capture(context.get_time()):
+            self._hold(state, None)
+        else:
+            self._capture(context, state)
+
+    def _hold(self, state: State, capture: _Capture | None) -> None:
+        state.get_mutable_abstract_state(self._held_state).set_value(capture)
+
+    def _last_capture(self, context: Context) -> _Capture | None:
+        """Returns the scan that a discrete LiDAR took last, if any."""
+        return context.get_abstract_state(self._held_state).get_value()
+
+    def _held(self, context: Context) -> _Capture | None:
+        """Returns what the outputs show; None if they are to be computed."""
+        if self._captures is None:
+            return None
+        capture = self._last_capture(context)
+        number = self._captures.number(context.get_time())
+        if capture is None or capture.number != number:
+            return None
+        return capture
+
+    def _eval_points(self, context: Context) -> np.ndarray:
+        """Returns the points of `scan`."""
+        held = self._held(context)
+        return self._points.Eval(context) if held is None else held.points
+
+    def _eval_poses(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the poses of S during the revolution of `scan`."""
+        held = self._held(context)
+        return self._calc_poses(context) if held is None else held.poses
+
     def _update_seen(
         self, context: Context, seen: SeenGeometry, ball: Ball
     ) -> None:
@@ -471,7 +723,14 @@ class Lidar(LeafSystem):
 
     def _known_poses(self, context: Context) -> KnownPoses:
         known = optional_value(self._frame_poses, context)
-        return NOTHING_KNOWN if known is None else known
+        if known is None:
+            return NOTHING_KNOWN
+        if not isinstance(known, KnownPoses):
+            raise TypeError(
+                f"frame_poses: the port gives a {type(known).__name__}, "
+                "not KnownPoses"
+            )
+        return known
 
     def _calc_ball(self, context: Context) -> Ball:
         """Returns the ball in which beams can meet geometry.
@@ -508,7 +767,8 @@ class Lidar(LeafSystem):
         return {f: m for f, m in motions.items() if m.w.any() or m.v.any()}
 
     def _calc_measured(self, context: Context, output: AbstractValue) -> None:
-        revolution = round(context.get_time() / self.pattern.period)
+        # Not `round`: of two scans a period apart, it gives half numbers one.
+        revolution = math.floor(context.get_time() / self.pattern.period + 0.5)
         draw = 0.0
         if self._noise_draw.HasValue(context):
             draw = self._noise_draw.Eval(context)[0]
@@ -537,13 +797,29 @@ class Lidar(LeafSystem):
 
     def _calc_carrier_pose(self, context: Context) -> RigidTransform:
         """Returns the pose of P at the time of the output."""
-        sweep = optional_value(self._sweep, context)
-        if sweep is not None and len(sweep.p_WPset) == 1:
-            R_WP = RotationMatrix(sweep.R_WPset[0])
-            return RigidTransform(R_WP, sweep.p_WPset[0])
+        sweep = self._swept_poses(context)
+        if sweep is not None and len(sweep[0]) == 1:
+            return RigidTransform(RotationMatrix(sweep[1][0]), sweep[0][0])
         query_object = self._geometry_query.Eval(context)
         return self._known_poses(context).find(
             self.parent_frame_id, query_object.GetPoseInWorld
+        )
+
+    def _swept_poses(
+        self, context: Context
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Returns the poses of P in the port `sweep`, if it is connected.
+
+        Returns:
+            Positions (K, 3) and rotations (K, 3, 3), one for each column.
+        """
+        numbers = optional_value(self._sweep, context)
+        if numbers is None:
+            return None
+        X_WPset = numbers.reshape(-1, 3, 4)
+        return (
+            np.ascontiguousarray(X_WPset[:, :, 3]),
+            np.ascontiguousarray(X_WPset[:, :, :3]),
         )
 
     def _calc_poses(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
@@ -551,10 +827,13 @@ class Lidar(LeafSystem):
 
         With motion distortion, K is the number of columns; otherwise K is 1.
         """
-        sweep = optional_value(self._sweep, context)
+        sweep = self._swept_poses(context)
         if sweep is not None:
-            sweep = sweep.of_frame(self.X_PB)
-            return sweep.p_WPset, sweep.R_WPset
+            p_WPset, R_WPset = sweep
+            return (
+                p_WPset + rotated(R_WPset, self.X_PB.translation()),
+                product(R_WPset, self.X_PB.rotation().matrix()),
+            )
         X_WP = self._calc_carrier_pose(context)
         X_WS = X_WP @ self.X_PB
         motion = self._calc_motions(context).get(self.parent_frame_id)
@@ -571,29 +850,91 @@ class Lidar(LeafSystem):
         return np.array([p_WS]), np.array([R_WS])
 
     def _calc_X_WS(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self._calc_pose(context))
+        held = self._held(context)
+        output.set_value(
+            self._calc_pose(context) if held is None else held.X_WS
+        )
 
-    def _calc_point_cloud_S(
-        self, context: Context, output: AbstractValue
+    def _calc_scan_time(self, context: Context, output: BasicVector) -> None:
+        held = self._held(context)
+        output[0] = context.get_time() if held is None else held.time
+
+    def _set_cloud(
+        self,
+        cloud: PointCloud,
+        scan: np.ndarray,
+        poses: tuple[np.ndarray, np.ndarray] | None,
     ) -> None:
-        scan = self._points.Eval(context)
-        p_SRset = np.stack([scan["x"], scan["y"], scan["z"]])
+        """Sets the points of a scan as a cloud.
+
+        Args:
+            cloud: the cloud.
+            scan: (N,) points of `POINT_DTYPE`.
+            poses: poses of S if the cloud is in the world; None for S.
+        """
         greys = self._scanner.greys(scan["intensity"])
-        set_points(output.get_mutable_value(), p_SRset, greys)
-
-    def _calc_point_cloud_W(
-        self, context: Context, output: AbstractValue
-    ) -> None:
-        scan = self._points.Eval(context)
-        p_WSset, R_WSset = self._calc_poses(context)
+        if poses is None:
+            p_SRset = np.stack([scan["x"], scan["y"], scan["z"]])
+            set_points(cloud, p_SRset, greys)
+            return
+        p_WSset, R_WSset = poses
         # The pose of S when each point was measured: one, or each column's.
         columns = self._scanner.column_t_ns
         pose = np.searchsorted(columns, scan["t"]) % len(p_WSset)
         p_SRset = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
         p_SRset_W = np.einsum("nij,nj->ni", R_WSset[pose], p_SRset)
-        p_WRset = (p_WSset[pose] + p_SRset_W).T
-        greys = self._scanner.greys(scan["intensity"])
-        set_points(output.get_mutable_value(), p_WRset, greys)
+        set_points(cloud, (p_WSset[pose] + p_SRset_W).T, greys)
+
+
+def _capture_times(
+    rate: float | None, offset: float, revolution: float
+) -> _CaptureTimes | None:
+    """Returns when a LiDAR takes scans; None for a continuous LiDAR.
+
+    Args:
+        rate: scans per second, if any.
+        offset: time of the first scan [s].
+        revolution: duration of a revolution [s].
+
+    Raises:
+        ValueError: the rate is not positive or too high, or the offset is
+            negative or without a rate.
+    """
+    period = period_of_rate(rate)
+    if not (_is_number(offset) and offset >= 0.0):
+        raise ValueError(f"capture_offset: {offset!r} is not a time from 0 on")
+    if period is None:
+        if offset:
+            raise ValueError("capture_offset: only a LiDAR with a rate has one")
+        return None
+    # A rate that was computed from the duration of a revolution is allowed.
+    if period < revolution * (1.0 - 1e-9):
+        raise ValueError(
+            f"rate: {rate:g} scans per second, but a revolution takes "
+            f"{revolution:g} s; give a pattern with a shorter period"
+        )
+    return _CaptureTimes(period, float(offset))
+
+
+def period_of_rate(rate: float | None) -> float | None:
+    """Returns the time between two scans [s]; None without a rate.
+
+    Raises:
+        ValueError: the rate is not a positive number.
+    """
+    if rate is None:
+        return None
+    if not (_is_number(rate) and rate > 0.0):
+        raise ValueError(f"rate: {rate!r} is not a positive number per second")
+    return 1.0 / rate
+
+
+def _is_number(value: object) -> bool:
+    return (
+        isinstance(value, numbers.Real)
+        and not isinstance(value, bool)
+        and math.isfinite(value)
+    )
 
 
 def _eval_seen(entry: CacheEntry, context: Context) -> SeenGeometry:

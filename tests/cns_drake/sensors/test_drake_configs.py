@@ -9,11 +9,11 @@ from drake import lcmt_drake_signal, lcmt_point_cloud
 from helpers.browser import chromium, has_chromium
 import numpy as np
 from pydrake.common.schema import Transform
-from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
+from pydrake.common.yaml import yaml_dump_typed, yaml_load, yaml_load_typed
 from pydrake.geometry import Box
 from pydrake.lcm import DrakeLcm, DrakeLcmParams
 from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -130,6 +130,7 @@ def test_fields_are_those_of_a_scenario(struct, section):
         # These are as in `add_lidar`.
         own = {"rate": None, "resolution": 0.0, "causal": False}
         own |= {"capture_offset": 0.0, "output_delay": 0.0}
+        own |= {"role": "perception", "unseen": None, "num_threads": 1}
         assert {name: fields.pop(name) for name in own} == own
         names -= own.keys()
     assert set(fields) == names
@@ -372,12 +373,109 @@ def test_buses_by_name():
         ({"dropout": 1.5}, "roof: dropout: "),
         ({"returns": "calibrated"}, "roof: .*range_noise"),
         ({"echoes": "some"}, "roof: echoes: "),
+        ({"role": "nothing"}, "roof: role: 'nothing' is not one of"),
+        ({"num_threads": 0}, "roof: num_threads: 0 is not at least 1"),
+        ({"unseen": ["robt"]}, "roof: unseen: no body.* 'robt': .*robot"),
     ],
 )
 def test_faults_name_config_and_field(change, fault):
     config = dataclasses.replace(read_roof(), **change)
     with pytest.raises(ValueError, match=fault):
         ApplyLidarConfig(config, make_site()[0], lcm=DrakeLcm("memq://"))
+
+
+@pytest.mark.parametrize(
+    ("struct", "text", "fault"),
+    [
+        (LidarConfig, "{rate: fast}", r"\.rate: 'fast' is not a number"),
+        (LidarConfig, "{rate: true}", r"\.rate: True is not a number"),
+        (LidarConfig, "{rings: 3.5}", r"\.rings: 3\.5 is not a whole number"),
+        (LidarConfig, "{columns: many}", r"\.columns: 'many' is not a whole"),
+        (LidarConfig, "{dropout: some}", r"\.dropout: 'some' is not a number"),
+        (LidarConfig, "{causal: maybe}", r"\.causal: 'maybe' is not true or"),
+        (LidarConfig, "{motion_distortion: 1}", r"\.motion_distortion: 1 is"),
+        (LidarConfig, "{name: 3}", r"\.name: 3 is not a text"),
+        (LidarConfig, "{X_PB: 3}", r"\.X_PB: 3 is not a pose"),
+        (LidarConfig, "{unseen: robot}", r"\.unseen: 'robot' is not a list"),
+        (LidarConfig, "{num_threads: two}", r"\.num_threads: 'two' is not a"),
+        (ImuConfig, "{rate: fast}", r"\.rate: 'fast' is not a number"),
+        (OdometryConfig, "{rate: 2.5}", r"\.rate: 2\.5 is not a whole number"),
+    ],
+)
+def test_wrong_types_name_the_field_in_one_line(struct, text, fault):
+    fault = rf"^{struct.__name__}{fault}.*\Z"
+    with pytest.raises(ValueError, match=fault):
+        yaml_load_typed(schema=struct, data=text)
+    (field, value), *_ = yaml_load(data=text).items()
+    with pytest.raises(ValueError, match=fault):
+        struct(**{field: value})
+    with pytest.raises(ValueError, match=fault):
+        setattr(struct(), field, value)
+
+
+@pytest.mark.parametrize("text", ["{rate: 10}", "{rate: 1e1}", "{rate: '10'}"])
+def test_numbers_are_read_as_drake_reads_them(text):
+    config = yaml_load_typed(schema=LidarConfig, data=text)
+    assert (config.rate, type(config.rate)) == (10.0, float)
+    assert yaml_dump_typed(config, defaults=LidarConfig()) == "rate: 10.0\n"
+    assert LidarConfig(rate=np.float32(10), rings=np.int64(4)).rings == 4
+
+
+def ahead_of(**fields):
+    """What a beam ahead of the robot sees first: range and geometry."""
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.01)
+    inertia = SpatialInertia.SolidBoxWithMass(10.0, 0.5, 0.3, 0.2)
+    for x, name in ((0.0, "robot"), (4.0, "near"), (6.0, "far")):
+        body = plant.AddRigidBody(name, inertia)
+        plant.WeldFrames(
+            plant.world_frame(), body.body_frame(), RigidTransform([x, 0, 0])
+        )
+        box = (body, RigidTransform(), Box(1, 1, 1), "box")
+        if name == "near":
+            plant.RegisterCollisionGeometry(*box, CoulombFriction())
+        else:
+            plant.RegisterVisualGeometry(*box, np.ones(4))
+    near = plant.GetBodyByName("near")
+    plant.RegisterVisualGeometry(
+        near, RigidTransform([1, 0, 0]), Box(0.5, 1, 1), "behind", np.ones(4)
+    )
+    plant.Finalize()
+    place = Transform()
+    place.base_frame = "robot"
+    fields = {"preset": "hokuyo-ust-20lx", "columns": 8, **fields}
+    lidar = ApplyLidarConfig(
+        LidarConfig(X_PB=place, **fields), builder, lcm=DrakeLcm("memq://")
+    )
+    context = builder.Build().CreateDefaultContext()
+    context = lidar.GetMyContextFromRoot(context)
+    hits = lidar.CastRays(context, np.zeros(3), np.eye(3)[:1])
+    (found,) = hits.geometry_ids
+    name = found and scene_graph.model_inspector().GetName(found)
+    return round(float(hits.ranges[0]), 3), name
+
+
+@pytest.mark.parametrize(
+    ("fields", "ahead"),
+    [
+        ({}, (4.75, "behind")),
+        ({"role": "illustration"}, (4.75, "behind")),
+        ({"role": "proximity"}, (3.5, "box")),
+        ({"unseen": ["robot", "near"]}, (5.5, "box")),
+        ({"unseen": ["robot", "behind"]}, (5.5, "box")),
+        ({"unseen": ["box"]}, (4.75, "behind")),
+        ({"unseen": ["box", "near"]}, (np.inf, None)),
+        ({"unseen": ["behind"]}, (0.5, "box")),
+        ({"unseen": []}, (0.5, "box")),
+        ({"num_threads": 2}, (4.75, "behind")),
+    ],
+)
+def test_a_config_says_what_is_seen(fields, ahead):
+    assert ahead_of(**fields) == ahead
+    text = yaml_dump_typed(LidarConfig(**fields))
+    again = yaml_load_typed(schema=LidarConfig, data=text)
+    assert {name: getattr(again, name) for name in fields} == fields
+    assert yaml_dump_typed(again) == text
 
 
 APPLIED = (

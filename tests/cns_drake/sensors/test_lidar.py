@@ -219,10 +219,15 @@ def test_a_cloned_context_has_poses_of_its_own():
     stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
 
     def ahead_from(x):
-        sweep = Sweep(np.eye(3)[None], np.array([[x, 0.0, 0.0]]))
+        columns = FORWARD.num_columns
+        sweep = Sweep(
+            np.tile(np.eye(3), (columns, 1, 1)),
+            np.tile([x, 0.0, 0.0], (columns, 1)),
+        )
         port = stage.lidar.GetInputPort("sweep")
         port.FixValue(
-            stage.lidar.GetMyMutableContextFromRoot(stage.context), sweep
+            stage.lidar.GetMyMutableContextFromRoot(stage.context),
+            sweep.numbers(),
         )
         return ahead(stage.eval())
 

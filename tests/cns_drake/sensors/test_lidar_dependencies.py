@@ -53,17 +53,18 @@ def stage(**kwargs):
     return made, {"parent": made.frame, "structures": table, **kwargs}
 
 
+@pytest.mark.parametrize("rate", [None, 20])
 @pytest.mark.parametrize("moves", [False, True])
 @pytest.mark.parametrize("noise", [0.0, 0.1])
-def test_outputs_depend_on_what_they_read(moves, noise):
-    made, arguments = stage()
+def test_outputs_depend_on_what_they_read(moves, noise, rate):
+    made, arguments = stage(rate=rate)
     arguments["measurement"] = MeasurementModel(range_noise=noise)
     if moves:
         arguments["moving_bodies"] = {made.frame: 0}
     lidar = made.finish(**arguments).lidar
     velocities = {"body_spatial_velocities"} if moves else set()
     scans = ALL | velocities | (NOISE if noise else set())
-    expected = {"X_WS": POSE} | dict.fromkeys(SCANS, scans)
+    expected = {"X_WS": POSE, "scan_time": set()} | dict.fromkeys(SCANS, scans)
     found = {
         name: {
             lidar.get_input_port(i).get_name()

@@ -28,7 +28,7 @@ from cns_drake.sensors import (
     make_beam_pattern,
     make_pattern,
 )
-from cns_drake.sensors.lidar.sheet_patterns import aimed
+from cns_drake.sensors.sheet_patterns import aimed
 from cns_drake.units import LIDAR_PRESETS
 
 INERTIA = SpatialInertia.SolidBoxWithDensity(1000.0, 1.0, 1.0, 1.0)

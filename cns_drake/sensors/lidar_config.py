@@ -19,16 +19,16 @@ from cns_drake.base import InputError, validated
 from cns_drake.drives import LayoutName
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.patterns import SpinningPattern
-from cns_drake.sensors.lidar.sheet_patterns import (
-    UnitPattern,
-    aimed,
-    make_beam_pattern,
-)
 from cns_drake.sensors.sensor_config import (
     Mount,
     Section,
     Triple,
     field_off_by_default,
+)
+from cns_drake.sensors.sheet_patterns import (
+    UnitPattern,
+    aimed,
+    make_beam_pattern,
 )
 from cns_drake.units import (
     DEFAULT_PRESET,

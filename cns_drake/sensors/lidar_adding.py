@@ -21,16 +21,9 @@ from cns_drake.scene import anchored_frames as find_anchored_frames
 from cns_drake.scene import geometry_port
 from cns_drake.sensors.carriers import body_and_pose, connect_motion
 from cns_drake.sensors.lidar.beams import BeamPattern
-from cns_drake.sensors.lidar.config import (
-    LidarSection,
-    WeatherConfig,
-    make_pattern,
-    make_returns,
-)
-from cns_drake.sensors.lidar.lidar import Lidar
+from cns_drake.sensors.lidar.lidar import Lidar, period_of_rate
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.seen_geometry import Structures
-from cns_drake.sensors.lidar.sheet_patterns import aimed, make_beam_pattern
 from cns_drake.sensors.system_names import check_new_sensor, check_unused_names
 
 if TYPE_CHECKING:
@@ -38,7 +31,6 @@ if TYPE_CHECKING:
     from cns_drake.sensors.returns.calibrated import CalibratedReturns
 
 _VIEW_COLOR = Rgba(0.9, 0.2, 0.1, 1.0)
-_CLEAR = WeatherConfig()
 # Ending of the name of the system that chooses a LiDAR's random numbers.
 _DRAW = "noise_draw"
 # Period of a system that never changes its state [s].
@@ -67,6 +59,8 @@ def add_lidar(
     moving_bodies: Mapping[FrameId, int] | None = None,
     num_threads: int = 1,
     causal: bool = False,
+    rate: float | None = None,
+    capture_offset: float = 0.0,
 ) -> Lidar:
     """Adds a LiDAR to a diagram and connects it to the SceneGraph.
 
@@ -78,11 +72,12 @@ def add_lidar(
             that any other source has registered with `scene_graph`. A frame on
             a body keeps its pose in the model, even if a Context gives the
             frame another pose. Drake's cameras behave in the same way.
-        X_PB: pose of the sensor B in P, as in Drake's RgbdSensor. In outputs,
-            the frame of the sensor is S.
+        X_PB: pose of the sensor's body B in P, as in Drake's RgbdSensor. The
+            frame S of the measurements coincides with B.
         pattern: beams of the LiDAR, the name of a preset, or the file of a data
-            sheet. With a name or file, the LiDAR makes as many revolutions per
-            second as its data sheet states, and coordinates are not rounded.
+            sheet. With a name or file, the LiDAR makes `rate` revolutions per
+            second, by default as many as its data sheet states, and coordinates
+            are not rounded.
         name: name of the system, and of the LiDAR's frame and topics in a
             recording.
         unseen: bodies, frames and geometries that the LiDAR does not see; by
@@ -120,11 +115,16 @@ def add_lidar(
         num_threads: number of threads that share the LiDAR's rays.
         causal: whether a scan is the revolution that ends at the time of the
             output.
+        rate: scans per second of a discrete LiDAR, which computes a scan once
+            per period and holds it (see `Lidar`). By default the LiDAR is
+            continuous: its ports have a scan for each time at which they are
+            evaluated.
+        capture_offset: time of a discrete LiDAR's first scan [s].
 
     Returns:
-        The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W` and
-        `X_WS`, and the methods `EvalGeometryIds`, `EvalInstances` and
-        `CastRays` of a Context.
+        The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W`,
+        `X_WS` and `scan_time`, and the methods `EvalGeometryIds`,
+        `EvalInstances` and `CastRays` of a Context.
 
     Raises:
         RuntimeError: the plant is not finalized, or not registered with the
@@ -132,8 +132,9 @@ def add_lidar(
         TypeError: an argument is of the wrong type.
         ValueError: there is no preset of that name, the name of the LiDAR is
             taken, reserved or cannot be a part of a ROS 2 topic, the noise is
-            out of range or given twice, motion distortion needs a body, or
-            calibrated returns need a preset or a data sheet.
+            out of range or given twice, motion distortion needs a body,
+            calibrated returns need a preset or a data sheet, or the rate is not
+            positive or higher than that of the revolutions.
         InputError: the file cannot be read, or is no data sheet.
 
     Warns:
@@ -142,7 +143,7 @@ def add_lidar(
     Example:
         from cns_drake import add_lidar
 
-        lidar = add_lidar(builder, scene_graph, body, X_BS, "os1-64")
+        lidar = add_lidar(builder, scene_graph, body, X_PB, "os1-64")
         builder.ExportOutput(lidar.GetOutputPort("scan"), "scan")
     """
     if not isinstance(scene_graph, SceneGraph):
@@ -157,7 +158,10 @@ def add_lidar(
         body, X_PB = body_and_pose(body, X_PB)
     unit = pattern if isinstance(pattern, str | Path) else None
     if unit is not None:
-        pattern = make_beam_pattern(unit)
+        # Imported here: patterns of the caller's own need no data sheets.
+        from cns_drake.sensors.sheet_patterns import make_beam_pattern
+
+        pattern = make_beam_pattern(unit, period_of_rate(rate))
     if not isinstance(pattern, BeamPattern):
         raise TypeError(
             f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "
@@ -165,6 +169,8 @@ def add_lidar(
         )
     model = _returns_model(returns, unit, seed, name)
     if model is not None and unit is not None:
+        from cns_drake.sensors.sheet_patterns import aimed
+
         pattern = aimed(pattern, model.sheet)
     if model is not None:
         _check_no_noise(measurement, range_noise, dropout)
@@ -203,6 +209,8 @@ def add_lidar(
             anchored_frames=anchored_frames or (),
             num_threads=num_threads,
             causal=causal,
+            rate=rate,
+            capture_offset=capture_offset,
         ),
     )
     _warn_of_no_geometry(scene_graph, role)
@@ -233,77 +241,6 @@ def _make_noise_draw() -> LinearSystem:
     )
     constant.configure_random_state(np.eye(1))
     return constant
-
-
-def add_described_lidar(
-    config: LidarSection,
-    builder: DiagramBuilder,
-    scene_graph: SceneGraph,
-    body: RigidBody | Frame,
-    X_PB: RigidTransform,
-    *,
-    name: str = "lidar",
-    seed: int = 0,
-    weather: WeatherConfig = _CLEAR,
-    period: float | None = None,
-    unseen: Collection[RigidBody] | None = None,
-    motion_distortion: bool = False,
-    structures: Structures | None = None,
-    anchored_frames: Collection[FrameId] | None = None,
-    moving_bodies: Mapping[FrameId, int] | None = None,
-    num_threads: int = 1,
-    causal: bool = False,
-) -> Lidar:
-    """Adds a LiDAR to a diagram, given its description in a scenario.
-
-    Args:
-        config: the description, a section of a scenario.
-        builder: builder of a diagram with `scene_graph`.
-        scene_graph: the SceneGraph to scan.
-        body: the carrier P: a body of a finalized plant, or a frame that is
-            fixed on such a body.
-        X_PB: pose of the sensor B in P.
-        name: name of the system.
-        seed: seed of noise and returns.
-        weather: weather of calibrated returns.
-        period: duration of a revolution [s]; by default it follows from the
-            rate in the description.
-        unseen: bodies that the LiDAR does not see. This argument and all
-            further arguments are the same as for `add_lidar`.
-        motion_distortion: whether the bodies of the LiDAR's plant keep moving
-            during a revolution. A recorded drive connects a `Sweep` instead of
-            setting this argument.
-        structures: table of the structures.
-        anchored_frames: frames that never move.
-        moving_bodies: frames that move during a revolution.
-        num_threads: number of threads that share the LiDAR's rays.
-        causal: whether a scan is the revolution that ends at the time of the
-            output.
-    """
-    return add_lidar(
-        builder,
-        scene_graph,
-        body,
-        X_PB,
-        make_pattern(config, period),
-        name=name,
-        measurement=MeasurementModel(
-            resolution=config.resolution,
-            range_noise=config.range_noise,
-            dropout=config.dropout,
-            faint_dropout=config.faint_dropout,
-            seed=seed,
-            sensor_name=name,
-        ),
-        returns=make_returns(config, weather, name, seed) or "ideal",
-        unseen=unseen,
-        motion_distortion=motion_distortion,
-        structures=structures,
-        anchored_frames=anchored_frames,
-        moving_bodies=moving_bodies,
-        num_threads=num_threads,
-        causal=causal,
-    )
 
 
 def add_lidar_view(

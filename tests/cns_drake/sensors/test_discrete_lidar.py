@@ -1,0 +1,357 @@
+"""A LiDAR with a rate: computes a scan once per period, and holds it."""
+
+import numpy as np
+from pydrake.common import RandomGenerator
+from pydrake.geometry import Box
+from pydrake.lcm import DrakeLcm
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.multibody.tree import PrismaticJoint, SpatialInertia
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
+import pytest
+
+from cns_drake import (
+    ApplyLidarConfig,
+    LidarConfig,
+    add_lidar,
+    add_mcap_recorder,
+    add_odometry,
+    make_flash_pattern,
+)
+from cns_drake.ray_casting import RayCastingScene
+
+# A beam ahead, many times.
+AHEAD = make_flash_pattern(
+    3, 3, (2.0, 2.0), min_range=0.1, max_range=90.0, period=0.1
+)
+PORTS = ("scan", "point_cloud_S", "point_cloud_W", "positions_W", "X_WS")
+SPEED = 2.0
+
+
+class Reader(LeafSystem):
+    """Evaluates ports at every step, and keeps what `read` makes of them."""
+
+    def __init__(self, ports, read):
+        super().__init__()
+        self.seen = []
+        for k, port in enumerate(ports):
+            self.DeclareAbstractInputPort(f"u{k}", port.Allocate())
+
+        def publish(context):
+            values = [
+                self.get_input_port(k).Eval(context) for k in range(len(ports))
+            ]
+            self.seen.append((context.get_time(), read(*values)))
+
+        self.DeclarePerStepPublishEvent(publish)
+
+
+class Site:
+    """A LiDAR on a cart that drives towards a wall at x = 50 m."""
+
+    def __init__(self, time_step=0.001, ports=("scan",), read=None, **options):
+        self.builder = DiagramBuilder()
+        self.plant, self.scene_graph = AddMultibodyPlantSceneGraph(
+            self.builder, time_step
+        )
+        plant = self.plant
+        plant.mutable_gravity_field().set_gravity_vector([0, 0, 0])
+        plant.RegisterVisualGeometry(
+            plant.world_body(),
+            RigidTransform([50.5, 0, 0]),
+            Box(1, 90, 90),
+            "wall",
+            np.ones(4),
+        )
+        inertia = SpatialInertia.SolidBoxWithMass(1.0, 1.0, 1.0, 1.0)
+        self.cart = plant.AddRigidBody("cart", inertia)
+        joint = plant.AddJoint(
+            PrismaticJoint(
+                "rail", plant.world_frame(), self.cart.body_frame(), [1, 0, 0]
+            )
+        )
+        plant.Finalize()
+        plant.get_mutable_joint(joint.index()).set_default_translation(0.0)
+        self.joint = joint
+        options = {"rate": 10.0, **options}
+        pattern = options.pop("pattern", AHEAD)
+        self.lidar = add_lidar(
+            self.builder,
+            self.scene_graph,
+            self.cart,
+            RigidTransform(),
+            pattern,
+            **options,
+        )
+        self.reader = None
+        if read is not None:
+            outputs = [self.lidar.GetOutputPort(name) for name in ports]
+            self.reader = self.builder.AddSystem(Reader(outputs, read))
+            for k, port in enumerate(outputs):
+                self.builder.Connect(port, self.reader.get_input_port(k))
+
+    def simulator(self):
+        self.diagram = self.builder.Build()
+        simulator = Simulator(self.diagram)
+        self.start(simulator.get_mutable_context())
+        return simulator
+
+    def start(self, context, x=0.0):
+        own = self.plant.GetMyMutableContextFromRoot(context)
+        self.joint.set_translation(own, x)
+        self.joint.set_translation_rate(own, SPEED)
+
+    def eval(self, context, port="scan"):
+        own = self.lidar.GetMyContextFromRoot(context)
+        return self.lidar.GetOutputPort(port).Eval(own)
+
+
+def distance(scan):
+    return float(scan["x"].mean())
+
+
+@pytest.fixture
+def casts(monkeypatch):
+    """The number of times that rays are cast, in a list of one."""
+    count = [0]
+    cast = RayCastingScene.cast_rays
+
+    def counted(*args, **kwargs):
+        count[0] += 1
+        return cast(*args, **kwargs)
+
+    monkeypatch.setattr(RayCastingScene, "cast_rays", counted)
+    return count
+
+
+@pytest.mark.parametrize("time_step", [0.001, 0.0])
+@pytest.mark.parametrize(("ports", "duration"), [(("scan",), 6), (PORTS, 1)])
+def test_a_scan_is_computed_once_per_period(casts, time_step, ports, duration):
+    site = Site(time_step, ports, lambda *values: None)
+    simulator = site.simulator()
+    if not time_step:
+        simulator.get_mutable_integrator().set_maximum_step_size(0.001)
+    simulator.AdvanceTo(duration)
+    assert len(site.reader.seen) > 1000 * duration
+    assert casts[0] in (10 * duration, 10 * duration + 1)
+
+
+def test_a_continuous_lidar_is_the_choice_without_a_rate(casts):
+    site = Site(0.01, read=distance, rate=None)
+    site.simulator().AdvanceTo(0.5)
+    assert casts[0] == len(site.reader.seen) == 51
+    for time, seen in site.reader.seen:
+        assert seen == pytest.approx(50.0 - SPEED * time, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("rate", "offset", "time_step"),
+    [(10.0, 0.0, 0.004), (10.0, 0.05, 0.004), (7.0, 0.3, 0.003), (3, 0, 0.1)],
+)
+def test_scans_are_held_until_the_next_capture(rate, offset, time_step):
+    """Whether or not the rate divides the step of the plant."""
+    site = Site(
+        time_step,
+        ("scan", "X_WS", "point_cloud_W"),
+        lambda scan, X_WS, cloud: (
+            distance(scan),
+            X_WS.translation()[0],
+            cloud.xyzs()[0].mean(),
+        ),
+        rate=rate,
+        capture_offset=offset,
+    )
+    site.simulator().AdvanceTo(2.0)
+    assert len({seen for _, seen in site.reader.seen}) >= 2 * rate - 1
+    for time, (ahead, x, wall) in site.reader.seen:
+        # Times of steps and of captures are rounded.
+        captured = [
+            offset + np.floor((time - offset) * rate + rounding) / rate
+            for rounding in (-1e-9, 1e-9)
+        ]
+        if time < offset:
+            captured = [0.0]  # The scan of the start.
+        # A discrete plant moves at its steps only.
+        off = ahead - (50.0 - SPEED * np.array(captured))
+        assert np.abs(off).min() < SPEED * time_step + 1e-4
+        assert x == pytest.approx(50.0 - ahead, abs=1e-4)
+        assert wall == pytest.approx(50.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+@pytest.mark.parametrize("offset", [0.0, 0.0625])
+def test_captures_are_the_scans_of_a_continuous_lidar(noise, offset):
+    options = {"range_noise": noise, "seed": 4}
+    seen = {}
+    for rate in (None, 8.0):
+        site = Site(
+            2.0**-6,
+            read=lambda scan: scan.copy(),
+            rate=rate,
+            capture_offset=offset if rate else 0.0,
+            **options,
+        )
+        site.simulator().AdvanceTo(1.0)
+        seen[rate] = dict(site.reader.seen)
+    kept = [offset + k / 8.0 for k in range(8)]
+    for time in kept:
+        np.testing.assert_array_equal(seen[None][time], seen[8.0][time])
+    assert len({seen[8.0][time].tobytes() for time in kept}) == 8
+
+
+def test_without_a_simulator_there_is_a_scan_at_each_time():
+    site = Site()
+    context = site.builder.Build().CreateDefaultContext()
+    for time, x in ((0.0, 1.0), (0.03, 2.0), (0.1, 3.0), (0.0, 4.0)):
+        context.SetTime(time)
+        site.start(context, x)
+        assert distance(site.eval(context)) == pytest.approx(50.0 - x)
+        assert site.eval(context, "X_WS").translation()[0] == x
+        assert site.eval(context, "scan_time") == [time]
+
+
+def test_contexts_hold_scans_of_their_own(casts):
+    site = Site(0.01, range_noise=0.01)
+    simulator = site.simulator()
+    simulator.AdvanceTo(0.25)
+    context = simulator.get_mutable_context()
+    held = site.eval(context)
+    clone = context.Clone()
+    before = casts[0]
+    np.testing.assert_array_equal(site.eval(clone), held)
+    # A change between two captures is not seen, but rays see it.
+    site.start(context, 20.0)
+    assert site.eval(context) is held
+    assert site.eval(context, "scan_time") == [0.2]
+    own = site.lidar.GetMyContextFromRoot(context)
+    ids = site.lidar.EvalGeometryIds(own)
+    assert len(ids) == len(held)
+    assert site.lidar.EvalInstances(own) == {1: (ids[0],)}
+    assert casts[0] == before
+    hits = site.lidar.CastRays(own, np.array([20.0, 0, 0]), np.eye(3)[:1])
+    assert hits.ranges[0] == pytest.approx(30.0)
+    simulator.AdvanceTo(0.31)
+    assert distance(site.eval(context)) == pytest.approx(30.0, abs=0.2)
+    np.testing.assert_array_equal(site.eval(clone), held)
+    # No scan is left after a reset, whatever randomness does.
+    diagram = site.diagram
+    for reset in (
+        diagram.SetDefaultContext,
+        lambda one: diagram.SetRandomContext(one, RandomGenerator(3)),
+    ):
+        reset(clone)
+        assert distance(site.eval(clone)) == pytest.approx(50.0, abs=0.1)
+
+
+def test_initializing_again_forgets_the_scan():
+    site = Site(0.01)
+    simulator = site.simulator()
+    simulator.AdvanceTo(0.05)
+    context = simulator.get_mutable_context()
+    for time, x in ((0.0, 5.0), (0.05, 7.0), (0.02, 9.0), (0.1, 11.0)):
+        context.SetTime(time)
+        site.start(context, x)
+        simulator.Initialize()
+        found = distance(site.eval(context))
+        assert found == pytest.approx(50.0 - x, abs=1e-4)
+        # Held from the start, even if the start is between two captures.
+        simulator.AdvanceTo(time + 0.03)
+        assert distance(site.eval(context)) == found
+
+
+def test_advancing_in_pieces_changes_nothing(casts):
+    found = []
+    for pieces in ([1.0], [0.1, 0.25, 0.25, 0.3, 0.7, 1.0]):
+        casts[0] = 0
+        site = Site(0.001, range_noise=0.02)
+        simulator = site.simulator()
+        for end in pieces:
+            simulator.AdvanceTo(end)
+        found.append(site.eval(simulator.get_context()).copy())
+        assert casts[0] == 11
+    np.testing.assert_array_equal(*found)
+
+
+def test_a_lidar_config_with_a_rate_is_discrete(casts):
+    for rate, expected in ((10.0, 11), (None, 101)):
+        casts[0] = 0
+        builder = DiagramBuilder()
+        plant, _ = AddMultibodyPlantSceneGraph(builder, 0.01)
+        plant.RegisterVisualGeometry(
+            plant.world_body(), RigidTransform(), Box(9, 9, 9), "b", np.ones(4)
+        )
+        # It moves, so that every step needs a scan of its own.
+        plant.AddRigidBody(
+            "ball", SpatialInertia.SolidBoxWithMass(1.0, 1.0, 1.0, 1.0)
+        )
+        plant.Finalize()
+        lidar = ApplyLidarConfig(
+            LidarConfig(preset="hokuyo-ust-20lx", rate=rate, columns=8),
+            builder,
+            lcm=DrakeLcm("memq://"),
+        )
+        port = lidar.GetOutputPort("scan")
+        reader = builder.AddSystem(Reader([port], lambda scan: None))
+        builder.Connect(port, reader.get_input_port())
+        Simulator(builder.Build()).AdvanceTo(1.0)
+        assert casts[0] == expected
+
+
+@pytest.mark.parametrize(
+    ("options", "fault"),
+    [
+        ({"rate": 0}, "rate: 0 is not a positive"),
+        ({"rate": -1.0}, "rate: "),
+        ({"rate": np.nan}, "rate: "),
+        ({"rate": "fast"}, "rate: 'fast' is not a positive"),
+        ({"rate": True}, "rate: True is not a positive"),
+        ({"rate": 20}, "rate: 20 scans per second, but a revolution takes 0.1"),
+        ({"capture_offset": -0.1}, "capture_offset: -0.1"),
+        ({"capture_offset": np.inf}, "capture_offset: inf"),
+        ({"rate": None, "capture_offset": 0.1}, "capture_offset: only"),
+    ],
+)
+def test_rates_that_cannot_be(options, fault):
+    with pytest.raises(ValueError, match=f"^{fault}"):
+        Site(**options)
+
+
+def test_a_rate_sets_the_revolutions_of_a_preset():
+    site = Site(pattern="vlp-16", rate=5.0)
+    assert site.lidar.pattern.period == 0.2
+    with pytest.raises(ValueError, match=r"^rate: 0 is not a positive"):
+        Site(pattern="vlp-16", rate=0)
+
+
+def test_a_recording_needs_the_pose_at_its_own_times(tmp_path):
+    site = Site()
+    odometry = add_odometry(site.builder, site.cart)
+    fault = r"^lidars: 'lidar' takes 10 scans .*; add it without rate"
+    for rates in ({"odometry": 100}, {"lidar": 20}):
+        with pytest.raises(ValueError, match=fault):
+            add_mcap_recorder(
+                site.builder,
+                tmp_path / "drive",
+                lidars=[site.lidar],
+                odometry=odometry,
+                rates=rates,
+            )
+    site = Site(capture_offset=0.02)
+    with pytest.raises(ValueError, match=fault):
+        add_mcap_recorder(site.builder, tmp_path / "drive", lidars=[site.lidar])
+
+
+def test_a_recording_has_each_scan_at_its_time(tmp_path):
+    """As that of a continuous LiDAR, byte for byte."""
+    recorded = []
+    for rate in (10.0, None):
+        site = Site(0.01, rate=rate)
+        folder = tmp_path / str(rate) / "drive"
+        bag = add_mcap_recorder(site.builder, folder, lidars=[site.lidar])
+        simulator = site.simulator()
+        with bag:
+            simulator.AdvanceTo(0.5)
+        (file,) = folder.glob("*.mcap")
+        recorded.append(file.read_bytes())
+    assert recorded[0] == recorded[1]

@@ -1,0 +1,51 @@
+"""What cannot be written is refused before anything is measured."""
+
+from pathlib import Path
+
+import pytest
+
+from cns_drake.base import InputError, check_outputs, choose_cluster
+from evaluation.real import measure_real
+from evaluation.study import measure_pairs, study_recordings
+
+MEASURE = {
+    "pair": lambda output: measure_pairs("one", [], [], output),
+    "real": lambda output: measure_real(
+        Path("nowhere"), output, choose_cluster(1, None)
+    ),
+    "report": lambda output: study_recordings(
+        [], output, choose_cluster(1, None), [], {}, source="nowhere"
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ["results.csv", "queries.csv"])
+@pytest.mark.parametrize("study", MEASURE)
+def test_a_link_is_refused_at_once(tmp_path, study, name):
+    elsewhere = tmp_path / "mine.csv"
+    elsewhere.write_text("mine")
+    output = tmp_path / "study"
+    output.mkdir()
+    (output / name).symlink_to(elsewhere)
+    with pytest.raises(InputError, match=rf"{name}: a link; give the name"):
+        MEASURE[study](output)
+    assert elsewhere.read_text() == "mine"
+    assert sorted(path.name for path in output.iterdir()) == [name]
+
+
+@pytest.mark.parametrize("study", MEASURE)
+def test_a_dead_link_is_no_folder(tmp_path, study):
+    output = tmp_path / "study"
+    output.symlink_to(tmp_path / "gone")
+    with pytest.raises(InputError, match="study: not a folder"):
+        MEASURE[study](output)
+
+
+def test_outputs_need_not_exist(tmp_path):
+    check_outputs(tmp_path / "new" / "study", ["a.csv"])
+    assert not (tmp_path / "new").exists()
+    (tmp_path / "a.csv").write_text("old")
+    check_outputs(tmp_path, ["a.csv", "b.csv"])
+    (tmp_path / "b.csv").mkdir()
+    with pytest.raises(InputError, match=r"b\.csv: a folder has this name"):
+        check_outputs(tmp_path, ["a.csv", "b.csv"])
