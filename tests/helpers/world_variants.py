@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+import re
 from xml.etree.ElementTree import Comment, Element, fromstring, tostring
 
 # Root tag -> attribute of the root with a model's name.
@@ -19,8 +20,10 @@ def same_worlds(path: Path) -> dict[str, str]:
     if tag in _NAMES:
         changes["another name"] = lambda root: root.set(_NAMES[tag], "other")
     changes |= _ADDITIONS.get(tag, _ADDITIONS["sdf"])
+    body = re.sub(r"\A<\?xml.*?\?>\s*", "", text)
     found = {
-        "a declaration": f"<?xml version='1.0' encoding='utf-8'?>\n{text}",
+        "a declaration": f"<?xml version='1.0' encoding='utf-8'?>\n{body}",
+        "no declaration": body,
         "a byte order mark": f"\ufeff{text}",
         "other line ends": text.replace("\n", "\r\n"),
     }
