@@ -125,13 +125,13 @@ def pr(
         chosen = _made(choice)
         _write_scores(chosen, database, query, scores, protocol, columns)
         return
-    from cns_drake.base import make_folder
     from cns_drake.drives import check_same_map, check_same_world
     from evaluation.drives import CountedDrive
     from evaluation.recognition import (
         check_has_match,
         write_overlaps,
     )
+    from evaluation.results import make_output
 
     if turn_queries is not None:
         protocol = replace(protocol, turn_queries=turn_queries)
@@ -146,7 +146,7 @@ def pr(
     is_itself = database.resolve() == query.resolve()
     _check_together(protocol, database, query, overlaps, exact_overlaps)
     if output is not None:
-        make_folder(output)
+        make_output(output)
     given = _choice_of(method, parameter)
     choice = given.at_height(sensor_height)
     chosen = _made(choice)

@@ -65,13 +65,12 @@ def tcr(
         )
         compare_paths(first, second, align, json=json)
         return
-    from cns_drake.base import make_folder
     from evaluation.change import (
         maps_in_one_world,
         same_stage_partner,
         spread_over_grids,
     )
-    from evaluation.results import LAST, OWN, STAGE
+    from evaluation.results import LAST, OWN, STAGE, make_output
     from evaluation.study import ChangeTask, measure_pairs, pair_of_drive_maps
 
     named = [path for path in (source, target, control) if path is not None]
@@ -91,7 +90,7 @@ def tcr(
         for both, stage in zip(compared, (OWN, LAST), strict=False)
     ]
     if output is not None:
-        make_folder(output)
+        make_output(output)
     engine = measure_pairs("tcr", pairs, [ChangeTask({}, "tcr")], output)
     report, *beside = (engine.found(pair, ChangeTask.name) for pair in pairs)
     for other in beside:
