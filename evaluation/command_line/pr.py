@@ -19,7 +19,7 @@ from cns_drake.base import (
     terminal,
 )
 from evaluation.command_line import options
-from evaluation.command_line.printed_text import NOT_FINITE, interval_text
+from evaluation.command_line.printed_text import interval_text
 from evaluation.recognition import RetrievalProtocol, with_protocol
 
 if TYPE_CHECKING:
@@ -242,6 +242,8 @@ def _measured(
 
 def _show_notes(method: Method, drives: Sequence[CountedDrive]) -> None:
     """Shows what the method assumes, and what was ignored of the scans."""
+    from evaluation.drives import NOT_FINITE
+
     assumptions = (method.assumption(drive.lidar_field) for drive in drives)
     for note in dict.fromkeys(assumptions):
         if note is not None:
@@ -313,6 +315,7 @@ def _write_scores(
     columns: int | None,
 ) -> None:
     """Writes the scores of `pr --scores`, and shows the notes on them."""
+    from evaluation.drives import NOT_FINITE
     from evaluation.recognition import write_scores
 
     num_ignored = write_scores(

@@ -11,7 +11,6 @@ import typer
 
 from cns_drake.base import commands, number_text, shared_options, terminal
 from evaluation.command_line import options
-from evaluation.command_line.printed_text import NOT_FINITE
 from evaluation.command_line.trajectories import compare_paths
 
 if TYPE_CHECKING:
@@ -70,6 +69,7 @@ def tcr(
         same_stage_partner,
         spread_over_grids,
     )
+    from evaluation.drives import NOT_FINITE
     from evaluation.results import LAST, OWN, STAGE, make_output
     from evaluation.study import ChangeTask, measure_pairs, pair_of_drive_maps
 

@@ -42,7 +42,7 @@ _GROUPS = {
     "localise": _Group(
         re.compile(r"localisation\.csv|track\.png"),
         "localisation.csv",
-        re.compile(rb"\Aframe,stamp_ns,start_x,"),
+        re.compile(rb"\A[^\n]*\bstamp_ns,[^\n]*\btranslation_error,"),
     ),
     "map-update": _Group(
         re.compile(r"[AB]\.npy"),

@@ -13,7 +13,7 @@ OWN = {
     "summaries.csv": "a\n",
     "chart_1.pdf": "a",
     "chart_12.png": "a",
-    "localisation.csv": "frame,stamp_ns,start_x,start_y\n",
+    "localisation.csv": "frame,stamp_ns,translation_error,along\n",
     "track.png": "a",
     "A.npy": "a",
     "B.npy": "a",
