@@ -391,7 +391,7 @@ def _barrier(
     where = (name, faults)
     usual = _BARRIERS[tags["barrier"]]
     high = tag_value(tags, "height", length, _TALLEST, where) or usual.height
-    low = tag_value(tags, "min_height", length, _TALLEST, where) or 0.0
+    low = tag_value(tags, "min_height", length, _TALLEST, where, 0.0) or 0.0
     if low >= high:
         faults.add("barrier that begins above its top, lowered", name)
         low = 0.0

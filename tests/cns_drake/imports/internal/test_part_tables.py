@@ -110,6 +110,32 @@ def test_each_key_changes_the_triangles_or_is_accounted_for(tmp_path, key):
             assert "left out" in told, (name, key)
 
 
+NO_SIZES = ["0", "-1", "zzz", "1e9"]
+
+
+@pytest.mark.parametrize("value", NO_SIZES)
+@pytest.mark.parametrize(
+    ("key", "elements"),
+    [
+        ("width", {"highway": "residential"}),
+        ("width", {"highway": "footway"}),
+        ("width", {"barrier": "hedge"}),
+        ("height", {"barrier": "wall"}),
+        ("lanes", {"highway": "residential"}),
+        ("maxspeed", {"highway": "residential"}),
+    ],
+)
+def test_sizes_that_cannot_be_are_counted_on_each_element(
+    tmp_path, key, elements, value
+):
+    osm = OsmWriter()
+    osm.box(-80, -80, 9, 9, building="yes", height="9")
+    osm.way([(0, 0), (30, 0)], **(elements | {key: value}))
+    city, _ = import_osm(osm.write(tmp_path / "a.osm"))
+    told = {fault.kind: fault.number for fault in city.faults.rows()}
+    assert told[f"{key} unreadable or implausible, the usual one taken"] == 1
+
+
 def write_dressed(path, more):
     """Writes the elements of a dressed city; returns what to look for."""
     osm = OsmWriter()
