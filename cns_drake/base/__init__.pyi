@@ -13,7 +13,6 @@ from cns_drake.base.complete_files import (
     check_folder_writable as check_folder_writable,
 )
 from cns_drake.base.complete_files import check_new_folder as check_new_folder
-from cns_drake.base.complete_files import check_outputs as check_outputs
 from cns_drake.base.complete_files import check_writable as check_writable
 from cns_drake.base.complete_files import complete_part as complete_part
 from cns_drake.base.complete_files import completing as completing

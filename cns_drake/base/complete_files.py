@@ -1,6 +1,6 @@
 """Writes files and folders, which get their names only when complete."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 import contextlib
 import os
 from pathlib import Path
@@ -194,21 +194,6 @@ def sole_writer(folder: Path) -> contextlib.AbstractContextManager[None]:
         raise InputError(f"{folder}: another process is writing this folder")
 
     return exclusive(part_path(Path(os.path.abspath(folder))), refuse)
-
-
-def check_outputs(folder: Path, names: Iterable[str]) -> None:
-    """Checks before a long run what stands in the way of files in a folder.
-
-    Neither the folder nor the files need exist. Nothing is made.
-
-    Raises:
-        InputError: the folder is no folder, or a file is a folder, link, device
-            or pipe.
-    """
-    if os.path.lexists(folder) and not folder.is_dir():
-        raise InputError(f"{folder}: not a folder")
-    for name in names:
-        _new_part(folder / name)
 
 
 def _new_part(path: Path) -> Path:

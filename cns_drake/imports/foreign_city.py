@@ -21,6 +21,7 @@ class SmallObject:
         kind: a key of `cns_drake.city.placement.objects.OBJECTS`.
         xy: position in W [m].
         yaw: heading in W [rad]; None if unknown.
+        height: height of a tree [m]; None if unknown, or for other objects.
     """
 
     source: str
@@ -28,6 +29,7 @@ class SmallObject:
     kind: str
     xy: tuple[float, float]
     yaw: float | None
+    height: float | None = None
 
 
 @dataclass(frozen=True)

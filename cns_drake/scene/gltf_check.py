@@ -27,6 +27,8 @@ _CHANGING = (
     "EXT_mesh_gpu_instancing", "EXT_instance_features", "KHR_node_visibility",
     "KHR_mesh_quantization",
 )  # fmt: skip
+# Compressions. A file that does not require them has its shapes without, too.
+_COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 # Type of an accessor with floats.
 _FLOAT = 5126
 # Modes of primitives below this number (points and lines) have no triangles.
@@ -55,6 +57,8 @@ def check_gltf(content: bytes) -> tuple[str, ...]:
         modes = [p.get("mode", _FIRST_TRIANGLES) for p in primitives]
         has_other_mode = any(not 0 <= m <= _LAST_TRIANGLES for m in modes)
         counts = _ignored_contents(top, primitives)
+        for name in _optional_extensions(top):
+            counts[f"uses of the extension {name} of glTF ignored"] += 1
     except (
         AttributeError, LookupError, RecursionError, TypeError, struct.error
     ) as error:  # fmt: skip
@@ -72,6 +76,42 @@ def check_gltf(content: bytes) -> tuple[str, ...]:
             " are not read; export it without"
         )
     return tuple(f"{number} {what}" for what, number in counts.items())
+
+
+def count_triangles(content: bytes) -> int:
+    """Returns how many triangles a glTF file shows, which was checked.
+
+    Open3D leaves out triangles whose vertices do not exist.
+    """
+    top = parse_json(_json_chunk(content))
+    try:
+        meshes = [_count_of_mesh(top, one) for one in top.get("meshes", [])]
+        nodes = top.get("nodes", [])
+        waiting = list(top["scenes"][top.get("scene", 0)].get("nodes", []))
+        total = 0
+        # A node has one parent, so no node is visited twice.
+        for _ in range(len(nodes)):
+            if not waiting:
+                break
+            node = nodes[waiting.pop()]
+            waiting += node.get("children", [])
+            total += meshes[node["mesh"]] if "mesh" in node else 0
+    except (AttributeError, LookupError, TypeError) as error:
+        raise ValueError(f"no valid glTF ({type(error).__name__})") from error
+    return total
+
+
+def _count_of_mesh(top: Any, mesh: Any) -> int:
+    count = 0
+    for one in mesh["primitives"]:
+        corners = one.get("indices", one["attributes"].get("POSITION"))
+        number = 0 if corners is None else top["accessors"][corners]["count"]
+        mode = one.get("mode", _FIRST_TRIANGLES)
+        if mode == _FIRST_TRIANGLES:
+            count += number // 3
+        elif mode > _FIRST_TRIANGLES:
+            count += max(number - 2, 0)
+    return count
 
 
 def with_own_buffers(path: Path, content: bytes) -> bytes | None:
@@ -124,10 +164,28 @@ def _unread_extensions(top: Any) -> list[str]:
     """Returns the names of extensions that change shapes."""
     required = [str(name) for name in top.get("extensionsRequired", [])]
     used = [str(name) for name in top.get("extensionsUsed", [])]
+    used += _extensions_of_shapes(top)
     return [
         *(name for name in required if not name.startswith(_HARMLESS)),
         *(name for name in used if name in _CHANGING),
     ]
+
+
+def _optional_extensions(top: Any) -> list[str]:
+    """Returns the extension of each use by a shape that need not be read."""
+    return [
+        name
+        for name in _extensions_of_shapes(top)
+        if not name.startswith((*_HARMLESS, *_COMPRESSIONS))
+    ]
+
+
+def _extensions_of_shapes(top: Any) -> list[str]:
+    """Returns the extension of each use by a node, a mesh or a primitive."""
+    meshes = top.get("meshes", [])
+    shapes = [*top.get("nodes", []), *meshes]
+    shapes += [one for mesh in meshes for one in mesh["primitives"]]
+    return [name for one in shapes for name in one.get("extensions", {})]
 
 
 def _has_float_positions(top: Any, primitives: list[Any]) -> bool:

@@ -1,7 +1,8 @@
 """Checks mesh files for contents that their readers misread or leave out.
 
 Open3D reads glTF, COLLADA, STL and PLY. Some files are read only in part,
-without a warning. This module refuses such a file if surfaces would be missing.
+without a warning. This module refuses such a file if surfaces would be missing,
+and files of all other formats.
 """
 
 from collections import Counter
@@ -10,21 +11,16 @@ import re
 import struct
 
 from cns_drake.base import read_bytes
+from cns_drake.scene.collada_check import check_collada
 from cns_drake.scene.gltf_check import check_gltf
 from cns_drake.scene.obj_check import LARGEST_FILE, obj_notes
 from cns_drake.scene.ply_check import check_ply
 
 # File name extensions of glTF.
 GLTF = (".gltf", ".glb")
-# Pattern of elements of COLLADA that would move or add shapes, and are not
-# read -> what a note calls them.
-_COLLADA = {
-    re.compile(rb"<instance_controller\b"): "skins or morphs of COLLADA",
-    re.compile(rb"<animation\b"): "animations of COLLADA",
-    re.compile(rb"<(?:lines|linestrips|spline)\b"): "lines of COLLADA",
-}
-# Elements of COLLADA with surfaces that are not read.
-_COLLADA_SURFACES = re.compile(rb"<(brep|convex_mesh)\b")
+# Formats that Drake itself checks.
+_BY_DRAKE = (".vtk",)
+_FORMATS = ".obj .gltf .glb .dae .stl .ply .vtk"
 _STL_HEADER_BYTES = 84
 _STL_FACET_BYTES = 50
 _STL_WORDS = re.compile(rb"^[ \t]*(vertex|endfacet|endsolid)\b", re.M | re.I)
@@ -34,29 +30,24 @@ def check_mesh_file(path: Path) -> tuple[str, ...]:
     """Checks a mesh file; returns notes on what is not read, such as lines.
 
     There is one note for each kind of content that is not read. The tuple is
-    empty if everything is read, and for files of other formats.
+    empty if everything is read.
 
     Raises:
-        ValueError: the shapes in the file would be misread.
+        ValueError: the format is not read, or the shapes in the file would be
+            misread.
         InputError: the file cannot be read.
     """
-    check = _CHECKS.get(path.suffix.lower())
-    return () if check is None else check(read_bytes(path, LARGEST_FILE))
-
-
-def _check_collada(content: bytes) -> tuple[str, ...]:
-    """Returns notes on ignored elements of a COLLADA file, one for each kind.
-
-    Raises:
-        ValueError: the file has surfaces that would not be read.
-    """
-    if found := _COLLADA_SURFACES.search(content):
+    ending = path.suffix.lower()
+    if ending in _BY_DRAKE:
+        return ()
+    if ending == ".dae":
+        return check_collada(path)
+    if ending not in _CHECKS:
         raise ValueError(
-            f"has <{found[1].decode()}> of COLLADA, which is not read; export"
-            " it with triangles"
+            f"is no mesh of a format that is read ({_FORMATS}); Blender or"
+            " trimesh writes these"
         )
-    counts = {what: len(one.findall(content)) for one, what in _COLLADA.items()}
-    return tuple(f"{n} {what} ignored" for what, n in counts.items() if n)
+    return _CHECKS[ending](read_bytes(path, LARGEST_FILE))
 
 
 def _check_stl(content: bytes) -> tuple[()]:
@@ -95,5 +86,4 @@ _CHECKS = {
     ".obj": obj_notes,
     ".ply": check_ply,
     ".stl": _check_stl,
-    ".dae": _check_collada,
 }

@@ -18,7 +18,7 @@ from pydrake.geometry import (
 from cns_drake.base import InputError, read_bytes
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.foreign_meshes import ForeignMeshes
-from cns_drake.scene.gltf_check import with_own_buffers
+from cns_drake.scene.gltf_check import count_triangles, with_own_buffers
 from cns_drake.scene.mesh_check import GLTF, check_mesh_file
 from cns_drake.scene.obj_check import LARGEST_FILE, check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
@@ -98,7 +98,7 @@ class MeshFiles:
         check_mesh_file(path)
         if ending in _READERS:
             p_GVset, triangles = _READERS[ending](path)
-        elif ending == ".gltf":
+        elif ending in GLTF:
             p_GVset, triangles = self._read_gltf(path)
         else:
             p_GVset, triangles = self._foreign.read(path)
@@ -113,13 +113,31 @@ class MeshFiles:
         return TriangleSurface(p_GVset, triangles)
 
     def _read_gltf(self, path: Path) -> tuple[np.ndarray, np.ndarray]:
-        whole = with_own_buffers(path, read_bytes(path, LARGEST_FILE))
+        content = read_bytes(path, LARGEST_FILE)
+        whole = with_own_buffers(path, content)
         if whole is None:
-            return self._foreign.read(path)
-        with tempfile.TemporaryDirectory() as folder:
-            copy = Path(folder) / "mesh.gltf"
-            copy.write_bytes(whole)
-            return self._foreign.read(copy)
+            found = self._foreign.read(path)
+        else:
+            with tempfile.TemporaryDirectory() as folder:
+                copy = Path(folder) / "mesh.gltf"
+                copy.write_bytes(whole)
+                found = self._foreign.read(copy)
+        _check_count(len(found[1]), count_triangles(content))
+        return found
+
+
+def _check_count(found: int, expected: int) -> None:
+    """Checks that all triangles of a file were read.
+
+    Raises:
+        ValueError: some are missing.
+    """
+    if found < expected:
+        raise ValueError(
+            f"only {found} of {expected} triangles can be read; faces have"
+            " vertices that are not there, or outlines that touch themselves:"
+            " export it with valid triangles"
+        )
 
 
 def _write_mesh(source: MeshSource, folder: Path) -> Path:
@@ -223,11 +241,12 @@ def _parse_small_obj(
 
 
 def _parse_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    check_obj(path)
+    expected = check_obj(path)
     mesh = ReadObjToTriangleSurfaceMesh(path)
     triangles = [
         (t.vertex(0), t.vertex(1), t.vertex(2)) for t in mesh.triangles()
     ]
+    _check_count(len(triangles), expected)
     return (
         np.asarray(mesh.vertices(), dtype=float).reshape(-1, 3),
         np.asarray(triangles, dtype=np.int32).reshape(-1, 3),

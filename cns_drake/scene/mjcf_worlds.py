@@ -7,6 +7,7 @@ elements that Drake does not read are refused.
 
 from collections import Counter
 from collections.abc import Mapping
+import os
 from pathlib import Path
 from typing import NoReturn
 from xml.etree.ElementTree import Element, tostring
@@ -122,6 +123,7 @@ class _Reader:
         self._counts: Counter[str] = Counter()
         self._missing: list[str] = []
         self._folder = path.absolute().parent
+        self._mesh_folder = ""
 
     def notes(self) -> tuple[str, ...]:
         """Returns one line for each kind of what is not as in the file."""
@@ -141,7 +143,7 @@ class _Reader:
         for compiler in model.iterfind("compiler"):
             for key in ("assetdir", "meshdir"):
                 if key in compiler.attrib:
-                    self._folder /= compiler.attrib.pop(key)
+                    self._mesh_folder = compiler.attrib.pop(key)
         self._reduce(model)
         self._find_meshes(model)
 
@@ -191,7 +193,10 @@ class _Reader:
                 uri = mesh.get("file")
                 if uri is None:
                     self._refuse("<mesh> without a file")
-                found = self._finder.find(uri, self._folder)
+                place = uri
+                if "://" not in uri:  # An absolute path stays as it is.
+                    place = os.path.join(self._mesh_folder, uri)
+                found = self._finder.find(place, self._folder)
                 if found is None or not found.is_file():
                     self._missing.append(uri)
                     gone.add(mesh.get("name", Path(uri).stem))

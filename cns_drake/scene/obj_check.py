@@ -43,6 +43,14 @@ _OTHER_INDICES = re.compile(rb"/[^\s]*")
 _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
 
 
+# A face of one or two corners, which has no surface.
+_SHORT_FACE = re.compile(
+    rb"^[ \t]*(f[ \t](?:[ \t]*[^\s#]+){0,2})[ \t]*(?:[\n#]|\Z)",
+    re.MULTILINE,
+)
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+
 def obj_notes(content: bytes) -> tuple[str, ...]:
     """Returns notes on statements of an OBJ file that are not read.
 
@@ -54,9 +62,12 @@ def obj_notes(content: bytes) -> tuple[str, ...]:
             statement.
     """
     counts: Counter[str] = Counter()
-    for word, count in Counter(
-        _STATEMENT.findall(content.replace(b"\r", b"\n"))
-    ).items():
+    content = content.replace(b"\r", b"\n")
+    if content.startswith(_BYTE_ORDER_MARK):
+        raise ValueError("begins with a byte order mark; save it without")
+    if short := len(_SHORT_FACE.findall(content)):
+        counts["faces of OBJ with fewer than three corners ignored"] = short
+    for word, count in Counter(_STATEMENT.findall(content)).items():
         name = word.decode("ascii", "replace")
         if name in _REFUSED:
             raise ValueError(
@@ -70,8 +81,11 @@ def obj_notes(content: bytes) -> tuple[str, ...]:
     return tuple(f"{count} {what}" for what, count in sorted(counts.items()))
 
 
-def check_obj(path: Path) -> None:
+def check_obj(path: Path) -> int:
     """Checks that the faces of an OBJ file use only vertices that exist.
+
+    Returns:
+        Number of triangles into which the faces can be divided.
 
     Raises:
         ValueError: a face has a vertex that does not exist, a vertex is not
@@ -89,11 +103,15 @@ def check_obj(path: Path) -> None:
             " a weight of 1 or a colour"
         )
     num_vertices = len(_VERTEX.findall(content))
-    faces = b" \n".join(_FACE.findall(content))
+    rows = _FACE.findall(content)
+    faces = b" \n".join(rows)
     if b"/" in faces:
         faces = _OTHER_INDICES.sub(b"", faces)
     if _are_valid_indices(faces, num_vertices):
-        return
+        short = [row.split() for row in _SHORT_FACE.findall(content)]
+        # Each face of n corners is n - 2 triangles, a short one none.
+        surplus = sum(2 - (len(row) - 1) for row in short)
+        return len(faces.split()) - 2 * len(rows) + surplus
     for number, line in enumerate(content.split(b"\n"), start=1):
         face = _FACE.match(line)
         indices = _OTHER_INDICES.sub(b"", face[1]) if face else b""
@@ -107,6 +125,7 @@ def check_obj(path: Path) -> None:
                 f"line {number}: a face has a vertex that is not there (of"
                 f" {num_vertices})"
             )
+    raise AssertionError  # One of the lines has the fault.
 
 
 def _are_valid_indices(text: bytes, num_vertices: int) -> bool:

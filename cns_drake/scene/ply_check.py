@@ -13,6 +13,9 @@ from cns_drake.base import repeated
 _NO_SHAPES = ("vertex", "face", "camera", "material")
 # Open3D reports a longer header itself [bytes].
 _LONGEST_HEADER = 1 << 16
+# Properties of vertices and faces that are read.
+_AXES = ["x", "y", "z"]
+_CORNER_LISTS = ("vertex_indices", "vertex_index")
 # Least number of corners of a face.
 _CORNERS = 3
 # Type of a number in PLY -> its type in NumPy.
@@ -64,6 +67,7 @@ def check_ply(content: bytes) -> tuple[str, ...]:
     for name in repeated(one.name for one in elements):
         raise ValueError(f"has the element {name} of PLY twice; export it once")
     notes = _ignored_elements(elements)
+    _check_names(elements)
     # The line of the word end_header ends by \n or by \r\n.
     _, _, body = body.partition(b"\n")
     least = _CORNERS
@@ -93,6 +97,28 @@ def _parse_header(head: str) -> tuple[str, list[_Element]]:
             case ["property", kind, name] if elements:
                 elements[-1].properties.append((name, (kind,)))
     return encoding, elements
+
+
+def _check_names(elements: Sequence[_Element]) -> None:
+    """Checks that coordinates and corners have the names that Open3D reads.
+
+    Raises:
+        ValueError: they have other names, or another order.
+    """
+    for one in elements:
+        names = [name for name, _ in one.properties]
+        axes = [name for name in names if name in _AXES]
+        if one.name == "vertex" and axes != _AXES:
+            raise ValueError(
+                f"has vertices of PLY with {' '.join(axes) or 'no x, y and z'},"
+                " not x y z in this order; export it again"
+            )
+        lists = [name for name, types in one.properties if len(types) > 1]
+        if one.name == "face" and one.count and not {*lists} & {*_CORNER_LISTS}:
+            raise ValueError(
+                f"has faces of PLY with the lists {' '.join(lists) or '(none)'}"
+                f", none of {' or '.join(_CORNER_LISTS)}; export it again"
+            )
 
 
 def _ignored_elements(elements: Sequence[_Element]) -> tuple[str, ...]:

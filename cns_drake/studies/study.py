@@ -11,7 +11,6 @@ import numpy as np
 from cns_drake.base import (
     Cluster,
     InputError,
-    check_outputs,
     did_you_mean,
     doing,
     errors_at,
@@ -66,12 +65,11 @@ from evaluation.results import (
     LAST,
     LEVEL,
     OWN,
-    QUERIES,
-    RESULTS,
     SETTINGS,
     STAGE,
     chart_factors,
     check_factors,
+    check_output,
     write_page,
 )
 from evaluation.study import (
@@ -197,7 +195,7 @@ def plan_study(
     if experiment.frozen is not None:
         with errors_at(f"{run.source}: frozen"):
             frozen_drives(experiment.frozen)
-    check_outputs(run.output, (RESULTS, QUERIES, "index.html"))
+    check_output(run.output, ["page"])
     _note_lower_levels(run)
     found = list(pairs_by_map(run, maps))
     doing("looking at all conditions")

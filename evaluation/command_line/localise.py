@@ -113,12 +113,7 @@ def localise(
             localisation.csv contains all values of each query. With --track,
             the folder also contains a picture.
     """
-    from cns_drake.base import (
-        InputError,
-        check_outputs,
-        choose_cluster,
-        make_folder,
-    )
+    from cns_drake.base import InputError, choose_cluster
     from evaluation.localisation import (
         FEWEST_POINTS,
         Starts,
@@ -127,6 +122,7 @@ def localise(
         make_estimator,
         tracking_summary,
     )
+    from evaluation.results import make_output
     from evaluation.study import (
         LocaliseTask,
         OpenSource,
@@ -155,8 +151,7 @@ def localise(
     make_estimator(method, chosen)
     source, drive = _opened(place, query, align, lidar, columns)
     if output is not None:
-        check_outputs(output, ["localisation.csv"])
-        make_folder(output)
+        make_output(output, ["localise"])
     settings: dict = {
         "methods": [method],
         "starts": [[start, start_turn]],
@@ -235,9 +230,9 @@ def _write_results(
     """Writes the tables and, of a tracked drive, the picture."""
     from evaluation.localisation import write_rows
 
+    options.write_tables(engine)
     write_rows(rows, output / "localisation.csv")
     terminal.note(f"wrote {output / 'localisation.csv'}")
-    options.write_tables(engine)
     # A picture that fails takes no number along.
     if track:
         from evaluation.results import draw_track

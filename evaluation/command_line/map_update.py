@@ -50,8 +50,9 @@ def map_update(
             labels that were scored, A.npy and B.npy; created if it does not
             exist.
     """
-    from cns_drake.base import InputError, check_outputs, make_folder
+    from cns_drake.base import InputError
     from evaluation.map_update import read_pair, write_labels
+    from evaluation.results import make_output
     from evaluation.study import (
         GIVEN,
         LabelledMapTask,
@@ -64,10 +65,8 @@ def map_update(
     if labels_a is not None and baseline is not None:
         raise InputError("--baseline: not together with --labels-a")
     if output is not None:
-        make_folder(output)
+        make_output(output, ["map-update"])
     pair = read_pair(folder)
-    if output is not None:
-        check_outputs(output, (f"{session.side}.npy" for session in pair))
     given = [file for file in (labels_a, labels_b) if file is not None]
     method = (baseline or BaselineName.FREE_SPACE).value
     name = GIVEN if given else method
@@ -76,9 +75,9 @@ def map_update(
     engine = measure_pairs("map-update", [maps], [task], output)
     found = engine.found(maps, task.name)[name]
     if output is not None:
+        options.write_tables(engine)
         for session, labels in zip(pair, found.labels, strict=True):
             write_labels(output / f"{session.side}.npy", labels)
-        options.write_tables(engine)
     terminal.show(
         {"method": name, **found.scores}, _rows(name, found.scores), json=json
     )

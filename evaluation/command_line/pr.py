@@ -16,13 +16,12 @@ from cns_drake.base import (
     check_writable,
     commands,
     errors_at_option,
-    make_folder,
     number_text,
     shared_options,
     terminal,
 )
 from evaluation.command_line import options
-from evaluation.command_line.printed_text import NOT_FINITE, interval_text
+from evaluation.command_line.printed_text import interval_text
 from evaluation.recognition import RetrievalProtocol, with_protocol
 
 if TYPE_CHECKING:
@@ -128,6 +127,8 @@ def pr(
         chosen = _made(choice)
         _write_scores(chosen, database, query, scores, protocol, columns)
         return
+    from evaluation.results import make_output
+
     protocol = replace(
         _rotated(protocol, turn_queries, tilt_queries),
         overlap=options.overlap_of(truth),
@@ -136,7 +137,7 @@ def pr(
     )
     _check_together(protocol, database, query, overlaps, exact_overlaps)
     if output is not None:
-        make_folder(output)
+        make_output(output)
     given = _choice_of(method, parameter)
     choice = given.at_height(sensor_height)
     chosen = _made(choice)
@@ -277,6 +278,8 @@ def _write_overlaps(
 
 def _show_notes(method: Method, drives: Sequence[CountedDrive]) -> None:
     """Shows what the method assumes, and what was ignored of the scans."""
+    from evaluation.drives import NOT_FINITE
+
     assumptions = (method.assumption(drive.lidar_field) for drive in drives)
     for note in dict.fromkeys(assumptions):
         if note is not None:
@@ -345,6 +348,7 @@ def _write_scores(
     columns: int | None,
 ) -> None:
     """Writes the scores of `pr --scores`, and shows the notes on them."""
+    from evaluation.drives import NOT_FINITE
     from evaluation.recognition import write_scores
 
     num_ignored = write_scores(

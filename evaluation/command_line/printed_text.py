@@ -9,9 +9,6 @@ from cns_drake.base import number_text
 if TYPE_CHECKING:
     from evaluation.recognition import Interval
 
-# Note on a cloud, after the number of points.
-NOT_FINITE = "points are not finite, and left out"
-
 
 def interval_text(interval: Interval) -> str:
     """Returns an interval as text in brackets."""

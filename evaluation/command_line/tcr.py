@@ -11,7 +11,6 @@ import typer
 
 from cns_drake.base import commands, number_text, shared_options, terminal
 from evaluation.command_line import options
-from evaluation.command_line.printed_text import NOT_FINITE
 from evaluation.command_line.trajectories import compare_paths
 
 if TYPE_CHECKING:
@@ -67,14 +66,14 @@ def tcr(
         )
         compare_paths(first, second, align, json=json)
         return
-    from cns_drake.base import make_folder
     from evaluation.change import (
         maps_in_one_world,
         registered_change,
         same_stage_partner,
         spread_over_grids,
     )
-    from evaluation.results import LAST, OWN, STAGE
+    from evaluation.drives import NOT_FINITE
+    from evaluation.results import LAST, OWN, STAGE, make_output
     from evaluation.study import ChangeTask, measure_pairs, pair_of_drive_maps
 
     named = [path for path in (source, target, control) if path is not None]
@@ -94,7 +93,7 @@ def tcr(
         for both, stage in zip(compared, (OWN, LAST), strict=False)
     ]
     if output is not None:
-        make_folder(output)
+        make_output(output)
     engine = measure_pairs("tcr", pairs, [ChangeTask({}, "tcr")], output)
     report, *beside = (engine.found(pair, ChangeTask.name) for pair in pairs)
     for other in beside:

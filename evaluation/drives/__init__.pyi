@@ -3,6 +3,7 @@ from evaluation.drives.comparison import Driving as Driving
 from evaluation.drives.comparison import compare_drives as compare_drives
 from evaluation.drives.data_set import DataSet as DataSet
 from evaluation.drives.data_set_check import check_data_set as check_data_set
+from evaluation.drives.drive_views import NOT_FINITE as NOT_FINITE
 from evaluation.drives.drive_views import CountedDrive as CountedDrive
 from evaluation.drives.drive_views import DriveView as DriveView
 from evaluation.drives.drive_views import MovedDrive as MovedDrive

@@ -81,6 +81,10 @@ class MovedDrive(DriveView):
         return self._drive.instances
 
 
+# Note on scans or a cloud, after the number of points.
+NOT_FINITE = "points are not finite, and left out"
+
+
 class CountedDrive(MovedDrive):
     """A view of a drive that counts the points that are not finite.
 

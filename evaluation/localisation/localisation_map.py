@@ -13,7 +13,12 @@ from cns_drake.base import points as clouds
 from cns_drake.drives import Drive
 from evaluation.alignment import Surface, make_surface
 from evaluation.clouds import OnNote, no_note, read_blocks
-from evaluation.drives import JoinedDrive, sample_frames, within_cube
+from evaluation.drives import (
+    NOT_FINITE,
+    JoinedDrive,
+    sample_frames,
+    within_cube,
+)
 from evaluation.localisation.settings import (
     HALF_EXTENT,
     Settings,
@@ -106,7 +111,8 @@ def make_map(
         settings: settings for downsampling and for normals.
         columns: number of columns of a `.bin` file; by default guessed from the
             values.
-        on_note: is called with notes on how a cloud's file was read.
+        on_note: is called with notes on how a cloud's file was read, and on
+            points that are not finite.
         keep: which frames of a `JoinedDrive` are used, see `map_frames`.
 
     Raises:
@@ -120,7 +126,10 @@ def make_map(
     accumulator = VoxelAccumulator(settings.voxel)
     for block, X_WS in blocks:
         accumulator.add(block, X_WS)
-    points = accumulator.to_map().centroids_W
+    cells = accumulator.to_map()
+    if cells.num_ignored:
+        on_note(f"{source.name}: {cells.num_ignored} {NOT_FINITE}")
+    points = cells.centroids_W
     if len(points) < FEWEST_POINTS:
         raise InputError(
             f"{source.name}: a map of {len(points)} points, fewer than"
@@ -136,8 +145,10 @@ def _scans_of_map(
     frames = map_frames(drive, keep).tolist()
     for frame in track(frames, f"mapping {drive.name}", len(frames), "scans"):
         scan = drive.scan(frame)
-        near = within_cube(clouds.xyz(scan), HALF_EXTENT)
-        yield scan[near], drive.X_WS[frame]
+        p_S = clouds.xyz(scan)
+        # The map counts the points that are not finite.
+        kept = within_cube(p_S, HALF_EXTENT) | ~np.isfinite(p_S).all(axis=1)
+        yield scan[kept], drive.X_WS[frame]
 
 
 def map_frames(drive: Drive, keep: str | int = KEEP_ALL) -> np.ndarray:

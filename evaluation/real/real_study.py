@@ -16,7 +16,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Cluster, InputError, Reporter, check_outputs
+from cns_drake.base import Cluster, InputError, Reporter
 from evaluation.clouds import OnNote
 from evaluation.localisation import METHODS
 from evaluation.methods import MethodConfig, run_module, shipped_methods
@@ -42,10 +42,9 @@ from evaluation.recognition import (
     Role,
 )
 from evaluation.results import (
-    QUERIES,
-    RESULTS,
     QueryRows,
     Results,
+    check_output,
     write_page,
 )
 from evaluation.study import (
@@ -115,7 +114,7 @@ def measure_real(
             contains no data set that can be measured, or a data set cannot be
             read.
     """
-    check_outputs(output, (RESULTS, QUERIES, "index.html"))
+    check_output(output, ["page"])
     chosen = list(names) or [*shipped_methods(), *SHIPPED]
     aligning = [name for name in chosen if _is_estimator(name)]
     recognising = [name for name in chosen if name not in aligning]

@@ -50,8 +50,6 @@ _TASKS = {
     "cost": "Costs",
 }
 _SUMMARIES = "summaries.csv"
-# Files that only some pages have beside them.
-_OF_A_PAGE = re.compile(r"summaries\.csv|chart_\d+\.(pdf|png)")
 # Greatest number of columns of the table of conditions.
 _MOST_COLUMNS = 12
 # Line style of Matplotlib -> dashes of an SVG line.
@@ -107,9 +105,6 @@ def write_page(
         InputError: a file cannot be written.
     """
     make_folder(folder)
-    for path in folder.iterdir():
-        if _OF_A_PAGE.fullmatch(path.name):
-            path.unlink()
     known, undefined = results.defined()
     numbers = summarised(*_charted(results, queries, {}), charts)
     if numbers:

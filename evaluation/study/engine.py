@@ -21,7 +21,6 @@ from cns_drake.base import (
     did_you_mean,
     doing,
     forecast,
-    make_folder,
     nothing_left,
     run_jobs,
 )
@@ -34,6 +33,8 @@ from evaluation.results import (
     Row,
     as_factor,
     made_by,
+    make_output,
+    remove_earlier,
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import FeatureExtraction
@@ -134,7 +135,7 @@ class Engine:
         """
         for text in self._notes:
             self.on_note(text)
-        make_folder(self.output)
+        make_output(self.output, ["page"])
         jobs = list(self.jobs.values())
         _renew_removed_descriptors(jobs)
         pictures = list(self.pictures.values())
@@ -169,6 +170,7 @@ class Engine:
     def _write(
         self, results: Results, queries: QueryRows
     ) -> tuple[Results, QueryRows]:
+        remove_earlier(self.output)
         results.write_csv(self.output / RESULTS)
         queries.write_csv(self.output / QUERIES)
         return results, queries

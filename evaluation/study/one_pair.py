@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Reporter, check_outputs, one_line
+from cns_drake.base import Reporter, one_line
 from cns_drake.drives import Drive
 from evaluation.change import DriveMap
 from evaluation.recognition import FAIR_PROTOCOL, RetrievalProtocol
-from evaluation.results import QUERIES, RESULTS
+from evaluation.results import check_output
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine
 from evaluation.study.parts import Part
@@ -124,7 +124,7 @@ def measure_pairs(
         )
 
     if output is not None:
-        check_outputs(output, (RESULTS, QUERIES))
+        check_output(output)
     engine = Engine(
         experiment,
         {one.name: one for one in tasks},

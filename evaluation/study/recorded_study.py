@@ -21,7 +21,6 @@ from cns_drake.base import (
     Job,
     Reporter,
     Space,
-    check_outputs,
     read_yaml,
 )
 from evaluation.drives import MovedDrive, cloud_at
@@ -38,8 +37,6 @@ from evaluation.results import (
     LAST,
     OWN,
     PROTOCOL_BASE,
-    QUERIES,
-    RESULTS,
     STAGE,
     PageDrive,
     PageSection,
@@ -47,6 +44,7 @@ from evaluation.results import (
     Results,
     browser_section,
     change_section,
+    check_output,
     in_table_order,
     page_section,
     routes_section,
@@ -124,7 +122,7 @@ def study_recordings(
         InputError: two recordings have the same map and stage, there is nothing
             to compare, a step failed, or a file cannot be written.
     """
-    check_outputs(output, (RESULTS, QUERIES, "index.html"))
+    check_output(output, ["page"])
     experiment = read_yaml(STAGES_FILE)
     engine = Engine(
         STAGES_FILE.stem,

@@ -283,9 +283,7 @@ def _read_geometry(
         boundaries = geometry["boundaries"]
         for _ in range(_NESTING[kind]):
             boundaries = [face for group in boundaries for face in group]
-        kinds = _surface_kinds(
-            geometry.get("semantics"), _NESTING[kind], len(boundaries)
-        )
+        kinds = _surface_kinds(geometry, name, faults)
     except (LookupError, TypeError, ValueError, AttributeError):
         faults.add("geometry that is not an object, left out", name)
         return None
@@ -323,25 +321,58 @@ def _face_of_boundary(boundary: Any, vertices: np.ndarray) -> Face | None:
     return face or None
 
 
-def _surface_kinds(semantics: Any, nesting: int, number: int) -> Sequence[str]:
-    """Returns the types of `number` faces; "" for an unknown type."""
-    unknown = [""] * number
-    if not isinstance(semantics, dict):
+def _surface_kinds(
+    geometry: dict, name: str, faults: ImportFaults
+) -> Sequence[str]:
+    """Returns the type of each face of a geometry; "" for an unknown type.
+
+    Args:
+        geometry: the geometry, whose boundaries can be read.
+        name: id of the object, as an example in `faults`.
+        faults: counts semantics that do not fit the geometry.
+    """
+    nesting = _NESTING[geometry["type"]]
+    boundaries = geometry["boundaries"]
+    semantics = geometry.get("semantics")
+    unknown = [""] * len(_flat(None, boundaries, nesting))
+    if semantics is None:
         return unknown
-    values, surfaces = semantics.get("values"), semantics.get("surfaces")
-    for _ in range(nesting):
-        if not isinstance(values, list) or None in values:
-            return unknown
-        values = [value for group in values for value in group]
-    if not isinstance(values, list) or len(values) != number:
+    try:
+        _PARTS.account(["semantics"], semantics, name, faults)
+        surfaces = semantics["surfaces"]
+        for surface in surfaces:
+            _PARTS.account(["surface"], surface, name, faults)
+        values = _flat(semantics.get("values"), boundaries, nesting)
+        types = [str(surface.get("type", "")) for surface in surfaces]
+    except (AttributeError, LookupError, TypeError, ValueError):
+        faults.add("semantics that do not fit their faces, ignored", name)
         return unknown
-    if not isinstance(surfaces, list):
-        return unknown
+    kinds = []
+    for value in values:
+        is_index = type(value) is int and 0 <= value < len(types)
+        kinds.append(types[value] if is_index else "")
+        if not is_index and value is not None:
+            faults.add("semantics of a face that are not there", name)
+    return kinds
+
+
+def _flat(values: Any, boundaries: Sequence, nesting: int) -> list:
+    """Returns the value of each face, from values nested like the boundaries.
+
+    None is the value of all faces within its place.
+
+    Raises:
+        TypeError, ValueError: the values are nested otherwise.
+    """
+    if values is None:
+        values = [None] * len(boundaries)
+    pairs = list(zip(values, boundaries, strict=True))
+    if nesting == 0:
+        return [value for value, _ in pairs]
     return [
-        ""
-        if value is None or not 0 <= value < len(surfaces)
-        else str(surfaces[value].get("type", ""))
-        for value in values
+        inner
+        for value, group in pairs
+        for inner in _flat(value, group, nesting - 1)
     ]
 
 

@@ -325,7 +325,7 @@ def _place_from_file(
         yaw = towards if yaw is None else yaw
     rng = random_generator(seed, "thing", name)
     at = (float(xy[0]), float(xy[1]))
-    if room.place(name, small.kind, at, yaw or 0.0, rng):
+    if room.place(name, small.kind, at, yaw or 0.0, rng, small.height):
         placed_last = room.placed.objects[-1].structure.name
         room.placed.from_file.add(placed_last)
         room.placed.sources.add(small.source)

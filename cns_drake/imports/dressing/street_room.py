@@ -163,6 +163,7 @@ class StreetRoom:
         xy: tuple[float, float],
         yaw: float,
         rng: np.random.Generator,
+        height: float | None = None,
     ) -> bool:
         """Places an object if there is room; returns whether there was room.
 
@@ -176,13 +177,16 @@ class StreetRoom:
             xy: position of the object's centre in W [m].
             yaw: heading of the object in W [rad].
             rng: random generator for the object's variant and colours.
+            height: height of a tree [m]; None for a random one, and for other
+                objects.
         """
         builder = OBJECTS[kind]
         at = np.array([xy])
         is_car = kind in PARKED_CARS
         if not is_car and np.isfinite(self._roads.heights(at)[0]):
             return False
-        model = without_curves(builder.build(rng))
+        given = {} if height is None else {"height": height}
+        model = without_curves(builder.build(rng, **given))
         x, y = round(xy[0], 3), round(xy[1], 3)
         structure = Structure(
             name,

@@ -34,6 +34,8 @@ _SPACING = 2.0
 # Greatest error of chords of the reference line, of widths and of heights:
 # edges are then exact to 5 mm [m].
 SAG = 0.002
+# Smaller negative widths are rounding errors [m].
+_ROUNDING = 1e-3
 # A lane counts as absent where it is narrower than this [m].
 LEAST_WIDTH = 0.1
 # Lanes with less area are left out [m^2].
@@ -93,6 +95,9 @@ class LaneBand:
         rise: (N, 2) heights of the lane's edges above the road [m]; NaN if
             unknown.
         s: (N,) distances along the road [m].
+        is_inverted: whether the lane's width in the file is negative somewhere,
+            or its border is within the lane beside it. Such a lane has no width
+            there.
     """
 
     road: ImportedRoad
@@ -107,6 +112,7 @@ class LaneBand:
     grade: np.ndarray
     rise: np.ndarray
     s: np.ndarray
+    is_inverted: bool
 
     @property
     def width(self) -> np.ndarray:
@@ -141,13 +147,14 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
             )
             for number in numbers:
                 lane = section.lanes[number]
+                # A negative width is a slip in the file.
                 if lane.width or not lane.border:
-                    # A negative width is a slip in the file.
-                    width = np.maximum(lane.width.at(s, inside), 0.0)
-                    beyond = t + side * width
+                    width = lane.width.at(s, inside)
+                    beyond = t + side * np.maximum(width, 0.0)
                 else:
                     border = np.abs(lane.border.at(s, inside))
                     inner_border = side * (t - offset)
+                    width = border - inner_border
                     beyond = offset + side * np.maximum(border, inner_border)
                 is_level = lane.is_level and bool(road.superelevation)
                 own_roll = np.zeros(len(s)) if is_level else roll
@@ -171,6 +178,7 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
                         grade=grade,
                         rise=_edge_heights(lane, s, inside),
                         s=s,
+                        is_inverted=bool((width < -_ROUNDING).any()),
                     )
                 )
                 t, inner = beyond, outer

@@ -296,6 +296,10 @@ def _read_streets(
     """
     with value_errors(source):
         bands = [band for road in roads.roads for band in lane_bands(road)]
+    for band in bands:
+        if band.is_inverted:
+            kind = "lane of negative width, without width there"
+            faults.add(kind, band.road.name)
     ground, raised = split_levels(bands)
     _count_raised_kerbs(raised, faults)
     ends = bridge_ends(raised)

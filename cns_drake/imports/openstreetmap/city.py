@@ -60,6 +60,7 @@ from cns_drake.imports.openstreetmap.sea import coasts_of, sea
 from cns_drake.imports.openstreetmap.small_objects import (
     make_small_objects,
     object_kind,
+    tree_height,
 )
 from cns_drake.imports.openstreetmap.tags import (
     has_tag,
@@ -77,7 +78,7 @@ from cns_drake.imports.solids import extruded
 from cns_drake.imports.streets import Street
 
 _PARTS = PartTable(Path(__file__).with_name("parts.yaml"))
-# Greatest height of a barrier or a tree [m].
+# Greatest height of a barrier [m].
 _TALLEST = 150.0
 # A car can hit this part of a tree: radius and height of the trunk [m].
 _TRUNK_RADIUS = 0.3
@@ -390,7 +391,7 @@ def _barrier(
     where = (name, faults)
     usual = _BARRIERS[tags["barrier"]]
     high = tag_value(tags, "height", length, _TALLEST, where) or usual.height
-    low = tag_value(tags, "min_height", length, _TALLEST, where) or 0.0
+    low = tag_value(tags, "min_height", length, _TALLEST, where, 0.0) or 0.0
     if low >= high:
         faults.add("barrier that begins above its top, lowered", name)
         low = 0.0
@@ -416,10 +417,7 @@ def _trees(
             # Editors give negative numbers to new objects.
             np.random.default_rng([abs(int(name[1:]))]),
             species="spruce" if needles else "lime_tree",
-            height=tag_value(
-                tags, "height", length, _TALLEST, (name, features.faults)
-            )
-            or None,
+            height=tree_height(name, tags, features.faults),
         )
         place_W = (round(x, 3), round(y, 3), 0.0)
         structure = Structure(f"tree_{name}", "vegetation", model, place_W)

@@ -9,10 +9,17 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString
 
+from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.foreign_city import SmallObject
 from cns_drake.imports.openstreetmap.features import OsmFeatures, Tags
 from cns_drake.imports.openstreetmap.local_metres import LocalMetres
-from cns_drake.imports.openstreetmap.tags import TABLES, has_tag, is_inside
+from cns_drake.imports.openstreetmap.tags import (
+    TABLES,
+    has_tag,
+    is_inside,
+    length,
+    tag_value,
+)
 
 # Names of directions, clockwise from north.
 _COMPASS = (
@@ -23,6 +30,7 @@ _COMPASS = (
 # post of its own. With other values, such as `wall_mounted`, another structure
 # carries the object.
 _POSTS = ("pole", "straight_mast", "bent_mast", "mast")
+_TALLEST_TREE = 150.0  # [m]
 # Distance between the trees of a tree row [m].
 _TREE_SPACING = 8.0
 
@@ -73,8 +81,18 @@ def make_small_objects(
                 course, steps, normalized=True
             )
             kind = "spruce" if needles else "lime_tree"
-            for x, y in shapely.get_coordinates(points).tolist():
-                yield SmallObject(name, elements[name], kind, (x, y), None)
+            height = tree_height(name, tags, features.faults)
+            for xy in map(tuple, shapely.get_coordinates(points).tolist()):
+                yield SmallObject(name, elements[name], kind, xy, None, height)
+
+
+def tree_height(name: str, tags: Tags, faults: ImportFaults) -> float | None:
+    """Returns the height of a tree, or of a row's trees [m]; None if unknown.
+
+    A height that cannot be is counted in `faults`.
+    """
+    where = (name, faults)
+    return tag_value(tags, "height", length, _TALLEST_TREE, where) or None
 
 
 def _heading(tags: Tags) -> float | None:

@@ -66,7 +66,7 @@ def _street_areas(
         if _is_elsewhere(name, tags, bridges):
             continue
         width = street_width(tags, (name, faults))
-        path = path_width(tags)
+        path = path_width(tags, (name, faults))
         if width is None and path is None:
             continue
         course = LineString(local(line))

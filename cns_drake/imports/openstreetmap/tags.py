@@ -12,6 +12,8 @@ from cns_drake.base import parse_yaml
 from cns_drake.imports.faults import ImportFaults
 
 TABLES = parse_yaml(Path(__file__).with_name("tags.yaml").read_bytes())
+# Smaller sizes and numbers are 0 in words, which no thing has.
+LEAST = 0.01
 # OpenStreetMap allows no longer values of tags [characters].
 _LONGEST_VALUE = 255
 _FOOT = 0.3048  # [m]
@@ -84,7 +86,7 @@ def tag_value(
     read: Callable[[str], float | None],
     most: float,
     where: tuple[str, ImportFaults] | None,
-    least: float = 0.0,
+    least: float = LEAST,
 ) -> float | None:
     """Returns the value of a tag; None if the tag has no valid value.
 
@@ -97,7 +99,8 @@ def tag_value(
             does a text that `read` cannot convert.
         where: id of the element, and the faults to add to; None if faults are
             not counted.
-        least: least plausible value. A smaller value counts as a fault.
+        least: least plausible value. A smaller value counts as a fault. By
+            default, 0 is a fault, too.
     """
     text = tags.get(key)
     if text is None:

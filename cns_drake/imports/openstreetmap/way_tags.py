@@ -115,15 +115,18 @@ def lanes_beside(tags: Mapping[str, str], width: float) -> float:
     return width / 2.0 * (1.0 - 1.0 / max(lanes, 1.0))
 
 
-def path_width(tags: Mapping[str, str]) -> float | None:
+def path_width(
+    tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
+) -> float | None:
     """Returns the width of a path for people [m]; None for other ways.
 
-    Without a tag for the width, the width follows from the kind of path.
+    Without a tag for the width, the width follows from the kind of path. The
+    arguments are as for `street_width`.
     """
     usual: float | None = TABLES["paths"].get(tags.get("highway", ""))
     if usual is None:
         return None
-    return tag_value(tags, "width", length, _WIDEST, None) or usual
+    return tag_value(tags, "width", length, _WIDEST, where) or usual
 
 
 def way_width(tags: Mapping[str, str]) -> float | None:

@@ -18,6 +18,7 @@ from cns_drake.base import (
     track,
 )
 from cns_drake.drives import Drive
+from evaluation.drives import NOT_FINITE, CountedDrive
 from evaluation.localisation import (
     KISS_MATCHER,
     METHODS,
@@ -250,7 +251,7 @@ def measure_localisation(
         the map, the list is empty.
     """
     mapped = database()
-    asked = query()
+    asked = CountedDrive(query())
     columns = getattr(database, "columns", None)
     keep = database.keep if isinstance(database, JoinedSource) else KEEP_ALL
     made: list[LocalisationMap] = []
@@ -279,12 +280,17 @@ def measure_localisation(
                 asked, frames, made, (methods, values, starts), processes
             )
     else:
-        found = [
-            # A drive may be simulated while it is read: each track opens it.
-            track_drive(one, query(), is_mapped, draw, odometry_drift)
-            for one in localisers
-            for draw in starts
-        ]
+        found = []
+        for one in localisers:
+            for draw in starts:
+                # A drive may be simulated while it is read: each track opens
+                # it.
+                asked = CountedDrive(query())
+                found.append(
+                    track_drive(one, asked, is_mapped, draw, odometry_drift)
+                )
+    if asked.num_ignored:
+        reporter.note(f"{asked.name}: {asked.num_ignored} {NOT_FINITE}")
     note_sparse(asked.name, found[0], reporter.note)
     return found
 

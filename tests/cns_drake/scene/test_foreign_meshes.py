@@ -67,7 +67,7 @@ def test_what_is_read_in_part_is_refused_in_every_format(tmp_path):
 
 @pytest.mark.slow
 def test_a_world_with_a_damaged_mesh(tmp_path):
-    (tmp_path / "rock.ply").write_text(DEADLY)
+    (tmp_path / "rock.ply").write_text(PLY[:-20])
     mesh = "<geometry><mesh><uri>rock.ply</uri></mesh></geometry>"
     path = tmp_path / "world.sdf"
     path.write_text(world_text([f'<visual name="rock">{mesh}</visual>']))

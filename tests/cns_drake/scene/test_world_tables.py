@@ -4,6 +4,7 @@ from pathlib import Path
 import re
 
 from helpers.mesh_texts import obj_text
+from helpers.world_variants import same_worlds
 import numpy as np
 import pytest
 
@@ -14,7 +15,9 @@ from cns_drake.scene import (
     read_perception_geometry,
 )
 
-PAGE = Path(__file__).parents[3] / "docs" / "formats.md"
+ROOT = Path(__file__).parents[3]
+PAGE = ROOT / "docs" / "formats.md"
+ALL_WORLDS = ROOT / "worlds"
 BOX = "<geometry><box><size>1 1 1</size></box></geometry>"
 VISUAL = f"<visual name='v'>{BOX}</visual>"
 LINK = f"<link name='l'>{VISUAL}</link>"
@@ -195,11 +198,6 @@ def test_elements_are_treated_as_the_tables_say(tmp_path, name, treated, tag):
     assert bool(notes) == (treated == "noted"), notes
 
 
-MORE = {
-    "a light": "<light name='s' type='directional'/>",
-    "a plugin": "<plugin name='p' filename='p.so'/>",
-    "an included sun": "<include><uri>model://sun</uri></include>",
-}
 WORLDS = {
     "old frames": "<model name='a'><link name='b'><pose>1 0 0 0 0 0</pose>"
     f"</link><link name='l'><pose frame='b'>0 0 0 0 0 0</pose>{VISUAL}"
@@ -220,25 +218,61 @@ WORLDS = {
 }
 
 
-@pytest.mark.parametrize("more", MORE)
-@pytest.mark.parametrize("world", WORLDS)
-def test_a_light_a_plugin_or_an_include_changes_nothing(tmp_path, world, more):
+def worlds():
+    """Name, file name and text of each world of this module."""
+    for name, body in WORLDS.items():
+        text = f"<sdf version='1.6'><world name='w'>{body}</world></sdf>"
+        yield name, "w.world", text
+    for name, treated, tag in rows():
+        file, make = FORMATS[name]
+        text = make(tag)
+        if text is not None and treated != "refused":
+            yield f"{name} {tag}", file, text
+
+
+def assert_read_alike(path):
+    """Reads a world, and the same world written otherwise."""
+
+    def read(file):
+        loaded = load_world(file, model_paths=[path.parent.parent])
+        # What a variant adds is counted.
+        return triangles(loaded), {
+            note.replace(str(file), "")
+            for note in loaded.notes
+            if not re.search(r"\d (lights|plugins) ignored$", note)
+        }
+
+    expected = read(path)
+    other = path.with_name(f"other{path.suffix}")
+    for change, text in same_worlds(path).items():
+        other.write_text(text, "utf-8")
+        found = read(other)
+        np.testing.assert_array_equal(found[0], expected[0], change)
+        assert found[1] == expected[1], change
+
+
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [pytest.param(*row, id=name) for name, *row in worlds()],
+)
+def test_a_world_is_read_alike_however_it_is_written(tmp_path, file, text):
     folder = tmp_path / "pkg"
     folder.mkdir()
     (folder / "a.obj").write_text(obj_text())
-    path = tmp_path / "w.world"
-    found = []
-    for extra in ("", MORE[more]):
-        path.write_text(
-            f"<sdf version='1.6'><world name='w'>{WORLDS[world]}{extra}"
-            "</world></sdf>"
-        )
-        loaded = load_world(path, model_paths=[tmp_path])
-        notes = {
-            note
-            for note in loaded.notes
-            if not note.endswith(("1 lights ignored", "1 plugins ignored"))
-        }
-        found.append((triangles(loaded), notes))
-    np.testing.assert_array_equal(found[0][0], found[1][0])
-    assert found[0][1] == found[1][1]
+    (folder / "thing.sdf").write_text(
+        f"<sdf version='1.9'><model name='t'>{LINK}</model></sdf>"
+    )
+    path = folder / file
+    path.write_text(text)
+    assert_read_alike(path)
+
+
+@pytest.mark.night
+@pytest.mark.parametrize(
+    "stage", sorted(ALL_WORLDS.glob("*/stage_*.sdf")), ids=str
+)
+def test_a_shipped_world_is_read_alike_however_it_is_written(tmp_path, stage):
+    # The meshes stay where they are.
+    for one in stage.parent.iterdir():
+        (tmp_path / one.name).symlink_to(one)
+    assert_read_alike(tmp_path / stage.name)

@@ -84,7 +84,7 @@ def planned(recordings, output, methods=None, protocols=None, **more):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(engine, "run_jobs", stop)
         patch.setattr(engine, "forecast", keep)
-        patch.setattr(engine, "make_folder", lambda path: None)
+        patch.setattr(engine, "make_output", lambda path, writes: None)
         with pytest.raises(PlannedError):
             study_recordings(
                 recordings,

@@ -7,16 +7,23 @@ changes no shape.
 
 import json
 from pathlib import Path
+from xml.etree import ElementTree
 
 from helpers.imported_osm import import_osm, volume
-from helpers.small_opendrive import straight, write_roads
+from helpers.small_opendrive import lane, straight, write_roads
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
 import yaml
 
-from cns_drake.imports import import_cityjson, import_openstreetmap, opendrive
+from cns_drake.imports import (
+    cityjson,
+    import_cityjson,
+    import_openstreetmap,
+    opendrive,
+)
 from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive.lanes import lane_bands
 from cns_drake.imports.opendrive.road_reader import read_roads
 
 # The most used keys on ways and nodes that can describe a thing, by taginfo,
@@ -101,6 +108,84 @@ def test_each_key_changes_the_triangles_or_is_accounted_for(tmp_path, key):
             assert key in words or f"tag {key} of" in told, (name, key)
         elif name not in tagged:
             assert "left out" in told, (name, key)
+
+
+NO_SIZES = ["0", "-1", "zzz", "1e9"]
+
+
+@pytest.mark.parametrize("value", NO_SIZES)
+@pytest.mark.parametrize(
+    ("key", "elements"),
+    [
+        ("width", {"highway": "residential"}),
+        ("width", {"highway": "footway"}),
+        ("width", {"barrier": "hedge"}),
+        ("height", {"barrier": "wall"}),
+        ("lanes", {"highway": "residential"}),
+        ("maxspeed", {"highway": "residential"}),
+    ],
+)
+def test_sizes_that_cannot_be_are_counted_on_each_element(
+    tmp_path, key, elements, value
+):
+    osm = OsmWriter()
+    osm.box(-80, -80, 9, 9, building="yes", height="9")
+    osm.way([(0, 0), (30, 0)], **(elements | {key: value}))
+    city, _ = import_osm(osm.write(tmp_path / "a.osm"))
+    told = {fault.kind: fault.number for fault in city.faults.rows()}
+    assert told[f"{key} unreadable or implausible, the usual one taken"] == 1
+
+
+def write_dressed(path, more):
+    """Writes the elements of a dressed city; returns what to look for."""
+    osm = OsmWriter()
+    osm.box(-80, -80, 9, 9, building="yes", height="9")
+    zebra = osm.node(
+        15, 0, **({"highway": "crossing", "crossing": "zebra"} | more)
+    )
+    street = [osm.node(0, 0), zebra, osm.node(30, 0)]
+    osm.way_of(street, highway="residential")
+    row = {"natural": "tree_row"} | more
+    bench = {"amenity": "bench"} | more
+    coast = {"natural": "coastline"} | more
+    former = {"was:building": "yes"} | more
+    osm.way([(0, 40), (40, 40)], **row)
+    osm.node(60, 60, **bench)
+    osm.way([(-200, -120), (200, -120)], **coast)
+    osm.box(120, 0, 9, 9, **former)
+    osm.write(path)
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_each_key_is_accounted_for_in_a_dressed_city(tmp_path, key):
+    path = tmp_path / "a.osm"
+    write_dressed(path, {key: KEYS[key]})
+    city = import_openstreetmap(path, None, True)
+    told = [fault.kind for fault in city.faults.rows()]
+    lines = [line.split(": ", 2) for line in city.faults.parts()]
+    for element in ("tree row", "small object", "coastline", "building",
+                    "crossing"):  # fmt: skip
+        words = {
+            word
+            for one, _, names in lines
+            if one == element
+            for word in names.split()
+        }
+        is_counted = f"tag {key} of {element}, not read" in told
+        assert key in words or is_counted, element
+
+
+def test_trees_of_a_row_have_its_height(tmp_path):
+    path = tmp_path / "a.osm"
+    for height in (None, "17.5"):
+        write_dressed(path, {"height": height} if height else {})
+        trees = [
+            one
+            for one in import_openstreetmap(path, None, True).small_objects
+            if one.element == "natural=tree_row"
+        ]
+        expected = None if height is None else float(height)
+        assert {one.height for one in trees} == {expected}
 
 
 @pytest.mark.parametrize(
@@ -278,3 +363,186 @@ def house(attributes):
         },
         "vertices": corners,
     }
+
+
+# The most used attributes of OpenDRIVE, and some of none of its versions.
+ATTRIBUTES = (
+    "id name length junction rule s t x y z a b c d hdg sOffset tOffset zOffset"
+    " hOffset width height radius inner outer type subtype level direction"
+    " value unit max country text dynamic orientation pitch roll validLength"
+    " side weight color material laneChange space speed restriction code"
+    " distance tStart tEnd widthStart widthEnd heightStart heightEnd"
+    " zOffsetStart zOffsetEnd radiusStart radiusEnd lengthStart lengthEnd"
+    " detachFromReferenceLine perpToRoad closed outer fillType laneType"
+    " elementId contactPoint singleSide roadWorks curvature travelDir new"
+)
+OF_ALL = """<road id="1" length="200" junction="-1" name="a"><link><predecessor
+elementType="road" elementId="9"/><successor elementType="road"
+elementId="8"/></link><type s="0" type="town"><speed max="50" unit="km/h"/>
+</type><planView><geometry s="0" x="0" y="0" hdg="0" length="100"><line/>
+</geometry><geometry s="100" x="100" y="0" hdg="0" length="100"><arc
+curvature="0.001"/></geometry></planView><elevationProfile><elevation s="0"
+a="0" b="0" c="0" d="0"/></elevationProfile><lateralProfile><superelevation
+s="0" a="0" b="0" c="0" d="0"/></lateralProfile><lanes><laneOffset s="0"
+a="0" b="0" c="0" d="0"/><laneSection s="0"><left><lane id="1"
+type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/><height
+sOffset="0" inner="0" outer="0"/><roadMark sOffset="0" type="solid"><type
+name="solid"><line length="3" space="3" tOffset="0" sOffset="0"/></type>
+</roadMark></lane></left><center><lane id="0" type="none"/></center>
+</laneSection></lanes><objects><object id="1" type="pole" s="10" t="9"
+height="3" radius="1"><repeat s="10" length="20" distance="5" tStart="9"
+tEnd="9"/></object><object id="2" type="building" s="50"
+t="20"><outlines><outline><cornerLocal u="0" v="0" z="0"
+height="3"/><cornerLocal u="5" v="0" z="0" height="3"/><cornerLocal u="5"
+v="5" z="0" height="3"/></outline></outlines>
+</object></objects><signals><signal id="3" s="40" t="9" type="274"
+dynamic="no"/></signals></road><junction id="7" name="j"><connection id="0"
+incomingRoad="1" connectingRoad="1" contactPoint="start"/></junction>"""
+
+
+@pytest.mark.parametrize(
+    "tag",
+    sorted({e.tag for e in ElementTree.fromstring(f"<a>{OF_ALL}</a>").iter()}
+           - {"a", "left", "center"}),
+)  # fmt: skip
+def test_each_attribute_of_each_element_of_opendrive_is_accounted_for(
+    tmp_path, tag
+):
+    read = opendrive_table()[tag].get("read", [])
+    more = [
+        key for key in ATTRIBUTES.split() if key not in " ".join(read).split()
+    ]
+    root = ElementTree.fromstring(f"<OpenDRIVE>{OF_ALL}</OpenDRIVE>")
+    element = next(root.iter(tag))
+    for key in more:
+        # The names of things may refer to each other.
+        element.set(key, element.get(key, "1.5"))
+    path = tmp_path / "a.xodr"
+    path.write_text(ElementTree.tostring(root, "unicode"))
+    faults = ImportFaults()
+    read_roads(path, faults)
+    told = {fault.kind for fault in faults.rows()}
+    lines = {
+        word
+        for line in faults.parts()
+        if line.startswith(f"{tag}: ")
+        for word in line.split(": ")[-1].split()
+    }
+    for key in more:
+        assert key in lines or f"{key} of {tag}, not read" in told, key
+
+
+def opendrive_table():
+    page = Path(opendrive.__file__).with_name("parts.yaml")
+    return yaml.safe_load(page.read_text("utf-8"))["elements"]
+
+
+@pytest.mark.parametrize(("a", "is_counted"), [(-1.0, True), (3.0, False)])
+def test_negative_widths_of_lanes_are_counted(tmp_path, a, is_counted):
+    lanes = (lane(1, "driving", 3.5), lane(2, "shoulder", a),
+             lane(-1, "driving", 3.5))  # fmt: skip
+    path = write_roads(
+        tmp_path / "a.xodr",
+        straight("1", 0, 0, 100, 0, lanes=lanes),
+    )
+    (road,) = read_roads(path, ImportFaults()).roads
+    found = {band.lane.number: band.is_inverted for band in lane_bands(road)}
+    assert found == {1: False, 2: is_counted, -1: False}
+
+
+# Names that files of CityJSON use on things of any kind, and some of none.
+MEMBERS = (
+    "type lod boundaries semantics template transformationMatrix texture"
+    " material geographicalExtent address extent attributes parents children"
+    " geometry surfaces values name id identifier description function class"
+    " usage roofType storeysAboveGround storeysBelowGround measuredHeight"
+    " storeyHeightsAboveGround yearOfConstruction yearOfDemolition"
+    " relativeToTerrain relativeToWater conditionOfConstruction creationDate"
+    " terminationDate validFrom validTo h_min h_max h_dak height roofheight"
+    " slope azimuth inclination orientation area volume color colour"
+    " identificatie b3_h_maaiveld b3_dak_type bgt_status plus_status gml_id"
+    " trunkDiameter crownDiameter species direction occupancy dimension"
+    " elevation appearance version title"
+)
+
+
+@pytest.mark.parametrize(
+    "element", ["object", "geometry", "attributes", "semantics", "surface"]
+)
+def test_each_member_of_each_thing_of_cityjson_is_accounted_for(
+    tmp_path, element
+):
+    document = house({"function": "house"})
+    one = document["CityObjects"]["a"]
+    geometry = one["geometry"][0]
+    semantics = {
+        "surfaces": [{"type": "RoofSurface"}],
+        "values": [[None, 0, None, None, None, None]],
+    }
+    geometry["semantics"] = semantics
+    thing = {
+        "object": one,
+        "geometry": geometry,
+        "attributes": one["attributes"],
+        "semantics": semantics,
+        "surface": semantics["surfaces"][0],
+    }[element]
+    read = set(cityjson_table()[element]["read"])
+    more = [key for key in MEMBERS.split() if key not in read | set(thing)]
+    for key in more:
+        thing[key] = "1.5"
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps(document))
+    city = import_cityjson(path, None, None)
+    assert len(city.objects) == 1
+    told = {fault.kind for fault in city.faults.rows()}
+    lines = {
+        word
+        for line in city.faults.parts()
+        if line.startswith(f"{element}: ")
+        for word in line.split(": ")[-1].split()
+    }
+    for key in more:
+        assert key in lines or f"{key} of {element}, not read" in told, key
+
+
+def cityjson_table():
+    page = Path(cityjson.__file__).with_name("parts.yaml")
+    return yaml.safe_load(page.read_text("utf-8"))["elements"]
+
+
+@pytest.mark.parametrize(
+    ("semantics", "count"),
+    [
+        ({"surfaces": [{"type": "RoofSurface"}], "values": [[0, 1, -1, None,
+          True, "0"]]}, ("semantics of a face that are not there", 4)),
+        ({"surfaces": [{"type": "RoofSurface"}], "values": [None]}, None),
+        ({"surfaces": [{"type": "RoofSurface"}], "values": None}, None),
+        ({"surfaces": [{"type": "RoofSurface"}], "values": [[0, 0]]},
+         ("semantics that do not fit their faces, ignored", 1)),
+        ({"surfaces": [{"type": "RoofSurface"}], "values": [0] * 6},
+         ("semantics that do not fit their faces, ignored", 1)),
+        ({"values": [[0] * 6]},
+         ("semantics that do not fit their faces, ignored", 1)),
+        ({"surfaces": ["RoofSurface"], "values": [[0] * 6]},
+         ("semantics that do not fit their faces, ignored", 1)),
+        (None, None),
+    ],
+)  # fmt: skip
+def test_semantics_of_cityjson_that_do_not_fit_are_counted(
+    tmp_path, semantics, count
+):
+    document = house({})
+    geometry = document["CityObjects"]["a"]["geometry"][0]
+    geometry["semantics"] = semantics
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps(document))
+    city = import_cityjson(path, None, None)
+    (one,) = city.objects
+    assert len(one.triangles) == 12
+    told = {
+        fault.kind: fault.number
+        for fault in city.faults.rows()
+        if "semantics" in fault.kind
+    }
+    assert told == ({} if count is None else dict([count]))

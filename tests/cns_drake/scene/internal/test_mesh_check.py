@@ -8,7 +8,7 @@ from helpers.small_map import world_text
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.scene import load_world
+from cns_drake.scene import load_world, read_perception_geometry
 from cns_drake.scene.mesh_check import check_mesh_file
 from cns_drake.scene.obj_check import check_obj
 
@@ -62,6 +62,7 @@ def test_extensions_that_change_shapes_are_refused(
         ("KHR_lights_punctual", True),
         # Shapes are there without it, too.
         ("KHR_draco_mesh_compression", False),
+        # No shape uses it.
         ("ACME_folded_space", False),
     ],
 )
@@ -97,6 +98,10 @@ def test_numbers_that_are_no_floats_are_refused(tmp_path):
             "1 see-through materials of glTF taken as solid",
         ),
         (lambda top: top["scenes"].append({"nodes": []}), "1 further scenes"),
+        (
+            lambda top: top["nodes"][0].update(extensions={"ACME_lod": {}}),
+            "1 uses of the extension ACME_lod of glTF ignored",
+        ),
     ],
 )
 def test_what_is_not_read_is_named(tmp_path, change, note):
@@ -333,6 +338,81 @@ def test_surfaces_of_obj_that_would_be_missing_are_refused(
     # Lines and points have no surface, and names are no statements.
     path.write_text(f"{VERTICES}o surf\ng call me\nf 1 2 3\nl 1 2\np 1\n")
     check_obj(path)
+
+
+@pytest.mark.parametrize(
+    "name", ["a.off", "a.fbx", "a.3ds", "a.ply.gz", "a", "a.step"]
+)
+def test_other_formats_are_refused(tmp_path, name):
+    (tmp_path / name).write_text("OFF\n")
+    with pytest.raises(ValueError, match="no mesh of a format that is read"):
+        check_mesh_file(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        (
+            "<asset><unit meter='0,01'/></asset>",
+            "has a unit of COLLADA of '0,01' m",
+        ),
+        (
+            "<asset><unit meter='1'/></asset><library_nodes><node><asset>"
+            "<unit meter='2'/></asset></node></library_nodes>",
+            "parts of COLLADA with another unit or axis",
+        ),
+        (
+            "<library_nodes><node><instance_node url='b.dae#a'/></node>"
+            "</library_nodes>",
+            r"another file \('b.dae#a'\)",
+        ),
+    ],
+)
+def test_collada_whose_places_would_be_wrong_is_refused(tmp_path, text, fault):
+    path = tmp_path / "thing.dae"
+    path.write_text(f"<COLLADA>{text}</COLLADA>")
+    with pytest.raises(ValueError, match=fault):
+        check_mesh_file(path)
+    # A camera may have any place.
+    path.write_text(
+        "<COLLADA><library_nodes><node><lookat>1 2 3 0 0 0 0 0 1</lookat>"
+        "<instance_camera url='#c'/></node></library_nodes></COLLADA>"
+    )
+    assert check_mesh_file(path) == ()
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("property float x\nproperty float y", "property float y\nproperty"
+         " float x"),
+        ("property float z\n", ""),
+        ("vertex_index", "corners"),
+    ],
+)  # fmt: skip
+def test_ply_with_other_names_is_refused(tmp_path, old, new):
+    text = ply(BY_INDEX, "3 0 1 2\n")
+    path = tmp_path / "thing.ply"
+    path.write_text(text.replace(old, new))
+    with pytest.raises(ValueError, match=r"of PLY with .* export it again"):
+        check_mesh_file(path)
+
+
+def test_triangles_that_are_not_read_are_missed(tmp_path):
+    """A square with a hole and its outline in one polygon."""
+    corners = [(0, 0), (3, 0), (3, 3), (0, 3), (0, 0), (1, 1), (1, 2), (2, 2),
+               (2, 1), (1, 1)]  # fmt: skip
+    path = tmp_path / "thing.obj"
+    path.write_text(
+        "".join(f"v {x} {y} 0\n" for x, y in corners)
+        + "f 1 2 3 4 5 6 7 8 9 10\n"
+    )
+    sdf = tmp_path / "world.sdf"
+    mesh = "<geometry><mesh><uri>thing.obj</uri></mesh></geometry>"
+    sdf.write_text(world_text([f'<visual name="thing">{mesh}</visual>']))
+    inspector = load_world(sdf).scene_graph.model_inspector()
+    with pytest.raises(InputError, match="only 5 of 8 triangles"):
+        read_perception_geometry(inspector)
 
 
 @pytest.mark.parametrize(

@@ -576,6 +576,39 @@ def test_numbers_of_jobs(streets, capsys):
         assert_refused(capsys, [*command, "--jobs", jobs], f"--jobs: {jobs}")
 
 
+def test_points_that_are_not_finite_are_noted(streets, tmp_path, capsys):
+    cloud = street()
+    for name, holes in (("map", 7), ("scan", 5)):
+        points = cloud.copy()
+        points[:holes, 1] = np.nan
+        np.save(tmp_path / f"{name}.npy", points)
+    pair = [tmp_path / "map.npy", tmp_path / "scan.npy"]
+    status, _, err = run(capsys, "localise", *pair, "--method", "gicp")
+    assert status == 0
+    for note in ("map.npy: 7", "scan.npy: 5"):
+        assert f"{note} points are not finite, and left out" in err
+    # Drives without such points have no note.
+    pair = [streets["map"], streets["query"]]
+    _, _, err = run(capsys, "localise", *pair, "--method", "gicp")
+    assert "not finite" not in err
+
+
+def test_results_of_an_earlier_run_go(streets, tmp_path, capsys):
+    pair = [streets["map"], streets["query"]]
+    output = tmp_path / "out"
+    command = ["localise", *pair, "--method", "gicp", "--output", output]
+    assert run(capsys, *command, "--track")[0] == 0
+    (output / "notes.txt").write_text("mine")
+    tables = {"results.csv", "queries.csv", "localisation.csv"}
+    names = {path.name for path in output.iterdir()}
+    assert names == {*tables, "track.png", "notes.txt"}
+    assert run(capsys, *command)[0] == 0
+    names = {path.name for path in output.iterdir()}
+    assert names == {*tables, "notes.txt"}
+    (output / "results.csv").write_text("mine")
+    assert_refused(capsys, command, "csv: no earlier run wrote it")
+
+
 def test_bad_input(streets, tmp_path, capsys, monkeypatch):
     pair = [streets["map"], streets["query"]]
     gicp = ["--method", "gicp"]

@@ -647,6 +647,7 @@ def test_a_page_stands_alone(tmp_path):
     assert outside == {"results.csv", "data:,"}
     assert "name: &lt;age&gt;" in text
     note, headline = told
+    assert headline in text
     assert note.startswith(
         "Chart 2 is left out: charts: lines: the table has no r1"
     )

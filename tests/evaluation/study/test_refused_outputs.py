@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from cns_drake.base import InputError, check_outputs, choose_cluster
+from cns_drake.base import InputError, choose_cluster
 from evaluation.real import measure_real
+from evaluation.results import check_output
 from evaluation.study import measure_pairs, study_recordings
 
 MEASURE = {
@@ -42,10 +43,10 @@ def test_a_dead_link_is_no_folder(tmp_path, study):
 
 
 def test_outputs_need_not_exist(tmp_path):
-    check_outputs(tmp_path / "new" / "study", ["a.csv"])
+    check_output(tmp_path / "new" / "study", ["page"])
     assert not (tmp_path / "new").exists()
-    (tmp_path / "a.csv").write_text("old")
-    check_outputs(tmp_path, ["a.csv", "b.csv"])
-    (tmp_path / "b.csv").mkdir()
-    with pytest.raises(InputError, match=r"b\.csv: a folder has this name"):
-        check_outputs(tmp_path, ["a.csv", "b.csv"])
+    (tmp_path / "other.csv").write_text("mine")
+    check_output(tmp_path, ["page"])
+    (tmp_path / "index.html").mkdir()
+    with pytest.raises(InputError, match=r"index\.html: a folder has this"):
+        check_output(tmp_path, ["page"])

@@ -1,0 +1,65 @@
+"""A folder of results keeps the user's files, and no files of earlier runs."""
+
+import pytest
+
+from cns_drake.base import InputError
+from evaluation.results import RESULTS, make_output, remove_earlier
+
+TABLE = "experiment,map,task,method,gate,metric,value,low,high,n\n"
+OWN = {
+    RESULTS: TABLE + "map-update,a,map,b,0,miou,1,,,1\n",
+    "queries.csv": "experiment\n",
+    "index.html": "<p>Made by cns-drake 3.0.0; protocol: paper</p>",
+    "summaries.csv": "a\n",
+    "chart_1.pdf": "a",
+    "chart_12.png": "a",
+    "localisation.csv": "frame,stamp_ns,translation_error,along\n",
+    "track.png": "a",
+    "A.npy": "a",
+    "B.npy": "a",
+}
+OTHERS = ["notes.txt", "chart_1.svg", "my_chart_1.png", "C.npy", "track.pdf"]
+GROUPS = ["page", "localise", "map-update"]
+
+
+def write(folder, files):
+    for name, text in files.items():
+        (folder / name).write_text(text)
+
+
+def names(folder):
+    return {path.name for path in folder.iterdir()}
+
+
+def test_files_of_an_earlier_run_go_and_others_stay(tmp_path):
+    write(tmp_path, OWN | dict.fromkeys(OTHERS, "mine"))
+    (tmp_path / "parts").mkdir()
+    make_output(tmp_path, GROUPS)
+    remove_earlier(tmp_path)
+    assert names(tmp_path) == {*OTHERS, "parts"}
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_a_file_that_no_run_wrote_is_neither_removed_nor_overwritten(
+    tmp_path, name
+):
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(InputError, match="no earlier run wrote it") as refusal:
+        make_output(tmp_path, GROUPS)
+    assert str(refusal.value).startswith(str(tmp_path / name))
+    remove_earlier(tmp_path)
+    assert (tmp_path / name).read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", sorted(OWN.keys() - {RESULTS, "queries.csv"}))
+def test_beside_results_of_another_command_it_stays(tmp_path, name):
+    write(tmp_path, {RESULTS: TABLE + "pr,a,place,b,0,auc,1,,,1\n"})
+    (tmp_path / name).write_text("mine")
+    make_output(tmp_path)
+    remove_earlier(tmp_path)
+    assert names(tmp_path) == {name}
+
+
+def test_an_interrupted_run_can_continue(tmp_path):
+    write(tmp_path, {RESULTS: TABLE, "chart_1.png": "a", "summaries.csv": "a"})
+    make_output(tmp_path, GROUPS)
