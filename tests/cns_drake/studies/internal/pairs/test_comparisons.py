@@ -728,3 +728,24 @@ def test_data_sheets_as_a_factor(query_drive, tmp_path):
         InputError, match=rf"^{path}: query: lidars.lidar.unit: .*b.yaml: "
     ):
         Conditions(load_experiment(path), query_drive, source=str(path))
+
+
+def test_a_file_of_the_working_folder_is_no_sheet(
+    tmp_path, query_drive, monkeypatch
+):
+    """Paths start at the experiment, also of files without an ending."""
+    sheet = "rings_deg: [[9, -9, 5]]\ncolumns: 9\nranges: [1, 9]\nsource: a\n"
+    (tmp_path / "here").write_text(sheet)
+    (tmp_path / "work").mkdir()
+    (tmp_path / "work" / "there").write_text(sheet)
+    monkeypatch.chdir(tmp_path / "work")
+    path = tmp_path / "mine.yaml"
+    path.write_text("query: {lidar: here}\n")
+    found = Conditions(load_experiment(path), query_drive, source=str(path))
+    (compared,) = found.compared()
+    assert make_pattern(compared.query.lidars["lidar"]).num_rings == 5
+    path.write_text("query: {lidar: there}\n")
+    with pytest.raises(
+        InputError, match=rf"^{path}: query.lidar: unknown preset 'there'"
+    ):
+        Conditions(load_experiment(path), query_drive, source=str(path))
