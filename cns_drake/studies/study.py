@@ -72,6 +72,7 @@ from evaluation.results import (
     STAGE,
     chart_factors,
     check_factors,
+    check_metric_names,
     write_page,
 )
 from evaluation.study import (
@@ -151,6 +152,7 @@ def run_study(
     )
     with errors_at(f"{run.source}: metrics"):
         metrics = choose_metrics(experiment.metrics)
+        check_metric_names(metrics, experiment.factor_names)
     engine, cities = plan_study(run, maps)
     results, queries = engine.run(cluster)
     return write_page(
