@@ -145,8 +145,8 @@ def _pairs_of(
         return
     if path.is_dir() and not MapFolder(path).drives():
         with errors_at(place) if place else nullcontext():
-            cities = drives_by_map(find_recordings(path, run.on_note))
-        for city in cities:
+            recorded = drives_by_map(find_recordings(path, run.on_note))
+        for city in recorded:
             yield MapPairs(city.name, {}, city=city)
         return
     yield MapPairs(path.name, {}, _drive_pairs(recordable_map(one), kind))
