@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 import contextlib
 from pathlib import Path
 import re
@@ -165,24 +165,25 @@ class _Measured(NamedTuple):
     """
 
     factors: tuple[str, ...]
-    values: Mapping[str, tuple[Any, ...]]
+    values: Mapping[str, Collection[Any]]
 
     @classmethod
     def of(cls, experiment: Experiment) -> _Measured:
-        values: dict[str, tuple[Any, ...]] = {
-            # The task `cost` is added to some studies.
-            "task": (*experiment.tasks, CostTask.name)
-        }
+        # The task `cost` is added to some studies.
+        tasks = (*experiment.tasks, CostTask.name)
+        values: dict[str, dict[Any, None]] = {"task": dict.fromkeys(tasks)}
         for condition in experiment.conditions:
             for name, value in condition.factors.items():
-                values[name] = (*values.get(name, ()), as_factor(value))
+                values.setdefault(name, {})[as_factor(value)] = None
         return cls(tuple(experiment.factor_names), values)
 
     def joined(self, other: _Measured) -> _Measured:
         return _Measured(
             (*self.factors, *other.factors),
             {
-                name: (*self.values.get(name, ()), *other.values.get(name, ()))
+                name: dict.fromkeys(
+                    [*self.values.get(name, ()), *other.values.get(name, ())]
+                )
                 for name in (*self.values, *other.values)
             },
         )
@@ -208,12 +209,19 @@ def _check_charts(experiment: Experiment, known: _Measured, path: Path) -> None:
                 and not (has_own and name in (chart.get("x"), chart.get("y")))
             ]
             check_factors(chart, names, factors)
+            if chart["kind"] == "lines":
+                for one in known.values.get(chart["over"], ()):
+                    if isinstance(one, str):
+                        raise InputError(
+                            f"charts: lines: over: {chart['over']}: {one!r} is"
+                            " no number; take dumbbell or matrix"
+                        )
             for name, value in chart.items():
                 chosen = value if isinstance(value, list) else [value]
                 there = known.values.get(name, chosen)
                 for one in chosen:
                     if one not in there:
-                        listed = ", ".join(map(str, dict.fromkeys(there)))
+                        listed = ", ".join(map(str, there))
                         raise InputError(
                             f"charts: {chart['kind']}: {name}: {one!r} is none"
                             f" of {listed}"

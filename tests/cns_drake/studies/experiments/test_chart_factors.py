@@ -55,6 +55,12 @@ def test_rows_that_no_table_has_are_refused(read, selected, fault):
         read(TEXT + chart % selected)
 
 
+def test_lines_are_over_numbers(read):
+    chart = "  - {kind: lines, over: cause, metric: auc}"
+    with pytest.raises(InputError, match="lines: over: cause: 'none' is no nu"):
+        read(TEXT + chart)
+
+
 def test_values_that_quick_or_an_option_leaves_out_are_known(read):
     chart = (
         "  - {kind: lines, over: query.transient.snow, metric: auc,"
