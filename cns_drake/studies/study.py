@@ -15,7 +15,6 @@ from cns_drake.base import (
     doing,
     errors_at,
     fingerprint,
-    is_there,
     read_records,
     whole_number,
 )
@@ -66,8 +65,6 @@ from evaluation.results import (
     LAST,
     LEVEL,
     OWN,
-    QUERIES,
-    RESULTS,
     SETTINGS,
     STAGE,
     chart_factors,
@@ -89,6 +86,7 @@ from evaluation.study import (
     RecordedCondition,
     RecordingInfo,
     ShownCity,
+    StudyFiles,
     Task,
     add_city,
     choose_methods,
@@ -199,8 +197,7 @@ def plan_study(
     if experiment.frozen is not None:
         with errors_at(f"{run.source}: frozen"):
             frozen_drives(experiment.frozen)
-    for name in (RESULTS, QUERIES, "index.html"):
-        is_there(run.output / name)  # Nothing else may have its name.
+    StudyFiles(run.output).check()
     _note_lower_levels(run)
     found = list(pairs_by_map(run, maps))
     doing("looking at all conditions")

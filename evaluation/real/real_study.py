@@ -55,6 +55,7 @@ from evaluation.study import (
     PlaceTask,
     PoseTask,
     Result,
+    StudyFiles,
     Task,
     choose_methods,
 )
@@ -117,6 +118,7 @@ def measure_real(
         choices = choose_methods(recognising, settings)
     elif given := next(iter(settings), None):
         raise InputError(f"--set: {given!r}: no method of place recognition")
+    StudyFiles(output).check()
     tasks: list[Task] = [PlaceTask({}, _NAME), PoseTask({}, _NAME)]
     if aligning:
         tasks.append(LocaliseTask({"methods": aligning}, _NAME))

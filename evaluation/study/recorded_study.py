@@ -114,6 +114,7 @@ def study_recordings(
         InputError: two recordings have the same map and stage, there is nothing
             to compare, a step failed, or a file cannot be written.
     """
+    StudyFiles(output).check()
     experiment = read_yaml(STAGES_FILE)
     engine = Engine(
         STAGES_FILE.stem,

@@ -1,9 +1,11 @@
 """Where the files of a study are in its folder."""
 
 from dataclasses import dataclass
+import os
 from pathlib import Path
 
-from cns_drake.base import file_name
+from cns_drake.base import InputError, file_name, is_there
+from evaluation.results import QUERIES, RESULTS
 from evaluation.study.parts import Part
 
 
@@ -73,6 +75,22 @@ class StudyFiles:
 
     output: Path
 
+    def check(self) -> None:
+        """Checks that nothing else has the name of a file or of a folder.
+
+        Raises:
+            InputError: a folder has the name of a file, or the reverse.
+        """
+        for name in (RESULTS, QUERIES, "index.html"):
+            is_there(self.output / name)
+        for folder in (self.output, self._parts):
+            if os.path.lexists(folder) and not folder.is_dir():
+                raise InputError(f"{folder}: not a folder")
+
+    @property
+    def _parts(self) -> Path:
+        return self.output / "parts"
+
     @property
     def figures(self) -> Path:
         """The folder of all figures."""
@@ -80,7 +98,7 @@ class StudyFiles:
 
     def features(self, recording: str) -> FeatureFiles:
         """Returns the files with a recording's map and descriptors."""
-        folder = self.output / "parts" / "features"
+        folder = self._parts / "features"
         return FeatureFiles(folder / file_name(recording))
 
     def part(self, kind: str, *names: str) -> Part:
@@ -91,4 +109,4 @@ class StudyFiles:
             names: names of the drives to which the result belongs.
         """
         name = ",".join(map(file_name, names))
-        return Part(self.output / "parts" / kind / f"{name}.data")
+        return Part(self._parts / kind / f"{name}.data")
