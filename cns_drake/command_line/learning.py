@@ -15,6 +15,7 @@ from cns_drake.base import (
     terminal,
     uninterrupted,
 )
+from cns_drake.command_line import options
 
 
 class Variation(str, Enum):
@@ -35,9 +36,7 @@ def train(
     without: list[Variation] | None = None,
     drawn_streets: Annotated[bool, typer.Option("--drawn-streets")] = False,
     graded: Annotated[bool, typer.Option("--graded")] = False,
-    lidar: Annotated[
-        list[str] | None, typer.Option(metavar="PRESET|FILE.yaml")
-    ] = None,
+    lidar: Annotated[list[str] | None, options.LIDAR_OPTION] = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:
@@ -45,9 +44,11 @@ def train(
 
     The training simulates drives through cities that are generated at random
     along the streets of Riverside, Suburbia and Downtown. The drives differ in
-    the stage of the city and in the driver, and are not recorded. On one
-    machine, the same command always gives the same weights. Needs the optional
-    packages of the extra `train` (JAX).
+    the stage of the city and in the driver, and are not recorded. A third of
+    the drives have one of five presets with 16 to 128 rings, and the others the
+    LiDAR of the map. With --lidar, which may be repeated, each drive has one of
+    these LiDARs at random. On one machine, the same command always gives the
+    same weights. Needs the optional packages of the extra `train` (JAX).
 
     Args:
         output: File for the weights; an existing file is replaced. The training
@@ -75,10 +76,6 @@ def train(
             shows more of the query's scan. Without --graded, all places within
             7.5 m of a query are equally good matches. With --graded, the
             training takes about 1.5 times as long as without.
-        lidar: LiDAR of the drives, by preset or by the file of a data sheet of
-            your own; may be repeated: then each drive has one of these LiDARs
-            at random. By default, a third of the drives have one of five
-            presets with 16 to 128 rings, and the others the LiDAR of the map.
     """
     with uninterrupted():
         from cns_drake.base import choose_cluster
