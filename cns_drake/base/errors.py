@@ -170,11 +170,14 @@ def describe_validation_error(
             for an unknown field, or lists the known fields.
     """
     fault = min(error.errors(), key=_urgency)
-    field = ".".join(str(part) for part in fault["loc"]) or "(top level)"
     # pydantic puts this before the message of one of our validators.
     message = fault["msg"].removeprefix("Value error, ")
     message += _advice(fault, model)
-    return f"{source}: {field}: {message}"
+    field = ".".join(str(part) for part in fault["loc"])
+    if not field and fault["type"] == "value_error":
+        # A validator of the whole model, whose message names the fields.
+        return f"{source}: {message}"
+    return f"{source}: {field or '(top level)'}: {message}"
 
 
 def _urgency(fault: Mapping[str, Any]) -> int:

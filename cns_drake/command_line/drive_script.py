@@ -7,7 +7,13 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Literal
 
-from cns_drake.base import program, show_progress, terminal, uninterrupted
+from cns_drake.base import (
+    errors_at_option,
+    program,
+    show_progress,
+    terminal,
+    uninterrupted,
+)
 from cns_drake.command_line import options
 from cns_drake.command_line.suggestions import suggest_export
 
@@ -143,7 +149,8 @@ def _changed_scenario(
 ) -> Scenario:
     """Returns a scenario with the changes that `run_drive` takes."""
     if lidar is not None:
-        scenario = scenario.with_lidar(lidar)
+        with errors_at_option("--lidar", "unit"):
+            scenario = scenario.with_lidar(lidar)
     if returns is not None:
         scenario = scenario.with_returns(returns, weather)
     if traffic is not None:

@@ -163,10 +163,11 @@ def export(
             replaced; its name ends in .webp, or in .mp4, which needs ffmpeg.
         absent_in: Another stage of the map, such as 01. Points on structures
             that do not exist in that stage get SemanticKITTI's labels of moving
-            objects (252 to 259). Only with --format kitti.
+            objects (252 to 259). Only with a format that has labels, such as
+            kitti.
         sequence: Number NN of the exported drive, whose folder is called
             sequences/NN. By default the digits at the end of the drive's name.
-            Only with --format kitti.
+            Only with a format that numbers drives, such as kitti.
         spacing: Distance that the car drives between two clouds of training
             data (by default 10) or between two scans of a map (by default 1)
             [m]. The smaller the distance, the denser the map.

@@ -4,11 +4,18 @@ from enum import Enum
 from pathlib import Path
 import shlex
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from cns_drake.base import Jobs, Scheduler, terminal, uninterrupted
+from cns_drake.base import (
+    Jobs,
+    Scheduler,
+    errors_at_option,
+    terminal,
+    uninterrupted,
+)
+from cns_drake.command_line import options
 
 
 class Variation(str, Enum):
@@ -29,6 +36,7 @@ def train(
     without: list[Variation] | None = None,
     drawn_streets: Annotated[bool, typer.Option("--drawn-streets")] = False,
     graded: Annotated[bool, typer.Option("--graded")] = False,
+    lidar: Annotated[list[str] | None, options.LIDAR_OPTION] = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:
@@ -36,9 +44,11 @@ def train(
 
     The training simulates drives through cities that are generated at random
     along the streets of Riverside, Suburbia and Downtown. The drives differ in
-    the stage of the city and in the driver, and are not recorded. On one
-    machine, the same command always gives the same weights. Needs the optional
-    packages of the extra `train` (JAX).
+    the stage of the city and in the driver, and are not recorded. A third of
+    the drives have one of five presets with 16 to 128 rings, and the others the
+    LiDAR of the map. With --lidar, which may be repeated, each drive has one of
+    these LiDARs at random. On one machine, the same command always gives the
+    same weights. Needs the optional packages of the extra `train` (JAX).
 
     Args:
         output: File for the weights; an existing file is replaced. The training
@@ -69,10 +79,17 @@ def train(
     """
     with uninterrupted():
         from cns_drake.base import choose_cluster
+        from cns_drake.sensors import make_lidar_config
         from cns_drake.studies import TrainingPlan, make_weights
 
     cluster = choose_cluster(jobs, scheduler)
-    fields: dict[str, int | bool] = {"seed": seed}
+    # A preset by its name, a data sheet by its content.
+    lidars = []
+    for unit in lidar or ():
+        with errors_at_option("--lidar", "unit"):
+            config = make_lidar_config(unit)
+        lidars.append(config.preset or config.sheet.to_fields())
+    fields: dict[str, Any] = {"seed": seed, "lidars": tuple(lidars)}
     if cities is not None:
         fields["cities"] = cities
     if steps is not None:

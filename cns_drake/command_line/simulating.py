@@ -12,6 +12,7 @@ import typer
 from cns_drake.base import (
     InputError,
     doing,
+    errors_at_option,
     next_command,
     note,
     shared_options,
@@ -260,7 +261,8 @@ def scan(
         raise InputError(f"--pose: {pose} is beyond {LARGEST_SIZE:g} m or rad")
     check_ending(output)
     check_writable(output)
-    config = make_lidar_config(lidar)
+    with errors_at_option("--lidar", "unit"):
+        config = make_lidar_config(lidar)
     pattern = make_pattern(config)
     X_WS = RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
     doing(f"reading {world.name}")

@@ -4,8 +4,19 @@ from collections.abc import Mapping
 from pathlib import Path
 import re
 
-from cns_drake.base import InputError, errors_at, is_there, read_yaml
-from cns_drake.units import make_sheet, read_sheet
+from cns_drake.base import (
+    InputError,
+    errors_at,
+    is_there,
+    read_yaml,
+    value_errors,
+)
+from cns_drake.units import (
+    MOST_RINGS,
+    check_one_unit,
+    make_sheet,
+    read_sheet,
+)
 
 # Name of the file with the scenario, in the folder of an exported drive.
 SCENARIO = "scenario.yaml"
@@ -48,7 +59,8 @@ def read_scenario(folder: Path) -> Mapping | None:
 
     Raises:
         InputError: the file is not a mapping in YAML, its field `name` is not a
-            valid name of a drive, or a data sheet cannot be used.
+            valid name of a drive, or the data sheet or the number of rings of a
+            LiDAR cannot be used.
     """
     path = folder / SCENARIO
     if not is_there(path):
@@ -60,13 +72,23 @@ def read_scenario(folder: Path) -> Mapping | None:
     if name is not None and not _NAME.fullmatch(str(name)):
         raise InputError(f"{path}: name: {name!r} is no name of a drive")
     lidars = scenario.get("lidars")
-    for section in lidars.values() if isinstance(lidars, dict) else ():
-        if not isinstance(section, dict) or section.get("unit") is None:
+    for name, section in lidars.items() if isinstance(lidars, dict) else ():
+        if not isinstance(section, dict):
             continue
-        with errors_at(f"{path}: lidars"):
-            if section.get("preset") is not None:
-                raise InputError("unit: give either a unit or a preset")
+        with errors_at(f"{path}: lidars.{name}"):
+            rings = section.get("rings")
+            if rings is not None and (
+                type(rings) is not int or not 2 <= rings <= MOST_RINGS
+            ):
+                raise InputError(
+                    f"rings: {rings!r} is no whole number from 2 to "
+                    f"{MOST_RINGS}"
+                )
+            if section.get("unit") is None:
+                continue
             unit = section["unit"]
+            with value_errors("unit"):
+                check_one_unit(section.get("preset"), unit)
             if isinstance(unit, str):
                 sheet = read_sheet(folder / unit)
             else:

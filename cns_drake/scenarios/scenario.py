@@ -36,6 +36,7 @@ from cns_drake.sensors import (
     check_rate,
     field_off_by_default,
 )
+from cns_drake.units import LidarSheet
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]*$")]
 # Defaults are validated as well, because a rule may depend on another field.
@@ -639,14 +640,14 @@ class Scenario(Section):
             chosen = chosen.replaced(lane_changes=0.0)
         return self.replaced(driver=chosen)
 
-    def with_lidar(self, unit: str | Path) -> Scenario:
+    def with_lidar(self, unit: str | Path | LidarSheet) -> Scenario:
         """Returns the scenario with every LiDAR replaced by another model.
 
         The LiDARs keep their poses and all settings of the measurement.
 
         Args:
-            unit: name of the model's preset, such as `vlp-16`, or the file of
-                its data sheet.
+            unit: name of the model's preset, such as `vlp-16`, the file of
+                its data sheet, or its data sheet.
 
         Raises:
             InputError: there is no such preset, or the file is no data sheet.

@@ -36,7 +36,9 @@ from cns_drake.units import (
     MOST_BEAMS,
     MOST_RINGS,
     LidarSheet,
+    check_one_unit,
     check_preset,
+    find_sheet,
     is_sheet_file,
     make_sheet,
     read_sheet,
@@ -215,8 +217,7 @@ class LidarSection(LidarDescription, Mount):
     def _check_one(
         cls, unit: LidarSheet | None, info: ValidationInfo
     ) -> LidarSheet | None:
-        if unit is not None and info.data.get("preset") is not None:
-            raise ValueError("give either a unit or a preset")
+        check_one_unit(info.data.get("preset"), unit)
         return unit
 
     @model_validator(mode="after")
@@ -251,6 +252,8 @@ class LidarSection(LidarDescription, Mount):
                 f"min_range {nearest:g} is not below max_range {farthest:g}"
             )
         make_pattern(self)
+        if self.returns == "calibrated":
+            sheet.returns.check_range(farthest)
         return self
 
     @property
@@ -262,14 +265,14 @@ class LidarSection(LidarDescription, Mount):
             sheet = LIDAR_PRESETS[self.preset]
         return sheet if self.rings is None else sheet.with_rings(self.rings)
 
-    def with_lidar(self, unit: str | Path) -> "LidarSection":
+    def with_lidar(self, unit: str | Path | LidarSheet) -> "LidarSection":
         """Returns this description of a LiDAR, with another model.
 
         The data sheet, the numbers of rings and columns, and the range limits
         are the other model's; all other fields stay the same.
 
         Args:
-            unit: name of a preset, or the file of a data sheet.
+            unit: name of a preset, the file of a data sheet, or a data sheet.
 
         Raises:
             InputError: there is no such preset, or the file is no data sheet.
@@ -281,19 +284,24 @@ class LidarSection(LidarDescription, Mount):
         return self.replaced(**{name: getattr(new, name) for name in names})
 
 
-def make_lidar_config(unit: str | Path) -> LidarSection:
+def make_lidar_config(unit: str | Path | LidarSheet) -> LidarSection:
     """Returns the description of a LiDAR of a given model.
 
     All other fields have their defaults.
 
     Args:
-        unit: name of a preset, or the file of a data sheet.
+        unit: name of a preset, the file of a data sheet, or a data sheet.
 
     Raises:
         InputError: there is no such preset, or the file is no data sheet.
     """
-    field = "unit" if is_sheet_file(unit) else "preset"
-    return validated(LidarSection, {field: unit}, "--lidar")
+    try:
+        sheet = find_sheet(unit)
+    except (InputError, ValueError) as error:
+        raise InputError(f"unit: {error}") from None
+    is_preset = not (unit is sheet or is_sheet_file(unit))
+    fields = {"preset": str(unit)} if is_preset else {"unit": sheet}
+    return validated(LidarSection, fields, "unit")
 
 
 def make_pattern(

@@ -62,7 +62,7 @@ def make_beam_pattern(
 
         patterns = [make_beam_pattern(name, 0.1) for name in LIDAR_PRESETS]
     """
-    sheet = unit if isinstance(unit, LidarSheet) else find_sheet(unit)
+    sheet = find_sheet(unit)
     if period is not None and not 0.0 < period <= LONGEST_PERIOD:
         raise ValueError(
             f"period: {period:g} s is not above 0 and up to {LONGEST_PERIOD:g}"

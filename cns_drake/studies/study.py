@@ -69,7 +69,7 @@ from evaluation.results import (
     STAGE,
     chart_factors,
     check_factors,
-    check_output,
+    check_metric_names,
     write_page,
 )
 from evaluation.study import (
@@ -86,6 +86,7 @@ from evaluation.study import (
     RecordedCondition,
     RecordingInfo,
     ShownCity,
+    StudyFiles,
     Task,
     add_city,
     choose_methods,
@@ -149,6 +150,7 @@ def run_study(
     )
     with errors_at(f"{run.source}: metrics"):
         metrics = choose_metrics(experiment.metrics)
+        check_metric_names(metrics, experiment.factor_names)
     engine, cities = plan_study(run, maps)
     results, queries = engine.run(cluster)
     return write_page(
@@ -195,7 +197,7 @@ def plan_study(
     if experiment.frozen is not None:
         with errors_at(f"{run.source}: frozen"):
             frozen_drives(experiment.frozen)
-    check_output(run.output, ["page"])
+    StudyFiles(run.output).check()
     _note_lower_levels(run)
     found = list(pairs_by_map(run, maps))
     doing("looking at all conditions")

@@ -1,6 +1,7 @@
 from cns_drake.units.data_sheet import LONGEST_PERIOD as LONGEST_PERIOD
 from cns_drake.units.data_sheet import MOST_BEAMS as MOST_BEAMS
 from cns_drake.units.data_sheet import MOST_RINGS as MOST_RINGS
+from cns_drake.units.data_sheet import THRESHOLD_SNR as THRESHOLD_SNR
 from cns_drake.units.data_sheet import Head as Head
 from cns_drake.units.data_sheet import LidarSheet as LidarSheet
 from cns_drake.units.data_sheet import NoddingSheet as NoddingSheet
@@ -13,6 +14,7 @@ from cns_drake.units.data_sheet import make_sheet as make_sheet
 from cns_drake.units.data_sheet import read_sheet as read_sheet
 from cns_drake.units.presets import DEFAULT_PRESET as DEFAULT_PRESET
 from cns_drake.units.presets import LIDAR_PRESETS as LIDAR_PRESETS
+from cns_drake.units.presets import check_one_unit as check_one_unit
 from cns_drake.units.presets import check_preset as check_preset
 from cns_drake.units.presets import find_sheet as find_sheet
 from cns_drake.units.presets import is_sheet_file as is_sheet_file

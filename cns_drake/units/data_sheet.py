@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 import math
 from pathlib import Path
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -148,6 +149,11 @@ class Head(_Part):
         return given
 
 
+# The SNR that a unit detects in half of all cases: Ouster's sheet of the OS1
+# (first generation) states 10 cm of range noise at an SNR of 12, its lowest.
+THRESHOLD_SNR = 9.0
+
+
 class SheetRow(NamedTuple):
     """A row of a data sheet: how well a target is detected at a range.
 
@@ -162,6 +168,22 @@ class SheetRow(NamedTuple):
     reflectivity: Annotated[float, Field(ge=1e-3, le=1.0)]
     range: Annotated[float, Field(ge=1e-3, le=_FARTHEST)]
     probability: Annotated[float, Field(gt=0.0, lt=1.0)]
+
+    @property
+    def snr(self) -> float:
+        """The SNR at which a target is detected with this probability."""
+        # `detection_probability` of the link budget, solved for the root.
+        z = NormalDist().inv_cdf(self.probability)
+        root = (z + math.sqrt(z * z + 4.0 * THRESHOLD_SNR)) / 2.0
+        return root * root
+
+    @property
+    def log_strength(self) -> float:
+        """Logarithm of the SNR of a target of reflectivity 1 at 1 m.
+
+        This is what the row says if the SNR falls with the square of the range.
+        """
+        return math.log(self.snr * self.range**2 / self.reflectivity)
 
 
 class ReturnsSheet(_Part):
@@ -219,6 +241,11 @@ class ReturnsSheet(_Part):
                 )
         return rows
 
+    @model_validator(mode="after")
+    def _check_falling(self) -> Self:
+        self.check_range(max(row.range for row in self.rows))
+        return self
+
     @field_validator("head")
     @classmethod
     def _check_alternate(cls, head: Head, info: ValidationInfo) -> Head:
@@ -230,6 +257,30 @@ class ReturnsSheet(_Part):
                     f"times own_part, {most:g}"
                 )
         return head
+
+    def check_range(self, farthest: float) -> None:
+        """Checks that echoes get weaker with the range, up to a range [m].
+
+        Raises:
+            ValueError: the rows say that they get stronger.
+        """
+        # exp(-2 a r) / r^2 falls with r as long as a r > -1.
+        extinction = self.own_extinction
+        if extinction * farthest <= -1.0:
+            raise ValueError(
+                "rows: these two say that echoes get stronger with the range "
+                f"from {-1.0 / extinction:.1f} m on; the brighter target must "
+                "be detected farther or more often"
+            )
+
+    @property
+    def own_extinction(self) -> float:
+        """The constant alpha_0 of the link budget [1/m]; 0 with one row."""
+        if len(self.rows) == 1:
+            return 0.0
+        first, second = self.rows
+        way = 2.0 * (second.range - first.range)
+        return (first.log_strength - second.log_strength) / way
 
     @property
     def range_bias(self) -> float:
@@ -290,6 +341,15 @@ class LidarSheet(_Part, ABC):
         if not isinstance(given, Mapping) or "ranges" not in info.data:
             return given
         return {"rows": [[0.8, info.data["ranges"][1], 0.9]], **given}
+
+    @field_validator("returns")
+    @classmethod
+    def _check_falling(
+        cls, given: ReturnsSheet, info: ValidationInfo
+    ) -> ReturnsSheet:
+        if "ranges" in info.data:
+            given.check_range(info.data["ranges"][1])
+        return given
 
     @property
     @abstractmethod

@@ -65,28 +65,50 @@ def check_preset(name: str) -> None:
         )
 
 
-def is_sheet_file(unit: object) -> bool:
-    """Returns whether a LiDAR is given by a data sheet's file, not a preset."""
+def check_one_unit(preset: object, unit: object) -> None:
+    """Checks that a LiDAR is not given twice.
+
+    Args:
+        preset: name of a preset; None if there is none.
+        unit: data sheet of the user's; None if there is none.
+
+    Raises:
+        ValueError: both are given.
+    """
+    if preset is not None and unit is not None:
+        raise ValueError("give either a unit or a preset")
+
+
+def is_sheet_file(unit: object, folder: Path = Path()) -> bool:
+    """Returns whether a LiDAR is given by a data sheet's file, not a preset.
+
+    Args:
+        unit: name of a preset, or a file.
+        folder: folder in which the path of a file starts.
+    """
     if not isinstance(unit, str):
         return isinstance(unit, Path)
     return unit not in LIDAR_PRESETS and (
-        unit.endswith(_ENDINGS) or os.path.isfile(unit)
+        unit.endswith(_ENDINGS) or os.path.isfile(folder / unit)
     )
 
 
-def find_sheet(unit: str | Path) -> LidarSheet:
+def find_sheet(unit: str | Path | LidarSheet) -> LidarSheet:
     """Returns the data sheet of a LiDAR.
 
     Args:
-        unit: name of a preset, or the file of a data sheet.
+        unit: name of a preset, the file of a data sheet, or a data sheet.
 
     Raises:
         ValueError: there is no such preset.
         InputError: the file cannot be read, or is no data sheet.
     """
-    if is_sheet_file(unit):
-        from cns_drake.units.data_sheet import read_sheet
+    # Slow to import, and not needed for the names of presets.
+    from cns_drake.units.data_sheet import LidarSheet, read_sheet
 
+    if isinstance(unit, LidarSheet):
+        return unit
+    if is_sheet_file(unit):
         return read_sheet(Path(unit))
     check_preset(str(unit))
     return LIDAR_PRESETS[str(unit)]

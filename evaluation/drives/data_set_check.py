@@ -36,6 +36,7 @@ _FEWEST = 100
 # Points that are so much higher than the ground's layer are not the ground's
 # [m].
 _GROUND_MARGIN = 0.5
+_METRES_PER_FOOT = 0.3048
 # Other poses are right if points then lie nearer by this factor.
 _NEARER = 0.5
 
@@ -48,6 +49,8 @@ def check_data_set(path: Path | str) -> None:
     each time it is read. The check also looks for what readers often confuse:
     units other than metres and nanoseconds, a LiDAR frame whose z axis points
     down, poses that are inverted, and points that are not in the LiDAR's frame.
+    Points whose coordinates are not finite are beams without a return: they are
+    allowed, and left out, as in all programs.
 
     Args:
         path: a drive, as `open_drive` takes it.
@@ -90,12 +93,7 @@ def _faults(drive: Drive) -> Iterator[str]:
         again = drive.scan(frame)
         if scan.dtype != again.dtype or scan.tobytes() != again.tobytes():
             yield f"scan {frame}: other points when it is read again"
-        clouds[frame] = np.stack(
-            [scan[axis].astype(np.float64) for axis in "xyz"], axis=1
-        )
-        if not np.isfinite(clouds[frame]).all():
-            yield f"scan {frame}: a coordinate is not finite"
-            return
+        clouds[frame] = _returns(scan)
     yield from _faults_of_points(clouds)
     yield from _faults_of_frames(drive, clouds)
 
@@ -179,6 +177,16 @@ def _faults_of_points(clouds: dict[int, np.ndarray]) -> Iterator[str]:
         )
 
 
+def _returns(scan: np.ndarray) -> np.ndarray:
+    """Returns the points (N, 3) of a scan, without beams that missed.
+
+    Many drivers give such beams coordinates that are not finite; whoever reads
+    a drive leaves them out.
+    """
+    points = np.stack([scan[axis].astype(np.float64) for axis in "xyz"], axis=1)
+    return points[np.isfinite(points).all(axis=1)]
+
+
 def _fullest_height(points: np.ndarray) -> float | None:
     """Returns the lower end of the layer with most points (N, 3) [m].
 
@@ -216,9 +224,7 @@ def _faults_of_frames(
         if other is None:
             continue
         scan = drive.scan(other)
-        beside = _above_ground(
-            np.stack([scan[axis].astype(np.float64) for axis in "xyz"], axis=1)
-        )
+        beside = _above_ground(_returns(scan))
         cloud = _above_ground(cloud)
         if min(len(beside), len(cloud)) < _FEWEST:
             continue
@@ -226,10 +232,13 @@ def _faults_of_frames(
         tree = KDTree(cloud)
         X = poses.inverse(drive.X_WS[frame]) @ drive.X_WS[other]
         inverted = drive.X_WS[frame] @ poses.inverse(drive.X_WS[other])
+        in_feet = X.copy()
+        in_feet[:3, 3] /= _METRES_PER_FOOT
         for name, X_there in (
             ("as given", X),
             ("inverted: X_SW instead of X_WS?", inverted),
             ("of scans whose points are in one frame already", np.eye(4)),
+            ("in metres, and the points in feet", in_feet),
         ):
             moved = some @ X_there[:3, :3].T + X_there[:3, 3]
             distance, _ = tree.query(moved)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import InputError, errors_at, read_only
+from cns_drake.base import InputError, did_you_mean, errors_at, read_only
 from evaluation.methods.method import (
     Method,
     check_class,
@@ -30,6 +30,8 @@ _FIELDS = {
     "label": np.uint16,
     "instance": np.uint16,
 }
+# Further fields that recordings of some LiDARs have.
+_RARE_FIELDS = ("ambient", "laser", "line", "range", "reflectivity", "velocity")
 _PLAIN = (bool, int, float, complex, str, bytes, np.generic, type(None))
 
 
@@ -39,8 +41,8 @@ def check_method(method: Method) -> None:
     The check describes made-up clouds, also empty ones, and compares them: all
     results must have the right type, shape and number, be finite, be the same
     for the same input, and survive pickling, which worker processes need. The
-    input must not be changed, and a cloud must not fit another cloud better
-    than itself.
+    input must not be changed, scores must tell places apart, and a cloud must
+    not fit another cloud better than itself.
 
     Args:
         method: the method, with the settings to check.
@@ -72,6 +74,7 @@ class _Check:
         self._clouds = [self._cloud(seed) for seed in range(_NUM_PLACES)]
         places, queries = self._described()
         database = self._call("build_database", places)
+        self._check_differences(queries, database)
         places_again, queries_again = self._described()
         again = self._call("build_database", places_again)
         for number, query in enumerate(queries):
@@ -126,6 +129,13 @@ class _Check:
             raise self._fault("name: missing; use the decorator register")
         with errors_at(self._name):
             check_class(type(method))
+        known = (*_FIELDS, *_RARE_FIELDS)
+        for field in method.point_fields:
+            # Drives of your own can have fields of their own.
+            if field not in known and (near := did_you_mean(field, known)):
+                raise self._fault(
+                    f"point_fields: no recording has {field!r}{near}"
+                )
         if not isinstance(method.config, method.Config):
             raise self._fault("config: no object of the class Config")
 
@@ -201,6 +211,20 @@ class _Check:
         found = self._call("score_in_drive", [query], database, exhaustive=True)
         checked_scores(self._method, "score_in_drive", found, number)
         return first
+
+    def _check_differences(self, queries: list[Any], database: Any) -> None:
+        """Checks that scores tell places apart, at least for one query."""
+        is_constant = False
+        for query in queries:
+            scores = self._scores(query, database, _NUM_PLACES)
+            scores = scores[np.isfinite(scores)]
+            if len(np.unique(scores)) > 1:
+                return
+            is_constant |= len(scores) > 1
+        if is_constant:
+            raise self._fault(
+                "score: every place has the same score, whatever the query is"
+            )
 
     def _check_own_score(self, scores: np.ndarray, number: int) -> None:
         own = scores[number]

@@ -44,7 +44,6 @@ from evaluation.recognition import (
 from evaluation.results import (
     QueryRows,
     Results,
-    check_output,
     write_page,
 )
 from evaluation.study import (
@@ -60,6 +59,7 @@ from evaluation.study import (
     PlaceTask,
     PoseTask,
     Result,
+    StudyFiles,
     Task,
     choose_methods,
 )
@@ -114,7 +114,7 @@ def measure_real(
             contains no data set that can be measured, or a data set cannot be
             read.
     """
-    check_output(output, ["page"])
+    StudyFiles(output).check()
     chosen = list(names) or [*shipped_methods(), *SHIPPED]
     aligning = [name for name in chosen if _is_estimator(name)]
     recognising = [name for name in chosen if name not in aligning]

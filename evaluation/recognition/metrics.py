@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from cns_drake.base import InputError, did_you_mean, errors_at
+from cns_drake.base import InputError, did_you_mean, errors_at, repeated
 from evaluation.methods import as_users_code, run_module
 from evaluation.recognition.bootstrap import (
     SampledMetrics,
@@ -130,18 +130,29 @@ class Metric:
             InputError: a user's file computes something else than a number
                 that the metric can have.
         """
+        value = self._computed(outcomes)
+        if self.file is not None and math.isnan(value) and not self.undefined:
+            raise InputError(
+                f"{self.file}: {self.name}: the value is undefined (NaN); say"
+                " when that is in `undefined`"
+            )
+        return value
+
+    def _computed(self, outcomes: QueryOutcomes) -> float:
+        """Returns the value of all queries, or of a sample of them."""
         assert self.compute is not None
-        value = self.compute(outcomes)
         if self.file is None:
-            return value
+            return self.compute(outcomes)
+        value = self.compute(outcomes.read_only())
         with errors_at(str(self.file)):
-            try:
-                number = float(value)
-            except (TypeError, ValueError):
+            array = np.asarray(value)
+            if array.shape or array.dtype.kind not in "biuf":
+                shown = f"an array of shape {array.shape}"
                 raise InputError(
-                    f"{self.name}: {value!r} is no number"
-                ) from None
-            return self.checked(number)
+                    f"{self.name}: {shown if array.shape else repr(value)} is"
+                    " no number"
+                )
+            return self.checked(float(array))
 
     def samples(
         self, outcomes: QueryOutcomes, weights: np.ndarray | None = None
@@ -165,7 +176,10 @@ class Metric:
         counts = weights.astype(np.int64)
         every = np.arange(len(outcomes))
         return np.array(
-            [self.of(outcomes.subset(np.repeat(every, n))) for n in counts]
+            [
+                self._computed(outcomes.subset(np.repeat(every, n)))
+                for n in counts
+            ]
         )
 
 
@@ -535,7 +549,11 @@ def register_metric(
         def median_rank(outcomes):
             return float(np.median(outcomes.first_right_ranks))
     """
-    if not (name.isprintable() and name.strip() == name != ""):
+    if not (
+        isinstance(name, str)
+        and name.isprintable()
+        and name.strip() == name != ""
+    ):
         raise ValueError(f"{name!r} is no name of a metric")
     better = fields.get("better", "")
     if better not in ("more", "less", ""):
@@ -549,6 +567,11 @@ def register_metric(
             compute=compute,
             **fields,
         )
+        if metric.least >= metric.greatest:
+            raise ValueError(
+                f"{name}: least: {metric.least:g} is not below greatest,"
+                f" {metric.greatest:g}"
+            )
         if name in METRICS and METRICS[name].file is None:
             raise ValueError(f"there is another metric {name!r}")
         return metric
@@ -578,12 +601,38 @@ def load_metrics(path: Path) -> list[Metric]:
         raise InputError(
             f"{path}: registers no metric; see evaluation.register_metric"
         )
+    for name in repeated(metric.name for metric in found):
+        raise InputError(f"{path}: two metrics are named {name!r}")
     for metric in found:
         known = METRICS.get(metric.name)
         if known is not None and known.file != path:
             raise InputError(f"{path}: another metric is named {metric.name!r}")
+        _try(metric)
         METRICS[metric.name] = metric
     return found
+
+
+def _try(metric: Metric) -> None:
+    """Computes a user's metric of made-up outcomes, before any real ones.
+
+    Raises:
+        InputError: it fails, or is random.
+    """
+    right = np.arange(24) % 3 != 0
+    outcomes = QueryOutcomes(
+        best_scores=np.linspace(0.9, 0.1, 24),
+        is_right=right,
+        has_match=right | (np.arange(24) % 2 == 0),
+        first_right_ranks=np.where(right, 1.0, np.arange(24) + 2.0),
+        num_places=30,
+        blocks=np.arange(24) // 4,
+    )
+    first, second = metric.of(outcomes), metric.of(outcomes)
+    if not np.array_equal(first, second, equal_nan=True):
+        raise InputError(
+            f"{metric.file}: {metric.name}: other values of the same outcomes"
+            f" ({first:g}, {second:g}); give random numbers a fixed seed"
+        )
 
 
 def choose_metrics(names: Iterable[str]) -> list[Metric]:

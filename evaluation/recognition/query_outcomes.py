@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 import math
 
 import numpy as np
+
+from cns_drake.base import read_only
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +53,16 @@ class QueryOutcomes:
             self.num_places,
             None if self.blocks is None else self.blocks[kept],
         )
+
+    def read_only(self) -> QueryOutcomes:
+        """Returns the same outcomes, whose arrays cannot be changed."""
+        views = {}
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if isinstance(value, np.ndarray):
+                value = read_only(value)
+            views[one.name] = value
+        return QueryOutcomes(**views)
 
     @property
     def own_blocks(self) -> np.ndarray:

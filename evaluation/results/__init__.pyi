@@ -16,6 +16,7 @@ from evaluation.results.keys import PROTOCOL_BASE as PROTOCOL_BASE
 from evaluation.results.keys import SETTINGS as SETTINGS
 from evaluation.results.keys import STAGE as STAGE
 from evaluation.results.keys import Key as Key
+from evaluation.results.keys import check_metric_names as check_metric_names
 from evaluation.results.keys import made_by as made_by
 from evaluation.results.method_names import in_table_order as in_table_order
 from evaluation.results.method_names import title as title

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import json
 import math
 import re
 from typing import Any
@@ -22,6 +23,10 @@ _NUMBER = re.compile(
 _INFINITE = {"inf": math.inf, "-inf": -math.inf}
 # Leading zeros belong to names, as in the stage 01.
 _NAME_OF_DIGITS = re.compile(r"0\d+")
+# A text in JSON.
+_QUOTED = re.compile(r'".*"', re.DOTALL)
+# Control characters: no cell has them, and a terminal would obey them.
+CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _TRUTH = {"0": False, "1": True, "false": False, "true": True}
 
 
@@ -89,16 +94,37 @@ def _read_truth(cell: str) -> bool:
     return _TRUTH[cell.lower()]
 
 
+def _write_text(text: str) -> str:
+    """Returns a text as it is, or in JSON if it would be read otherwise."""
+    is_plain = text.strip(" ") == text and not _QUOTED.fullmatch(text)
+    return json.dumps(text) if not is_plain or CONTROL.search(text) else text
+
+
+def _read_text(cell: str) -> str:
+    if not _QUOTED.fullmatch(cell):
+        return cell
+    try:
+        return str(json.loads(cell))
+    except ValueError:
+        return cell  # As other programs write a text with quotation marks.
+
+
 def _write_factor(value: Any) -> str:
     if isinstance(value, bool | np.bool_):
         return str(value).lower()
     if isinstance(value, float):
         return _write_number(value)
-    return "" if value is None else str(value)
+    if not isinstance(value, str):
+        return "" if value is None else str(value)
+    cell = _write_text(value)
+    is_text = cell != value or isinstance(_read_factor(cell), str)
+    return cell if is_text else json.dumps(value)
 
 
 def _read_factor(cell: str) -> float | bool | str | None:
     """Returns a number, a truth value, text, or None for an empty cell."""
+    if _QUOTED.fullmatch(cell):
+        return _read_text(cell)
     if cell.lower() in ("true", "false"):
         return _TRUTH[cell.lower()]
     is_number = _NUMBER.fullmatch(cell) and not _NAME_OF_DIGITS.fullmatch(cell)
@@ -117,8 +143,11 @@ WHOLE = CellKind(_write_whole, _read_whole)
 SEED = CellKind(str, _read_seed)
 # Truth values, 0 or 1; never empty.
 TRUTH = CellKind(lambda value: str(int(value)), _read_truth)
-TEXT = CellKind(str, str)
-# Values of factors.
+# Text. What is read otherwise, such as a name that ends with a space, is in
+# quotation marks, as in JSON.
+TEXT = CellKind(_write_text, _read_text)
+# Values of factors. A text that looks like a number or a truth value, such as
+# "1e5", is in quotation marks, too.
 FACTOR = CellKind(_write_factor, _read_factor)
 
 
@@ -127,4 +156,7 @@ def as_factor(value: object) -> float | bool | str | None:
 
     A text on the command line and a number in a file are the same value.
     """
-    return _read_factor(_write_factor(value).strip(" "))
+    if not isinstance(value, str):
+        return _read_factor(_write_factor(value))
+    read = _read_factor(value.strip(" "))
+    return read if isinstance(read, int | float) else value

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import Any
 
-from cns_drake.base import __version__
-from evaluation.recognition import RetrievalProtocol
+from cns_drake.base import InputError, __version__
+from evaluation.recognition import Metric, RetrievalProtocol
 
 # The beginning of a factor that is a setting of a method.
 SETTINGS = "methods."
@@ -45,6 +45,22 @@ LEVEL = "level"
 NO_CAUSE = "none"
 # Names that no factor can have.
 RESERVED = frozenset(("label", *KEYS, *MEASURED))
+
+
+def check_metric_names(
+    metrics: Iterable[Metric], factors: Iterable[str]
+) -> None:
+    """Checks that no metric has the name of a column.
+
+    Raises:
+        InputError: one has.
+    """
+    for metric in metrics:
+        if metric.name in RESERVED or metric.name in factors:
+            raise InputError(
+                f"{metric.file}: {metric.name!r} is the name of a column of"
+                " the tables; give the metric another name"
+            )
 
 
 def key_columns(factors: Iterable[str]) -> tuple[str, ...]:

@@ -383,25 +383,21 @@ def _wide_table(results: Results) -> dict[str, Any]:
         any(isinstance(v, str) for v in column)
         for column in zip(*cells, strict=True)
     ]
+    forms = [
+        *("g" for _ in varied),
+        *(".0f" if metric_named(name).is_whole else "" for name in metrics),
+    ]
     columns = [
-        [f"{v:.0f}" if _is_finite(v) else value_text(v) for v in column]
-        if _are_counts(column)
-        else [value_text(v) for v in column]
-        for column in zip(*cells, strict=True)
+        [
+            f"{v:{form}}" if form and _is_finite(v) else value_text(v)
+            for v in column
+        ]
+        for form, column in zip(forms, zip(*cells, strict=True), strict=True)
     ]
     return {
         "header": list(zip(names, is_text, strict=True)),
         "rows": list(zip(*columns, strict=True)),
     }
-
-
-def _are_counts(values: Iterable[object]) -> bool:
-    """Returns whether all numbers are whole, and one is greater than 1.
-
-    Numbers that are all 0 or 1 may be shares, and therefore do not suffice.
-    """
-    numbers = np.array([v for v in values if _is_finite(v)])
-    return bool((numbers == np.floor(numbers)).all() and (numbers > 1.0).any())
 
 
 def _is_finite(value: object) -> bool:

@@ -7,12 +7,18 @@ import csv
 from dataclasses import dataclass
 import io
 from pathlib import Path
-import re
 from typing import Any
 
 from cns_drake.base import InputError, check_separator, read_bytes, repeated
 from evaluation.recognition import PROTOCOL_NAMES
-from evaluation.results.cells import FACTOR, SEED, TRUTH, CellKind
+from evaluation.results.cells import (
+    CONTROL,
+    FACTOR,
+    SEED,
+    TEXT,
+    TRUTH,
+    CellKind,
+)
 from evaluation.results.keys import (
     NEEDED_KEYS,
     OPTIONAL_KEYS,
@@ -21,8 +27,16 @@ from evaluation.results.keys import (
     key_columns,
 )
 
-# Control characters: no name has them, and a terminal would obey them.
-_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
+# Columns of a key that every table has, with text.
+_TEXTS = (
+    "experiment",
+    "map",
+    "task",
+    "database",
+    "query",
+    "method",
+    "protocol",
+)
 
 
 @dataclass(frozen=True)
@@ -80,13 +94,10 @@ class TableLine:
         Raises:
             InputError: a cell is empty or has a value that is not allowed.
         """
-        values: dict[str, Any] = {
-            name: self.text(name) for name in ("experiment", "map", "task")
-        }
-        for name in ("database", "query", "method", "protocol"):
-            values[name] = self.cells[self.columns[name]]
-        for name in filter(self.columns.__contains__, OPTIONAL_KEYS):
-            values[name] = self.cells[self.columns[name]]
+        for name in ("experiment", "map", "task"):
+            self.text(name)  # Not empty.
+        optional = filter(self.columns.__contains__, OPTIONAL_KEYS)
+        values = {name: self.value(name, TEXT) for name in (*_TEXTS, *optional)}
         self.text("seed")
         values["seed"] = self.value("seed", SEED)
         values["gate"] = self.value("gate", TRUTH)
@@ -211,10 +222,10 @@ def _csv_lines(file: Path) -> list[tuple[int, list[str]]]:
     if NEEDED_KEYS[0] not in names:
         check_separator(file, text)
     for index, (number, cells) in enumerate(lines):
-        if not _CONTROL.search("".join(cells)):
+        if not CONTROL.search("".join(cells)):
             continue
         k, cell = next(
-            (k, cell) for k, cell in enumerate(cells) if _CONTROL.search(cell)
+            (k, cell) for k, cell in enumerate(cells) if CONTROL.search(cell)
         )
         column = names[k] if index > 0 and k < len(names) else k + 1
         raise InputError(

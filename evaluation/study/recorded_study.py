@@ -44,7 +44,6 @@ from evaluation.results import (
     Results,
     browser_section,
     change_section,
-    check_output,
     in_table_order,
     page_section,
     routes_section,
@@ -122,7 +121,7 @@ def study_recordings(
         InputError: two recordings have the same map and stage, there is nothing
             to compare, a step failed, or a file cannot be written.
     """
-    check_output(output, ["page"])
+    StudyFiles(output).check()
     experiment = read_yaml(STAGES_FILE)
     engine = Engine(
         STAGES_FILE.stem,

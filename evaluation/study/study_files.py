@@ -1,9 +1,11 @@
 """Where the files of a study are in its folder."""
 
 from dataclasses import dataclass
+import os
 from pathlib import Path
 
-from cns_drake.base import file_name
+from cns_drake.base import InputError, file_name
+from evaluation.results import check_output
 from evaluation.study.parts import Part
 
 
@@ -73,6 +75,22 @@ class StudyFiles:
 
     output: Path
 
+    def check(self) -> None:
+        """Checks before all work what stands in the way of the study's files.
+
+        Raises:
+            InputError: `check_output` refuses the folder, or a file has the
+                name of one of its folders.
+        """
+        check_output(self.output, ["page"])
+        for folder in (self._parts, self.figures):
+            if os.path.lexists(folder) and not folder.is_dir():
+                raise InputError(f"{folder}: not a folder")
+
+    @property
+    def _parts(self) -> Path:
+        return self.output / "parts"
+
     @property
     def figures(self) -> Path:
         """The folder of all figures."""
@@ -80,7 +98,7 @@ class StudyFiles:
 
     def features(self, recording: str) -> FeatureFiles:
         """Returns the files with a recording's map and descriptors."""
-        folder = self.output / "parts" / "features"
+        folder = self._parts / "features"
         return FeatureFiles(folder / file_name(recording))
 
     def part(self, kind: str, *names: str) -> Part:
@@ -91,4 +109,4 @@ class StudyFiles:
             names: names of the drives to which the result belongs.
         """
         name = ",".join(map(file_name, names))
-        return Part(self.output / "parts" / kind / f"{name}.data")
+        return Part(self._parts / kind / f"{name}.data")

@@ -13,7 +13,6 @@ alpha_0 follow from two rows of the unit's data sheet: the ranges at 80 % and at
 """
 
 import math
-from statistics import NormalDist
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -21,13 +20,10 @@ from numpy.typing import ArrayLike
 from scipy.special import erf
 
 from cns_drake.base import compiled
-from cns_drake.units import ReturnsSheet, SheetRow
+from cns_drake.units import THRESHOLD_SNR, ReturnsSheet
 
 _Value = TypeVar("_Value", float, np.ndarray)
 
-# The SNR that a unit detects in half of all cases: Ouster's sheet of the OS1
-# (first generation) states 10 cm of range noise at an SNR of 12, its lowest.
-THRESHOLD_SNR = 9.0
 # Above this SNR, an echo is missed less than once in 10^13 times.
 CERTAIN_SNR = 81.0
 # Below this SNR, the probability of detection is 0 in double precision.
@@ -62,29 +58,14 @@ def fit_link_budget(sheet: ReturnsSheet) -> LinkBudget:
     """Returns the link budget that fits a data sheet's one or two rows exactly.
 
     Args:
-        sheet: the data sheet; two rows have different ranges.
+        sheet: the data sheet; two rows have different ranges. A sheet refuses
+            rows from which the SNR would rise with the range.
     """
-    rows = sheet.rows
-    # log(snr r^2 / e) = log(S) - 2 alpha_0 r at each row.
-    logs = [
-        math.log(stated_snr(row) * row.range**2 / row.reflectivity)
-        for row in rows
-    ]
-    extinction = 0.0
-    if len(rows) == 2:
-        way = 2.0 * (rows[1].range - rows[0].range)
-        extinction = (logs[0] - logs[1]) / way
-    scale = math.exp(logs[0] + 2.0 * extinction * rows[0].range)
+    extinction = sheet.own_extinction
+    first = sheet.rows[0]
+    scale = math.exp(first.log_strength + 2.0 * extinction * first.range)
     noise = sheet.range_noise, sheet.range_floor, sheet.range_bias
     return LinkBudget(scale, extinction, *noise)
-
-
-def stated_snr(row: SheetRow) -> float:
-    """Returns the SNR at which a target is detected as a row states."""
-    # `detection_probability`, solved for the root of the SNR.
-    z = NormalDist().inv_cdf(row.probability)
-    root = (z + math.sqrt(z * z + 4.0 * THRESHOLD_SNR)) / 2.0
-    return root * root
 
 
 @compiled

@@ -13,6 +13,7 @@ from cns_drake.base import (
     errors_at,
     read_records,
     validated,
+    value_errors,
 )
 from cns_drake.roads import RoadNetwork, Route, draw_route, load_road_network
 from cns_drake.scenarios import (
@@ -35,7 +36,7 @@ from cns_drake.studies.drives.viewpoints import (
 )
 from cns_drake.studies.experiments.nested_fields import Changes
 from cns_drake.traffic import room_for_vehicles
-from cns_drake.units import is_sheet_file
+from cns_drake.units import check_preset, is_sheet_file
 from evaluation.results import LAST, OWN
 
 # Fields of a drive that do not change the drive itself.
@@ -150,9 +151,14 @@ class DriveChanger:
         """Returns a drive with another LiDAR, or another model of returns."""
         if "lidar" in left:
             unit = left.pop("lidar")
-            if is_sheet_file(unit):
-                unit = str(Path(self._source).parent / unit)
-            with errors_at(f"{self._source}: {place}.lidar", "--lidar: "):
+            folder = Path(self._source).parent
+            where = f"{self._source}: {place}.lidar"
+            with value_errors(where), errors_at(where, "unit: "):
+                if is_sheet_file(unit, folder):
+                    unit = folder / unit
+                else:
+                    # A file of the working folder is not meant.
+                    check_preset(str(unit))
                 drive = drive.with_lidar(unit)
         if "returns" not in left:
             return drive

@@ -1,10 +1,12 @@
 """Reads experiments from files, with changes to single fields."""
 
+from __future__ import annotations
+
 from collections.abc import Collection, Iterable, Mapping, Sequence
 import contextlib
 from pathlib import Path
 import re
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -24,8 +26,13 @@ from cns_drake.studies.experiments.experiment import (
     named_programs,
 )
 from cns_drake.studies.experiments.nested_fields import Changes, merged, nested
-from evaluation.results import SETTINGS, chart_factors, check_factors
-from evaluation.study import STAGES_FILE
+from evaluation.results import (
+    SETTINGS,
+    as_factor,
+    chart_factors,
+    check_factors,
+)
+from evaluation.study import STAGES_FILE, CostTask
 
 _FOLDER = Path(__file__).parent
 
@@ -99,19 +106,20 @@ def load_experiment(
                 f"{path}: quick: missing, or no mapping; --quick needs this"
                 " section, with the fields to replace"
             )
-        values = _chosen_anew(values, short)
-        return _checked(values, path, overrides, chosen)
-    found = _checked(values, path, overrides, chosen)
+        changed = _chosen_anew(values, short)
+        return _checked(changed, values, path, overrides, chosen)
+    found = _checked(values, values, path, overrides, chosen)
     if isinstance(short, dict) and short:
         # A fault of the section is told before it is used.
         with errors_at(f"{path}: quick", f"{path}: "):
-            values = _chosen_anew(values, short)
-            _checked(values, path, overrides, chosen)
+            changed = _chosen_anew(values, short)
+            _checked(changed, values, path, overrides, chosen)
     return found
 
 
 def _checked(
     values: Changes,
+    written: Changes,
     path: Path,
     overrides: Iterable[str | tuple[str, Any]],
     chosen: Mapping[str, Sequence[str]],
@@ -119,12 +127,13 @@ def _checked(
     """Returns an experiment whose conditions are known to be usable.
 
     Args:
-        values: the fields of the file, in long form.
+        values: the fields of the experiment, in long form.
+        written: the fields of the file without those of `quick`, whose factors
+            charts may name, too.
         path: the file.
         overrides: see `load_experiment`.
         chosen: names of tasks and methods that replace those of the experiment.
     """
-    written = values
     for one in overrides:
         values = _overridden(values, one)
     values = in_long_form(dict(values))
@@ -135,20 +144,53 @@ def _checked(
             values[field] = {name: given.get(name, {}) for name in names}
     experiment = validated(Experiment, values, path)
     with value_errors(path):
-        factors = experiment.factor_names
+        known = _Measured.of(experiment)
     if values != written:
-        # A factor whose values an option has fixed is still known.
+        # What an option has left out is still known.
         with contextlib.suppress(InputError, ValueError):
-            known = validated(Experiment, written, path).factor_names
-            factors = [*dict.fromkeys([*factors, *known])]
-    _check_charts(experiment, factors, path)
+            known = known.joined(
+                _Measured.of(validated(Experiment, written, path))
+            )
+    _check_charts(experiment, known, path)
     return experiment
 
 
-def _check_charts(
-    experiment: Experiment, factors: Collection[str], path: Path
-) -> None:
-    """Checks that charts name factors of an experiment.
+class _Measured(NamedTuple):
+    """What charts can show: factors, their values, and tasks.
+
+    Attributes:
+        factors: names of the factors.
+        values: column -> the values that rows can have there. Columns whose
+            values are known only after the study are left out.
+    """
+
+    factors: tuple[str, ...]
+    values: Mapping[str, Collection[Any]]
+
+    @classmethod
+    def of(cls, experiment: Experiment) -> _Measured:
+        # The task `cost` is added to some studies.
+        tasks = (*experiment.tasks, CostTask.name)
+        values: dict[str, dict[Any, None]] = {"task": dict.fromkeys(tasks)}
+        for condition in experiment.conditions:
+            for name, value in condition.factors.items():
+                values.setdefault(name, {})[as_factor(value)] = None
+        return cls(tuple(experiment.factor_names), values)
+
+    def joined(self, other: _Measured) -> _Measured:
+        return _Measured(
+            (*self.factors, *other.factors),
+            {
+                name: dict.fromkeys(
+                    [*self.values.get(name, ()), *other.values.get(name, ())]
+                )
+                for name in (*self.values, *other.values)
+            },
+        )
+
+
+def _check_charts(experiment: Experiment, known: _Measured, path: Path) -> None:
+    """Checks that charts show what an experiment measures.
 
     Settings of methods, and metrics of the user, are known once their files
     have run: `run_study` checks them.
@@ -157,6 +199,7 @@ def _check_charts(
         InputError: a chart names something else, or cannot be used.
     """
     has_own = bool(named_programs(experiment.metrics))
+    factors = [*dict.fromkeys(known.factors)]
     for chart in experiment.charts:
         with errors_at(path):
             names = [
@@ -166,6 +209,23 @@ def _check_charts(
                 and not (has_own and name in (chart.get("x"), chart.get("y")))
             ]
             check_factors(chart, names, factors)
+            if chart["kind"] == "lines":
+                for one in known.values.get(chart["over"], ()):
+                    if isinstance(one, str):
+                        raise InputError(
+                            f"charts: lines: over: {chart['over']}: {one!r} is"
+                            " no number; take dumbbell or matrix"
+                        )
+            for name, value in chart.items():
+                chosen = value if isinstance(value, list) else [value]
+                there = known.values.get(name, chosen)
+                for one in chosen:
+                    if one not in there:
+                        listed = ", ".join(map(str, there))
+                        raise InputError(
+                            f"charts: {chart['kind']}: {name}: {one!r} is none"
+                            f" of {listed}"
+                        )
 
 
 def _experiment_file(name_or_file: str | Path) -> Path:

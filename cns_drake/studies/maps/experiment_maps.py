@@ -1,11 +1,12 @@
 """The maps of an experiment, with the drives that are compared on each map."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Cluster, InputError, natural_key
+from cns_drake.base import Cluster, InputError, errors_at, natural_key
 from cns_drake.scenarios import (
     Scenario,
     load_scenario,
@@ -88,6 +89,7 @@ def pairs_by_map(run: ExperimentRun, maps: Sequence[str]) -> Iterator[MapPairs]:
     wanted: Sequence[str | MadeMap] = [made.get(one, one) for one in maps]
     if not maps:
         wanted = run.experiment.maps or recordable_maps()
+    place = "" if maps else f"{run.source}: maps"
     known: set[str] = set()
     for one in wanted:
         # A wrong name is found before any map is made.
@@ -99,13 +101,10 @@ def pairs_by_map(run: ExperimentRun, maps: Sequence[str]) -> Iterator[MapPairs]:
                 f" {getattr(one, 'name', one)}: no shipped map"
             )
         if isinstance(one, str) and not Path(one).is_dir():
-            try:
+            with errors_at(place) if place else nullcontext():
                 recordable_map(one)
-            except InputError as error:
-                place = "" if maps else f"{run.source}: maps: "
-                raise InputError(f"{place}{error}") from None
     for one in wanted:
-        for some in _pairs_of(run, one):
+        for some in _pairs_of(run, one, place):
             names = {some.map_name, *some.drive_names}
             if some.factors:
                 names.remove(some.map_name)
@@ -118,7 +117,10 @@ def pairs_by_map(run: ExperimentRun, maps: Sequence[str]) -> Iterator[MapPairs]:
             yield some
 
 
-def _pairs_of(run: ExperimentRun, one: str | MadeMap) -> Iterator[MapPairs]:
+def _pairs_of(
+    run: ExperimentRun, one: str | MadeMap, place: str
+) -> Iterator[MapPairs]:
+    """Yields the pairs of a map; `place` is the field for errors, or ""."""
     kind = run.experiment.drives
     if isinstance(one, MadeMap):
         folder = run.output / "cities" / one.name
@@ -142,7 +144,9 @@ def _pairs_of(run: ExperimentRun, one: str | MadeMap) -> Iterator[MapPairs]:
             )
         return
     if path.is_dir() and not MapFolder(path).drives():
-        for city in drives_by_map(find_recordings(path, run.on_note)):
+        with errors_at(place) if place else nullcontext():
+            recorded = drives_by_map(find_recordings(path, run.on_note))
+        for city in recorded:
             yield MapPairs(city.name, {}, city=city)
         return
     yield MapPairs(path.name, {}, _drive_pairs(recordable_map(one), kind))

@@ -188,6 +188,14 @@ class PairMaker:
             MissingError: the map lacks what the condition needs.
             InputError: a field is unknown or not usable.
         """
+        try:
+            return self._build(condition, seed)
+        except InputError as error:
+            raise InputError(
+                _as_written(str(error), self.source, condition)
+            ) from error
+
+    def _build(self, condition: Condition, seed: int) -> ComparedDrives:
         fields = self._fields(condition)
         both = fields.get("both", {})
         database = merged(both, fields.get("database", {}))
@@ -449,6 +457,33 @@ _SHARED_FIELDS = (*DATABASE_FIELDS, "rates")
 _OF_DATABASE = ("keep", "maintain")
 # Fields that put a drive into another frame of reference.
 _FRAME_FIELDS = ("map", "world")
+
+
+def _as_written(fault: str, source: str, condition: Condition) -> str:
+    """Returns a fault of a drive's field, with the section that sets the field.
+
+    That can be `both` or a case, of which the drive's section knows nothing.
+    """
+    found = re.match(
+        rf"{re.escape(source)}: (database|query)[.:] ?(\w+)", fault
+    )
+    if found is None:
+        return fault
+    side, field = found.groups()
+    sections = {n: condition.changes.get(n, {}) for n in (side, "both")}
+    case = f"cases.{condition.factors.get(CAUSE)}"
+    for cause in condition.causes:
+        for name in (side, "both"):
+            changes = cause[0].get(name, {}) if cause else {}
+            sections[f"{case}.{name}"] = {
+                **sections.get(f"{case}.{name}", {}),
+                **changes,
+            }
+    for section, fields in sections.items():
+        if field in fields:
+            start, end = found.span(1)
+            return fault[:start] + section + fault[end:]
+    return fault
 
 
 def _session_fields(

@@ -5,7 +5,7 @@ structures, and two earlier stages, are sampled anew. Several drives follow the
 same route and differ as real visits do: in stage, effects, LiDAR and driver.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from cns_drake.scene import STAGES_NAME, MapFolder
 from cns_drake.studies.drives.viewpoints import with_lidars_moved
 from cns_drake.studies.maps.redrawing import marked_yaml, redrawn_inputs
 from cns_drake.studies.maps.turned_inputs import turned_content
+from cns_drake.units import make_sheet
 
 # First seed, far from the seeds of all experiments and tests.
 _FIRST_SEED = 500_000
@@ -29,7 +30,9 @@ _FIRST_SEED = 500_000
 _MOST_CITIES = 1000
 # Length of a route [m].
 _ROUTE_LENGTH = 1600.0
+# LiDARs of some drives; the others have the map's LiDAR.
 _PRESETS = ("os1-64", "hdl-64e", "os1-32", "vlp-16", "os1-128")
+_SHARE_OF_PRESETS = 0.35
 # Takes the place of a map's name in cities whose streets are drawn.
 DRAWN_STREETS = "drawn"
 # Purpose of the random numbers of streets; cities and drives have the least.
@@ -54,6 +57,10 @@ class SampledCity:
         driver: whether drivers wander and change lanes.
         graded: whether the overlap of each scan with the places of the other
             scans is computed.
+        lidars: LiDARs of the drives, from which each drive gets one at random:
+            names of presets, or fields of data sheets, for JSON. By default,
+            some drives have one of five presets, and the others the LiDAR of
+            the map.
     """
 
     map_name: str
@@ -64,6 +71,7 @@ class SampledCity:
     returns: bool = True
     driver: bool = True
     graded: bool = False
+    lidars: tuple[str | Mapping[str, Any], ...] = ()
 
     @property
     def city_seed(self) -> int:
@@ -122,13 +130,16 @@ class SampledCity:
         aside = float(rng.uniform(-1.0, 1.0))
         if rng.random() < 0.35:
             aside = float(rng.uniform(-2.0, 6.0))
-        preset = _PRESETS[int(rng.integers(len(_PRESETS)))]
+        lidars = self.lidars or _PRESETS
+        lidar = lidars[int(rng.integers(len(lidars)))]
         changes = _draw_changes(rng, number)
         returns = rng.random() < 0.6
         fog = float(rng.uniform(80.0, 400.0)) if rng.random() < 0.2 else None
         seed = int(rng.integers(2**31))
-        if rng.random() < 0.35:
-            drive = drive.with_lidar(preset)
+        if rng.random() < _SHARE_OF_PRESETS or self.lidars:
+            drive = drive.with_lidar(
+                lidar if isinstance(lidar, str) else make_sheet(lidar, "lidars")
+            )
         fields: dict[str, Any] = {"seed": seed}
         if self.driver:
             fields["driver"] = {

@@ -62,6 +62,7 @@ class TrainingPlan:
         drawn_streets: whether the streets of the cities are sampled at random.
         graded: whether exact overlaps, and not distances, determine which
             places are right.
+        lidars: LiDARs of the drives, see `SampledCity`.
     """
 
     cities: int
@@ -72,6 +73,7 @@ class TrainingPlan:
     driver: bool = True
     drawn_streets: bool = False
     graded: bool = False
+    lidars: tuple[str | Mapping[str, Any], ...] = ()
 
     @classmethod
     def of_minutes(cls, minutes: float, **fields: Any) -> TrainingPlan:
@@ -93,6 +95,7 @@ class TrainingPlan:
                 returns=self.returns,
                 driver=self.driver,
                 graded=self.graded,
+                lidars=self.lidars,
             )
             for number in range(self.cities)
         ]

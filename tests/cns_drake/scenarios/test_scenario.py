@@ -85,7 +85,7 @@ def test_preset_replaces_the_lidar_where_it_is():
     values = scenario.model_dump() | own
     config = make_scenario(values, "test").with_lidar("vlp-16")
     assert config.lidars["a"] == LidarSection(preset="vlp-16", range_noise=0.02)
-    with pytest.raises(InputError, match=r"--lidar: preset: .*os2-128.*vlp-16"):
+    with pytest.raises(InputError, match=r"^unit: .*os2-128.*vlp-16"):
         scenario.with_lidar("os2-128")
 
 

@@ -129,7 +129,7 @@ def test_the_option_of_a_simulation(tmp_path, capfd):
     write_sheet(tmp_path, columns="many")
     status, said = run_drake(capfd, *words, "--lidar", sheet, "--overwrite")
     assert status == 2
-    assert f"--lidar: unit: {sheet}: columns: " in said
+    assert f"--lidar: {sheet}: columns: " in said
     assert said.strip().count("\n") == 0
     status, said = run_drake(capfd, *words, "--lidar", tmp_path / "no.yaml")
     assert (status, "no.yaml: No such file" in said) == (2, True)
@@ -318,5 +318,7 @@ def test_scans_of_a_real_lidar_name_its_sheet(tmp_path):
     found = read_scenario(tmp_path)["lidars"]["lidar"]["unit"]
     assert (found["columns"], found["source"]) == (40, "mine")
     write_sheet(tmp_path, ranges="far")
-    with pytest.raises(InputError, match=r"lidars: .*unit.yaml: ranges: "):
+    with pytest.raises(
+        InputError, match=r"lidars.lidar: .*unit.yaml: ranges: "
+    ):
         read_scenario(tmp_path)

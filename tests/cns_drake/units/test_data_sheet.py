@@ -103,6 +103,10 @@ FAULTS = [
         {"returns": {"head": {"elevations_deg": [10.0, 0.0, -10.0]}}},
         ".*returns.head.elevations_deg: 3 elevations of 48 rings",
     ),
+    (
+        {"returns": {"rows": [[0.8, 60, 0.9], [0.5, 20, 0.9]]}},
+        "returns: rows: these two say that echoes get stronger",
+    ),
     ({"returns": {"range_noise": -1.0}}, "returns.range_noise: "),
     ({"returns": {"noise": 1.0}}, "returns.noise: Extra"),
     ({"returns": {"head": {"alternate": 5.0}}}, "returns.head: alternate: 5"),

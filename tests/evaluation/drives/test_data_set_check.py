@@ -146,6 +146,8 @@ SCANS = scans_in(X_WB)
         ("without points", [one[:0] for one in SCANS], {}),
         ("inverted", SCANS, {"X_WS": poses.inverse(X_WB)}),
         ("in one frame already", [SCANS[0]] * NUM_SCANS, {}),
+        ("points in feet", [one / 0.3048 for one in SCANS], {}),
+        ("without points", [one * np.nan for one in SCANS], {}),
         ("every 1e-07 s", SCANS, {"times": 1e-7 * np.arange(NUM_SCANS)}),
         (
             "moves at 150000 m/s",
@@ -164,6 +166,12 @@ def test_a_wrong_drive_is_refused_in_one_line(tmp_path, fault, scans, more):
     assert "\n" not in str(raised.value)
 
 
+def test_beams_without_a_return_are_left_out(tmp_path):
+    missed = np.full((40, 3), np.nan)
+    kitti(tmp_path / "00", [np.concatenate([one, missed]) for one in SCANS])
+    check_data_set(tmp_path / "00")
+
+
 def test_poses_that_hang_down(tmp_path):
     """KITTI's frame is that of the first scan, so another layout shows it."""
     folder = tmp_path / "drive"
@@ -180,10 +188,16 @@ def test_poses_that_hang_down(tmp_path):
         ("[vlp-16]", "lidars: not a mapping"),
         ("{roof: vlp-16}", "lidars: not a mapping"),
         ("{roof: {preset: vlp16}}", "lidars: preset: .* did you mean vlp-16"),
-        ("{roof: {unit: 16}}", "lidars: unit: not a mapping"),
-        ("{roof: {unit: {columns: 16}}}", "lidars: unit: ranges: "),
-        ("{roof: {unit: none.yaml}}", "lidars: .*none.yaml: No such file"),
-        ("{roof: {unit: a.yaml, preset: cns}}", "lidars: unit: give either"),
+        ("{roof: {unit: 16}}", "lidars.roof: unit: not a mapping"),
+        ("{roof: {unit: {columns: 16}}}", "lidars.roof: unit: ranges: "),
+        ("{roof: {unit: none.yaml}}", "lidars.roof: .*none.yaml: No such file"),
+        (
+            "{roof: {unit: a.yaml, preset: cns}}",
+            "lidars.roof: unit: give",
+        ),
+        ("{roof: {preset: cns, rings: 0}}", "lidars.roof: rings: 0 is no"),
+        ("{roof: {rings: 100000000000}}", "lidars.roof: rings: 1000"),
+        ("{roof: {rings: many}}", "lidars.roof: rings: 'many' is no"),
     ],
 )
 def test_a_lidar_that_cannot_be(tmp_path, lidars, fault):

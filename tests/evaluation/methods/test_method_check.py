@@ -111,6 +111,11 @@ FAULTS = {
     "score returned ndarray of shape": {
         "score": lambda self, query, database, *, exhaustive=False: np.zeros(2)
     },
+    "every place has the same score": {
+        "score": lambda self, query, database, *, exhaustive=False: np.ones(
+            len(database)
+        )
+    },
     "infinite score": {
         "score": lambda self, query, database, *, exhaustive=False: np.full(
             len(database), np.inf
@@ -164,6 +169,9 @@ FAULTS = {
     "title: 7": {"title": 7},
     "point_fields: 'intensity'": {"point_fields": "intensity"},
     "point_fields: .*'x'": {"point_fields": ("x",)},
+    "no recording has 'intensty'; did you mean intensity": {
+        "point_fields": ("intensty",)
+    },
     "describe_place raised SystemExit": {"describe": lambda *_: sys.exit()},
     "name: missing": {"name": ""},
 }

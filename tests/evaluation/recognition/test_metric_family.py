@@ -179,6 +179,9 @@ def test_a_file_adds_a_metric(tmp_path):
         (OWN.replace("mean_rank", "auc"), "there is another metric 'auc'"),
         (OWN.replace("less", "lower"), "better: 'lower'"),
         (OWN.replace("least=", "lowest="), "lowest"),
+        (OWN.replace('"mean_rank"', "7"), "7 is no name of a metric"),
+        (OWN.replace("1.0", "1.0, greatest=0.0"), "least: 1 is not below"),
+        (OWN + OWN.replace("def mean", "def other"), "two metrics are named"),
         ("1 / 0", "line 1: ZeroDivisionError"),
     ],
 )
@@ -195,17 +198,37 @@ def test_a_file_that_adds_none(tmp_path, text, words):
     ("line", "words"),
     [
         ("return 'high'", "mean_rank: 'high' is no number"),
+        ("return '2.5'", "mean_rank: '2.5' is no number"),
+        ("return None", "mean_rank: None is no number"),
+        ("return 1j", "mean_rank: 1j is no number"),
+        ("return np.ones(3)", "an array of shape .3,. is no number"),
+        ("return np.ones((1, 1))", "an array of shape .1, 1. is no number"),
+        ("return np.nan", "undefined .NaN.; say when that is in `undefined`"),
+        ("return 1 + np.random.default_rng().random()", "of the same outcomes"),
+        ("outcomes.is_right[:] = True", "read-only"),
         ("return -3.0", "mean_rank: -3 cannot be: it is a number from 1 on"),
         ("raise KeyError('x')", "KeyError"),
     ],
 )
-def test_a_wrong_value_names_the_file(tmp_path, line, words):
+def test_a_wrong_value_names_the_file_before_any_job(tmp_path, line, words):
     path = tmp_path / "own.py"
     path.write_text(OWN.partition("    return")[0] + f"    {line}\n")
-    (own,) = load_metrics(path)
     with pytest.raises(InputError, match=words) as raised:
-        own.of(outcomes())
+        load_metrics(path)
     assert str(raised.value).startswith(str(path))
+    assert "mean_rank" not in METRICS
+
+
+def test_a_value_that_is_undefined_later_names_the_file(tmp_path):
+    path = tmp_path / "own.py"
+    path.write_text(OWN)
+    (own,) = load_metrics(path)
+    none = judge(np.zeros((3, 2)), np.zeros((3, 2), bool))
+    with pytest.raises(InputError, match=r"own\.py: mean_rank: .*`undefined`"):
+        own.of(none)
+    path.write_text(OWN.replace("least=1.0", "undefined='no match', least=1.0"))
+    (own,) = load_metrics(path)
+    assert math.isnan(own.of(none))
 
 
 def test_an_unknown_metric_is_refused_with_all_names():

@@ -113,6 +113,25 @@ def test_values_of_factors(tmp_path, cell, value):
     assert type(row[FACTOR]) is type(value)
 
 
+@pytest.mark.parametrize(
+    ("given", "value"),
+    [
+        ("60", 60),
+        (" 1e5", 1e5),
+        ("True", True),
+        ("007", "007"),
+        (" x ", " x "),
+        ("", ""),
+        (True, True),
+        (60, 60),
+        (math.nan, None),
+    ],
+)
+def test_a_text_of_the_command_line_counts_as_what_it_says(given, value):
+    found = as_factor(given)
+    assert (type(found), found) == (type(value), value)
+
+
 def test_columns_may_have_any_order(tmp_path):
     order = np.random.default_rng(1).permutation(15)
     lines = [
@@ -393,6 +412,14 @@ WORDS = (
     "5.",
     "-0",
     "x" * 300,
+    "1e5",
+    "true",
+    "007",
+    " x ",
+    '"quoted"',
+    '"',
+    "two\nlines",
+    "\x1b[31m",
 )
 FACTORS = (
     None,
@@ -428,7 +455,7 @@ def test_what_is_written_is_read_value_for_value(tmp_path, seed):
             factors={
                 name: value
                 for name in ("query.a;b", "methods.c,d.e", "both.f")
-                if (value := as_factor(some(FACTORS))) is not None
+                if (value := some(FACTORS)) is not None
             },
         )
         for k in range(30)

@@ -40,6 +40,36 @@ def test_other_names_are_refused_with_all_factors(read, chart):
     assert f"(there are: {NAMES})" in str(raised.value)
 
 
+@pytest.mark.parametrize(
+    ("selected", "fault"),
+    [
+        ("task: pose", "task: 'pose' is none of place, cost"),
+        ("task: [place, map]", "task: 'map' is none of place, cost"),
+        ("database.years: 5", "database.years: 5 is none of 0, 10"),
+        ("cause: found", "cause: 'found' is none of none, lost"),
+    ],
+)
+def test_rows_that_no_table_has_are_refused(read, selected, fault):
+    chart = "  - {kind: lines, over: query.transient.snow, metric: auc, %s}"
+    with pytest.raises(InputError, match=rf"yaml: charts: lines: {fault}"):
+        read(TEXT + chart % selected)
+
+
+def test_lines_are_over_numbers(read):
+    chart = "  - {kind: lines, over: cause, metric: auc}"
+    with pytest.raises(InputError, match="lines: over: cause: 'none' is no nu"):
+        read(TEXT + chart)
+
+
+def test_values_that_quick_or_an_option_leaves_out_are_known(read):
+    chart = (
+        "  - {kind: lines, over: query.transient.snow, metric: auc,"
+        " database.years: 10, task: place}\nquick: {database: {years: [0]}}"
+    )
+    read(TEXT + chart)
+    read(TEXT + chart, "database.years=[0, 20]", "tasks=[pose]")
+
+
 def test_a_factor_that_an_option_fixes_is_known(read):
     text = f"{TEXT}  - {{kind: lines, over: database.years, metric: auc}}"
     found = read(text, "database.years=10")

@@ -693,10 +693,9 @@ def test_a_single_result_has_its_interval(tmp_path, ends, seeds, cell):
 def test_counts_are_whole_on_a_page(tmp_path):
     values = {
         "lost": (29.0, 106.0),
-        "first_right_rank": (3.0, math.inf),
-        # Shares that are 0 or 1 by chance, and a metric that is no count.
+        # Whole by chance: a share, and a time.
         "r1": (0.0, 1.0),
-        "found": (2.0, 2.5),
+        "query_time": (2.0, 3.0),
     }
     results = Results.of(
         row(value, {YEARS: year}, metric=metric)
@@ -709,9 +708,9 @@ def test_counts_are_whole_on_a_page(tmp_path):
     header, *lines = page.tables[-1]
     columns = dict(zip(header, zip(*lines, strict=True), strict=True))
     assert columns["lost"] == ("29", "106")
-    assert columns["first_right_rank"] == ("3", "more")
     assert columns["r1"] == ("0.000", "1.000")
-    assert columns["found"] == ("2.000", "2.500")
+    assert columns["query_time"] == ("2.000", "3.000")
+    assert columns[YEARS] == ("0", "10")
 
 
 def test_a_page_without_a_chart_or_a_value(tmp_path):

@@ -620,14 +620,14 @@ FAULTS = [
     ("database: {stage: '09'}", "database.stage: '09': town has 01, 02, 04"),
     ("database: {stage: 1}", "database.stage: 1: town has"),
     ("database: {stage: earlier 5}", "database.stage: 'earlier 5'"),
-    ("cases: {a: {query: {stage: next}}}", "query.stage: 'next'"),
+    ("cases: {a: {query: {stage: next}}}", "cases.a.query.stage: 'next'"),
     ("{database: {stage: '01'}, query: {years: 5}}", "years: stage last ages"),
     (
         "{database: {redraw: 3}, query: {years: 5}}",
         "database.redraw: a city drawn anew does not age by query.years",
     ),
     ("query: {without: [nothing]}", "query.without: .*no structure nothing to"),
-    ("both: {without: [nothing]}", "database.without: .*no structure nothing"),
+    ("both: {without: [nothing]}", "both.without: .*no structure nothing"),
     ("query: {map: nowhere}", "query: map: 'nowhere' is neither"),
     ("query: {map: metropolis, stage: '09'}", "query.stage: '09': .* has 01"),
     (
@@ -638,7 +638,13 @@ FAULTS = [
     ("query: {frames: 99999}", "query: frames: 99999 is too many: the drive"),
     (
         "cases: {a: {query: {traffic: {fcd: no.xml}}}}",
-        "query: traffic.fcd: no.xml: no such file",
+        "cases.a.query: traffic.fcd: no.xml: no such file",
+    ),
+    ("both: {transient: {snoww: 1}}", "both: transient.snoww: Extra"),
+    ("cases: {a: {both: {sno: 1}}}", "cases.a.both: sno: Extra"),
+    (
+        "{cases: {a: {query: {ride: 3}}, b: [a]}, query: {imu: {rate: 20}}}",
+        "cases.a.query: ride: ",
     ),
     ("query: {imu: {kalibr: no.yaml}}", "query: imu.kalibr: no.yaml: no such"),
     ("database: {rates: 2}", "database.rates: those of no years"),
@@ -648,12 +654,12 @@ FAULTS = [
         "database.rates: those of no years",
     ),
     ("query: {distractors: 3}", "query.distractors: it is a field of database"),
-    ("both: {lateral: 3}", "query.lateral: it is a field of database"),
+    ("both: {lateral: 3}", "both.lateral: it is a field of database"),
     ("database: {hide_sector: 3}", "database.hide_sector: .* field of query"),
     ("database: {redraw: {frozen: 1}}", "database.redraw: give a number"),
     (
         "cases: {a: {both: {redraw: {frozen: 1}}}}",
-        "database.redraw: give a number",
+        "cases.a.both.redraw: give a number",
     ),
     ("database: {distractors: -1}", "database.distractors: -1 is not from 0"),
     ("database: {distractors: 100001}", "database.distractors: 100001 is not"),
@@ -742,5 +748,26 @@ def test_data_sheets_as_a_factor(query_drive, tmp_path):
     path.write_text(f"query: {lidars}\n")
     with pytest.raises(
         InputError, match=rf"^{path}: query: lidars.lidar.unit: .*b.yaml: "
+    ):
+        Conditions(load_experiment(path), query_drive, source=str(path))
+
+
+def test_a_file_of_the_working_folder_is_no_sheet(
+    tmp_path, query_drive, monkeypatch
+):
+    """Paths start at the experiment, also of files without an ending."""
+    sheet = "rings_deg: [[9, -9, 5]]\ncolumns: 9\nranges: [1, 9]\nsource: a\n"
+    (tmp_path / "here").write_text(sheet)
+    (tmp_path / "work").mkdir()
+    (tmp_path / "work" / "there").write_text(sheet)
+    monkeypatch.chdir(tmp_path / "work")
+    path = tmp_path / "mine.yaml"
+    path.write_text("query: {lidar: here}\n")
+    found = Conditions(load_experiment(path), query_drive, source=str(path))
+    (compared,) = found.compared()
+    assert make_pattern(compared.query.lidars["lidar"]).num_rings == 5
+    path.write_text("query: {lidar: there}\n")
+    with pytest.raises(
+        InputError, match=rf"^{path}: query.lidar: unknown preset 'there'"
     ):
         Conditions(load_experiment(path), query_drive, source=str(path))

@@ -7,6 +7,7 @@ import pytest
 
 from cns_drake.base import InputError
 from cns_drake.roads import draw_route, load_road_network
+from cns_drake.scenarios import load_scenario
 from cns_drake.studies import TrainingPlan
 from cns_drake.studies.maps.redrawing import marked_yaml
 from cns_drake.studies.training import batches, descent
@@ -17,7 +18,7 @@ from cns_drake.studies.training.network import (
     scores,
     start_parameters,
 )
-from cns_drake.studies.training.sampled_city import draw_streets
+from cns_drake.studies.training.sampled_city import SampledCity, draw_streets
 from cns_drake.studies.training.weights import MAPS, write_weights
 from evaluation.methods import (
     CHANNELS,
@@ -170,6 +171,25 @@ def test_plans_of_minutes():
     assert len({one.city_seed for one in drawn}) == 3
     assert all(one.city_seed > 100_000 and not one.change for one in drawn)
     assert TrainingPlan.of_minutes(10.0, cities=5).cities == 5
+
+
+def test_lidars_of_the_users():
+    """Each drive has one of them, and nothing else changes."""
+    sheet = {
+        "rings_deg": [[10.0, -10.0, 48]],
+        "columns": 512,
+        "ranges": [0.5, 60.0],
+        "source": "mine",
+    }
+    base = load_scenario("riverside_01")
+    usual = SampledCity("riverside", 1, 0, 12)
+    own = TrainingPlan(1, 1, lidars=("vlp-16", sheet)).drawn()[0]
+    rings = set()
+    for number in range(12):
+        first, second = (one._drive(base, number) for one in (usual, own))
+        assert first.replaced(lidars=second.lidars) == second
+        rings.add(second.lidars["lidar"].sheet.num_rings)
+    assert rings == {16, 48}
 
 
 def test_graded_batches_rank_by_overlap():

@@ -1,0 +1,27 @@
+"""Names in the folder of a study that something else has."""
+
+import pytest
+
+from cns_drake.base import InputError
+from evaluation.study import StudyFiles
+
+
+@pytest.mark.parametrize("name", ["results.csv", "queries.csv", "index.html"])
+def test_a_folder_with_the_name_of_a_file_is_found_first(tmp_path, name):
+    StudyFiles(tmp_path / "new").check()
+    StudyFiles(tmp_path).check()
+    (tmp_path / name).write_text("of an earlier run")
+    (tmp_path / "parts").mkdir()
+    StudyFiles(tmp_path).check()
+    (tmp_path / name).unlink()
+    (tmp_path / name).mkdir()
+    with pytest.raises(InputError, match=rf"^{tmp_path / name}: "):
+        StudyFiles(tmp_path).check()
+
+
+def test_a_file_with_the_name_of_a_folder_is_found_first(tmp_path):
+    (tmp_path / "parts").write_text("")
+    with pytest.raises(InputError, match=rf"^{tmp_path}/parts: not a folder"):
+        StudyFiles(tmp_path).check()
+    with pytest.raises(InputError, match=r"/parts: not a folder$"):
+        StudyFiles(tmp_path / "parts").check()
