@@ -35,8 +35,10 @@ from cns_drake.base.own_packages import leave_out_folder
 from cns_drake.base.process import collect_garbage_seldom
 from cns_drake.base.progress import heard_by
 
-# How long a process may take to close its files after SIGTERM [s].
-PATIENCE = 30.0
+# How long a process may take to close its files after SIGTERM [s]. A process
+# that does not react, because it is inside a library, is then killed, so that
+# an interrupted command ends within five seconds.
+PATIENCE = 3.0
 # File descriptors. Whatever a job prints goes to stderr.
 _STDOUT = 1
 _STDERR = 2
