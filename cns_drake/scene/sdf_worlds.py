@@ -110,7 +110,7 @@ _GROUND = """<model name="ground_plane"><link name="link"><visual name="visual">
 _DEEPEST = 20
 # Greatest number of elements in all included models together. A few files that
 # include each other can stand for any number.
-_MOST_INCLUDED = 500_000
+_MOST_INCLUDED = 250_000
 # Thickness of the box for a plane of finite size, below its surface [m].
 _PLANE_THICKNESS = 1e-4
 # Size of the box for an infinite plane. Larger shapes would show the single

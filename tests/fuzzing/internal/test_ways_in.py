@@ -627,13 +627,13 @@ def _(folder):
 # --- Images
 
 
-def png(width, height, mode=0):
+def png(width, height, mode=0, rows=9):
     def chunk(kind, data):
         checksum = struct.pack(">I", zlib.crc32(kind + data))
         return struct.pack(">I", len(data)) + kind + data + checksum
 
     packer, row = zlib.compressobj(9), bytes(1 + width * (3 if mode else 1))
-    data = b"".join(packer.compress(row) for _ in range(height))
+    data = b"".join(packer.compress(row) for _ in range(rows))
     head = struct.pack(">IIBBBBB", width, height, 8, mode, 0, 0, 0)
     return b"\x89PNG\r\n\x1a\n" + b"".join(
         (chunk(b"IHDR", head), chunk(b"IDAT", data + packer.flush()),
@@ -642,10 +642,11 @@ def png(width, height, mode=0):
 
 
 def show(folder):
-    from cns_drake.base import open_image, to_jpeg, value_errors
+    from cns_drake.base import open_image, to_jpeg, user_errors, value_errors
 
-    with value_errors(folder / "x.png"):
-        return to_jpeg(open_image((folder / "x.png").read_bytes()))
+    file = folder / "x.png"
+    with user_errors(file), value_errors(file):
+        return to_jpeg(open_image(file.read_bytes()))
 
 
 @way("image: large", "x.png", "cns_drake.base.open_image", use=show)
@@ -657,13 +658,12 @@ def _(folder):
     "image: as large as allowed", "x.png", "cns_drake.base.open_image", use=show
 )
 def _(folder):
-    (folder / "x.png").write_bytes(png(5700, 5700, 2))
+    (folder / "x.png").write_bytes(png(5700, 5700, 2, 5700))
 
 
 @way("image: declared", "x.png", "cns_drake.base.open_image", use=show)
 def _(folder):
-    data = png(9, 9)
-    (folder / "x.png").write_bytes(data[:16] + b"\0\0\xff\xff" * 2 + data[24:])
+    (folder / "x.png").write_bytes(png(65_535, 65_535))
 
 
 @way(
@@ -723,7 +723,7 @@ def _(folder):
 
 @way("sdf: one name", "w.sdf", *WORLDS, use=world())
 def _(folder):
-    (folder / "w.sdf").write_text(sdf(BOX * 9000))
+    (folder / "w.sdf").write_text(sdf(BOX * 6000))
 
 
 @way("sdf: a long number", "w.sdf", *WORLDS, use=world())
@@ -748,7 +748,7 @@ def _(folder):
     (folder / "m.obj").write_text(text)
 
 
-@way("urdf", "w.urdf", *WORLDS, "world .urdf", use=world("w.urdf"))
+@way("urdf", "m.obj", *WORLDS, "world .urdf", use=world("w.urdf"))
 def _(folder):
     (folder / "w.urdf").write_text(
         '<robot name="r"><link name="l"><visual><geometry><mesh'
@@ -1078,11 +1078,11 @@ def _(folder):
 
 def kitti(folder):
     from evaluation.change import read_map
-    from evaluation.drives import open_drive, sample_frames, travelled
+    from evaluation.drives import open_drive, sample_frames
 
     path = folder / "kitti" / "sequences" / "07"
     drive = open_drive(path)
-    sample_frames(travelled(drive.X_WS), 0.001)
+    sample_frames(drive.X_WS[:, :3, 3], 0.001)
     return read_map(path)
 
 
