@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 import io
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,7 +24,7 @@ _LEAST_SPREAD = 1e-300
 
 
 def open_image(
-    source: Path | bytes, formats: Sequence[str] = _FORMATS
+    source: Path | bytes, formats: tuple[str, ...] = _FORMATS
 ) -> Image:
     """Opens an image, whose pixels are decoded when they are used.
 
