@@ -64,6 +64,8 @@ from cns_drake.base.files import natural_key as natural_key
 from cns_drake.base.files import read_bytes as read_bytes
 from cns_drake.base.files import read_text as read_text
 from cns_drake.base.files import user_errors as user_errors
+from cns_drake.base.images import open_image as open_image
+from cns_drake.base.images import to_jpeg as to_jpeg
 from cns_drake.base.input_models import InputModel as InputModel
 from cns_drake.base.interrupts import INTERRUPTED as INTERRUPTED
 from cns_drake.base.interrupts import (
@@ -89,7 +91,6 @@ from cns_drake.base.jobs.running import run_jobs as run_jobs
 from cns_drake.base.jobs.step import Reporter as Reporter
 from cns_drake.base.jobs.step import Step as Step
 from cns_drake.base.jobs.step import Steps as Steps
-from cns_drake.base.jpeg_images import to_jpeg as to_jpeg
 from cns_drake.base.json_text import json_values as json_values
 from cns_drake.base.json_text import parse_json as parse_json
 from cns_drake.base.launch import start as start

@@ -113,8 +113,10 @@ class _ByContent:
         cls, function: Callable, file: str
     ) -> "_ByContent | None":
         """Returns a function's locator; None if there is no safe folder."""
-        root: str | None = numba.config.CACHE_DIR
-        if not root:
+        # Numba's own setting may come from a file in the working directory,
+        # which may belong to an unpacked recording.
+        root = os.environ.get("NUMBA_CACHE_DIR", "")
+        if not os.path.isabs(root):
             own = cache_folder()
             if own is None:
                 return None

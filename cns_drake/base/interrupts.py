@@ -132,8 +132,9 @@ def end_interrupted() -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):
             stream.flush()
-    # Nothing of `multiprocessing` is left in the temporary folder.
+    # Nothing of `multiprocessing` is left in the temporary folder. Processes of
+    # jobs end with this process; it does not wait for them.
     if util := sys.modules.get("multiprocessing.util"):
         with contextlib.suppress(Exception):
-            util._exit_function()
+            util._exit_function(active_children=list)
     os._exit(INTERRUPTED)

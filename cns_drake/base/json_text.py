@@ -41,6 +41,11 @@ def parse_json(data: bytes) -> Any:
             contain.
     """
     text = data.decode("utf-8-sig")
+    # The patterns below take quadratic time if a string does not end.
+    try:
+        value = json.loads(text, object_pairs_hook=_without_doubles)
+    except RecursionError:
+        raise ValueError(f"nested more than {_DEEPEST} deep") from None
     brackets = _NO_BRACKET.sub(b"", _STRING.sub(b"", data))
     steps = (1 if bracket in b"[{" else -1 for bracket in brackets)
     if max(itertools.accumulate(steps), default=0) > _DEEPEST:
@@ -48,7 +53,7 @@ def parse_json(data: bytes) -> Any:
     # The strings are read one by one only if there is a suspect escape.
     if _SUSPECT.search(data):
         _check_strings(data)
-    return json.loads(text, object_pairs_hook=_without_doubles)
+    return value
 
 
 def _check_strings(data: bytes) -> None:

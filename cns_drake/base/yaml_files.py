@@ -15,9 +15,9 @@ _MOST_NODES = 1_000_000
 _LONGEST_NUMBER = 100
 _WHOLE = "tag:yaml.org,2002:int"
 # Numbers to the base 8 in YAML 1.1, and names to most people.
-_OCTAL = re.compile(r"([-+]?)0+([0-7_]+)")
+_OCTAL = re.compile(r"([-+]?)0([0-7_]+)")
 # Python reads these as numbers, YAML 1.2 as texts.
-_UNDERSCORES = re.compile(r"[-+]?[0-9][0-9_]*_[0-9_.]*")
+_UNDERSCORES = re.compile(r"[-+]?[0-9]+_[0-9_.]*")
 _WORDS = {"yes": "true", "on": "true", "no": "false", "off": "false"}
 # Texts that PyYAML reads as numbers, without numbers to the bases 2, 8 and 60
 # and without numbers with underscores.

@@ -69,6 +69,10 @@ CHUNK_LIMIT_BYTES = 1 << 26
 _ATTACHMENT_LIMIT_BYTES = 1 << 23
 # Size of a chunk's record without its data.
 _CHUNK_FIELDS_BYTES = 1 << 10
+# Greatest size of all uncompressed chunks together: for any file, and for each
+# byte of the file. Recordings compress to a tenth; a hostile file, to nothing.
+_UNPACKED_BYTES = 1 << 30
+_UNPACKED_PER_BYTE = 200
 _RECORD_LIMIT_BYTES = CHUNK_LIMIT_BYTES + _CHUNK_FIELDS_BYTES
 # A message, after its record header: channel id, sequence, two times.
 _MESSAGE_HEADER = struct.Struct("<HIQQ")
@@ -129,11 +133,14 @@ class McapFile:
         """
         self.path = Path(path)
         check_regular(self.path)
+        self._unpacked = _Unpacked(self.path.stat().st_size)
         with self._reading() as stream:
             summary = _read_summary(stream, self.path)
             self._contents = _Contents.of(summary)
             if not self._contents.is_whole():
-                self._contents = self._contents.read_through(stream)
+                self._contents = self._contents.read_through(
+                    stream, self._unpacked
+                )
         self._channels: dict[str, list[Channel]] = {}
         for _, channel in sorted(self._contents.channels.items()):
             self._channels.setdefault(channel.topic, []).append(channel)
@@ -264,7 +271,9 @@ class McapFile:
             ):
                 # Message indexes are optional, too.
                 with self._reading() as stream:
-                    self._contents = self._contents.read_through(stream)
+                    self._contents = self._contents.read_through(
+                        stream, self._unpacked
+                    )
         found = self._contents.found
         if found is not None:
             locations = np.array(
@@ -333,7 +342,9 @@ class McapFile:
             )
             if opcode == Opcode.MESSAGE:
                 return memoryview(_RECORD_HEADER.pack(opcode, len(body)) + body)
-            return memoryview(_uncompress(Chunk.read(_RecordContent(body))))
+            chunk = Chunk.read(_RecordContent(body))
+            self._unpacked.add(start, chunk)
+            return memoryview(_uncompress(chunk))
 
     def _message(self, chunk: memoryview, place: Any) -> memoryview:
         _, offset, expected_time_ns, expected_channel_id = place
@@ -464,13 +475,14 @@ class _Contents:
             counts.message_count,
         )
 
-    def read_through(self, stream: BinaryIO) -> _Contents:
+    def read_through(self, stream: BinaryIO, unpacked: _Unpacked) -> _Contents:
         """Returns the contents of the whole file, found without an index.
 
         Schemas, channels and statistics of the summary are taken over.
 
         Args:
             stream: the file.
+            unpacked: the chunks that were uncompressed so far.
 
         Raises:
             ValueError: the file is damaged, or has fewer messages than its
@@ -484,7 +496,7 @@ class _Contents:
         contents.found = found
         there = 0
         size = stream.seek(0, os.SEEK_END)
-        for start, offset, record in _locate_records(stream):
+        for start, offset, record in _locate_records(stream, unpacked):
             if isinstance(record, Schema):
                 contents.schemas.setdefault(record.id, record)
             elif isinstance(record, Channel):
@@ -511,6 +523,27 @@ class _Contents:
                 f"{there} of {told.message_count} messages are there"
             )
         return contents
+
+
+class _Unpacked:
+    """The chunks of a file that were uncompressed, each counted once."""
+
+    def __init__(self, size: int):
+        """Makes the count for a file of `size` bytes."""
+        self._left = _UNPACKED_BYTES + _UNPACKED_PER_BYTE * size
+        self._starts: set[int] = set()
+
+    def add(self, start: int, chunk: Chunk) -> None:
+        """Adds a chunk, which begins at a place in the file [bytes].
+
+        Raises:
+            ValueError: the chunks are implausibly large for the file.
+        """
+        if start not in self._starts:
+            self._starts.add(start)
+            self._left -= min(chunk.uncompressed_size, CHUNK_LIMIT_BYTES)
+        if self._left < 0:
+            raise ValueError("its chunks stand for far more bytes than it has")
 
 
 def _chunk_offsets(body: bytes) -> tuple[int, dict[int, int]]:
@@ -683,7 +716,7 @@ _READERS = {
 
 
 def _locate_records(
-    stream: BinaryIO,
+    stream: BinaryIO, unpacked: _Unpacked
 ) -> Iterator[tuple[int, int, McapRecord]]:
     """Yields the records of an MCAP file, each with its place in the file.
 
@@ -706,21 +739,24 @@ def _locate_records(
             opcode, content = _read_record(
                 stream, position, _RECORD_LIMIT_BYTES, "a record"
             )
-            for offset, record in _records_in(opcode, content):
+            chunk = None
+            if opcode == Opcode.CHUNK:
+                chunk = Chunk.read(_RecordContent(content))
+                unpacked.add(position, chunk)
+            for offset, record in _records_in(opcode, content, chunk):
                 yield position, offset, record
         position += _RECORD_HEADER.size + len(content)
 
 
 def _records_in(
-    opcode: int, content: bytes
+    opcode: int, content: bytes, chunk: Chunk | None
 ) -> Iterator[tuple[int, McapRecord]]:
-    """Yields a record itself or, for a chunk, the records in the chunk.
+    """Yields a record itself or, if it is a chunk, the records in the chunk.
 
     Types of records that no caller needs are left out. Each record comes with
     its offset in the uncompressed chunk [bytes], which is 0 outside of chunks.
     """
-    if opcode == Opcode.CHUNK:
-        chunk = Chunk.read(_RecordContent(content))
+    if chunk is not None:
         inner = _RecordContent(_uncompress(chunk))
         while inner.left:
             offset = chunk.uncompressed_size - inner.left

@@ -14,11 +14,9 @@ from cns_drake.scene.model_finder import ModelFinder
 
 # File name endings of the files of a model's folder, besides meshes.
 _MODEL_ENDINGS = (".sdf", ".urdf", ".config", ".xml")
-# Ending of a mesh file -> pattern of its references to materials, textures,
-# buffers.
+# Ending of a mesh file -> pattern of its references to materials or buffers.
 _NAMING = {
     ".obj": re.compile(rb"^mtllib\s+(.+)$", re.MULTILINE),
-    ".mtl": re.compile(rb"^\s*map_\w+.*?(\S+)\s*$", re.MULTILINE),
     ".gltf": re.compile(rb'"uri"\s*:\s*"([^":]+)"'),
 }
 
@@ -99,10 +97,24 @@ def _references(file: str) -> list[str]:
     ending = os.path.splitext(file)[1].lower()
     if ending in (*_MODEL_ENDINGS, ".dae"):
         return _xml_references(_contents(file))
-    if ending not in _NAMING:
+    if ending == ".mtl":
+        names = _textures(_contents(file))
+    elif ending in _NAMING:
+        names = _NAMING[ending].findall(_contents(file))
+    else:
         return []
-    names = _NAMING[ending].findall(_contents(file))
     return [name.decode(errors="replace").strip() for name in names]
+
+
+def _textures(content: bytes) -> list[bytes]:
+    """Returns the textures that a file of materials (.mtl) names."""
+    lines = [line.split() for line in content.splitlines()]
+    # The name follows the options.
+    return [
+        words[-1]
+        for words in lines
+        if len(words) > 1 and words[0].startswith(b"map_")
+    ]
 
 
 def _xml_references(content: bytes) -> list[str]:

@@ -18,11 +18,13 @@ from cns_drake.scene.ply_check import check_ply
 
 # File name extensions of glTF.
 GLTF = (".gltf", ".glb")
-# Formats that Drake itself checks.
-_BY_DRAKE = (".vtk",)
 _FORMATS = ".obj .gltf .glb .dae .stl .ply .vtk"
 _STL_HEADER_BYTES = 84
 _STL_FACET_BYTES = 50
+# Counts that a VTK file declares, for which memory is reserved.
+_VTK_COUNTS = re.compile(
+    rb"^[ \t]*(POINTS|CELLS|CELL_TYPES)[ \t]+(\d{1,18})\b", re.M | re.I
+)
 _STL_WORDS = re.compile(rb"^[ \t]*(vertex|endfacet|endsolid)\b", re.M | re.I)
 
 
@@ -38,8 +40,6 @@ def check_mesh_file(path: Path) -> tuple[str, ...]:
         InputError: the file cannot be read.
     """
     ending = path.suffix.lower()
-    if ending in _BY_DRAKE:
-        return ()
     if ending == ".dae":
         return check_collada(path)
     if ending not in _CHECKS:
@@ -80,10 +80,26 @@ def _check_stl(content: bytes) -> tuple[()]:
     return ()
 
 
+def _check_vtk(content: bytes) -> tuple[()]:
+    """Checks that a VTK file can hold what it declares; there are no notes.
+
+    Raises:
+        ValueError: a count is larger than the number of bytes.
+    """
+    for what, count in _VTK_COUNTS.findall(content):
+        if int(count) > len(content):
+            raise ValueError(
+                f"declares {int(count)} {what.decode()} of VTK in"
+                f" {len(content)} bytes"
+            )
+    return ()
+
+
 # File name extension -> function that checks the contents of a file.
 _CHECKS = {
     **dict.fromkeys(GLTF, check_gltf),
     ".obj": obj_notes,
     ".ply": check_ply,
     ".stl": _check_stl,
+    ".vtk": _check_vtk,
 }

@@ -30,6 +30,9 @@ _FACES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
 _Y_UP = (*GLTF, ".dae")
 # Larger files are parsed again each time, so that they do not stay in memory.
 _SMALL_BYTES = 1 << 18
+# Greatest number of triangles in all copies of meshes at further scales, of
+# which a small world can declare any number.
+_MOST_COPIED = 1 << 25
 
 
 class MeshFiles:
@@ -42,6 +45,7 @@ class MeshFiles:
         self._foreign = foreign
         self._unscaled: dict[object, TriangleSurface] = {}
         self._surfaces: dict[tuple, TriangleSurface] = {}
+        self._num_copied = 0
 
     def read(self, name: str, shape: Mesh | Convex) -> TriangleSurface:
         """Returns the surface of a mesh shape in the geometry's frame G.
@@ -77,6 +81,13 @@ class MeshFiles:
         surface = self._unscaled.get(key)
         if surface is None:
             surface = self._unscaled[key] = self._read_source(source)
+        else:
+            self._num_copied += len(surface.triangles)
+            if self._num_copied > _MOST_COPIED:
+                raise ValueError(
+                    f"with this mesh, copies at other scales have more than"
+                    f" {_MOST_COPIED} triangles"
+                )
         triangles = surface.triangles
         scale = shape.scale3()
         if np.prod(scale) < 0.0:  # Mirroring turns faces inside out.

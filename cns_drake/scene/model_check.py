@@ -19,7 +19,7 @@ from cns_drake.scene.surfaces import LARGEST_SIZE
 _MODELS = (".sdf", ".world", ".urdf")
 # Longest name [characters].
 _LONGEST_NAME = 1000
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 # Shape -> element of its size -> how many numbers the element has.
 SIZES = {
     "box": {"size": 3},

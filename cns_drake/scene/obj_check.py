@@ -29,7 +29,7 @@ _STATEMENT = re.compile(rb"^[ \t]*([A-Za-z_]\w*)(?=[ \t\n]|\Z)", re.MULTILINE)
 # and may end the process.
 _VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
 # Drake's reader takes what it cannot read in a vertex for 0.
-_NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBER = rb"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _NO_VERTEX = re.compile(
     rb"^[ \t]*v[ \t](?![ \t]*(?:(?:" + _NUMBER + rb"(?:[ \t]+|(?=[\n#]|\Z)))"
     # With a weight of 1, or with a colour.

@@ -8,6 +8,7 @@ in such a world moves.
 
 from collections import Counter
 import contextlib
+import copy
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -107,6 +108,9 @@ _GROUND = """<model name="ground_plane"><link name="link"><visual name="visual">
 </model>"""
 # Greatest depth of models within models.
 _DEEPEST = 20
+# Greatest number of elements in all included models together. A few files that
+# include each other can stand for any number.
+_MOST_INCLUDED = 250_000
 # Thickness of the box for a plane of finite size, below its surface [m].
 _PLANE_THICKNESS = 1e-4
 # Size of the box for an infinite plane. Larger shapes would show the single
@@ -167,6 +171,33 @@ class _Visual:
     properties: tuple[IllustrationProperties | PerceptionProperties, ...]
 
 
+class _Names:
+    """Names that are in use, in time that is linear in their number.
+
+    Attributes:
+        taken: the names.
+        seen: number of elements whose names were taken.
+    """
+
+    def __init__(self) -> None:
+        self.taken: set[str] = set()
+        self.seen = 0
+        # A name -> the last number behind it that was free.
+        self._numbers: dict[str, int] = {}
+
+    def free(self, element: Element) -> str:
+        """Returns an element's name, changed if it is already in use."""
+        name = wanted = _legal_name(element.get("name", element.tag))
+        number = self._numbers.get(wanted, 1)
+        if number > 1:
+            name = f"{wanted}_{number}"
+        while name in self.taken:
+            number += 1
+            name = f"{wanted}_{number}"
+        self._numbers[wanted] = number
+        return name
+
+
 class _Reader:
     """One pass over a world and all models that it includes."""
 
@@ -184,6 +215,12 @@ class _Reader:
         self._frames = Element("world", name="frames")
         self._visuals: dict[Element, list[_Visual]] = {}
         self._meshes: dict[tuple[str, Path], Path | None] = {}
+        # Element that is made -> the names of its children.
+        self._names: dict[Element, _Names] = {}
+        # Root elements of the included files, and the number of elements of all
+        # models that were included.
+        self._included: dict[Path, Element] = {}
+        self._num_included = 0
 
     def notes(self) -> tuple[str, ...]:
         """Returns one line for each kind of omitted element."""
@@ -258,6 +295,13 @@ class _Reader:
         for tag in ("insertions", "deletions"):
             for _ in world.iterfind(f"state/{tag}/*"):
                 self.skip(f"saved {tag} (state)")
+
+    def _names_in(self, target: Element) -> _Names:
+        """Returns the names of the children of an element that is made."""
+        names = self._names.setdefault(target, _Names())
+        names.taken |= {part.get("name", "") for part in target[names.seen :]}
+        names.seen = len(target)
+        return names
 
     def _scan_file(self, root: Element) -> None:
         """Takes in what concerns a whole file, before its models are added."""
@@ -351,7 +395,16 @@ class _Reader:
 
     def _read_included(self, file: Path) -> Element | None:
         """Returns a file's first model, if any; counts all other content."""
-        root = read_model(file)
+        if file not in self._included:
+            self._included[file] = read_model(file)
+        # The model is changed as its include says.
+        root = copy.deepcopy(self._included[file])
+        self._num_included += sum(1 for _ in root.iter())
+        if self._num_included > _MOST_INCLUDED:
+            raise InputError(
+                f"{self._path}: its models include more than {_MOST_INCLUDED}"
+                " elements"
+            )
         self._scan_file(root)
         models = root.findall("model")
         lights, actors = root.findall("light"), root.findall("actor")
@@ -371,7 +424,7 @@ class _Reader:
                 f"{self._path}: include of {model.get('name')}: a"
                 " placement_frame together with merge is not read"
             )
-        own = f"_merged_{_free_name(model, target)}"
+        own = f"_merged_{self._names_in(target).free(model)}"
         self._copy_pose(model, SubElement(target, "frame", name=own))
         for part in model:
             if part.tag not in ("link", "model", "include", "frame", "joint"):
@@ -394,7 +447,7 @@ class _Reader:
     def _add_model(
         self, model: Element, target: Element, folder: Path, depth: int
     ) -> None:
-        made = Element("model", name=_free_name(model, target))
+        made = Element("model", name=self._names_in(target).free(model))
         if model.get("placement_frame"):
             made.set("placement_frame", model.get("placement_frame", ""))
         # Drake does not weld an inner model because the outer one is static.
@@ -407,15 +460,17 @@ class _Reader:
     def _add_link(self, link: Element, target: Element, folder: Path) -> None:
         self._count_unknown(link)
         # A link without visuals stays, because poses can refer to the link.
-        made = SubElement(target, "link", name=_free_name(link, target))
+        made = SubElement(
+            target, "link", name=self._names_in(target).free(link)
+        )
         self._copy_pose(link, made)
         visuals = self._visuals[made] = []
-        taken: set[str] = set()
+        names = _Names()
         for element in link.iterfind("visual"):
-            name = _free_name_of(element, taken)
+            name = names.free(element)
             visual = self._read_visual(element, name, made, target, folder)
             if visual is not None:
-                taken.add(name)
+                names.taken.add(name)
                 visuals.append(visual)
 
     def _read_visual(
@@ -480,7 +535,7 @@ class _Reader:
             return "", RigidTransform()
         if not kept.attrib:
             return "", _pose(kept.text or "")
-        own.set("name", _free_name(own, model))
+        own.set("name", self._names_in(model).free(own))
         own.set("attached_to", link.get("name", ""))
         model.append(own)
         return own.get("name", ""), RigidTransform()
@@ -664,21 +719,6 @@ def _number_in(text: str | None, default: float) -> float:
         with contextlib.suppress(ValueError):
             return float(kind((text or "").strip()))
     return default
-
-
-def _free_name(element: Element, target: Element) -> str:
-    """Returns an element's name, changed if it is already in use."""
-    return _free_name_of(element, {part.get("name", "") for part in target})
-
-
-def _free_name_of(element: Element, taken: set[str]) -> str:
-    wanted = _legal_name(element.get("name", element.tag))
-    name = wanted
-    count = 1
-    while name in taken:
-        count += 1
-        name = f"{wanted}_{count}"
-    return name
 
 
 def _legal_name(name: str) -> str:

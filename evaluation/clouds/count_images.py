@@ -15,15 +15,20 @@ published images. One rule is that indices are rounded towards zero, so that the
 middle row and the middle column are twice as wide as the others.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 import contextlib
 from pathlib import Path
+from typing import TYPE_CHECKING
 import zlib
 
 import numpy as np
-from PIL import Image
 
-from cns_drake.base import InputError, check_regular, user_errors
+from cns_drake.base import InputError, check_regular, open_image, user_errors
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 # Side of a voxel and of a pixel [m].
 PIXEL = 0.4
@@ -117,11 +122,11 @@ def read_image(path: Path) -> np.ndarray:
 
 
 @contextlib.contextmanager
-def _opened_image(path: Path) -> Iterator[Image.Image]:
+def _opened_image(path: Path) -> Iterator[Image]:
     check_regular(path)
     with contextlib.ExitStack() as stack:
         with user_errors(path), _naming_damage(path):
-            image = stack.enter_context(Image.open(path, formats=("PNG",)))
+            image = stack.enter_context(open_image(path, ("PNG",)))
         if image.mode != "L":
             raise InputError(
                 f"{path}: an image of mode {image.mode}, not of one channel of"

@@ -16,6 +16,8 @@ _LONGEST_LINE_BYTES = 1 << 16
 BYTE_ORDER_MARK = codecs.BOM_UTF8
 # The end of a header is searched up to here; a header takes some hundred bytes.
 HEADER_LIMIT_BYTES = 1 << 16
+# The longest descriptors of points have some kilobytes.
+_LARGEST_RECORD_BYTES = 1 << 16
 
 
 def read_records(
@@ -131,10 +133,25 @@ def _to_records(
 
 
 def record_type(fields: list[tuple], where: str) -> np.dtype:
-    """Returns a type of records; raises an error if a field is there twice."""
+    """Returns a type of records.
+
+    Raises:
+        ValueError: a field is there twice, or a record is implausibly large.
+            A header can declare a field of billions of numbers, for which
+            memory would be reserved.
+    """
     names = [field[0] for field in fields]
     for name in repeated(names):
         raise ValueError(f"{where} {name} is there twice")
+    size = sum(
+        np.dtype(kind).itemsize * math.prod(*shape or [()])
+        for _, kind, *shape in fields
+    )
+    if size > _LARGEST_RECORD_BYTES:
+        raise ValueError(
+            f"{where.partition(':')[0]}: {size} bytes for each point, more than"
+            f" {_LARGEST_RECORD_BYTES}"
+        )
     return np.dtype(fields)
 
 

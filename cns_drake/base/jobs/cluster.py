@@ -125,9 +125,12 @@ class LocalWorkers:
     def __enter__(self) -> LocalWorkers:
         return self
 
-    def __exit__(self, *error: object) -> None:
+    def __exit__(self, kind: type | None, *error: object) -> None:
         self.stop()
-        self._threads.shutdown()
+        # After an interrupt, a thread that still waits for the imports of a
+        # process is not waited for; what it starts ends with this process.
+        interrupted = kind is KeyboardInterrupt
+        self._threads.shutdown(wait=not interrupted, cancel_futures=True)
 
     def submit(self, name: str, job: bytes, priority: float) -> None:
         """Queues a job; jobs start in the order in which they are submitted.

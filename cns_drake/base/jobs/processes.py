@@ -35,8 +35,10 @@ from cns_drake.base.own_packages import leave_out_folder
 from cns_drake.base.process import collect_garbage_seldom
 from cns_drake.base.progress import heard_by
 
-# How long a process may take to close its files after SIGTERM [s].
-PATIENCE = 30.0
+# How long a process may take to close its files after SIGTERM [s]. A process
+# that does not react, because it is inside a library, is then killed, so that
+# an interrupted command ends within five seconds.
+PATIENCE = 3.0
 # File descriptors. Whatever a job prints goes to stderr.
 _STDOUT = 1
 _STDERR = 2
@@ -118,13 +120,27 @@ def run_process(
 def _start_process(connection: Connection, job: bytes) -> BaseProcess:
     process = _context.Process(target=_process_main, args=(connection, job))
     try:
-        with _starting, _environment_of_jobs():
+        with _starting, _environment_of_jobs(), _beyond_ctrl_c():
             process.start()
     except (EOFError, OSError) as error:
         # A new fork server starts only after the dead one has disappeared.
         time.sleep(_DEATH_TIME)
         raise ProcessDiedError("the process that starts jobs died") from error
     return process
+
+
+@contextlib.contextmanager
+def _beyond_ctrl_c() -> Iterator[None]:
+    """Blocks SIGINT in the processes that this thread starts.
+
+    Ctrl-C would otherwise end them with a traceback, until each has a session
+    of its own.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextlib.contextmanager
@@ -219,6 +235,7 @@ def _process_main(connection: Connection, job: bytes) -> None:
     # In its own session, which Ctrl-C does not reach: the interrupted parent
     # ends its jobs in good order.
     os.setsid()
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     os.dup2(_STDERR, _STDOUT)
 
     def send(*message: object) -> None:

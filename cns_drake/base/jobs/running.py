@@ -230,6 +230,6 @@ class _Run:
         """Ends running jobs, and waits until they have closed their files."""
         self._submitted.clear()
         self._workers.stop()
-        deadline = time.monotonic() + processes.PATIENCE
+        deadline = time.monotonic() + processes.PATIENCE + _LOOK_INTERVAL
         while self._running and (left := deadline - time.monotonic()) > 0:
             self._receive(min(left, _LOOK_INTERVAL))

@@ -7,6 +7,7 @@ order, direction and units of the axes of the file's reference system.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 import itertools
 from pathlib import Path
 import re
@@ -14,7 +15,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base import InputError, check_regular, parse_json, user_errors
+from cns_drake.base import (
+    InputError,
+    check_regular,
+    errors_at,
+    parse_json,
+    user_errors,
+)
 from cns_drake.imports.cityjson.city_file import (
     CityFile,
     CityGeometry,
@@ -55,6 +62,9 @@ _NESTING = {
 }
 # No place on Earth is farther than this from the origin of a survey grid [m].
 _FARTHEST = 1e8
+# Greatest number of faces in all places of templates together. A short file can
+# place a template with many faces any number of times.
+_MOST_PLACED = 1_000_000
 
 
 def read_cityjson(path: Path) -> CityFile:
@@ -185,16 +195,32 @@ def _reference_system(document: dict, where: str) -> ReferenceSystem:
     return reference_system(str(name), f"{where}: metadata.referenceSystem")
 
 
-class _Templates(NamedTuple):
+@dataclass
+class _Templates:
     """Geometry templates of a file, which objects place in the world.
 
     Attributes:
         geometries: the templates, as in the file.
         points: (N, 3) vertices of all templates, in coordinates of the file.
+        num_placed: number of faces of all instances that were read.
     """
 
     geometries: Sequence[Any] = ()
-    points: np.ndarray = np.zeros((0, 3))
+    points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    num_placed: int = 0
+
+    def place(self, number: int) -> None:
+        """Counts the faces of an instance.
+
+        Raises:
+            InputError: all instances together have too many.
+        """
+        self.num_placed += number
+        if self.num_placed > _MOST_PLACED:
+            raise InputError(
+                f"geometry-templates: more than {_MOST_PLACED} faces in all"
+                " places"
+            )
 
 
 def _read_templates(document: dict, where: str) -> _Templates:
@@ -268,12 +294,14 @@ def _read_geometry(
         faults: counts geometries and faces that are left out.
     """
     vertices = source.vertices
+    is_instance = False
     if isinstance(geometry, dict):
         _PARTS.account(["geometry"], geometry, name, faults)
     try:
         lod = _level_of_detail(geometry.get("lod"))
         kind = geometry["type"]
-        if kind == "GeometryInstance":
+        is_instance = kind == "GeometryInstance"
+        if is_instance:
             geometry, vertices = source.instance(geometry)
             kind = geometry["type"]
             lod = lod or _level_of_detail(geometry.get("lod"))
@@ -287,6 +315,8 @@ def _read_geometry(
     except (LookupError, TypeError, ValueError, AttributeError):
         faults.add("geometry that is not an object, left out", name)
         return None
+    if is_instance:
+        source.templates.place(len(boundaries))
     faces, kinds_of_faces = [], []
     for boundary, kind_of_face in zip(boundaries, kinds, strict=True):
         face = _face_of_boundary(boundary, vertices)
@@ -421,7 +451,8 @@ def _read_objects(
             continue
         if name in city.objects:
             city.faults.add("object that is there twice, its last taken", name)
-        city.objects[name] = _read_object(name, value, source, city.faults)
+        with errors_at(where):
+            city.objects[name] = _read_object(name, value, source, city.faults)
     _add_parents(objects, city)
 
 

@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 # Places in the file of an experiment where a list of values is a factor.
 _FACTORED = (*SIDES, "protocol")
 _MOST_CONDITIONS = 20_000
+# Greatest number of conditions x seeds x maps x methods. A study of more would
+# take years.
+_MOST_MEASUREMENTS = 500_000
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,16 @@ def conditions(experiment: Experiment) -> list[Condition]:
     number = _num_cells(experiment.design, factors) * len(cases)
     if number > _MOST_CONDITIONS:
         raise ValueError(f"{number} conditions, more than {_MOST_CONDITIONS}")
+    number *= (
+        len(experiment.seeds)
+        * len(experiment.maps or [""])
+        * len(experiment.method_variants or [""])
+    )
+    if number > _MOST_MEASUREMENTS:
+        raise ValueError(
+            f"{number} measurements (conditions x seeds x maps x methods), more"
+            f" than {_MOST_MEASUREMENTS}"
+        )
     cells = _cells(experiment.design, factors, baseline)
     found = []
     for cell, case in itertools.product(cells, cases):

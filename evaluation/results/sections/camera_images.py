@@ -3,12 +3,10 @@
 import base64
 from collections.abc import Callable
 from dataclasses import dataclass
-import io
 
 import numpy as np
-from PIL import Image
 
-from cns_drake.base import to_jpeg
+from cns_drake.base import open_image, to_jpeg
 from cns_drake.drives import Drive
 
 # Longer side of a shown image [pixels].
@@ -75,7 +73,7 @@ def nearest_images(
     for number in np.unique(_nearest_index(times_ns, stamps_ns)):
         data = drive.image(number)
         try:
-            with Image.open(io.BytesIO(data)) as picture:
+            with open_image(data) as picture:
                 shown[number] = to_jpeg(picture, longest=_IMAGE_SIDE)
         except Exception:  # Decoders of damaged files raise any.
             faults += 1

@@ -1,6 +1,7 @@
 """A recording's names of map and stage are text, neither paths nor code."""
 
 import html
+from html.parser import HTMLParser
 
 from helpers.internal import studies
 from helpers.small_towns import drive
@@ -11,6 +12,15 @@ from evaluation.study import MethodChoice
 
 STAGE = r"../../../../evil|$\frac{_%# <b>&"
 MAP = "..|[x](y)_$"
+# Names that would run code in a page: in text, in an attribute, in a script.
+ACTIVE = (
+    "</script><script>run()</script>",
+    "<img src=x onerror=run()>",
+    '" onmouseover="run()" x="',
+    "javascript:run()",
+    "--></title><script>run()</script>",
+    "a\u202eb\u2028</style><svg onload=run()>",
+)
 
 
 @pytest.mark.slow
@@ -29,6 +39,44 @@ def test_a_report_stays_in_its_folder(tmp_path):
     # The text is unchanged, and only text.
     assert html.escape(STAGE) in page.read_text()
     assert "<b>&" not in page.read_text()
+
+
+class _Page(HTMLParser):
+    """Counts the scripts of a page, and lists what would run beside them."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.scripts = 0
+        self.active = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.scripts += tag == "script"
+        self.active += [
+            (tag, name, value)
+            for name, value in attrs
+            if name.startswith("on") or (value or "").startswith("javascript:")
+        ]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unrendered_figures")
+def test_names_run_nothing(tmp_path):
+    pages = []
+    for folder, city, names in (
+        ("plain", "town", ("a", "b")),
+        ("hostile", ACTIVE[0], ACTIVE[1:]),
+    ):
+        recordings = tmp_path / folder / "recordings"
+        for number, name in enumerate(names):
+            own = f"{number}{name}".replace("/", "")
+            drive(recordings / own, name, "a", city=city)
+        solid = MethodChoice("solid")
+        output = tmp_path / folder / "report"
+        file = studies.report(recordings, output, [solid])
+        pages.append(_Page(file.read_text()))
+    assert [page.active for page in pages] == [[], []]
+    assert pages[0].scripts == pages[1].scripts > 0
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,9 @@ def test_nothing_is_kept_beside_the_code(tmp_path, is_there):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("place", ["no home", "writable by all", "another's"])
+@pytest.mark.parametrize(
+    "place", ["no home", "writable by all", "another's", "here"]
+)
 def test_no_machine_code_where_others_can_write(tmp_path, place):
     """Numba unpickles what it finds, so it must find nothing there."""
     cache = tmp_path / "cache"
@@ -70,7 +72,11 @@ def test_no_machine_code_where_others_can_write(tmp_path, place):
         if not k.startswith(("NUMBA", "HOME", "XDG"))
     }
     who = []
-    if place == "no home":
+    if place == "here":
+        # Numba itself would take the folder from this file.
+        (tmp_path / ".numba_config.yaml").write_text("cache_dir: unpacked\n")
+        environment["XDG_CACHE_HOME"] = str(tmp_path.with_suffix(".cache"))
+    elif place == "no home":
         if os.geteuid():
             pytest.skip("only root can take a uid without a name")
         tmp_path.chmod(0o777)
