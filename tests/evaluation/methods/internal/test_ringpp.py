@@ -301,7 +301,7 @@ def plain_pose(method, query, place):
         # Rows v are along x, columns u along y.
         row = np.rint(c * v + s * u + centre).astype(int)
         column = np.rint(c * u - s * v + centre).astype(int)
-        inside = (0 <= row) & (row < n) & (0 <= column) & (column < n)
+        inside = (row >= 0) & (row < n) & (column >= 0) & (column < n)
         turned = query.bev(n)[:, row % n, column % n] * inside
         turned = turned - turned.mean()
         found = np.fft.ifft2(
