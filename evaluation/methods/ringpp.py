@@ -40,10 +40,10 @@ _NUM_FEATURES = 6
 _NORM_EPSILON = 1e-5
 # Number of spectra of places kept in memory, a third of a megabyte each.
 _REFERENCES_KEPT = 64
-# Number of queries whose shifts are kept in memory, two bytes for each place. A
-# search scores as many queries (`evaluation.recognition.search`) before it asks
-# for their poses.
-_QUERIES_KEPT = 256
+# Number of pairs of a query and a place whose shifts are kept in memory, two
+# bytes each. A search scores at most as many pairs before it asks for poses
+# (`MOST_PAIRS` in `evaluation.recognition.retrieval`).
+_SHIFTS_KEPT = 16_000_000
 # Number of headings whose rotated pixels are kept in memory: those of a whole
 # turn, 60 kB each.
 _HEADINGS_KEPT = 120
@@ -206,7 +206,9 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
             is_empty=np.array([len(place.filled) == 0 for place in places]),
             # Successive queries have many of their top-ranked places in common.
             reference=functools.lru_cache(_REFERENCES_KEPT)(reference),
-            shifts=functools.lru_cache(_QUERIES_KEPT)(unknown),
+            shifts=functools.lru_cache(
+                max(1, _SHIFTS_KEPT // max(1, len(places)))
+            )(unknown),
         )
 
     def score(
