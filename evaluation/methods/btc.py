@@ -420,6 +420,9 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     source = "Yuan et al.: T-RO 2024"
     standard = True
     order = 4
+    describe_time = 0.04
+    query_time = 0.01
+    place_time = 4e-5
     Config = BtcConfig
     skips_places = True
     divides = True

@@ -87,9 +87,9 @@ def image_axes(normal: np.ndarray, orthogonal: bool) -> np.ndarray:
         along = [1.0, 0.0, -(a + b) / c]
     else:
         along = [1.0, -a / b, 0.0] if b != 0.0 else [0.0, 1.0, 0.0]
-    along = np.array(along) / _length(along)
-    across = np.cross(normal, along)
-    return np.stack([across / _length(across), along, normal])
+    unit = np.array(along) / _length(along)
+    across = np.cross(normal, unit)
+    return np.stack([across / _length(across), unit, normal])
 
 
 def _length(vector: Sequence[float] | np.ndarray) -> float:

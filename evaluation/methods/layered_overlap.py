@@ -495,6 +495,8 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     style = ("#E69F00", "-", "v")
     standard = True
     order = 5
+    query_time = 0.08
+    place_time = 4.5e-5
     Config = LayeredOverlapConfig
     skips_places = True
     sees_images = True

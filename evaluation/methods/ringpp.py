@@ -162,6 +162,9 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     source = "Xu, Lu, Wu, Lu, Zhu, Liang, Xiong, Wang: T-RO 2023"
     standard = True
     order = 3
+    describe_time = 0.03
+    query_time = 0.05
+    place_time = 1.2e-4
     Config = RingPlusPlusConfig
     skips_places = True
     sees_images = True

@@ -13,6 +13,8 @@ from evaluation.study.place_measurements import DescribedSource
 from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 
+# Expected time to start a job [s].
+STARTING_COST = 2.0
 # Expected time to start a job and to open a drive [s].
 OPENING_COST = 8.0
 # Expected time to read a scan [s].
@@ -107,7 +109,7 @@ class Jobs:
             with_map=False,
         )
         job = f"describe {name}"
-        cost = self.description_cost(drive, role, protocol)
+        cost = OPENING_COST + self.description_cost(drive, role, protocol)
         self.jobs[job] = Job(job, step, drive.needs, cost)
         needs.append(job)
         return (
@@ -118,11 +120,14 @@ class Jobs:
     def description_cost(
         self, drive: NamedDrive, role: Role, protocol: RetrievalProtocol
     ) -> float:
-        """Returns the expected time to describe a drive by all methods [s]."""
+        """Returns the expected time to describe a drive by all methods [s].
+
+        The time does not include opening the drive.
+        """
         made = [one.make() for one in self.methods]
         scans = max(map(protocol.scans, made), default=1)
         each = SCAN_COST * scans + sum(one.describe_time for one in made)
-        return OPENING_COST + each * num_described(drive, role, protocol)
+        return each * num_described(drive, role, protocol)
 
     def mapped(
         self, drive: NamedDrive, spacing: float | None, needs: list[str]
