@@ -162,7 +162,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     source = "Xu, Lu, Wu, Lu, Zhu, Liang, Xiong, Wang: T-RO 2023"
     standard = True
     order = 3
-    describe_time = 0.03
+    describe_time = 0.018
     query_time = 0.05
     place_time = 1.2e-4
     Config = RingPlusPlusConfig

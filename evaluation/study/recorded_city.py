@@ -215,11 +215,12 @@ class _ExtractionJobs(Jobs):
                 further=tuple(self._further[drive.name].values()),
                 removes_descriptors=True,
             )
-            cost = STARTING_COST + sum(
-                self.description_cost(drive, role, protocol) for role in roles
-            )
-            if self.with_map:
-                cost += _MAP_COST * drive.share
+            # All scans are read for the map.
+            cost = STARTING_COST + self.with_map * _MAP_COST * drive.share
+            for role in roles:
+                cost += self.description_cost(drive, role, protocol)
+                if not self.with_map:
+                    cost += self.reading_cost(drive, role, protocol)
             self.jobs[name] = Job(name, step, drive.needs, cost)
         return files
 

@@ -109,7 +109,8 @@ class Jobs:
             with_map=False,
         )
         job = f"describe {name}"
-        cost = OPENING_COST + self.description_cost(drive, role, protocol)
+        cost = self.reading_cost(drive, role, protocol)
+        cost += self.description_cost(drive, role, protocol)
         self.jobs[job] = Job(job, step, drive.needs, cost)
         needs.append(job)
         return (
@@ -122,12 +123,22 @@ class Jobs:
     ) -> float:
         """Returns the expected time to describe a drive by all methods [s].
 
-        The time does not include opening the drive.
+        The time does not include opening the drive and reading its scans.
+        """
+        each = sum(one.make().describe_time for one in self.methods)
+        return each * num_described(drive, role, protocol)
+
+    def reading_cost(
+        self, drive: NamedDrive, role: Role, protocol: RetrievalProtocol
+    ) -> float:
+        """Returns the expected time to open a drive and to read its scans [s].
+
+        Only the scans that are described are read.
         """
         made = [one.make() for one in self.methods]
         scans = max(map(protocol.scans, made), default=1)
-        each = SCAN_COST * scans + sum(one.describe_time for one in made)
-        return each * num_described(drive, role, protocol)
+        number = num_described(drive, role, protocol)
+        return OPENING_COST + SCAN_COST * scans * number
 
     def mapped(
         self, drive: NamedDrive, spacing: float | None, needs: list[str]

@@ -23,7 +23,6 @@ from evaluation.study.place_measurements import (
     shown_overlaps,
 )
 from evaluation.study.tasks.jobs import (
-    OPENING_COST,
     STARTING_COST,
     Jobs,
     num_described,
@@ -60,7 +59,7 @@ class PoseTask(Task):
         if not all(isinstance(one, tuple) for one in sides):
             for (drive, role), side in zip(pair.roles, sides, strict=True):
                 if not isinstance(side, tuple):
-                    cost += OPENING_COST
+                    cost += jobs.reading_cost(drive, role, pair.protocol)
                     cost += jobs.description_cost(drive, role, pair.protocol)
             part = jobs.files.part("place", pair.key)
             return (jobs.add(part, measure_places, (compared,), needs, cost),)
