@@ -1,6 +1,7 @@
 """Starts the two command-line programs."""
 
 from collections.abc import Callable
+import os
 import sys
 
 from cns_drake.base.errors import InputError
@@ -9,7 +10,7 @@ from cns_drake.base.interrupts import (
     interrupt_on_termination,
     uninterrupted,
 )
-from cns_drake.base.process import collect_garbage_seldom
+from cns_drake.base.process import ONE_CORE, collect_garbage_seldom
 
 
 def start(program: str, load: Callable[[], Callable[[], None]]) -> None:
@@ -23,6 +24,9 @@ def start(program: str, load: Callable[[], Callable[[], None]]) -> None:
         program: name of the program.
         load: function that imports the program's main function and returns it.
     """
+    # NumPy reads these settings when it is imported. A user's own settings win.
+    for name, value in ONE_CORE.items():
+        os.environ.setdefault(name, value)
     try:
         interrupt_on_termination()
         collect_garbage_seldom()

@@ -7,6 +7,12 @@ import os
 # collection. Python's default is 700 or 2,000.
 _OBJECTS = 50_000
 
+# Environment of a process that uses one core. More threads of linear algebra
+# would wait for each other by spinning, and the matrices here are small.
+ONE_CORE = dict.fromkeys(
+    ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"), "1"
+)
+
 
 def num_cores() -> int:
     """Returns the number of cores that this process can use."""

@@ -9,13 +9,15 @@ are part of a line of such cells.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base import compiled
+from cns_drake.base import compiled, product
 
 # Fixed in the public program: side of a square that may contain one keypoint
 # [cells].
@@ -85,9 +87,15 @@ def image_axes(normal: np.ndarray, orthogonal: bool) -> np.ndarray:
         along = [1.0, 0.0, -(a + b) / c]
     else:
         along = [1.0, -a / b, 0.0] if b != 0.0 else [0.0, 1.0, 0.0]
-    along = np.array(along) / np.linalg.norm(along)
-    across = np.cross(normal, along)
-    return np.stack([across / np.linalg.norm(across), along, normal])
+    unit = np.array(along) / _length(along)
+    across = np.cross(normal, unit)
+    return np.stack([across / _length(across), unit, normal])
+
+
+def _length(vector: Sequence[float] | np.ndarray) -> float:
+    """Returns the length of a vector (3,), with equal bits everywhere."""
+    x, y, z = vector
+    return math.sqrt(x * x + y * y + z * z)
 
 
 @compiled
@@ -228,7 +236,7 @@ def find_keypoints(
     """
     cells = peaks(count_bits(image.heights), min_heights)
     return Keypoints(
-        positions=center + image.means[cells] @ axes[:2],
+        positions=center + product(image.means[cells], axes[:2]),
         heights=image.heights[cells],
     )
 

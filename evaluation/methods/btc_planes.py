@@ -9,6 +9,7 @@ in the public program.
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
 
 import numpy as np
 
@@ -277,8 +278,70 @@ def _planes_of_moments(
         covariances: (P, 3, 3) their covariances [m^2].
         counts: (P,) their numbers.
     """
-    variances, axes = np.linalg.eigh(covariances)
-    return Planes(centers, axes[:, :, 0], covariances, counts), variances[:, 0]
+    variances, normals = _least_axes(covariances)
+    return Planes(centers, normals, covariances, counts), variances
+
+
+@compiled
+def _least_axes(covariances: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the least eigenvalue (P,) of each covariance, and its axis.
+
+    Jacobi's method needs only sums, products, quotients and square roots, which
+    IEEE 754 defines to the last bit. It finds small eigenvalues of a covariance
+    as exactly as large ones.
+
+    Args:
+        covariances: (P, 3, 3), symmetric.
+
+    Returns:
+        (P,) least eigenvalues; (P, 3) unit eigenvectors of either sign.
+    """
+    variances = np.empty(len(covariances))
+    normals = np.empty((len(covariances), 3))
+    V = np.empty((3, 3))
+    for plane in range(len(covariances)):
+        A = covariances[plane].copy()
+        for i in range(3):
+            for j in range(3):
+                V[i, j] = 1.0 if i == j else 0.0
+        # Convergence is quadratic: far fewer sweeps are needed.
+        for _ in range(_MOST_SWEEPS):
+            size = A[0, 0] * A[0, 0] + A[1, 1] * A[1, 1] + A[2, 2] * A[2, 2]
+            off = A[0, 1] * A[0, 1] + A[0, 2] * A[0, 2] + A[1, 2] * A[1, 2]
+            if off <= 1e-34 * size:
+                break
+            for p, q in ((0, 1), (0, 2), (1, 2)):
+                if A[p, q] == 0.0:
+                    continue
+                ratio = (A[q, q] - A[p, p]) / (2.0 * A[p, q])
+                t = 1.0 / (abs(ratio) + math.sqrt(ratio * ratio + 1.0))
+                t = t if ratio >= 0.0 else -t
+                c = 1.0 / math.sqrt(t * t + 1.0)
+                s = t * c
+                r = 3 - p - q
+                change = t * A[p, q]
+                A[p, p] -= change
+                A[q, q] += change
+                A[p, q] = A[q, p] = 0.0
+                one, other = A[r, p], A[r, q]
+                A[r, p] = A[p, r] = c * one - s * other
+                A[r, q] = A[q, r] = s * one + c * other
+                for i in range(3):
+                    one, other = V[i, p], V[i, q]
+                    V[i, p] = c * one - s * other
+                    V[i, q] = s * one + c * other
+        least = 0
+        for axis in range(1, 3):
+            if A[axis, axis] < A[least, least]:
+                least = axis
+        variances[plane] = A[least, least]
+        for i in range(3):
+            normals[plane, i] = V[i, least]
+    return variances, normals
+
+
+# Sweeps of Jacobi's method, at most.
+_MOST_SWEEPS = 30
 
 
 # The hash of a voxel's index, in the public program.

@@ -92,13 +92,13 @@ def coarse_maps(
             each layer.
 
     Returns:
-        (H, R, S) uint64, the R rows of the S maps at each heading; bit k of a
+        (H, S, R) uint64, the R rows of the S maps at each heading; bit k of a
         row is set if column k is occupied. (H, S) int64, the number of occupied
         cells of each map.
     """
     rows = GRID >> halvings
     num_maps = maps.max() + 1
-    bits = np.zeros((len(turns), rows, num_maps), np.uint64)
+    bits = np.zeros((len(turns), num_maps, rows), np.uint64)
     counts = np.zeros((len(turns), num_maps), np.int64)
     for heading in range(len(turns)):
         c, s = turns[heading]
@@ -113,8 +113,8 @@ def coarse_maps(
                 column = y >> (_UNIT_BITS + 1 + halvings)
                 if 0 <= row < rows and 0 <= column < rows:
                     bit = np.uint64(1) << np.uint64(column)
-                    is_new = bits[heading, row, maps[layer]] & bit == 0
-                    bits[heading, row, maps[layer]] |= bit
+                    is_new = bits[heading, maps[layer], row] & bit == 0
+                    bits[heading, maps[layer], row] |= bit
                     counts[heading, maps[layer]] += is_new
     return bits, counts
 
@@ -134,9 +134,9 @@ def best_overlaps(
     weighted number of bits that are set in the maps of both scans.
 
     Args:
-        queries: (H, R, S) uint64 maps of the query, at H headings that divide
+        queries: (H, S, R) uint64 maps of the query, at H headings that divide
             360 deg evenly.
-        places: (D, R + 2 * margin, S) uint64 maps of the places, with `margin`
+        places: (D, S, R + 2 * margin) uint64 maps of the places, with `margin`
             empty rows before and after the R rows of each map.
         weights: (S,) int64 weight of a bit of each map.
         starts: (N, 4) int64 initial poses: number of the place, number of the
@@ -151,14 +151,14 @@ def best_overlaps(
         counts. If all `moves` shift the query by more than `margin` rows, the
         overlap is -1.
     """
-    num_headings, num_rows, num_maps = queries.shape
-    margin = (places.shape[1] - num_rows) // 2
-    size = num_rows * num_maps
-    all_weights = np.empty(size, np.uint64)
-    for i in range(size):
-        all_weights[i] = np.uint64(weights[i % num_maps])
-    query_words = queries.reshape(num_headings, size)
-    place_words = places.reshape(len(places), -1)
+    num_headings, num_maps, num_rows = queries.shape
+    margin = (places.shape[2] - num_rows) // 2
+    least_up = starts[:, 3].min() + moves[:, 2].min()
+    most_up = starts[:, 3].max() + moves[:, 2].max()
+    # The query's maps, shifted by columns when a shift is first needed.
+    num_ups = most_up - least_up + 1
+    shifted = np.empty((num_headings, num_ups, num_maps, num_rows), np.uint64)
+    is_shifted = np.zeros((num_headings, num_ups), np.bool_)
     counts = np.full(len(starts), -1, np.int64)
     poses = np.zeros((len(starts), 3), np.int64)
     for n in range(len(starts)):
@@ -168,20 +168,31 @@ def best_overlaps(
             up = starts[n, 3] + moves[k, 2]
             if abs(right) > margin:
                 continue
-            to_right, to_left = np.uint64(max(-up, 0)), np.uint64(max(up, 0))
-            first = (margin + right) * num_maps
-            query = query_words[heading]
-            place = place_words[starts[n, 0], first : first + size]
-            total = np.uint64(0)
-            for i in range(size):
-                bits = (query[i] << to_left >> to_right) & place[i]
-                # Bits are counted in pairs, nibbles, bytes, then all at once,
-                # for which compilers have an instruction.
-                bits -= (bits >> np.uint64(1)) & _EVERY_2ND
-                bits = (bits & _PAIRS) + ((bits >> np.uint64(2)) & _PAIRS)
-                bits = (bits + (bits >> np.uint64(4))) & _NIBBLES
-                total += all_weights[i] * (bits * _BYTES >> np.uint64(56))
-            if np.int64(total) > counts[n]:
+            query = shifted[heading, up - least_up]
+            if not is_shifted[heading, up - least_up]:
+                is_shifted[heading, up - least_up] = True
+                to_right = np.uint64(max(-up, 0))
+                to_left = np.uint64(max(up, 0))
+                for of_map in range(num_maps):
+                    for row in range(num_rows):
+                        query[of_map, row] = (
+                            queries[heading, of_map, row] << to_left >> to_right
+                        )
+            total = 0
+            for of_map in range(num_maps):
+                of_query = query[of_map]
+                of_place = places[starts[n, 0], of_map, margin + right :]
+                number = np.uint64(0)
+                for row in range(num_rows):
+                    bits = of_query[row] & of_place[row]
+                    # Bits are counted in pairs, nibbles, bytes, then all at
+                    # once, for which compilers have an instruction.
+                    bits -= (bits >> np.uint64(1)) & _EVERY_2ND
+                    bits = (bits & _PAIRS) + ((bits >> np.uint64(2)) & _PAIRS)
+                    bits = (bits + (bits >> np.uint64(4))) & _NIBBLES
+                    number += bits * _BYTES >> np.uint64(56)
+                total += weights[of_map] * np.int64(number)
+            if total > counts[n]:
                 counts[n] = total
                 poses[n, 0], poses[n, 1], poses[n, 2] = heading, right, up
     return counts, poses
@@ -368,7 +379,8 @@ class LayeredOverlapConfig(MethodConfig):
             cells.
         min_points: least number of points in an occupied cell.
         poses: number of candidate poses (a place and a heading) that the first
-            search passes to the second.
+            search passes to the second. With 24 headings, the default excludes
+            nothing in a database of up to 333 places.
         refined: number of candidate poses that the second search passes to the
             third.
         candidates: number of places that the third search passes to the last,
@@ -434,7 +446,7 @@ class CoarseMaps:
     together, and one each for high points, poles and kerbs.
 
     Attributes:
-        bits: (N, R, 4) uint64, the R rows of each map. Bit k of a row is set if
+        bits: (N, 4, R) uint64, the R rows of each map. Bit k of a row is set if
             column k is occupied. Maps of places have additional empty rows at
             both ends.
         counts: (N, 4) int64 number of bits set in each map.
@@ -483,6 +495,9 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     style = ("#E69F00", "-", "v")
     standard = True
     order = 5
+    describe_time = 0.01
+    query_time = 0.08
+    place_time = 4.5e-5
     Config = LayeredOverlapConfig
     skips_places = True
     sees_images = True
@@ -693,7 +708,7 @@ def _overlaps_beyond_chance(
     )
     place = starts[:, 0]
     product = query.counts[found[:, 0]] * places.counts[place]
-    num_cells = query.bits.shape[1] ** 2
+    num_cells = query.bits.shape[2] ** 2
     # The variance is at least one, for maps without bits.
     deviation = np.sqrt(product @ weights**2 / num_cells + 1.0)
     surprise = (counts - product @ weights / num_cells) / deviation
@@ -710,7 +725,7 @@ def _maps_of_places(
     maps = [_maps_of_scan(place, turns(1), halvings) for place in places]
     bits = np.concatenate([of_place.bits for of_place in maps])
     return CoarseMaps(
-        np.pad(bits, ((0, 0), (margin, margin), (0, 0))),
+        np.pad(bits, ((0, 0), (0, 0), (margin, margin))),
         np.concatenate([of_place.counts for of_place in maps]),
     )
 

@@ -139,6 +139,9 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     source = "Kim, Choi, Sim, Kim, Park: RA-L 2024"
     standard = True
     order = 2
+    describe_time = 0.01
+    query_time = 0.005
+    place_time = 1e-7
     Config = SolidConfig
     skips_places = True
     divides = True

@@ -106,6 +106,7 @@ from evaluation.recognition.retrieval import (
 from evaluation.recognition.retrieval import (
     matches_within_radius as matches_within_radius,
 )
+from evaluation.recognition.retrieval import query_batches as query_batches
 from evaluation.recognition.retrieval import retrieve as retrieve
 from evaluation.recognition.scan_folders import write_scores as write_scores
 from evaluation.recognition.scoring import score_places as score_places

@@ -167,6 +167,32 @@ class PlaceOutcome:
             nearest=allowed.min(axis=1, initial=math.inf),
         )
 
+    @classmethod
+    def joined(cls, batches: Sequence[PlaceOutcome]) -> PlaceOutcome:
+        """Returns the outcomes of successive batches of queries as one."""
+        if len(batches) == 1:
+            return batches[0]
+        outcomes = QueryOutcomes.joined([one.outcomes for one in batches])
+        columns = {
+            name: np.concatenate([one.columns[name] for one in batches])
+            for name in batches[0].columns
+        }
+        firsts = np.cumsum([0, *(len(one.outcomes) for one in batches)])
+        return replace(
+            batches[0],
+            outcomes=outcomes,
+            columns=columns | {"block": outcomes.own_blocks},
+            best_places=np.concatenate([one.best_places for one in batches]),
+            best_scores=np.concatenate([one.best_scores for one in batches]),
+            matches=np.concatenate(
+                [
+                    one.matches + np.array([first, 0], np.int32)
+                    for first, one in zip(firsts, batches, strict=False)
+                ]
+            ),
+            nearest=np.concatenate([one.nearest for one in batches]),
+        )
+
     @property
     def is_gated(self) -> bool:
         """Whether geometric verification was used.

@@ -43,6 +43,19 @@ class QueryOutcomes:
     def __len__(self) -> int:
         return len(self.best_scores)
 
+    @classmethod
+    def joined(cls, parts: Sequence[QueryOutcomes]) -> QueryOutcomes:
+        """Returns the outcomes of successive queries in one database as one."""
+        blocks = [one.blocks for one in parts if one.blocks is not None]
+        return cls(
+            np.concatenate([one.best_scores for one in parts]),
+            np.concatenate([one.is_right for one in parts]),
+            np.concatenate([one.has_match for one in parts]),
+            np.concatenate([one.first_right_ranks for one in parts]),
+            parts[0].num_places,
+            np.concatenate(blocks) if blocks else None,
+        )
+
     def subset(self, kept: np.ndarray) -> QueryOutcomes:
         """Returns the outcomes of the queries that a mask (Q,) bool selects."""
         return QueryOutcomes(

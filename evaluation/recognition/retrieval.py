@@ -4,8 +4,8 @@ The distance of a query from a place is the distance between the positions of
 the sensor in three dimensions.
 """
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -23,6 +23,10 @@ from evaluation.recognition.pose_errors import PoseErrors, pose_error
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.ranking import ranked_places
 from evaluation.recognition.search import Search
+
+# Greatest number of pairs of a query and a place in one batch. An array of
+# numbers of a batch has 128 MB, and there are about five.
+MOST_PAIRS = 16_000_000
 
 
 @dataclass(frozen=True)
@@ -126,11 +130,48 @@ def retrieve(
         overlaps = overlap_matrix(database, query, protocol)
     (places,) = describe_drive(database, [method], {"places"}, protocol)
     (queries,) = describe_drive(query, [method], {"queries"}, protocol)
-    radii = [protocol.gate_radius]
-    (found,) = compare_with_gates(
-        method, places, queries, protocol, radii, overlaps
+    batches = compare_with_gates(
+        method, places, queries, protocol, [protocol.gate_radius], overlaps
     )
-    return found
+    return _joined([found for _, (found,) in batches])
+
+
+def _joined(batches: Sequence[Retrieval]) -> Retrieval:
+    """Returns successive batches of queries as one retrieval."""
+    if len(batches) == 1:
+        return batches[0]
+    joined = {
+        field.name: np.concatenate(
+            [getattr(one, field.name) for one in batches]
+        )
+        for field in fields(Retrieval)
+        if isinstance(getattr(batches[0], field.name), np.ndarray)
+        and field.name != "database_frames"
+    }
+    errors = [one.pose_errors for one in batches]
+    return replace(
+        batches[0],
+        **joined,
+        pose_errors=PoseErrors(
+            np.concatenate([one.translation for one in errors]),
+            np.concatenate([one.rotation_deg for one in errors]),
+        ),
+    )
+
+
+def query_batches(
+    num_queries: int, num_places: int, most_pairs: int = MOST_PAIRS
+) -> Iterator[range]:
+    """Yields successive batches of queries that fit into memory, at least one.
+
+    Args:
+        num_queries: number of queries.
+        num_places: number of places with which each query is compared.
+        most_pairs: greatest number of pairs of a query and a place in a batch.
+    """
+    most = max(1, most_pairs // max(num_places, 1))
+    for start in range(0, max(num_queries, 1), most):
+        yield range(start, min(start + most, num_queries))
 
 
 def compare_with_gates(
@@ -140,12 +181,17 @@ def compare_with_gates(
     protocol: RetrievalProtocol,
     gate_radii: Collection[float | None],
     overlaps: np.ndarray | None = None,
-    is_known: np.ndarray | None = None,
-) -> list[Retrieval]:
-    """Returns the scores after geometric verification with several radii.
+    *,
+    leaves_out_itself: bool = False,
+    most_pairs: int = MOST_PAIRS,
+) -> Iterator[tuple[range, list[Retrieval]]]:
+    """Yields the scores after geometric verification with several radii.
 
     Geometric verification rejects places that lie beyond a radius according to
     the method's own pose estimate. Queries are described and scored only once.
+    They are compared in batches, because the scores of many queries for many
+    places do not fit into memory. A method that averages the scores of earlier
+    queries has one batch.
 
     Args:
         method: method that described both drives.
@@ -157,20 +203,62 @@ def compare_with_gates(
             radius stands for scores without geometric verification.
         overlaps: (Q, D) share of each query's scan that each place's scan
             shows; needed for matches by overlap.
-        is_known: (Q, D) bool, which places are allowed for each query; by
-            default as the protocol says.
+        leaves_out_itself: whether query and place of the same number are the
+            same scan, so that this place is not allowed as an answer.
+        most_pairs: see `query_batches`.
+
+    Yields:
+        The numbers of the queries of a batch, and their retrieval for each of
+        `gate_radii`.
 
     Raises:
         InputError: if the method returns an invalid result.
     """
     places = database.places
     queries = query.queries
-    if is_known is None:
-        is_known = _known_places(database, query, protocol)
     search = Search(method, places)
-    rows = range(len(queries.frames))
+    batches = query_batches(len(queries.frames), len(places.frames), most_pairs)
+    if method.config.sequence:
+        batches = iter([range(len(queries.frames))])
+    for rows in batches:
+        yield (
+            rows,
+            _compare_batch(
+                search,
+                database,
+                query,
+                protocol,
+                gate_radii,
+                overlaps,
+                leaves_out_itself,
+                rows,
+            ),
+        )
+
+
+def _compare_batch(
+    search: Search,
+    database: DriveDescriptors,
+    query: DriveDescriptors,
+    protocol: RetrievalProtocol,
+    gate_radii: Collection[float | None],
+    overlaps: np.ndarray | None,
+    leaves_out_itself: bool,
+    rows: range,
+) -> list[Retrieval]:
+    """Returns the retrievals of one batch, see `compare_with_gates`.
+
+    Args:
+        search: search in the database.
+        database, query, protocol, gate_radii, overlaps, leaves_out_itself: see
+            `compare_with_gates`.
+        rows: numbers of the queries of the batch.
+    """
+    is_known = _known_places(database, query, protocol, rows, leaves_out_itself)
+    places = database.places
+    queries = query.queries.chosen(np.array(rows, np.int64))
     alone = search.scores(query, rows, is_known)
-    if length := method.config.sequence:
+    if length := search.method.config.sequence:
         alone = sequence_scores(
             alone,
             is_known,
@@ -186,9 +274,10 @@ def compare_with_gates(
         tested_places(scores_of_query)[: None if is_gated else 1]
         for scores_of_query in alone
     ]
-    poses = search.poses(query, tested)
-    distances = _distances(database, query)
-    matches = _near_enough(distances, overlaps, protocol) & is_known
+    poses = search.poses(query, rows, tested)
+    distances = _distances(database, query, rows)
+    shown = None if overlaps is None else overlaps[rows.start : rows.stop]
+    matches = _near_enough(distances, shown, protocol) & is_known
     return [
         Retrieval(
             query_frames=queries.frames,
@@ -198,7 +287,7 @@ def compare_with_gates(
             matches=matches,
             pose_errors=_errors_at_best(kept, poses, places, queries),
             is_known=is_known,
-            overlaps=overlaps,
+            overlaps=shown,
             query_blocks=queries.blocks,
         )
         for kept in _gated_scores(alone, poses, gate_radii)
@@ -257,24 +346,36 @@ def matches_within_radius(
     database: DriveDescriptors,
     query: DriveDescriptors,
     protocol: RetrievalProtocol,
+    rows: range,
+    *,
+    leaves_out_itself: bool = False,
 ) -> np.ndarray:
-    """Returns which places are true matches of each query, (Q, D) bool.
+    """Returns which places are true matches of some queries, (R, D) bool.
 
     These are the places within the protocol's radius that the protocol allows.
+
+    Args:
+        database: drive of the D places.
+        query: drive of the queries.
+        protocol: protocol of the comparison.
+        rows: numbers of R queries.
+        leaves_out_itself: see `compare_with_gates`.
     """
-    is_near = _distances(database, query) <= protocol.radius
-    return is_near & _known_places(database, query, protocol)
+    is_near = _distances(database, query, rows) <= protocol.radius
+    return is_near & _known_places(
+        database, query, protocol, rows, leaves_out_itself
+    )
 
 
 def _distances(
-    database: DriveDescriptors, query: DriveDescriptors
+    database: DriveDescriptors, query: DriveDescriptors, rows: range
 ) -> np.ndarray:
-    """Returns the distance of each query from each place, (Q, D) [m]."""
+    """Returns the distance of queries from each place, (R, D) [m]."""
     p_WQs, p_WPs = query.queries.p_WSs, database.places.p_WSs
-    distances = np.empty((len(p_WQs), len(p_WPs)))
+    distances = np.empty((len(rows), len(p_WPs)))
     # One query at a time: all differences at once take three times the memory.
-    for row, p_WQ in enumerate(p_WQs):
-        distances[row] = np.linalg.norm(p_WQ - p_WPs, axis=1)
+    for k, row in enumerate(rows):
+        distances[k] = np.linalg.norm(p_WQs[row] - p_WPs, axis=1)
     return distances
 
 
@@ -303,11 +404,16 @@ def _known_places(
     database: DriveDescriptors,
     query: DriveDescriptors,
     protocol: RetrievalProtocol,
+    rows: range,
+    leaves_out_itself: bool,
 ) -> np.ndarray:
-    """Returns which places are allowed for each query, (Q, D) bool."""
-    query_ns, place_ns = query.queries.stamps_ns, database.places.stamps_ns
+    """Returns which places are allowed for some queries, (R, D) bool."""
+    place_ns = database.places.stamps_ns
+    if leaves_out_itself:
+        return np.array(rows)[:, None] != np.arange(len(place_ns))
     if protocol.exclude_recent is None or database.name != query.name:
-        return np.ones((len(query_ns), len(place_ns)), dtype=bool)
+        return np.ones((len(rows), len(place_ns)), dtype=bool)
+    query_ns = query.queries.stamps_ns[rows.start : rows.stop]
     age_ns = query_ns[:, None] - place_ns[None, :]
     return age_ns >= protocol.exclude_recent * 1e9
 

@@ -23,6 +23,7 @@ class Search:
     `Method.divides`).
 
     Attributes:
+        method: the method.
         query_ms: (Q,) CPU time of each query of the last call of `scores` [ms].
     """
 
@@ -33,7 +34,7 @@ class Search:
             method: method that described the places.
             places: D described places.
         """
-        self._method = method
+        self.method = method
         self._places = places
         descriptors = places.descriptors
         self._groups = [slice(0, len(places.frames))]
@@ -86,13 +87,17 @@ class Search:
         return scores
 
     def poses(
-        self, query: DriveDescriptors, wanted: Sequence[np.ndarray]
+        self,
+        query: DriveDescriptors,
+        rows: Sequence[int],
+        wanted: Sequence[np.ndarray],
     ) -> list[dict[int, np.ndarray | None]]:
-        """Returns the poses of queries at places.
+        """Returns the poses of some queries at places.
 
         Args:
-            query: drive with Q described queries.
-            wanted: Q arrays with the places at which to estimate the pose of
+            query: drive with described queries.
+            rows: R queries.
+            wanted: R arrays with the places at which to estimate the pose of
                 each query.
 
         Returns:
@@ -104,17 +109,17 @@ class Search:
         """
         found: list[dict[int, np.ndarray | None]] = [{} for _ in wanted]
         for _, group in self._groups_in_memory():
-            for row, places in enumerate(wanted):
+            for k, places in enumerate(wanted):
                 here = places[(group.start <= places) & (places < group.stop)]
                 if len(here) == 0:
                     continue
                 poses = estimated_poses(
-                    self._method,
-                    query.queries.descriptors[row],
+                    self.method,
+                    query.queries.descriptors[rows[k]],
                     self._database,
                     (here - group.start).tolist(),
                 )
-                found[row].update(zip(here.tolist(), poses, strict=True))
+                found[k].update(zip(here.tolist(), poses, strict=True))
         return found
 
     def _entries_by_group(
@@ -133,7 +138,7 @@ class Search:
             rows: R queries.
             is_known: (R, D) bool, which places may be candidates.
         """
-        method = self._method
+        method = self.method
         most = method.num_shortlisted
         if len(self._groups) == 1 or most is None:
             return None
@@ -179,7 +184,7 @@ class Search:
                 chooses; None to let the method choose.
         """
         queries = query.queries
-        method = self._method
+        method = self.method
         is_whole = bool(is_known.all())
         if num_entries is not None and is_whole:
             found = method.score_best(
@@ -217,7 +222,7 @@ class Search:
         """Builds the database of a group."""
         descriptors = self._places.descriptors[self._groups[number]]
         start = process_time_ns()
-        database = self._method.build_database(descriptors)
+        database = self.method.build_database(descriptors)
         self._build_ms[number] = (process_time_ns() - start) * 1e-6
         self._built = number, database
 

@@ -17,7 +17,6 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import rankdata
 
 from evaluation.recognition import (
     UNKNOWN,
@@ -429,6 +428,9 @@ def _spearman(values: np.ndarray) -> np.ndarray:
 
     NaN where a column is constant.
     """
+    # Slow to import, and needed by few tables.
+    from scipy.stats import rankdata
+
     ranks = rankdata(values, axis=-2)
     ranks -= ranks.mean(axis=-2, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):

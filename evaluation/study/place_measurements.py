@@ -1,8 +1,9 @@
 """Measures place recognition between two drives."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
+import itertools
 import math
 from typing import NamedTuple, Protocol, TypeAlias
 
@@ -26,6 +27,7 @@ from evaluation.recognition import (
     kept_places,
     matches_within_radius,
     overlaps_with_best_match,
+    query_batches,
     query_ms,
 )
 from evaluation.study.chosen_methods import MethodChoice
@@ -245,17 +247,6 @@ def shown_overlaps(
     here = compared._replace(distractors=(), num_distractors=0)
     searched = here.searched(0, described, method)
     database = searched.described
-    names = searched.drives
-    allowed = (
-        _other_places(query, names) if compared.leaves_out_itself else True
-    )
-    matches = {
-        radius: matches_within_radius(
-            database, query, replace(protocol, radius=radius)
-        )
-        & allowed
-        for radius in radii
-    }
     found = {radius: np.full(len(asked), math.nan) for radius in radii}
     drive_of = database.places.drive_of
     if drive_of is None:
@@ -277,15 +268,25 @@ def shown_overlaps(
                 )
                 for frame in database.places.frames[of].tolist()
             ]
-        for radius in radii:
+        for radius, rows in itertools.product(
+            radii, query_batches(len(asked), len(of))
+        ):
+            batch = slice(rows.start, rows.stop)
+            matches = matches_within_radius(
+                database,
+                query,
+                replace(protocol, radius=radius),
+                rows,
+                leaves_out_itself=compared.leaves_out_itself,
+            )
             shown = overlaps_with_best_match(
                 chosen,
                 database.places.X_WS[of],
-                asked,
-                query.queries.X_WS,
-                matches[radius][:, of],
+                asked[batch],
+                query.queries.X_WS[batch],
+                matches[:, of],
             )
-            found[radius] = np.fmax(found[radius], shown)
+            found[radius][batch] = np.fmax(found[radius][batch], shown)
     return found
 
 
@@ -310,9 +311,10 @@ def measure_places(
     methods, protocol = compared.methods, compared.protocol
     places = _described_drive(compared.database, "places", methods, protocol)
     queries = _described_drive(compared.query, "queries", methods, protocol)
-    overlaps: dict[float, np.ndarray] = {}
+    overlaps: dict[tuple[float, range], np.ndarray] = {}
+    known: Mapping[float, np.ndarray] = {}
     if compared.overlaps is not None:
-        overlaps = compared.overlaps.read()
+        known = compared.overlaps.read()
     outcomes = []
     for k, choice in enumerate(
         track(methods, "comparing", len(methods), "methods")
@@ -334,6 +336,7 @@ def measure_places(
             compared,
             partial(
                 _overlaps_of_matches,
+                known,
                 overlaps,
                 places,
                 queries,
@@ -346,38 +349,45 @@ def measure_places(
 
 
 def _overlaps_of_matches(
-    overlaps: dict[float, np.ndarray],
+    known: Mapping[float, np.ndarray],
+    overlaps: dict[tuple[float, range], np.ndarray],
     places: "_DescribedDrive",
     queries: "_DescribedDrive",
     database: DriveDescriptors,
     query: DriveDescriptors,
     radius: float,
+    rows: range,
     matches: np.ndarray,
 ) -> np.ndarray:
-    """Returns the share of each query's scan that its best match shows, (Q,).
+    """Returns how much of some queries' scans their best matches show, (R,).
 
     Matches follow from the positions of the scans, and not from a method. The
     overlaps of a radius are therefore computed once for all methods.
 
     Args:
-        overlaps: radius -> known overlaps; new overlaps are added here.
+        known: radius -> (Q,) overlaps that were computed before.
+        overlaps: radius and queries -> overlaps; new overlaps are added here.
         places: the drive of the places, which come first in the database.
         queries: the drive of the queries.
         database: the described places.
         query: the described queries.
         radius: radius of a match [m].
-        matches: (Q, D) which places match the queries within the radius.
+        rows: numbers of R queries.
+        matches: (R, D) which places match the queries within the radius.
     """
-    if radius not in overlaps:
+    batch = slice(rows.start, rows.stop)
+    if radius in known:
+        return known[radius][batch]
+    if (radius, rows) not in overlaps:
         scans = places.scans
-        overlaps[radius] = overlaps_with_best_match(
+        overlaps[radius, rows] = overlaps_with_best_match(
             scans,
             database.places.X_WS[: len(scans)],
-            queries.scans,
-            query.queries.X_WS,
+            queries.scans[batch],
+            query.queries.X_WS[batch],
             matches[:, : len(scans)],
         )
-    return overlaps[radius]
+    return overlaps[radius, rows]
 
 
 def _method_outcomes(
@@ -386,7 +396,7 @@ def _method_outcomes(
     database: _Searched,
     query: DriveDescriptors,
     compared: PlaceComparison,
-    shown: Callable[[float, np.ndarray], np.ndarray],
+    shown: Callable[[float, range, np.ndarray], np.ndarray],
     reporter: Reporter,
 ) -> list[PlaceOutcome]:
     """Returns a method's outcomes; none if the method would take too long.
@@ -397,8 +407,9 @@ def _method_outcomes(
         database: the places that are searched.
         query: the described queries.
         compared: the comparison.
-        shown: function that takes a radius, and the matches (Q, D) within this
-            radius, and returns the overlaps (Q,) of the queries.
+        shown: function that takes a radius, the numbers of R queries, and
+            their matches (R, D) within this radius, and returns the overlaps
+            (R,) of the queries.
         reporter: reports notes.
     """
     searched, drives, num_here, _ = database
@@ -413,42 +424,43 @@ def _method_outcomes(
             f"{choice.name}: left out, because it would take over an hour"
         )
         return []
-    plain, *by_gate = compare_with_gates(
+    # For each radius, without and with geometric verification: the outcomes of
+    # each batch of queries.
+    outcomes: list[list[PlaceOutcome]] = [[] for _ in range(2 * len(radii))]
+    for rows, (plain, *by_gate) in compare_with_gates(
         method,
         searched,
         query,
         protocol,
         [None, *radii],
         truth,
-        _other_places(query, drives) if compared.leaves_out_itself else None,
-    )
-    outcomes = []
-    for radius, one in zip(radii, by_gate, strict=True):
-        matches = plain.matches
-        if truth is None:
-            matches = (plain.distances <= radius) & plain.is_known
-        overlaps = shown(radius, matches)
-        outcomes += [
-            PlaceOutcome.of(
-                choice.key,
-                method,
-                replace(protocol, gate=is_gated, radius=radius),
-                replace(found, matches=matches),
-                QueryDrive(
-                    query.name, query.queries.stamps_ns, query.queries.p_WSs
-                ),
-                drives,
-                overlaps,
-                num_here,
-            )
-            for is_gated, found in ((False, plain), (True, one))
-        ]
-    return outcomes
-
-
-def _other_places(query: DriveDescriptors, drives: Sequence[str]) -> np.ndarray:
-    """Returns (Q, D) bool, all places but the place of the query's scan."""
-    return ~np.eye(len(query.queries.frames), len(drives), dtype=bool)
+        leaves_out_itself=compared.leaves_out_itself,
+    ):
+        batch = slice(rows.start, rows.stop)
+        asked = QueryDrive(
+            query.name,
+            query.queries.stamps_ns[batch],
+            query.queries.p_WSs[batch],
+        )
+        for k, (radius, gated) in enumerate(zip(radii, by_gate, strict=True)):
+            matches = plain.matches
+            if truth is None:
+                matches = (plain.distances <= radius) & plain.is_known
+            overlaps = shown(radius, rows, matches)
+            for is_gated, found in enumerate((plain, gated)):
+                outcomes[2 * k + is_gated].append(
+                    PlaceOutcome.of(
+                        choice.key,
+                        method,
+                        replace(protocol, gate=bool(is_gated), radius=radius),
+                        replace(found, matches=matches),
+                        asked,
+                        drives,
+                        overlaps,
+                        num_here,
+                    )
+                )
+    return [PlaceOutcome.joined(batches) for batches in outcomes]
 
 
 def _takes_long(

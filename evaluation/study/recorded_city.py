@@ -33,7 +33,7 @@ from evaluation.study.recordings.map_drives import MapDrives
 from evaluation.study.sources import DriveSource, RecordingSource
 from evaluation.study.study_files import FeatureFiles
 from evaluation.study.tasks.change import ChangeTask
-from evaluation.study.tasks.jobs import Jobs
+from evaluation.study.tasks.jobs import STARTING_COST, Jobs
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 from evaluation.study.tasks.place import PlaceTask
 
@@ -119,10 +119,8 @@ def add_city(
     return shown
 
 
-# Expected time to map a drive of 3000 scans [s].
+# Expected time to map a drive of usual length [s].
 _MAP_COST = 19.0
-# Expected time to describe its places or its queries [s].
-_ROLE_COST = 10.0
 
 
 @dataclass
@@ -205,18 +203,24 @@ class _ExtractionJobs(Jobs):
         files = self.files.features(drive.name)
         if name not in self.jobs:
             roles = frozenset(self._roles.get(drive.name, ()))
+            protocol = self._protocol or FAIR_PROTOCOL
             step = FeatureExtraction(
                 drive.source,
                 roles,
                 self.methods,
-                self._protocol or FAIR_PROTOCOL,
+                protocol,
                 files,
                 with_scans=bool(roles),
                 with_map=self.with_map,
                 further=tuple(self._further[drive.name].values()),
                 removes_descriptors=True,
             )
-            cost = self.with_map * _MAP_COST + _ROLE_COST * len(roles)
+            # All scans are read for the map.
+            cost = STARTING_COST + self.with_map * _MAP_COST * drive.share
+            for role in roles:
+                cost += self.description_cost(drive, role, protocol)
+                if not self.with_map:
+                    cost += self.reading_cost(drive, role, protocol)
             self.jobs[name] = Job(name, step, drive.needs, cost)
         return files
 

@@ -26,6 +26,10 @@ RUNS = {
         "of ideal",
     ),
     "many_houses.py": (("--houses", 16), "16 houses: "),
+    "many_places.py": (
+        ("--methods", "solid", "--places", 5, 10, "--queries", 2),
+        "time of a query ~ places",
+    ),
     "ray_casting_rates.py": (("{drive}", "--rounds", 1), "Mrays/s"),
     "recording.py": (
         ("{drive}", "--rounds", 1, "--frames", 2),

@@ -32,7 +32,7 @@ from cns_drake.base.file_locks import exclusive, remove_lock
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.own_packages import leave_out_folder
-from cns_drake.base.process import collect_garbage_seldom
+from cns_drake.base.process import ONE_CORE, collect_garbage_seldom
 from cns_drake.base.progress import heard_by
 
 # How long a process may take to close its files after SIGTERM [s]. A process
@@ -57,12 +57,6 @@ ALLOCATION = {
     "MALLOC_MMAP_THRESHOLD_": str(1 << 25),  # The largest that glibc takes.
     "MALLOC_TRIM_THRESHOLD_": str(1 << 28),
 }
-
-# As many jobs run as there are cores. More threads of linear algebra would wait
-# for each other, which takes processor time.
-_ONE_CORE = dict.fromkeys(
-    ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"), "1"
-)
 
 if sys.platform == "linux":
     _context = multiprocessing.get_context("forkserver")
@@ -152,7 +146,8 @@ def _environment_of_jobs() -> Iterator[None]:
         if name.startswith(("cns_drake.", "evaluation."))
     ]
     changed = {
-        **{k: os.environ.get(k, v) for k, v in _ONE_CORE.items()},
+        # As many jobs run as there are cores.
+        **{k: os.environ.get(k, v) for k, v in ONE_CORE.items()},
         **ALLOCATION,
         _MODULES_VARIABLE: " ".join(modules),
         # Another package of a name that is imported, such as another version

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+import math
 from pathlib import Path
 
 from cns_drake.base import InputError, natural_key
 from cns_drake.drives import LidarField
 from evaluation.study.sources import DriveSource, RecordingSource
-from evaluation.study.tasks.pair import NamedDrive
+from evaluation.study.tasks.pair import USUAL_LENGTH, NamedDrive
 
 _GUESSED = (
     " Map and stage were guessed from the drive's name; a scenario.yaml in its"
@@ -35,6 +36,7 @@ class RecordingInfo:
         lidar_field: number of rings and field of view of the LiDAR; None if
             unknown.
         is_guessed: whether map and stage come from the name of the drive.
+        length, num_scans: see `NamedDrive`.
     """
 
     name: str
@@ -46,6 +48,8 @@ class RecordingInfo:
     made_by: DriveSource | None = None
     lidar_field: LidarField | None = None
     is_guessed: bool = False
+    length: float = USUAL_LENGTH
+    num_scans: float = math.inf
 
     @property
     def source(self) -> DriveSource:
@@ -55,7 +59,9 @@ class RecordingInfo:
     @property
     def named(self) -> NamedDrive:
         """The drive, in the form in which tasks take drives."""
-        return NamedDrive(self.name, self.source, self.needs)
+        return NamedDrive(
+            self.name, self.source, self.needs, self.length, self.num_scans
+        )
 
     def drives_like(self, other: RecordingInfo) -> bool:
         """Returns whether another drive follows the same route.

@@ -9,7 +9,7 @@ import re
 
 from cns_drake.base import InputError, listed, natural_key, one_line
 from cns_drake.drives import SCENARIO, driven_way
-from evaluation.drives import find_data_sets, open_drive
+from evaluation.drives import find_data_sets, open_drive, travelled
 from evaluation.study.recordings.map_drives import RecordingInfo
 from evaluation.study.sources import RecordingSource
 
@@ -201,4 +201,6 @@ def _recording_info(
         made_by=source,
         lidar_field=drive.lidar_field,
         is_guessed=is_guessed,
+        length=float(travelled(drive.X_WS[:, :3, 3])[-1]),
+        num_scans=len(drive),
     )

@@ -13,6 +13,8 @@ from evaluation.study.place_measurements import DescribedSource
 from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 
+# Expected time to start a job [s].
+STARTING_COST = 2.0
 # Expected time to start a job and to open a drive [s].
 OPENING_COST = 8.0
 # Expected time to read a scan [s].
@@ -107,7 +109,8 @@ class Jobs:
             with_map=False,
         )
         job = f"describe {name}"
-        cost = self.description_cost(drive, role, protocol)
+        cost = self.reading_cost(drive, role, protocol)
+        cost += self.description_cost(drive, role, protocol)
         self.jobs[job] = Job(job, step, drive.needs, cost)
         needs.append(job)
         return (
@@ -118,11 +121,24 @@ class Jobs:
     def description_cost(
         self, drive: NamedDrive, role: Role, protocol: RetrievalProtocol
     ) -> float:
-        """Returns the expected time to describe a drive by all methods [s]."""
+        """Returns the expected time to describe a drive by all methods [s].
+
+        The time does not include opening the drive and reading its scans.
+        """
+        each = sum(one.make().describe_time for one in self.methods)
+        return each * num_described(drive, role, protocol)
+
+    def reading_cost(
+        self, drive: NamedDrive, role: Role, protocol: RetrievalProtocol
+    ) -> float:
+        """Returns the expected time to open a drive and to read its scans [s].
+
+        Only the scans that are described are read.
+        """
         made = [one.make() for one in self.methods]
         scans = max(map(protocol.scans, made), default=1)
-        each = SCAN_COST * scans + sum(one.describe_time for one in made)
-        return OPENING_COST + each * num_described(drive, role, protocol)
+        number = num_described(drive, role, protocol)
+        return OPENING_COST + SCAN_COST * scans * number
 
     def mapped(
         self, drive: NamedDrive, spacing: float | None, needs: list[str]

@@ -22,16 +22,14 @@ from evaluation.study.place_measurements import (
     measure_places,
     shown_overlaps,
 )
-from evaluation.study.tasks.jobs import Jobs, num_described
+from evaluation.study.tasks.jobs import (
+    STARTING_COST,
+    Jobs,
+    num_described,
+)
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Answered, Task
 
-# Expected time to start a job [s].
-_STARTING_COST = 2.0
-# Expected time of a method to answer a query, with geometric verification, and
-# to compare it with one more place [s].
-_QUERY_COST = 0.045
-_PLACE_COST = 3e-5
 # Expected time to find what the matches of a query show [s].
 _OVERLAP_COST = 0.2
 
@@ -61,6 +59,7 @@ class PoseTask(Task):
         if not all(isinstance(one, tuple) for one in sides):
             for (drive, role), side in zip(pair.roles, sides, strict=True):
                 if not isinstance(side, tuple):
+                    cost += jobs.reading_cost(drive, role, pair.protocol)
                     cost += jobs.description_cost(drive, role, pair.protocol)
             part = jobs.files.part("place", pair.key)
             return (jobs.add(part, measure_places, (compared,), needs, cost),)
@@ -184,9 +183,11 @@ def _search_cost(pair: Pair, jobs: Jobs, num_queries: float) -> float:
         for drives in ((pair.database, *pair.beside), jobs.distractors)
     )
     num_places = own + min(pair.distractors, others)
-    num_methods = sum(pair.has_method(one.name) for one in jobs.methods)
-    each = num_methods * (_QUERY_COST + _PLACE_COST * num_places)
-    return _STARTING_COST + num_queries * each
+    methods = [
+        choice.make() for choice in jobs.methods if pair.has_method(choice.name)
+    ]
+    each = sum(one.query_time + one.place_time * num_places for one in methods)
+    return STARTING_COST + num_queries * each
 
 
 def measure_costs(

@@ -10,12 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base import InputError, make_pose, transform
 from evaluation.drives import QuerySensor, cloud_at, open_drive
-from evaluation.methods import (
-    Method,
-    MethodConfig,
-    align,
-    make_method,
-)
+from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition import (
     FAIR_PROTOCOL,
     PAPER_PROTOCOL,
@@ -45,7 +40,11 @@ class Corresponding(Method):
         return np.array([-np.abs(one - ranges[0]).sum() for one in ranges[1:]])
 
     def relative_pose(self, query, database, place):
-        return align(query, database[place])
+        means = database[place].mean(axis=0), query.mean(axis=0)
+        R_PQ, _ = Rotation.align_vectors(
+            database[place] - means[0], query - means[1]
+        )
+        return make_pose(R_PQ.as_matrix(), means[0] - R_PQ.apply(means[1]))
 
 
 def record(folder, ys):

@@ -1,5 +1,6 @@
 """What happens to both programs while they are being imported."""
 
+import os
 import signal
 
 import pytest
@@ -39,3 +40,15 @@ def test_a_program_that_cannot_be_loaded(monkeypatch, capsys):
         start("program", load)
     assert error.value.code == 2
     assert capsys.readouterr() == ("", "program: error: a file: a fault\n")
+
+
+def test_linear_algebra_has_one_thread_unless_the_user_says_otherwise(
+    monkeypatch,
+):
+    environment = {"OPENBLAS_NUM_THREADS": "3"}
+    monkeypatch.setattr(os, "environ", environment)
+    monkeypatch.setattr(start_module, "interrupt_on_termination", lambda: None)
+    found = {}
+    start("program", lambda: lambda: found.update(environment))
+    assert found["OPENBLAS_NUM_THREADS"] == "3"
+    assert found["OMP_NUM_THREADS"] == "1"

@@ -21,16 +21,16 @@ def test_coarse_maps(halvings):
     turned = turns(24)[[0, 5, 17]]
     bits, counts = coarse_maps(cells, starts, turned, halvings, MAPS)
     rows = 256 >> halvings
-    assert bits.shape == (3, rows, 4)
+    assert bits.shape == (3, 4, rows)
     for heading, turn in enumerate(turned):
-        wanted = np.zeros((rows, 4, 64), dtype=bool)
+        wanted = np.zeros((4, rows, 64), dtype=bool)
         for layer in range(5):
             picture = image(cells, starts, layer, turn, halvings)
-            wanted[:, MAPS[layer], :rows] |= picture
+            wanted[MAPS[layer], :, :rows] |= picture
         columns = np.arange(64, dtype=np.uint64)
         found = (bits[heading][..., None] >> columns) & np.uint64(1)
         np.testing.assert_array_equal(found.astype(bool), wanted)
-        assert counts[heading].tolist() == wanted.sum(axis=(0, 2)).tolist()
+        assert counts[heading].tolist() == wanted.sum(axis=(1, 2)).tolist()
 
 
 # Some shifts lead beyond the rows that are added to a place.
@@ -57,7 +57,7 @@ def test_best_overlaps(halvings, start):
     ]
     counts, poses = best_overlaps(
         bits,
-        np.pad(np.concatenate(of_places), ((0, 0), (3, 3), (0, 0))),
+        np.pad(np.concatenate(of_places), ((0, 0), (0, 0), (3, 3))),
         weights,
         np.array([start]),
         moves,
@@ -183,7 +183,7 @@ def test_full_maps(share):
     rng = np.random.default_rng(5)
 
     def maps(number):
-        bits = rng.random((number, 64, 4, 64)) < share
+        bits = rng.random((number, 4, 64, 64)) < share
         return np.packbits(bits, -1).view(np.uint64)[..., 0]
 
     query, places = maps(1), maps(3)
@@ -196,4 +196,4 @@ def test_full_maps(share):
         common = [
             [int(word).bit_count() for word in row] for row in query[0] & place
         ]
-        assert count == np.sum(common, axis=0) @ weights
+        assert count == np.sum(common, axis=1) @ weights

@@ -159,10 +159,6 @@ class TestScore:
         expected = np.array(sums) / (0.15 * 6 * n * n)
         query, place = (method.describe(scan) for scan in scans)
         database = method.build_database([place])
-        found = method._correlate(
-            method._weighted_spectrum(query), place.spectrum
-        )
-        np.testing.assert_allclose(found, expected, rtol=1e-5)
         assert method.score(query, database) == pytest.approx(max(expected))
 
     @pytest.mark.parametrize("cells", [31, 32])
@@ -281,6 +277,62 @@ class TestRelativePose:
         query = method.describe(seen_from(X_PQ, scan))
         found = method.relative_pose(query, database, 0)
         np.testing.assert_allclose(found, X_PQ, atol=1e-9)
+
+
+def plain_pose(method, query, place):
+    """Returns X_PQ by the definition, without anything kept or shared."""
+    n = method.config.cells
+    weights = np.full(n // 2 + 1, 2.0)
+    weights[0] = 1.0
+    if n % 2 == 0:
+        weights[-1] = 1.0
+    product = query.spectrum * place.spectrum.conj()
+    product = product.reshape(6, -1, product.shape[1])
+    rows = np.fft.irfft(product * weights[:, None], n=n, axis=2)
+    shift = int(np.abs(rows).sum(axis=(0, 1)).argmax())
+    yaw = -2.0 * math.pi * ((shift + n // 2) % n - n // 2) / n
+    reference = place.bev(n).astype(np.float64)
+    reference -= reference.mean()
+    centre = 0.5 * (n - 1)
+    u, v = np.meshgrid(np.arange(n) - centre, np.arange(n) - centre)
+    best = (-1.0, 0.0, 0, 0)
+    for heading in (yaw, yaw - math.pi):
+        c, s = math.cos(heading), math.sin(heading)
+        # Rows v are along x, columns u along y.
+        row = np.rint(c * v + s * u + centre).astype(int)
+        column = np.rint(c * u - s * v + centre).astype(int)
+        inside = (row >= 0) & (row < n) & (column >= 0) & (column < n)
+        turned = query.bev(n)[:, row % n, column % n] * inside
+        turned = turned - turned.mean()
+        found = np.fft.ifft2(
+            np.fft.fft2(turned) * np.fft.fft2(reference).conj()
+        )
+        # The maps have the same norm at both headings.
+        found = np.abs(found.real).sum(axis=0)
+        at = np.unravel_index(found.argmax(), found.shape)
+        if found[at] > best[0]:
+            best = (found[at], heading, *at)
+    _, heading, row, column = best
+    cell = 2.0 * method.config.half_width / n
+    x, y = (-((k + n // 2) % n - n // 2) * cell for k in (row, column))
+    return pose(x, y, math.degrees(heading))
+
+
+@pytest.mark.parametrize("cells", [60, 61])
+@pytest.mark.parametrize("is_scored", [True, False])
+def test_poses_are_those_of_the_definition(cells, is_scored):
+    method = ring(cells=cells)
+    scenes = [make_scene(seed) for seed in range(30, 36)]
+    places = [method.describe_place(scene) for scene in scenes]
+    database = method.build_database(places)
+    for k, scene in enumerate(scenes):
+        motion = pose(2.0 - k, 1.5 * k, 65.0 * k + 10.0)
+        query = method.describe(seen_from(motion, scene))
+        if is_scored:
+            method.score(query, database)
+        found = method.relative_poses(query, database, range(len(places)))
+        expected = [plain_pose(method, query, place) for place in places]
+        np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 class TestConfig:

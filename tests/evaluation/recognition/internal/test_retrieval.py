@@ -10,13 +10,17 @@ from evaluation.drives import cloud_at, open_drive, sample_frames, within_cube
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition import (
     DescribedScans,
+    PlaceOutcome,
     PoseErrors,
+    QueryDrive,
     Retrieval,
     RetrievalProtocol,
+    compare_with_gates,
     describe_drive,
     joined_scans,
     retrieve,
 )
+from evaluation.recognition.retrieval import _joined
 
 
 def line(xs):
@@ -260,6 +264,65 @@ def test_a_drive_that_saw_nothing(tmp_path):
     blind = open_drive(tmp_path / "blind")
     with pytest.raises(InputError, match=r"blind: no finite point .* 3 scans"):
         retrieve(blind, blind, make_method("solid", {}))
+
+
+@pytest.mark.parametrize("leaves_out_itself", [False, True])
+def test_batches_of_queries_give_the_same_as_all_at_once(
+    tmp_path, leaves_out_itself
+):
+    database = record_line(tmp_path / "a", np.arange(0.0, 31.0, 2.5))
+    query = record_line(tmp_path / "b", np.arange(3.0, 84.0, 5.0))
+    method, protocol = OddOneOut(), RetrievalProtocol(radius=8.0)
+    (places,) = describe_drive(database, [method], {"places"}, protocol)
+    (queries,) = describe_drive(query, [method], {"queries"}, protocol)
+    num_queries, num_places = len(queries.queries.frames), 7
+    found = []
+    # All pairs; those of two queries; less than those of one.
+    for most_pairs, sizes in (
+        (num_queries * num_places, [num_queries]),
+        (2 * num_places + 3, [2] * (num_queries // 2) + [1]),
+        (num_places - 1, [1] * num_queries),
+    ):
+        outcomes, retrievals = [], []
+        batches = compare_with_gates(
+            method,
+            places,
+            queries,
+            protocol,
+            [None],
+            leaves_out_itself=leaves_out_itself,
+            most_pairs=most_pairs,
+        )
+        for rows, (one,) in batches:
+            asked = queries.queries.chosen(np.array(rows))
+            drive = QueryDrive("b", asked.stamps_ns, asked.p_WSs)
+            retrievals.append(one)
+            outcomes.append(
+                PlaceOutcome.of(
+                    "odd", method, protocol, one, drive, ["a"] * num_places
+                )
+            )
+        assert [len(one.outcomes) for one in outcomes] == sizes
+        found.append(PlaceOutcome.joined(outcomes))
+        whole = _joined(retrievals)
+        drive = QueryDrive(
+            "b", queries.queries.stamps_ns, queries.queries.p_WSs
+        )
+        found.append(
+            PlaceOutcome.of(
+                "odd", method, protocol, whole, drive, ["a"] * num_places
+            )
+        )
+    assert found[0].outcomes.is_right.any()
+    for one in found[1:]:
+        assert one.to_json() == found[0].to_json()
+        assert one.columns.keys() == found[0].columns.keys()
+        for name, column in found[0].columns.items():
+            np.testing.assert_array_equal(one.columns[name], column)
+        for name in ("best_places", "best_scores", "matches", "nearest"):
+            np.testing.assert_array_equal(
+                getattr(one, name), getattr(found[0], name)
+            )
 
 
 def test_different_worlds(tmp_path):

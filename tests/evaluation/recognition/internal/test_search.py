@@ -120,11 +120,10 @@ def test_groups_give_the_same_as_the_whole(name, settings):
         places = stored(drives, most_bytes, [])
         assert len(places.descriptors) == NUM_DRIVES * NUM_PLACES
         database = DriveDescriptors("places", places, places)
-        found.append(
-            compare_with_gates(
-                method, database, queries, protocol, [None, 25.0]
-            )
+        ((_, batch),) = compare_with_gates(
+            method, database, queries, protocol, [None, 25.0]
         )
+        found.append(batch)
     whole, one = found
     assert not np.isnan(whole[0].scores).all()
     for expected, got in zip(whole, one, strict=True):
@@ -166,7 +165,7 @@ def test_one_group_is_in_memory_at_a_time():
     search.scores(queries, range(5), np.ones((5, 24), bool))
     assert reads == [0, 1, 2, 3, 0, 1, 2, 3]
     # The last group is still there.
-    search.poses(queries, [np.array([0, 23])] * 5)
+    search.poses(queries, range(5), [np.array([0, 23])] * 5)
     assert reads == [0, 1, 2, 3, 0, 1, 2, 3, 0, 1]
 
 

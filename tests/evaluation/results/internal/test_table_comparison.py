@@ -5,10 +5,12 @@ from dataclasses import replace
 import itertools
 import json
 import sys
+import warnings
 
 from helpers.internal.eval_program import assert_refused, run
 import numpy as np
 import pytest
+from scipy.stats import kendalltau
 
 from cns_drake.base import InputError
 from evaluation.command_line import name_tables, suggest_comparison
@@ -25,6 +27,7 @@ from evaluation.results import (
     made_by,
 )
 from evaluation.results.metric_tables import _BASELINES
+from evaluation.results.table_comparison import _kendall_tau
 
 
 def key(method, town="town", **changes):
@@ -646,3 +649,18 @@ def test_tables_beside_a_page_are_named(tmp_path, capsys):
     write_table(tmp_path / "a", {"a": {"x": 0.5}})
     name_tables(tmp_path / "a")
     assert capsys.readouterr().err.startswith("wrote ")
+
+
+def test_kendall_tau_is_that_of_a_library():
+    rng = np.random.default_rng(71)
+    for number in (2, 3, 5, 9):
+        # Few different values, so that there are ties.
+        one, other = rng.integers(4, size=(2, 50, number)).astype(float)
+        with warnings.catch_warnings():
+            # SciPy warns if all values are equal.
+            warnings.simplefilter("ignore")
+            expected = [
+                kendalltau(*pair).statistic
+                for pair in zip(one, other, strict=True)
+            ]
+        np.testing.assert_array_equal(_kendall_tau(one, other), expected)

@@ -222,6 +222,14 @@ def test_a_slow_method_costs_more(town, tmp_path, monkeypatch):
     monkeypatch.setattr(SolidMethod, "describe_time", slower)
     scans = 200.0 / 2.0 + 200.0 / 5.0
     assert cost() - usual == pytest.approx(3.0 * scans)
+    # So does one that searches slowly: each query, and each pair.
+    monkeypatch.undo()
+    monkeypatch.setattr(SolidMethod, "query_time", SolidMethod.query_time + 2.0)
+    queries, places = sorted((200.0 / 2.0, 200.0 / 5.0))
+    assert cost() - usual == pytest.approx(2.0 * queries)
+    monkeypatch.setattr(SolidMethod, "place_time", SolidMethod.place_time + 0.1)
+    slow = (2.0 + 0.1 * places) * queries
+    assert cost() - usual == pytest.approx(slow)
 
 
 def run_of(wanted, output):

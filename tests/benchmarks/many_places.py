@@ -1,0 +1,155 @@
+"""How the cost of a search grows with the number of places.
+
+    python tests/benchmarks/many_places.py [--methods NAME ...]
+        [--places N ...] [--queries N] [--all-queries]
+
+Each place is another scene: a ground with walls and posts, drawn at random.
+Scenes have few points, so that many can be described; a search does not depend
+on the number of points. A query is a scene seen from elsewhere. Each method
+and number of places has a process of its own, of which the CPU time of the
+description, the database, a query without and with geometric verification and
+the peak of memory are printed. With `--all-queries`, there are as many queries
+as places. Exponents are slopes of straight lines through logarithms; the last
+column is the time for as many queries as places, on one core.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+import tempfile
+import time
+
+import numpy as np
+from processes import in_process
+
+# What it measures is imported in the processes that do it alone.
+METHODS = ("scan-context++", "solid", "ring++", "btc", "layered-overlap")
+PLACES = (300, 3000)
+QUERIES = 20
+# Distance between two places [m].
+APART = 10.0
+
+
+def scene(seed: int) -> np.ndarray:
+    """Returns a scene as a LiDAR at a height of 1.6 m sees it, (N, 3)."""
+    rng = np.random.default_rng([seed, 4])
+    ground = rng.uniform(-30.0, 30.0, (8000, 3))
+    ground[:, 2] = rng.normal(-1.6, 0.01, len(ground))
+    parts = [ground]
+    for _ in range(40):
+        size = rng.choice([0.1, 5.0])
+        along = rng.uniform(-size, size, 100)
+        angle = rng.uniform(0.0, np.pi)
+        x, y = rng.uniform(-30.0, 30.0, 2)
+        wall = np.empty((100, 3))
+        wall[:, 0] = x + along * np.cos(angle)
+        wall[:, 1] = y + along * np.sin(angle)
+        wall[:, 2] = rng.uniform(-1.6, rng.uniform(2.0, 8.0), 100)
+        parts.append(wall)
+    return np.concatenate(parts)
+
+
+def seen_again(points: np.ndarray, seed: int) -> np.ndarray:
+    """Returns a scene from up to 3 m away, at another heading."""
+    rng = np.random.default_rng([seed, 5])
+    angle = rng.uniform(0.0, 2.0 * np.pi)
+    c, s = np.cos(angle), np.sin(angle)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    shifted = points - [*rng.uniform(-2.0, 2.0, 2), 0.0]
+    return shifted @ R + rng.normal(0.0, 0.01, points.shape)
+
+
+def measure(name: str, num_places: int, num_queries: int, file: Path) -> None:
+    """Writes what a method's search takes to a file, see `report`."""
+    from evaluation.methods import make_method
+    from evaluation.recognition import (
+        FAIR_PROTOCOL,
+        DescribedScans,
+        DriveDescriptors,
+        compare_with_gates,
+    )
+
+    method = make_method(name, {})
+    # The first call of a function loads and compiles.
+    method.describe(scene(0))
+
+    def described(frames: np.ndarray, descriptors: list) -> DescribedScans:
+        X_WS = np.tile(np.eye(4), (len(frames), 1, 1))
+        X_WS[:, 0, 3] = APART * frames
+        return DescribedScans(frames, frames, X_WS, descriptors)
+
+    start = time.process_time()
+    of_places = [method.describe_place(scene(k)) for k in range(num_places)]
+    describing = (time.process_time() - start) / num_places
+    chosen = np.linspace(0, num_places - 1, num_queries).astype(int)
+    of_queries = [
+        method.describe(seen_again(scene(k), k)) for k in chosen.tolist()
+    ]
+    places = described(np.arange(num_places), of_places)
+    none = described(np.arange(0), [])
+    database = DriveDescriptors("places", places, none)
+    method.build_database(of_places[:2])
+    start = time.process_time()
+    built = method.build_database(of_places)
+    building = time.process_time() - start
+    method.build_database = lambda descriptors: built
+    times, right = [], 0
+    for radii in ([None], [None, 7.5]):
+        # The first query does not count: it compiles.
+        for part in (slice(0, 1), slice(0, None)):
+            asked = described(chosen[part], of_queries[part])
+            query = DriveDescriptors("queries", none, asked)
+            start = time.process_time()
+            for _, (found, *_) in compare_with_gates(
+                method, database, query, FAIR_PROTOCOL, radii
+            ):
+                right += int((found.best_places == found.query_frames).sum())
+        times.append((time.process_time() - start) / num_queries)
+    np.savetxt(file, [describing, building, *times, right, _peak()])
+
+
+def _peak() -> float:
+    """Returns the greatest resident memory of this process so far [MB]."""
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmHWM"):
+            return int(line.split()[1]) / 1e3
+    return np.nan
+
+
+def report(name: str, numbers: list[int], num_queries: int | None) -> None:
+    """Prints a line for each number of places, and the exponent."""
+    spent = []
+    for number in numbers:
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "times"
+            asked = number if num_queries is None else min(num_queries, number)
+            in_process(measure, name, number, asked, file)
+            describing, building, alone, gated, _, peak = np.loadtxt(file)
+        spent.append(gated)
+        print(
+            f"{name:16} {number:6} places: describe {1e3 * describing:.1f} ms,"
+            f" build {building:.3f} s, query {1e3 * alone:.2f} ms,"
+            f" verified {1e3 * gated:.2f} ms, peak {peak:.0f} MB;"
+            f" {number} queries {number * gated / 3600.0:.2g} h",
+            flush=True,
+        )
+    if len(numbers) > 1:
+        slope, _ = np.polyfit(np.log(numbers), np.log(spent), 1)
+        print(f"{name:16} time of a query ~ places^{slope:.2f}", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--methods", nargs="+", default=METHODS)
+    parser.add_argument("--places", nargs="+", type=int, default=PLACES)
+    parser.add_argument("--queries", type=int, default=QUERIES)
+    parser.add_argument("--all-queries", action="store_true")
+    arguments = parser.parse_args()
+    queries = None if arguments.all_queries else arguments.queries
+    for name in arguments.methods:
+        report(name, arguments.places, queries)
+
+
+if __name__ == "__main__":
+    main()
