@@ -40,8 +40,8 @@ def check_mesh_file(path: Path) -> tuple[str, ...]:
         InputError: the file cannot be read.
     """
     ending = path.suffix.lower()
-    if ending == ".dae":
-        return check_collada(path)
+    if ending in _CHECKS_OF_FILES:
+        return _CHECKS_OF_FILES[ending](path)
     if ending not in _CHECKS:
         raise ValueError(
             f"is no mesh of a format that is read ({_FORMATS}); Blender or"
@@ -95,6 +95,8 @@ def _check_vtk(content: bytes) -> tuple[()]:
     return ()
 
 
+# File name extension -> function that reads and checks a file.
+_CHECKS_OF_FILES = {".dae": check_collada}
 # File name extension -> function that checks the contents of a file.
 _CHECKS = {
     **dict.fromkeys(GLTF, check_gltf),

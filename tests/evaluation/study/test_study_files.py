@@ -10,9 +10,11 @@ from evaluation.study import StudyFiles
 def test_a_folder_with_the_name_of_a_file_is_found_first(tmp_path, name):
     StudyFiles(tmp_path / "new").check()
     StudyFiles(tmp_path).check()
-    (tmp_path / name).write_text("of an earlier run")
     (tmp_path / "parts").mkdir()
     StudyFiles(tmp_path).check()
+    (tmp_path / name).write_text("of the user")
+    with pytest.raises(InputError, match=f"{name}: no earlier run wrote it"):
+        StudyFiles(tmp_path).check()
     (tmp_path / name).unlink()
     (tmp_path / name).mkdir()
     with pytest.raises(InputError, match=rf"^{tmp_path / name}: "):

@@ -822,7 +822,7 @@ def test_a_folder_with_the_name_of_a_result(town, tmp_path, monkeypatch, name):
         engine, "run_jobs", lambda *_: pytest.fail("a job runs")
     )
     (tmp_path / name).mkdir()
-    with pytest.raises(InputError, match=f"{name}: Is a directory"):
+    with pytest.raises(InputError, match=f"{name}: a folder has this name"):
         run_study(experiment(town), tmp_path, Cluster())
 
 

@@ -383,7 +383,7 @@ def test_drives_differ_before_their_cities_are_redrawn(town):
 
 @pytest.mark.parametrize("side", ["both", "query"])
 def test_sessions_are_those_of_the_database(town, side):
-    with pytest.raises(InputError, match=r"query\.\w+: it is a field of data"):
+    with pytest.raises(InputError, match=rf"{side}\.\w+: it is a field of da"):
         compared(town, **{side: {"sessions": [{"years": 2}]}})
 
 
