@@ -1,4 +1,8 @@
-"""`python -m cns_drake` is the command `cns-drake`."""
+"""`python -m cns_drake` is the command `cns-drake`.
+
+The command `cns-eval` starts here as well: where another package `evaluation`
+hides ours, this module is found, and says so.
+"""
 
 from collections.abc import Callable
 import sys
@@ -11,13 +15,25 @@ from cns_drake.base import start  # noqa: E402
 
 
 def main() -> None:
-    """Runs the command."""
+    """Runs the command `cns-drake`."""
     start("cns-drake", _load)
+
+
+def evaluate() -> None:
+    """Runs the command `cns-eval`."""
+    start("cns-eval", _load_evaluation)
 
 
 def _load() -> Callable[[], None]:
     check_evaluation()
     from cns_drake.command_line import main as run
+
+    return run
+
+
+def _load_evaluation() -> Callable[[], None]:
+    check_evaluation()
+    from evaluation.command_line import main as run
 
     return run
 

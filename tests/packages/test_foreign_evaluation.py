@@ -116,7 +116,13 @@ def test_diagram_script(folder):
 )
 def test_a_program_names_what_hides_its_evaluation(folder, tmp_path_factory):
     elsewhere = tmp_path_factory.mktemp("elsewhere")
-    done = run(elsewhere, "-m", "cns_drake", "list", path=[str(folder)])
-    assert (done.stdout, done.returncode) == ("", 2)
-    (line,) = done.stderr.splitlines()
-    assert line.startswith(f"cns-drake: error: {folder}/evaluation")
+    # As the script that pip makes of the entry point.
+    script = "from cns_drake.__main__ import evaluate; evaluate()"
+    for program, command in (
+        ("cns-drake", ("-m", "cns_drake", "list")),
+        ("cns-eval", ("-c", script, "--help")),
+    ):
+        done = run(elsewhere, *command, path=[str(folder)])
+        assert (done.stdout, done.returncode) == ("", 2)
+        (line,) = done.stderr.splitlines()
+        assert line.startswith(f"{program}: error: {folder}/evaluation")
