@@ -65,7 +65,7 @@ def next_command(program: str, *words: object) -> None:
     note(f"next: {shlex.join(map(str, (program, *words)))}")
 
 
-def next_page(page: Path) -> None:
+def next_page(page: Path | str) -> None:
     """Prints that a page is what to open next, on stderr."""
     note(f"next: open {page} in a browser")
 
