@@ -88,7 +88,7 @@ def draw_pictures(folder: Path, aged: AgedMap) -> None:
     years = sorted(aged.years, key=lambda stage: aged.years[stage])
     (folder / PICTURES).mkdir()
     figure = Figure(
-        figsize=(len(views) * 3.2, len(years) * 1.85), layout="constrained"
+        figsize=(len(views) * 3.2, len(years) * 1.85), layout="compressed"
     )
     panels = figure.subplots(len(years), len(views), squeeze=False)
     for row, stage in zip(panels, years, strict=True):

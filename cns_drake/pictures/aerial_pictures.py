@@ -72,7 +72,7 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     columns = min(len(drives), _COLUMNS)
     figure = Figure(
         figsize=(columns * _PANEL_INCHES, rows * (_PANEL_INCHES + 0.3) + 0.4),
-        layout="constrained",
+        layout="compressed",
     )
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes in panels:

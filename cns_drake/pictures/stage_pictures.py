@@ -38,7 +38,7 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
         InputError: a world cannot be loaded, or the picture cannot be written.
     """
     figure = Figure(
-        figsize=(3.2 * len(stages), 2 * 1.8 + 0.9), layout="constrained"
+        figsize=(3.2 * len(stages), 2 * 1.8 + 0.9), layout="compressed"
     )
     axes = figure.subplots(2, len(stages), squeeze=False)
     for column, (title, world) in enumerate(stages.items()):
