@@ -225,7 +225,9 @@ def _verified_clause(change: Change, number: int) -> str:
     without, shares = change.shares(False), change.shares(True)
     if not shares:
         return ""
-    if all(change.is_at_ceiling(n, gate) for n in shares for gate in (0, 1)):
+    if all(
+        change.is_at_ceiling(n, gate) for n in shares for gate in (False, True)
+    ):
         return f", also {_VERIFIED}"
     if without.keys() == shares.keys() and all(
         abs(one - without[name]) < 1.0 - _CEILING

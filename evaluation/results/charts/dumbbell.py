@@ -24,6 +24,7 @@ from evaluation.results.charts.chart import (
 from evaluation.results.charts.words import end_words, in_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.headlines import from_least_to_greatest
+from evaluation.results.keys import SETTINGS
 from evaluation.results.method_names import title
 
 _PERCENT = "{:.0f}\N{NO-BREAK SPACE}%"
@@ -60,9 +61,21 @@ def _message(change: Change) -> str:
     Of other metrics, and of shares, it is what is left.
     """
     metric = metric_named(change.metric)
+    gate, *_ = change.gates
+    if change.over.startswith(SETTINGS):
+        # Each value of a setting makes a method with a row of its own.
+        ends = {
+            name: np.array([change.ends[name, gate, p] for p in change.pairs])
+            for name in change.methods
+        }
+        found = {
+            name: float(np.nanmedian(one))
+            for name, one in ends.items()
+            if not np.isnan(one).all()
+        }
+        return f"{in_words(change.metric)}: {from_least_to_greatest(found)}"
     if metric.better == "more" and not metric.share_of:
         return cost_sentence(change)
-    gate, *_ = change.gates
     shares = {n: 100.0 * one for n, one in change.shares(gate).items()}
     number = len(change.pairs)
     pairs = f"median of {number} pairs" if number > 1 else "one pair"
@@ -92,9 +105,9 @@ def _draw_methods(axes: Axes, chart: Chart, change: Change, gate: bool) -> None:
     for y, name in enumerate(change.methods):
         colour, _, marker = chart.styles[name]
         ends = np.array([change.ends[name, gate, p] for p in change.pairs])
-        ends = ends[~np.isnan(ends).any(axis=1)]
-        if not len(ends):
-            continue
+        is_whole = ~np.isnan(ends).any(axis=1)
+        if is_whole.any():
+            ends = ends[is_whole]
         # Above the row: before; below: after.
         for value, at, shift in (
             (change.before, ends[:, 0], -0.3),
@@ -143,6 +156,10 @@ def _axis_text(chart: Chart, change: Change) -> str:
             f": medians of {number} pairs; ticks are pairs, before above and"
             " after below the line"
         )
-    elif any(not math.isnan(row.low) for row in chart.rows):
+    elif any(
+        _interval(chart, name, gate, change.after)
+        for name in change.methods
+        for gate in change.gates
+    ):
         text += "; thin lines are 95\N{NO-BREAK SPACE}% intervals"
     return f"{text}; right: the share that is left"

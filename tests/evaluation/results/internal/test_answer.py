@@ -126,6 +126,17 @@ def test_lines_go_from_the_least_to_the_greatest_number():
     )
 
 
+def test_a_scatter_of_one_factor_tells_its_cost():
+    results = table(
+        {("ring++", False, "a"): (0.8, 0.2)}, "database.missing", (0, 0.6)
+    )
+    chart = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
+    assert headline(results, chart) == (
+        "A map without 60 % of the buildings and plants costs RING++ 75 % of"
+        " the AUC"
+    )
+
+
 def test_without_a_baseline_no_cost_is_told():
     results = table(
         {

@@ -309,6 +309,22 @@ def test_a_dumbbell_has_a_panel_with_verification():
     assert (0.75, 0.5) in {tuple(line.get_xdata()) for line in axes.get_lines()}
 
 
+def test_a_dumbbell_over_a_setting_has_a_row_for_each_value():
+    over = "methods.mine.size"
+    rows = [row(value, {over: size}) for size, value in ((1, 0.5), (2, 0.75))]
+    chart = {"kind": "dumbbell", "over": over, "metric": "auc"}
+    drawn = draw_chart(chart, Results.of(rows))
+    (axes,) = drawn.figure.axes
+    labels = [label.get_text() for label in axes.get_yticklabels()]
+    assert labels == ["mine, size 1", "mine, size 2"]
+    marks = [line for line in axes.get_lines() if line.get_markersize() == 8]
+    drawn_at = [value for mark in marks for value in mark.get_xdata()]
+    assert sorted(v for v in drawn_at if not math.isnan(v)) == [0.5, 0.75]
+    assert drawn.message == (
+        "AUC: from 0.50 (mine, size 1) to 0.75 (mine, size 2)"
+    )
+
+
 def test_texts_and_charts_have_one_definition_of_what_is_kept():
     """Medians of shares: means would rank the two methods the other way."""
     both = {
