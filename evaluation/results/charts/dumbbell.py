@@ -113,11 +113,11 @@ def _draw_methods(axes: Axes, chart: Chart, change: Change, gate: bool) -> None:
             (change.before, ends[:, 0], -0.3),
             (change.after, ends[:, 1], 0.3),
         ):
-            mark = "|"
+            mark, shown = "|", at.tolist()
             if len(change.pairs) == 1:
-                mark, at = "-", _interval(chart, name, gate, value)
-            rows = np.full(len(at), y + shift)
-            axes.plot(at, rows, mark, color=colour, ms=7, alpha=0.8, lw=1.2)
+                mark, shown = "-", _interval(chart, name, gate, value)
+            rows = np.full(len(shown), y + shift)
+            axes.plot(shown, rows, mark, color=colour, ms=7, alpha=0.8, lw=1.2)
         before, after = np.median(ends, axis=0)
         axes.plot([before, after], [y, y], color=colour, lw=3.5, alpha=0.5)
         axes.plot(before, y, marker, color=colour, mfc="white", ms=8)
