@@ -116,5 +116,6 @@ from evaluation.recognition.significance import Difference as Difference
 from evaluation.recognition.significance import (
     compared_by_auc as compared_by_auc,
 )
+from evaluation.recognition.significance import holm as holm
 from evaluation.recognition.stored_places import MOST_BYTES as MOST_BYTES
 from evaluation.recognition.stored_places import StoredDrives as StoredDrives

@@ -19,6 +19,7 @@ from cns_drake.base import (
     write_text,
 )
 from evaluation.recognition import METRICS, Metric, metric_named
+from evaluation.results.answer import page_answer
 from evaluation.results.charts.chart import NARROW, WIDE
 from evaluation.results.charts.kinds import DrawnChart, draw_chart
 from evaluation.results.charts.words import in_words, value_words
@@ -86,8 +87,11 @@ def write_page(
         title: title of the page.
         about: the question, in words.
         charts: descriptions of the charts, see `evaluation.results.charts`. The
-            message of the first chart is the headline. A chart without data in
-            the table is left out, with a note. If the experiment has several
+            headline says what the change of the first chart costs the methods,
+            or of the experiment's only factor, see `page_answer`; of other
+            questions, it is the message of the first chart. A chart without
+            data in the table is left out, with a note. If the experiment has
+            several
             protocols, a chart shows the first, unless it names the factor
             `protocol.base`.
         metrics: the metrics that the summary of each task shows, if the task
@@ -115,14 +119,23 @@ def write_page(
     for note in missing:
         on_note(note)
     protocols = ", ".join(filter(None, results.distinct("protocol")))
+    first = charts[0] if charts else {}
+    answer = page_answer(*_charted(known, queries, first), first)
+    headline = title
+    if answer is not None:
+        headline = answer.headline
+    elif shown:
+        headline = str(shown[0]["message"])
     about = f". {about}" if about else ""
-    headline = str(shown[0]["message"]) if shown else title
+    intro = Markup("<p><strong>{}</strong>{}</p>").format(title, about)
+    if answer is not None and answer.evidence:
+        intro = Markup("<p>{}</p>{}").format(answer.evidence, intro)
     text = framed_page(
         title,
         headline,
-        Markup("<p><strong>{}</strong>{}</p>").format(title, about),
+        intro,
         [
-            *_first_sections(known, shown, metrics),
+            *_first_sections(known, shown, metrics, headline),
             *sections,
             *_last_sections(results, queries, numbers, experiment_text),
         ],
@@ -131,7 +144,7 @@ def write_page(
     )
     path = folder / "index.html"
     write_text(path, text)
-    if shown:
+    if shown or answer is not None:
         on_note(headline)
     return path
 
@@ -208,6 +221,7 @@ def _first_sections(
     results: Results,
     charts: Sequence[Mapping[str, Any]],
     metrics: Sequence[Metric],
+    headline: str,
 ) -> list[PageSection]:
     """Returns the charts, and the main results of each task."""
     sections = []
@@ -219,6 +233,7 @@ def _first_sections(
                 "results.csv: the rows that are named below each chart",
                 is_open=True,
                 charts=charts,
+                headline=headline,
                 wide=WIDE,
                 dashes=_DASHES,
                 corners=marker_corners,

@@ -3,7 +3,7 @@
 - `curves`: precision over recall of each method, in a panel for each pair of
   drives; it needs the answers to all queries.
 - `dumbbell` (`over`, `metric`): a metric at the first and the last value of a
-  factor.
+  factor, without and with geometric verification.
 - `lines` (`over`, `metric`): a metric over a numeric factor, with a band from
   the lowest to the highest result among the seeds.
 - `matrix` (`over`, `metric`, `strips`): a metric for each method and each value
@@ -16,11 +16,11 @@
 The names in brackets are keys of the mapping; `kind` names the kind of chart.
 All other keys select rows: the key is a column of the table, and its value
 contains the entries of this column to show. By default, `gate` is 0 (without
-geometric verification). The default task is `place`, or the first task with the
-metric if `place` does not have it. Each method has the same colour in all
-charts. The title says in words what the chart shows. If the answers to all
-queries are known, the title also says which methods differ by the test of
-`evaluation.recognition.significance`.
+geometric verification), or both in a dumbbell. The default task is `place`, or
+the first task with the metric if `place` does not have it. Each method has the
+same colour in all charts. The title says in words what the chart shows. If the
+answers to all queries are known, the title of `lines` also says which methods
+differ by the test of `evaluation.recognition.significance`.
 
 `kinds` checks and draws a chart of any kind.
 """

@@ -1,37 +1,35 @@
-"""Dumbbell: a metric at the first and the last value of a factor."""
+"""Dumbbell: a metric at the first and the last value of a factor.
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+Results without and with geometric verification are in two panels.
+"""
+
+from collections.abc import Sequence
 import math
 import textwrap
-from typing import TypeAlias
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+import numpy as np
 
 from cns_drake.base import InputError
-from evaluation.recognition import kept_share
+from evaluation.recognition import metric_named
+from evaluation.results.answer import Change, change_of, cost_sentence
 from evaluation.results.charts.chart import (
     FONT,
     ROW,
+    WIDE,
     Chart,
     start_at_zero,
-    with_significance,
 )
-from evaluation.results.charts.words import in_words, value_words
+from evaluation.results.charts.words import end_words, in_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.headlines import from_least_to_greatest
-from evaluation.results.keys import STAGE
+from evaluation.results.keys import SETTINGS
 from evaluation.results.method_names import title
-from evaluation.results.summaries import means, median_kept
 
-# The sign of per cent never begins a line.
 _PERCENT = "{:.0f}\N{NO-BREAK SPACE}%"
-# Columns that say which drives are compared.
-_PAIR = ("map", "database", "query")
-_DrivePair: TypeAlias = tuple[str, str, str]
-# A metric at the first and at the last value of the factor.
-_Ends: TypeAlias = tuple[float, float]
+# Titles of the panels.
+_PANELS = ("Without geometric verification", "With geometric verification")
 
 
 def draw_dumbbell(chart: Chart) -> tuple[str, Figure]:
@@ -40,117 +38,128 @@ def draw_dumbbell(chart: Chart) -> tuple[str, Figure]:
     values = chart.results.distinct(over)
     if len(values) < 2:
         raise InputError(f"charts: dumbbell: {over}: the table has one value")
-    before, after = values[0], values[-1]
-    pairs, ends = _ends_of_pairs(chart, before, after)
-    figure = chart.figure((len(chart.styles) * (len(pairs) + 1) + 3) * ROW)
-    axes = figure.subplots()
-    _draw_methods(axes, chart, pairs, ends)
-    text = textwrap.fill(_axis_text(chart, before, after), chart.width // 9)
+    try:
+        change = change_of(chart.rows, over, values[0], values[-1])
+    except InputError as error:
+        raise InputError(f"charts: dumbbell: {error}") from None
+    figure, panels = _panels(chart, change)
+    for axes, gate in zip(panels, change.gates, strict=True):
+        _draw_methods(axes, chart, change, gate)
+        if len(panels) > 1:
+            axes.set_title(_PANELS[gate], loc="left")
+        axes.grid(axis="x", alpha=0.3)
+        axes.tick_params(length=0)
+        start_at_zero(axes, x=chart.metric)
+    text = textwrap.fill(_axis_text(chart, change), chart.width // 9)
     figure.supxlabel(escape_dollars(text), fontsize=FONT)
-    axes.grid(axis="x", alpha=0.3)
-    axes.tick_params(length=0)
-    start_at_zero(axes, x=chart.metric)
-    shares = {
-        name: 100.0
-        * median_kept(_kept_share(*ends[name, pair]) for pair in pairs)
-        for name in chart.styles
-    }
-    number = f"median of {len(pairs)} pairs" if len(pairs) > 1 else "one pair"
-    message = (
-        f"Share of the {in_words(chart.metric)} that is retained, {number}:"
+    return _message(change), figure
+
+
+def _message(change: Change) -> str:
+    """Returns what the chart shows: the cost, if more of the metric is better.
+
+    Of other metrics, and of shares, it is what is left.
+    """
+    metric = metric_named(change.metric)
+    gate, *_ = change.gates
+    if change.over.startswith(SETTINGS):
+        # Each value of a setting makes a method with a row of its own.
+        ends = {
+            name: np.array([change.ends[name, gate, p] for p in change.pairs])
+            for name in change.methods
+        }
+        found = {
+            name: float(np.nanmedian(one))
+            for name, one in ends.items()
+            if not np.isnan(one).all()
+        }
+        return f"{in_words(change.metric)}: {from_least_to_greatest(found)}"
+    if metric.better == "more" and not metric.share_of:
+        return cost_sentence(change)
+    shares = {n: 100.0 * one for n, one in change.shares(gate).items()}
+    number = len(change.pairs)
+    pairs = f"median of {number} pairs" if number > 1 else "one pair"
+    return (
+        f"Share of the {in_words(change.metric)} that is retained, {pairs}:"
         f" {from_least_to_greatest(shares, _PERCENT)}"
     )
-    return with_significance(message, chart, after), figure
 
 
-def _ends_of_pairs(
-    chart: Chart, before: object, after: object
-) -> tuple[list[_DrivePair], dict[tuple[str, _DrivePair], _Ends]]:
-    """Returns the pairs of drives that have both ends, and the ends.
+def _panels(chart: Chart, change: Change) -> tuple[Figure, list[Axes]]:
+    """Returns a figure with a panel without, and one with verification.
 
-    Args:
-        chart: a chart over a factor.
-        before: the factor's first value.
-        after: the factor's last value.
-
-    Returns:
-        The pairs, in the order of the table; and, by method and pair, the
-        metric at the first and the last value, NaN where it is unknown.
+    On a phone, one is below the other.
     """
-    metric_at = {
-        (title(mean.key[0]), mean.key[1:4], mean.key[4]): mean.value
-        for mean in means(chart.rows, "label", *_PAIR, chart.keys["over"])
-    }
-    pairs_before, pairs_after = (
-        dict.fromkeys(pair for _, pair, v in metric_at if v == value)
-        for value in (before, after)
+    number = len(change.gates)
+    height = (1.6 * len(change.methods) + 2) * ROW
+    is_wide = chart.width >= WIDE
+    figure = chart.figure((1 if is_wide else number) * height + 2 * ROW)
+    shape = (1, number) if is_wide else (number, 1)
+    grid = figure.subplots(*shape, squeeze=False, sharex=True, sharey=is_wide)
+    return figure, list(grid.flat)
+
+
+def _draw_methods(axes: Axes, chart: Chart, change: Change, gate: bool) -> None:
+    """Draws a row for each method: the median, and a tick for each pair."""
+    side = axes.get_yaxis_transform()
+    for y, name in enumerate(change.methods):
+        colour, _, marker = chart.styles[name]
+        ends = np.array([change.ends[name, gate, p] for p in change.pairs])
+        is_whole = ~np.isnan(ends).any(axis=1)
+        if is_whole.any():
+            ends = ends[is_whole]
+        # Above the row: before; below: after.
+        for value, at, shift in (
+            (change.before, ends[:, 0], -0.3),
+            (change.after, ends[:, 1], 0.3),
+        ):
+            mark, shown = "|", at.tolist()
+            if len(change.pairs) == 1:
+                mark, shown = "-", _interval(chart, name, gate, value)
+            rows = np.full(len(shown), y + shift)
+            axes.plot(shown, rows, mark, color=colour, ms=7, alpha=0.8, lw=1.2)
+        before, after = np.median(ends, axis=0)
+        axes.plot([before, after], [y, y], color=colour, lw=3.5, alpha=0.5)
+        axes.plot(before, y, marker, color=colour, mfc="white", ms=8)
+        axes.plot(after, y, marker, color=colour, ms=8)
+        share = change.share(name, gate)
+        if not math.isnan(share):
+            text = _PERCENT.format(100.0 * share)
+            axes.text(
+                1.02, y, text, transform=side, va="center", fontweight="bold"
+            )
+    axes.set_yticks(
+        range(len(change.methods)), list(map(escape_dollars, change.methods))
     )
-    pairs = [pair for pair in pairs_before if pair in pairs_after]
-    ends = {
-        (name, pair): (
-            metric_at.get((name, pair, before), math.nan),
-            metric_at.get((name, pair, after), math.nan),
+    axes.set_ylim(len(change.methods) - 0.4, -0.6)
+
+
+def _interval(
+    chart: Chart, method: str, gate: bool, value: object
+) -> Sequence[float]:
+    """Returns the 95 % interval of a single result; empty if unknown."""
+    found = [
+        (row.low, row.high)
+        for row in chart.rows
+        if (title(row.label), row.gate) == (method, gate)
+        and row[chart.keys["over"]] == value
+    ]
+    return found[0] if len(found) == 1 and not np.isnan(found).any() else ()
+
+
+def _axis_text(chart: Chart, change: Change) -> str:
+    """Returns the text of the axis: the metric, and what the marks are."""
+    first, last = end_words(change.over, change.before, change.after)
+    text = f"{in_words(chart.metric)} {first} (hollow) and {last} (filled)"
+    if (number := len(change.pairs)) > 1:
+        text += (
+            f": medians of {number} pairs; ticks are pairs, before above and"
+            " after below the line"
         )
-        for name in chart.styles
-        for pair in pairs
-    }
-    return pairs, ends
-
-
-def _draw_methods(
-    axes: Axes,
-    chart: Chart,
-    pairs: Sequence[_DrivePair],
-    ends: Mapping[tuple[str, _DrivePair], _Ends],
-) -> None:
-    """Draws a heading for each method, and below it a row for each pair."""
-    pair_labels = _pair_labels(pairs)
-    labels: list[str] = []
-    headings = []
-    for name, (colour, _, marker) in chart.styles.items():
-        headings.append(len(labels))
-        labels.append(name)
-        for pair, label in zip(pairs, pair_labels, strict=True):
-            y = float(len(labels))
-            labels.append(label)
-            before, after = ends[name, pair]
-            axes.plot([before, after], [y, y], color=colour, lw=2.5, alpha=0.5)
-            axes.plot(before, y, marker, color=colour, mfc="white", ms=7)
-            axes.plot(after, y, marker, color=colour, ms=7)
-            share = _kept_share(before, after)
-            if not math.isnan(share):
-                side = axes.get_yaxis_transform()
-                text = f"{100.0 * share:.0f} %"
-                axes.text(1.02, y, text, transform=side, va="center")
-    axes.set_yticks(range(len(labels)), list(map(escape_dollars, labels)))
-    tick_labels = axes.get_yticklabels()
-    for row in headings:
-        tick_labels[row].set_fontweight("bold")
-    axes.set_ylim(len(labels) - 0.4, -0.7)
-
-
-def _kept_share(before: float, after: float) -> float:
-    return float(kept_share(after, before))
-
-
-def _axis_text(chart: Chart, before: object, after: object) -> str:
-    """Returns the text of the axis: the metric, and what the ends are."""
-    over = chart.keys["over"]
-    first, last = (
-        value_words(value, over)
-        if over == STAGE
-        else f"at {in_words(over)} {value_words(value)}"
-        for value in (before, after)
-    )
-    return f"{in_words(chart.metric)} {first} (hollow) and {last} (filled)"
-
-
-def _pair_labels(pairs: Sequence[_DrivePair]) -> list[str]:
-    """Returns each pair's map, with the drives if the map has several pairs."""
-    of_map = Counter(name for name, *_ in pairs)
-    labels = []
-    for name, *drives in pairs:
-        drive_names = (drive.removeprefix(f"{name}_") for drive in drives)
-        is_alone = of_map[name] == 1
-        labels.append(name if is_alone else f"{name} {' → '.join(drive_names)}")
-    return labels
+    elif any(
+        _interval(chart, name, gate, change.after)
+        for name in change.methods
+        for gate in change.gates
+    ):
+        text += "; thin lines are 95\N{NO-BREAK SPACE}% intervals"
+    return f"{text}; right: the share that is left"

@@ -109,7 +109,12 @@ def _selected_rows(
             raise InputError(f"charts: {kind}: {name}: the table has none")
     tasks = results.where(metric=metric).distinct("task")
     task = "place" if "place" in tasks else tasks[:1]
-    chosen = {"task": task, "gate": 0, **chosen}
+    # A dumbbell shows results without and with geometric verification.
+    gate: object = 0
+    if kind == "dumbbell":
+        shown = results.where({"task": task, **chosen}, metric=metric)
+        gate = sorted({int(row.gate) for row in shown.rows}) or 0
+    chosen = {"task": task, "gate": gate, **chosen}
     known, undefined = results.where(chosen, metric=metric).defined()
     rows = known.rows
     if not rows:

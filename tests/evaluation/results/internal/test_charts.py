@@ -268,17 +268,60 @@ def test_a_dumbbell_joins_both_ends():
     chart = {"kind": "dumbbell", "over": "both.stage", "metric": "auc"}
     drawn = draw_chart(chart, Results.of(rows))
     (axes,) = drawn.figure.axes
-    bars = [line for line in axes.get_lines() if len(line.get_xdata()) == 2]
+    bars = [line for line in axes.get_lines() if line.get_linewidth() > 3.0]
     found = [list(bar.get_xdata()) for bar in bars]
-    assert found == [[0.5, 0.1]] * 2 + [[0.8, 0.6]] * 2
+    assert found == [[0.5, 0.1], [0.8, 0.6]]
     labels = [label.get_text() for label in axes.get_yticklabels()]
-    assert labels == ["SOLiD", "x", "y", "RING++", "x", "y"]
+    assert labels == ["SOLiD", "RING++"]
+    assert [shown(text.get_text()) for text in axes.texts] == ["20 %", "75 %"]
     assert shown(drawn.message) == (
-        "Share of the AUC that is retained, median of 2 pairs: from 20 %"
-        " (SOLiD) to 75 % (RING++)"
+        "A rebuilt city costs SOLiD 80 % and RING++ 25 % of the AUC"
     )
-    assert drawn.figure.get_supxlabel() == (
-        "AUC without the change (hollow) and with the change (filled)"
+    assert " ".join(drawn.figure.get_supxlabel().split()).startswith(
+        "AUC without the change (hollow) and with the change (filled):"
+        " medians of 2 pairs"
+    )
+
+
+def test_a_dumbbell_has_a_panel_with_verification():
+    rows = [
+        replace(
+            row(value, {"both.stage": stage}, gate=gate),
+            low=value - 0.125,
+            high=value + 0.125,
+        )
+        for gate, after in ((False, 0.25), (True, 0.5))
+        for stage, value in (("last", 0.75), ("own", after))
+    ]
+    chart = {"kind": "dumbbell", "over": "both.stage", "metric": "auc"}
+    for width in (WIDE, NARROW):
+        drawn = draw_chart(chart, Results.of(rows), width)
+        for axes, after in zip(drawn.figure.axes, (0.25, 0.5), strict=True):
+            lines = {tuple(line.get_xdata()) for line in axes.get_lines()}
+            # The pair, and the interval of each end.
+            wide = (after - 0.125, after + 0.125)
+            for ends in ((0.75, after), (0.625, 0.875), wide):
+                assert ends in lines
+        panels = [axes.get_title(loc="left") for axes in drawn.figure.axes]
+        assert [name.split()[0] for name in panels] == ["Without", "With"]
+    assert "gate 0 or 1" in drawn.source
+    (axes,) = draw_chart({**chart, "gate": 1}, Results.of(rows)).figure.axes
+    assert (0.75, 0.5) in {tuple(line.get_xdata()) for line in axes.get_lines()}
+
+
+def test_a_dumbbell_over_a_setting_has_a_row_for_each_value():
+    over = "methods.mine.size"
+    rows = [row(value, {over: size}) for size, value in ((1, 0.5), (2, 0.75))]
+    chart = {"kind": "dumbbell", "over": over, "metric": "auc"}
+    drawn = draw_chart(chart, Results.of(rows))
+    (axes,) = drawn.figure.axes
+    labels = [label.get_text() for label in axes.get_yticklabels()]
+    assert labels == ["mine, size 1", "mine, size 2"]
+    marks = [line for line in axes.get_lines() if line.get_markersize() == 8]
+    drawn_at = [value for mark in marks for value in mark.get_xdata()]
+    assert sorted(v for v in drawn_at if not math.isnan(v)) == [0.5, 0.75]
+    assert drawn.message == (
+        "AUC: from 0.50 (mine, size 1) to 0.75 (mine, size 2)"
     )
 
 
@@ -296,7 +339,9 @@ def test_texts_and_charts_have_one_definition_of_what_is_kept():
     ]
     chart = {"kind": "dumbbell", "over": "both.stage", "metric": "auc"}
     message = draw_chart(chart, Results.of(rows)).message
-    assert shown(message).endswith("from 90 % (RING++) to 100 % (SOLiD)")
+    assert shown(message) == (
+        "A rebuilt city costs SOLiD 0 % and RING++ 10 % of the AUC"
+    )
 
 
 @pytest.mark.parametrize("number", [1, 4, 5, 8])
@@ -574,7 +619,7 @@ def test_a_picture_for_print_has_its_legend(tmp_path):
         (
             {"kind": "dumbbell", "over": YEARS, "metric": "auc"},
             aged().where(method="solid", seed=0),
-            "Share of the AUC that is retained, one pair: 40 %",
+            "A map of age 30 instead of 0 years costs SOLiD 60 % of the AUC",
         ),
     ],
 )
@@ -653,7 +698,8 @@ def test_a_page_stands_alone(tmp_path):
     )
     assert note in text
     assert "Age &amp; &lt;years&gt;" in text
-    assert "AUC at 30 years" in text[text.index("<h1>") :][:100]
+    assert "A map of age 30 instead of 0 years" in text[text.index("<h1>") :]
+    assert "<h2>AUC at 30 years" in text
     summary, whole = page.tables
     header, *lines = summary
     assert header == ["method", "0", "10", "30"]
@@ -672,10 +718,10 @@ def test_a_page_stands_alone(tmp_path):
 @pytest.mark.parametrize(
     ("ends", "seeds", "cell"),
     [
-        ((0.4, 0.6), (0,), "0.500(0.400–0.600)"),
+        ((0.4, 0.6), (0,), "0.50095\N{NO-BREAK SPACE}% 0.400 to 0.600"),
         # An interval that is unknown, and results of several seeds.
         ((math.nan, math.nan), (0,), "0.500"),
-        ((0.4, 0.6), (0, 1), "0.5000.500 to 0.500 (2)"),
+        ((0.4, 0.6), (0, 1), "0.500least 0.500, greatest 0.500"),
     ],
 )
 def test_a_single_result_has_its_interval(tmp_path, ends, seeds, cell):
