@@ -57,6 +57,7 @@ def check_gltf(content: bytes) -> tuple[str, ...]:
         modes = [p.get("mode", _FIRST_TRIANGLES) for p in primitives]
         has_other_mode = any(not 0 <= m <= _LAST_TRIANGLES for m in modes)
         counts = _ignored_contents(top, primitives)
+        _buffer_uris(top)
         for name in _optional_extensions(top):
             counts[f"uses of the extension {name} of glTF ignored"] += 1
     except (
@@ -115,10 +116,11 @@ def _count_of_mesh(top: Any, mesh: Any) -> int:
 
 
 def with_own_buffers(path: Path, content: bytes) -> bytes | None:
-    """Returns a glTF file with its buffers, without looks; None if it has none.
+    """Returns a glTF file with its buffers, without looks; None if it has them.
 
-    Open3D does not find buffers whose names have percent escapes, and fails on
-    missing textures. The result is text (`.gltf`).
+    Open3D does not find buffers whose names have percent escapes, fails on
+    missing textures, and takes every buffer of a binary file for its chunk,
+    even a `data:` URI, which Open3D itself writes. The result is text.
 
     Args:
         path: the file, whose folder has the buffers.
@@ -128,20 +130,25 @@ def with_own_buffers(path: Path, content: bytes) -> bytes | None:
         ValueError: a buffer does not exist.
         InputError: a buffer cannot be read.
     """
+    is_binary = content[:4] == b"glTF"
     top = parse_json(_json_chunk(content))
-    outside = [
-        one
-        for one in top.get("buffers", [])
-        if not one.get("uri", "data:").startswith("data:")
-    ]
-    if not outside or content[:4] == b"glTF":
+    buffers = top.get("buffers", [])
+    uris = _buffer_uris(top)
+    readable = () if is_binary else ("data:",)
+    if all(uri is None or uri.startswith(readable) for uri in uris):
         return None
-    for one in outside:
-        found = resolve(one["uri"], path.parent)
-        if found is None or not found.is_file():
-            raise ValueError(f"its buffer {one['uri']} does not exist")
-        data = base64.b64encode(read_bytes(found, LARGEST_FILE)).decode()
-        one["uri"] = f"data:application/octet-stream;base64,{data}"
+    for one, uri in zip(buffers, uris, strict=True):
+        if uri is None:
+            data = _binary_chunk(content) if is_binary else b""
+        elif uri.startswith("data:"):
+            continue
+        else:
+            found = resolve(uri, path.parent)
+            if found is None or not found.is_file():
+                raise ValueError(f"its buffer {uri} does not exist")
+            data = read_bytes(found, LARGEST_FILE)
+        text = base64.b64encode(data).decode()
+        one["uri"] = f"data:application/octet-stream;base64,{text}"
     for key in ("images", "textures", "samplers", "materials"):
         top.pop(key, None)
     for mesh in top.get("meshes", []):
@@ -158,6 +165,25 @@ def _json_chunk(content: bytes) -> bytes:
     if kind != _JSON:
         raise ValueError("no JSON at its beginning")
     return content[20 : 20 + length]
+
+
+def _buffer_uris(top: Any) -> list[str | None]:
+    """Returns the address of each buffer; None for the chunk of a file.
+
+    Raises:
+        AttributeError, TypeError: the buffers are no valid glTF.
+    """
+    uris = [one.get("uri") for one in top.get("buffers", [])]
+    for uri in uris:
+        if not (uri is None or isinstance(uri, str)):
+            raise TypeError(f"{uri!r} is no address")
+    return uris
+
+
+def _binary_chunk(content: bytes) -> bytes:
+    """Returns the bytes behind the JSON of a binary file."""
+    (length,) = struct.unpack_from("<I", content, 12)
+    return content[20 + length + 8 :]
 
 
 def _unread_extensions(top: Any) -> list[str]:

@@ -91,12 +91,13 @@ def resolve(
     for name in dict.fromkeys((rest, unquote(rest))):
         for place in places:
             path = place / name
-            if path.exists():
+            # Not Path.exists, which fails on names that are too long.
+            if os.path.exists(path):
                 return path.resolve()
             # The folder may contain the model's folder, or be that folder
             # itself.
             first, _, within = name.partition("/")
-            if place.name == first and (place / within).exists():
+            if place.name == first and os.path.exists(place / within):
                 return (place / within).resolve()
     return None
 

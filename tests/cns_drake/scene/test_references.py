@@ -96,6 +96,13 @@ def test_the_highest_version_of_a_model_is_read(tmp_path):
     assert structures_in(load_world(world(tmp_path / "w.sdf", text))) == {"b"}
 
 
+def test_a_reference_that_is_too_long_for_a_name_is_not_found(tmp_path):
+    name = "data:model/stl;base64," + "A" * 5000
+    path = world(tmp_path / "w.sdf", MESH.format(name))
+    with pytest.raises(InputError, match="1 meshes not found"):
+        load_world(path)
+
+
 def test_a_buffer_of_gltf_that_is_missing_is_named(tmp_path):
     top = {
         "asset": {"version": "2.0"},

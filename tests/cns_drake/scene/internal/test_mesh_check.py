@@ -3,7 +3,7 @@
 import json
 import struct
 
-from helpers.mesh_texts import gltf_text
+from helpers.mesh_texts import L_TRIANGLES, gltf_text
 from helpers.small_map import world_text
 import pytest
 
@@ -434,3 +434,50 @@ def test_vertices_of_obj_in_other_forms_are_read(tmp_path, vertex):
     path = tmp_path / "thing.obj"
     path.write_text(f"v 0 0 0\n  v {vertex}\r\nv 0 1 0\nf 1 2 3\nv {vertex}")
     check_obj(path)
+
+
+def in_chunk(top, data):
+    del top["buffers"][0]["uri"]
+    return data
+
+
+def beside(top, data):
+    top["buffers"][0]["uri"] = "my%20data.bin"
+    return b""
+
+
+def as_open3d_writes_it(top, data):
+    return b""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("place", [in_chunk, beside, as_open3d_writes_it])
+def test_a_binary_gltf_has_its_buffer_at_any_place(tmp_path, place):
+    text, data = gltf_text()
+    (tmp_path / "my data.bin").write_bytes(data)
+    top = json.loads(text)
+    chunk = place(top, data)
+    text = json.dumps(top).encode()
+    text += b" " * (-len(text) % 4)
+    parts = [(text, b"JSON")] + [(chunk, b"BIN\0")] * bool(chunk)
+    body = b"".join(
+        struct.pack("<I4s", len(part), kind) + part for part, kind in parts
+    )
+    head = struct.pack("<4sII", b"glTF", 2, 12 + len(body))
+    (tmp_path / "thing.glb").write_bytes(head + body)
+    sdf = tmp_path / "world.sdf"
+    mesh = "<geometry><mesh><uri>thing.glb</uri></mesh></geometry>"
+    sdf.write_text(world_text([f'<visual name="thing">{mesh}</visual>']))
+    inspector = load_world(sdf).scene_graph.model_inspector()
+    (one,) = read_perception_geometry(inspector)
+    assert len(one.surface.triangles) == len(L_TRIANGLES)
+
+
+@pytest.mark.parametrize("suffix", [".gltf", ".glb"])
+@pytest.mark.parametrize(
+    "buffers", [None, "abc", {"a": 1}, [1], [{"uri": 5, "byteLength": 3}]]
+)
+def test_buffers_of_gltf_that_are_none_are_refused(tmp_path, buffers, suffix):
+    path = write(tmp_path, lambda top: top.update(buffers=buffers), suffix)
+    with pytest.raises(ValueError, match="no valid glTF"):
+        check_mesh_file(path)
