@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 
 # Greatest mean distance of two drives on one route [m]; lanes are 3.5 m wide.
 _SAME_ROUTE = 1.0
+# A registration with a smaller share of fitting upright surfaces is none: where
+# the frames differ by more than some degrees, a wrong pose has below .05.
+_LEAST_STRUCTURE = 0.3
 # If registration lowers TCR_sym by more than this, the frames differ.
 _EXPLAINED = 0.02
 
@@ -47,7 +50,7 @@ class RegisteredChange:
     Attributes:
         symmetric: TCR_sym of A and of B at this pose.
         X_AB: (4, 4) pose of B's frame in A's frame; the identity if no other
-            pose fits better.
+            pose nearby fits better.
     """
 
     symmetric: float
@@ -239,7 +242,8 @@ def registered_change(
     unmoved = registration_at(moved, held, np.eye(4))
     fit = register(moved, held, np.eye(4))
     X_AB = np.eye(4)
-    if fit.fitness > unmoved.fitness and np.isfinite(fit.X_TS).all():
+    is_better = fit.fitness > unmoved.fitness
+    if is_better and fit.structure >= _LEAST_STRUCTURE:
         X_AB[:3, :3] = fit.X_TS[:3, :3]
         X_AB[:3, 3] = fit.X_TS[:3, 3] + middle - fit.X_TS[:3, :3] @ middle
     change = temporal_change(

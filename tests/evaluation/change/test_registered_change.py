@@ -105,6 +105,14 @@ def test_far_from_the_origin_of_the_world():
     )
 
 
+@pytest.mark.parametrize("yaw_deg", [20.0, 90.0])
+def test_frames_that_differ_too_much_stay(yaw_deg):
+    """A pose at which little fits would explain nothing."""
+    turned = drive_map(CITY, X_WS=yaw_pose(np.radians(yaw_deg)))
+    found = registered_change(drive_map(CITY), turned)
+    assert np.array_equal(found.X_AB, np.eye(4))
+
+
 def test_what_cannot_be_registered():
     few = drive_map([np.eye(3)])
     assert registered_change(few, drive_map(CITY)) is None
