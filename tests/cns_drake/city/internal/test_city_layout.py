@@ -99,6 +99,7 @@ def test_relief_leaves_paths_buildings_and_borders_level(lay_out_text):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_things_stand_on_the_ground_and_cars_in_bays(lay_out_text):
     city = lay_out_text(PLAN)
     check_things_stand_on_the_ground(city.structures)

@@ -873,8 +873,8 @@ def test_each_part_of_years_has_a_job_of_its_own(tmp_path):
     wanted = load_experiment(
         "years",
         [
-            "database.years=[0, 5, 20]",
-            "query.years=[0, 5, 20]",
+            "database.years=[0, 1, 3]",
+            "query.years=[0, 1, 3]",
             "seeds=[1, 2]",
             "methods=[solid]",
             "tasks=[place, localise, map]",
