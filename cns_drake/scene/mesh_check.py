@@ -18,7 +18,6 @@ from cns_drake.scene.ply_check import check_ply
 
 # File name extensions of glTF.
 GLTF = (".gltf", ".glb")
-_FORMATS = ".obj .gltf .glb .dae .stl .ply .vtk"
 _STL_HEADER_BYTES = 84
 _STL_FACET_BYTES = 50
 # Counts that a VTK file declares, for which memory is reserved.
@@ -43,8 +42,9 @@ def check_mesh_file(path: Path) -> tuple[str, ...]:
     if ending in _CHECKS_OF_FILES:
         return _CHECKS_OF_FILES[ending](path)
     if ending not in _CHECKS:
+        formats = " ".join([*_CHECKS, *_CHECKS_OF_FILES])
         raise ValueError(
-            f"is no mesh of a format that is read ({_FORMATS}); Blender or"
+            f"is no mesh of a format that is read ({formats}); Blender or"
             " trimesh writes these"
         )
     return _CHECKS[ending](read_bytes(path, LARGEST_FILE))
