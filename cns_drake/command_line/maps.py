@@ -54,14 +54,14 @@ def list_drives(
 
     Args:
         folders: Folders of your own maps, whose drives are listed; by default
-            the drives of the shipped maps.
+            the drives of the shipped cities.
     """
     with uninterrupted():
-        from cns_drake.scenarios import drive_rows, shipped_maps
+        from cns_drake.scenarios import drive_rows, shipped_cities
         from cns_drake.scene import no_drives
 
     rows = []
-    for folder in folders or shipped_maps().values():
+    for folder in folders or shipped_cities().values():
         of_map = drive_rows(folder)
         if folders and not of_map:
             raise no_drives(folder)

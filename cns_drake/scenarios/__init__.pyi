@@ -37,6 +37,7 @@ from cns_drake.scenarios.scenario_files import (
 from cns_drake.scenarios.shipped import recordable_drives as recordable_drives
 from cns_drake.scenarios.shipped import recordable_map as recordable_map
 from cns_drake.scenarios.shipped import recordable_maps as recordable_maps
+from cns_drake.scenarios.shipped import shipped_cities as shipped_cities
 from cns_drake.scenarios.shipped import shipped_drives as shipped_drives
 from cns_drake.scenarios.shipped import shipped_maps as shipped_maps
 from cns_drake.scenarios.shipped import suspension_file as suspension_file

@@ -42,24 +42,39 @@ def suspension_file() -> Path:
 
 
 @functools.cache
+def shipped_cities() -> Mapping[str, Path]:
+    """Returns name -> folder of each of the paper's four cities."""
+    return _maps_in(worlds_folder())
+
+
+@functools.cache
 def shipped_maps() -> Mapping[str, Path]:
-    """Returns name -> folder of each shipped map."""
+    """Returns name -> folder of each shipped map.
+
+    The maps are the cities, and after these the maps for stress tests, which
+    nothing uses unless it is asked for them by name.
+    """
+    stress = _maps_in(worlds_folder() / "stress")
+    return MappingProxyType({**shipped_cities(), **stress})
+
+
+def _maps_in(folder: Path) -> Mapping[str, Path]:
     folders = {
         path.name: path
-        for path in sorted(worlds_folder().iterdir())
+        for path in sorted(folder.iterdir())
         if MapFolder(path).roads.exists()
     }
     return MappingProxyType(folders)
 
 
 def recordable_maps() -> list[str]:
-    """Returns the names of the shipped maps with a drive that can be recorded.
+    """Returns the names of the cities with a drive that can be recorded.
 
     A drive can be recorded if the map has the stage through which it goes.
     """
     return [
         name
-        for name, folder in shipped_maps().items()
+        for name, folder in shipped_cities().items()
         if MapFolder(folder).recordable_drives()
     ]
 
@@ -96,13 +111,13 @@ def shipped_drives() -> dict[str, Path]:
 
 
 def recordable_drives() -> dict[str, Path]:
-    """Returns the scenario files of recordable shipped drives, by drive name.
+    """Returns the scenario files of recordable drives of the cities, by drive name.
 
     A drive is recordable if its map has the stage through which it goes.
     """
     return {
         drive_name(path): path
-        for folder in shipped_maps().values()
+        for folder in shipped_cities().values()
         for path in MapFolder(folder).recordable_drives()
     }
 

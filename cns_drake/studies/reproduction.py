@@ -77,7 +77,7 @@ def reproduce_maps(
     recording.
 
     Args:
-        maps: names or folders of maps; all shipped maps if None.
+        maps: names or folders of maps; all shipped cities if None.
         output: folder for all results.
         cluster: runs the jobs.
         protocols: name -> protocol of place recognition; the first is the main

@@ -25,7 +25,7 @@ from cns_drake.scenarios import (
     digest_inputs,
     load_scenario,
     plan_drive,
-    shipped_maps,
+    shipped_cities,
     worlds_folder,
 )
 from cns_drake.scene import MapFolder
@@ -667,7 +667,7 @@ def _drives_elsewhere(
     query: Scenario, output: Path, cluster: Cluster
 ) -> Iterator[Scenario]:
     """Yields drives without end, in the order of `distracting_drives`."""
-    maps = {name: MapFolder(path) for name, path in shipped_maps().items()}
+    maps = {name: MapFolder(path) for name, path in shipped_cities().items()}
     drives = {
         name: [load_scenario(path) for path in folder.recordable_drives()]
         for name, folder in maps.items()

@@ -150,7 +150,7 @@ class Experiment(Section):
         name: name of the experiment in all tables.
         about: the question in words.
         maps: maps to use: names of shipped maps, folders of maps, folders of
-            recordings, or maps to make. By default the shipped maps.
+            recordings, or maps to make. By default the shipped cities.
         files: folder with the files that the field `import` of a map names.
         drives: which drives of a map are compared. `same-route`: the last drive
             is the query, and the database is recorded along the same route.

@@ -9,7 +9,7 @@ import yaml
 
 from cns_drake.base import Cluster, InputError, Reporter
 from cns_drake.roads import load_road_network
-from cns_drake.scenarios import load_scenario, shipped_maps
+from cns_drake.scenarios import load_scenario, shipped_cities
 from cns_drake.scene import MapFolder
 from cns_drake.studies.maps import map_step
 from cns_drake.studies.maps.frozen_redraws import (
@@ -24,10 +24,10 @@ from cns_drake.studies.maps.turned_inputs import turned_content
 def test_five_versions_of_each_map_of_which_two_are_off_the_axes():
     versions = frozen_redraws()
     assert Counter(one.map_name for one in versions) == dict.fromkeys(
-        shipped_maps(), 5
+        shipped_cities(), 5
     )
     assert len({one.seed for one in versions}) == 20
-    for name in shipped_maps():
+    for name in shipped_cities():
         of_map = [one for one in versions if one.map_name == name]
         assert [one.number for one in of_map] == [1, 2, 3, 4, 5]
         turns = np.array([one.turn_deg for one in of_map])

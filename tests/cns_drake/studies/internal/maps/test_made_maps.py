@@ -13,7 +13,7 @@ import pytest
 from cns_drake.ageing import DEFAULT_RATES
 from cns_drake.base import Cluster, InputError, Reporter, draft_folder
 from cns_drake.city import generate_city
-from cns_drake.scenarios import load_scenario, shipped_maps
+from cns_drake.scenarios import load_scenario, shipped_cities
 from cns_drake.scene import MapFolder
 from cns_drake.studies import Experiment, MadeMap, load_experiment
 from cns_drake.studies.maps import map_step
@@ -261,7 +261,7 @@ def test_twelve_pairs_are_frozen():
     assert len(imported) == 4
     assert all(len(one.sha256) == 64 for one in imported)
     assert all(one.plain for one in imported)
-    assert {one.age for one in pairs if one.years} == set(shipped_maps())
+    assert {one.age for one in pairs if one.years} == set(shipped_cities())
     assert {one.years for one in pairs} == {None, 5, 20}
     assert len({one.seed for one in pairs}) == 12
 
