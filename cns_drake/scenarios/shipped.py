@@ -111,7 +111,7 @@ def shipped_drives() -> dict[str, Path]:
 
 
 def recordable_drives() -> dict[str, Path]:
-    """Returns the scenario files of recordable drives of the cities, by drive name.
+    """Returns name -> scenario file of each recordable drive of a city.
 
     A drive is recordable if its map has the stage through which it goes.
     """

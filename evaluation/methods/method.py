@@ -8,7 +8,7 @@ import re
 from typing import ClassVar, Generic, Literal, TypeVar
 
 import numpy as np
-from pydantic import ConfigDict, NonNegativeFloat
+from pydantic import ConfigDict, NonNegativeFloat, StrictBool
 
 from cns_drake.base import InputError, InputModel, poses
 from cns_drake.drives import LidarField
@@ -35,6 +35,9 @@ class MethodConfig(InputModel):
         sequence: length of the path before a query [m]. Earlier queries on this
             path also vote for the place of the query, as in SeqSLAM. With 0,
             each query is recognised by itself.
+        center_scores: whether each place's mean score over all queries is
+            subtracted from its scores. This lowers hubs: places that score high
+            with every query. It needs all queries at once, and no second stage.
 
     Example:
         from evaluation import MethodConfig
@@ -48,6 +51,7 @@ class MethodConfig(InputModel):
     sensor_height: NonNegativeFloat = 1.6
     place: PlaceScan | None = None
     sequence: NonNegativeFloat = 0.0
+    center_scores: StrictBool = False
 
 
 class Method(abc.ABC, Generic[Descriptor, Database]):
@@ -127,6 +131,11 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
     def __init__(self, config: MethodConfig | None = None):
         self.config = self.Config() if config is None else config
+        if self.config.center_scores and self.rerank_best:
+            raise InputError(
+                f"{self.name}: center_scores: its second stage scores only"
+                " some places"
+            )
 
     @abc.abstractmethod
     def describe(self, points: np.ndarray) -> Descriptor:

@@ -218,7 +218,7 @@ def compare_with_gates(
     queries = query.queries
     search = Search(method, places)
     batches = query_batches(len(queries.frames), len(places.frames), most_pairs)
-    if method.config.sequence:
+    if method.config.sequence or method.config.center_scores:
         batches = iter([range(len(queries.frames))])
     for rows in batches:
         yield (
@@ -258,6 +258,8 @@ def _compare_batch(
     places = database.places
     queries = query.queries.chosen(np.array(rows, np.int64))
     alone = search.scores(query, rows, is_known)
+    if search.method.config.center_scores:
+        alone = alone - _mean_of_known(alone)
     if length := search.method.config.sequence:
         alone = sequence_scores(
             alone,
@@ -416,6 +418,15 @@ def _known_places(
     query_ns = query.queries.stamps_ns[rows.start : rows.stop]
     age_ns = query_ns[:, None] - place_ns[None, :]
     return age_ns >= protocol.exclude_recent * 1e9
+
+
+def _mean_of_known(scores: np.ndarray) -> np.ndarray:
+    """Returns the mean score (D,) of each place over the queries (Q, D).
+
+    Scores that are NaN do not count; a place without a score has the mean 0.
+    """
+    counts = np.count_nonzero(~np.isnan(scores), axis=0)
+    return np.nansum(scores, axis=0) / np.maximum(counts, 1)
 
 
 def sequence_scores(

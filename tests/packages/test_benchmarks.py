@@ -54,6 +54,7 @@ BY_HAND = {
     "scans_to_judge.py",
     "silences.py",
     "source_rays.py",
+    "table1_sources.py",
 }
 SHARED = {"processes.py", "stages.py"}
 # It compiles all loops anew, to see how long that takes.

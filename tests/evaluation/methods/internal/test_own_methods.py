@@ -35,6 +35,7 @@ def test_the_method_in_the_documents(capsys, towns, tmp_path, monkeypatch):
         "sensor_height": 1.6,
         "place": None,
         "sequence": 0.0,
+        "center_scores": False,
         "rings": 30,
     }
     assert values["recall_at_1"] > 0.8
