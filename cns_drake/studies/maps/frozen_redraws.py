@@ -27,7 +27,7 @@ from cns_drake.studies.maps.redrawing import (
 from cns_drake.studies.maps.turned_inputs import turned_bounds, turned_content
 from evaluation.results import FROZEN_REDRAW
 
-_COLUMNS = ("map", "number", "seed", "turn_deg")
+_COLUMNS = ("map", "number", "seed", "turn_deg", "stages")
 # The driver, frozen with the seeds.
 _DRIVER = {"wander": 0.35, "lane_changes": 6.0, "follows": True}
 
@@ -42,12 +42,16 @@ class FrozenRedraw:
         seed: seed of the redraw's city.
         turn_deg: angle by which the city is rotated about the world's origin
             [deg].
+        stages: name of the shipped map whose stages the redraw has, with the
+            same streets and structures. The redraws of Metropolis are older
+            than its present stages, and keep those of Metropolis cleared.
     """
 
     map_name: str
     number: int
     seed: int
     turn_deg: float
+    stages: str
 
 
 def frozen_redraws() -> list[FrozenRedraw]:
@@ -59,6 +63,7 @@ def frozen_redraws() -> list[FrozenRedraw]:
             int(row["number"]),
             int(row["seed"]),
             float(row["turn_deg"]),
+            row["stages"],
         )
         for _, row in rows
     ]
@@ -108,6 +113,7 @@ def redraw_frozen(
             max(MapFolder(shipped_maps()[one.map_name]).stages()),
             one.seed,
             one.turn_deg,
+            shipped_maps()[one.stages],
         )
         for one in redraws
         if (not maps or one.map_name in maps)
@@ -124,9 +130,11 @@ class RedrawFrozen(RedrawCity):
     Attributes:
         turn_deg: angle by which the city is rotated about the world's origin
             [deg].
+        stages_folder: folder of the map whose stages the redraw has.
     """
 
-    turn_deg: float = 0.0
+    turn_deg: float
+    stages_folder: Path
 
     def inputs(self) -> dict[str, bytes]:
         """Returns the new city's input files, without `stages.yaml`.
@@ -157,14 +165,14 @@ class RedrawFrozen(RedrawCity):
         return contents
 
     def finish_inputs(self, draft: Path) -> None:
-        source = MapFolder(self.map_folder)
+        source = MapFolder(self.stages_folder)
         names = [one.name for one in make_city(draft).structures]
         stages = kept_names(read_yaml(source.stage_plan), names)
         text = marked_yaml("the map's stages", stages)
         (draft / source.stage_plan.name).write_bytes(text)
 
     def sources(self) -> dict[str, object]:
-        stages = MapFolder(self.map_folder).stage_plan
+        stages = MapFolder(self.stages_folder).stage_plan
         return {**super().sources(), "stages": stages.read_text("utf-8")}
 
 

@@ -104,7 +104,9 @@ def test_a_version_of_a_small_city(tmp_path, turn_deg):
         "route": [{"road": name, "direction": "forward", "lane": 1}],
     }
     (town / "sequence_02.yaml").write_text(yaml.safe_dump(drive))
-    step = RedrawFrozen(tmp_path / "out" / "town_f01", town, "02", 5, turn_deg)
+    step = RedrawFrozen(
+        tmp_path / "out" / "town_f01", town, "02", 5, turn_deg, town
+    )
     step.folder.parent.mkdir()
     assert not step.is_done()
     step.run(Reporter())
@@ -123,7 +125,7 @@ def test_a_version_of_a_small_city(tmp_path, turn_deg):
     expected = np.stack([c * x - s * y, s * x + c * y], axis=1)
     np.testing.assert_allclose(road[:, :2], expected, atol=1e-4)
     # Another seed or turn is another city.
-    other = RedrawFrozen(step.folder, town, "02", 6, turn_deg)
+    other = RedrawFrozen(step.folder, town, "02", 6, turn_deg, town)
     assert not other.is_done()
 
 
