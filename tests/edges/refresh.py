@@ -9,17 +9,18 @@ import tempfile
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from edges.measured import EDGES, PINS, differences
+from edges.measured import BY_NIGHT, EDGES, PINS, differences
 
 
 def main() -> None:
-    names = sys.argv[1:] or list(EDGES)
+    edges = {**EDGES, **BY_NIGHT}
+    names = sys.argv[1:] or list(edges)
     for name in names:
-        if name not in EDGES:
-            sys.exit(f"{name}: no edge; there are {', '.join(EDGES)}")
+        if name not in edges:
+            sys.exit(f"{name}: no edge; there are {', '.join(edges)}")
     for name in names:
         with tempfile.TemporaryDirectory() as folder:
-            found = EDGES[name](Path(folder))
+            found = edges[name](Path(folder))
         for file, text in found.items():
             pin = PINS / file
             if not pin.exists():

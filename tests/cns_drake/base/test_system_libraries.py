@@ -30,6 +30,7 @@ def test_named_libraries(text, expected):
     assert missing_library(ImportError(text)) == expected
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_a_missing_library_is_one_line_and_names_the_package(tmp_path):
     """The import of Drake fails here as it does without GLib."""

@@ -91,6 +91,7 @@ def test_a_grown_plan_is_not_generated_with_the_old_names(grown):
         generate_city(grown)
 
 
+@pytest.mark.night
 def test_names_follow_what_stays_where_it_is(grown):
     before = rows_of(grown)
     outcome = CliRunner().invoke(

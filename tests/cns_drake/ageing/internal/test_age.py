@@ -382,6 +382,7 @@ def test_furniture_moves_as_far_as_allowed(world, farthest, least):
     assert (by[~stays] > least - 0.01).all()
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_the_past_lacks_younger_buildings(town, tmp_path):
     folder = tmp_path / "dated"
@@ -474,6 +475,7 @@ def test_each_stage_is_what_the_history_tells(long):
     assert not rows
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_a_scaffold_stands_before_its_building(world):
     city = AgeingCity(world, _BUSY, 3, shapely.Polygon())

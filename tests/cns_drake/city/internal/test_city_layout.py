@@ -98,6 +98,7 @@ def test_relief_leaves_paths_buildings_and_borders_level(lay_out_text):
     assert max(s.xyz[2] for s in trees) > 0.5
 
 
+@pytest.mark.night
 @pytest.mark.slow
 @pytest.mark.night
 def test_things_stand_on_the_ground_and_cars_in_bays(lay_out_text):

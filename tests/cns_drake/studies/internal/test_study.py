@@ -867,6 +867,7 @@ def test_maps_on_the_command_line(town, tmp_path):
         list(pairs_by_map(run, ["a"]))
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_each_part_of_years_has_a_job_of_its_own(tmp_path):
     """If two have one name, one of them never runs."""

@@ -166,6 +166,7 @@ def test_what_is_missing_or_another_is_named(measured):
     assert "hdl-64e: no simulated scan of it to judge" in lines
 
 
+@pytest.mark.night
 def test_simulated_scans_add_places(tmp_path, capsys):
     folder = fill(tmp_path / "scans")
     drives = tmp_path / "drives"

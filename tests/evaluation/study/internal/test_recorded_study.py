@@ -328,6 +328,7 @@ def test_the_main_protocol_alone_has_the_control(report):
             assert kept[0].value == own[0].value / last[0].value
 
 
+@pytest.mark.night
 def test_a_protocol_beside_another_changes_no_number(
     recordings, report, tmp_path
 ):
