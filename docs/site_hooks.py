@@ -23,6 +23,9 @@ PACKAGES = ("cns_drake", "evaluation")
 _PROJECT = "project"
 # Where `nav` in mkdocs.yml has the tab of the API reference.
 _API_TAB = -2
+# How much more a page of a tab counts in a search, and one of another tab.
+_SEARCH_BOOSTS = {"How to": 4.0, "Start": 3.0, "Results": 2.0, "Reference": 1.5}
+_SEARCH_BOOST = 0.5
 # Code in a line, and blocks of commands; blocks of a language have elements.
 _PLAIN_CODE = re.compile(r"<code>[^<]*</code>")
 _WITH_HYPHEN = re.compile(r"[^\s<>]{,40}-[^\s<>]{,40}")
@@ -58,8 +61,11 @@ def on_config(config: MkDocsConfig, **_: Any) -> MkDocsConfig:
 def on_page_markdown(markdown: str, page: Page, files: Files, **_: Any) -> str:
     """Sets formulas, and leads links to where the site has their target.
 
-    Files of the repository that are no pages are named without a link.
+    Files of the repository that are no pages are named without a link. Also
+    sets how high a page ranks in a search: what helps you to do something comes
+    first.
     """
+    page.meta.setdefault("search", _search_rank(page))
     markdown = _FORMULA.sub(_set, markdown)
     src = page.file.src_uri
     folder = os.path.dirname(_in_repository(src))
@@ -89,6 +95,18 @@ def on_page_content(html: str, **_: Any) -> str:
         ),
         re.sub(r"(?<=\d) %", "&nbsp;%", html),
     )
+
+
+def _search_rank(page: Page) -> dict[str, Any]:
+    """Returns the settings of a page for the theme's search."""
+    path = page.file.src_uri
+    if path == f"{_PROJECT}/CHANGELOG.md":
+        return {"exclude": True}
+    parents = {one.title for one in page.ancestors}
+    for tab, boost in _SEARCH_BOOSTS.items():
+        if tab in parents:
+            return {"boost": boost}
+    return {"boost": _SEARCH_BOOST}
 
 
 def _set(block: re.Match[str]) -> str:
