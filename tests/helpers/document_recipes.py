@@ -740,6 +740,12 @@ RECIPES = {
         after=("varied drives", "start a city"),
         prints=("hard/town_02", "AUC"),
     ),
+    "cleared map": Recipe(
+        ".venv/bin/cns-drake reproduce metropolis_cleared --output cleared",
+        changes=(("reproduce metropolis_cleared", "reproduce town"),),
+        after=("own city",),
+        all_methods=True,
+    ),
     "cleared city": Recipe(
         ".venv/bin/cns-drake generate worlds/metropolis/cleared_01.yaml",
         changes=(
