@@ -30,6 +30,7 @@ from docs.picture_parts import (
 from evaluation.methods import method_facts, shipped_methods
 from evaluation.results import (
     INK,
+    MARGIN,
     OWN,
     PALE,
     STAGE,
@@ -38,11 +39,11 @@ from evaluation.results import (
     Row,
     draw_chart,
     in_table_order,
+    judge_survival,
     listed,
     method_style,
     method_styles,
     rank_methods,
-    survivors,
     title,
 )
 
@@ -68,7 +69,7 @@ def survival(path: Path) -> str:
     """
     rows = kept_rows()
     # The best method without geometric verification is on top.
-    ranked = {gate: rank_methods(rows[gate])[0] for gate in rows}
+    ranked = {gate: rank_methods(rows[gate]) for gate in rows}
     order = [one.method for one in ranked[False]][::-1]
     styles = method_styles(order)
     figure = Figure(figsize=(WIDTH, 6.6), layout="constrained")
@@ -89,7 +90,9 @@ def survival(path: Path) -> str:
                 ]
                 at = 100.0 * np.mean(some)
                 axes.plot(at, y - below, marker, color=colour, ms=6)
-        axes.axvline(100.0 * SURVIVES, color=INK, lw=1.5, ls=":", zorder=0)
+        axes.axvline(
+            100.0 * (1.0 - MARGIN), color=INK, lw=1.5, ls=":", zorder=0
+        )
         axes.axvline(100.0, color=PALE, lw=1, zorder=0)
         axes.set(xlim=(-4.0, 119.0), ylim=(-0.7, len(order) - 0.45))
         axes.set_xlabel("retained AUC strict [%]")
@@ -108,7 +111,14 @@ def survival(path: Path) -> str:
         fontsize=12,
     )
     finding = survival_title(
-        {gate: survivors(some) for gate, some in ranked.items()}
+        {
+            gate: [
+                one.method
+                for one in judge_survival(some)
+                if one.verdict == SURVIVES
+            ]
+            for gate, some in rows.items()
+        }
     )
     add_heading(figure, finding)
     figure.savefig(path, dpi=DPI)
@@ -228,7 +238,7 @@ def ranking(path: Path) -> None:
             found.setdefault(place, []).append(row)
     radii = sorted({radius for *_, radius in found})
     every = [row for rows in found.values() for row in rows]
-    order = [one.method for one in rank_methods(every)[0]]
+    order = [one.method for one in rank_methods(every)]
     figure = Figure(figsize=(WIDTH, 13.6), layout="constrained")
     blocks = list(itertools.product(metrics, gates))
     parts = figure.subfigures(len(blocks), 1)
@@ -240,7 +250,7 @@ def ranking(path: Path) -> None:
         for axes, radius in zip(panels, radii, strict=True):
             for k, (kind, look) in enumerate(kinds.items()):
                 rows = found.get((metric, gate, kind, radius), [])
-                for one in rank_methods(rows)[0] if rows else ():
+                for one in rank_methods(rows) if rows else ():
                     y = order.index(one.method) + 0.25 * (k - 1)
                     colour = METHOD_STYLES[one.method][0]
                     ends = [one.interval.low, one.interval.high]
@@ -414,7 +424,7 @@ def upkeep(
                 row = _realisation(line)
                 of_condition.setdefault(line["condition"], []).append(row)
         found = {
-            condition: rank_methods(rows)[0]
+            condition: rank_methods(rows)
             for condition, rows in of_condition.items()
         }
         measured = {one.method for some in found.values() for one in some}
