@@ -29,6 +29,7 @@ from docs.picture_parts import (
 )
 from evaluation.methods import method_facts, shipped_methods
 from evaluation.results import (
+    CANNOT_SHOW,
     INK,
     MARGIN,
     OWN,
@@ -37,6 +38,7 @@ from evaluation.results import (
     SURVIVES,
     Results,
     Row,
+    Survival,
     draw_chart,
     in_table_order,
     judge_survival,
@@ -64,8 +66,9 @@ def survival(path: Path) -> str:
     """Draws what methods retain of their AUC strict; returns the title.
 
     Cities are the units: a point is the mean over a city's pairs, and a bar is
-    the 95 % t interval over the cities. The points stand below the bar, each
-    city's at a height of its own, so that none hides another or the bar's ends.
+    the 95 % interval over the cities, if there are eight. The points stand
+    below the bar, each city's at a height of its own, so that none hides
+    another or the bar's ends.
     """
     rows = kept_rows()
     # The best method without geometric verification is on top.
@@ -111,14 +114,7 @@ def survival(path: Path) -> str:
         fontsize=12,
     )
     finding = survival_title(
-        {
-            gate: [
-                one.method
-                for one in judge_survival(some)
-                if one.verdict == SURVIVES
-            ]
-            for gate, some in rows.items()
-        }
+        {gate: judge_survival(some) for gate, some in rows.items()}
     )
     add_heading(figure, finding)
     figure.savefig(path, dpi=DPI)
@@ -137,15 +133,20 @@ _CITY_MARKERS = {
 }
 
 
-def survival_title(found: Mapping[bool, Collection[str]]) -> str:
+def survival_title(found: Mapping[bool, Collection[Survival]]) -> str:
     """Returns a title: which methods survive, without and with verification.
 
     Args:
-        found: whether geometric verification was used -> methods that survive.
+        found: whether geometric verification was used -> whether methods
+            survive.
     """
+    every = [one for some in found.values() for one in some]
+    if all(one.verdict == CANNOT_SHOW for one in every):
+        return f"{every[0].cities} cities cannot show what survives rebuilding"
 
-    def named(some: Collection[str]) -> str:
-        marked = [f"{title(n)}{'*' * (n in OURS)}" for n in sorted(some)]
+    def named(some: Collection[Survival]) -> str:
+        names = sorted(one.method for one in some if one.verdict == SURVIVES)
+        marked = [f"{title(n)}{'*' * (n in OURS)}" for n in names]
         return listed(marked).lower() if marked else "no method"
 
     alone, verified = named(found[False]), named(found[True])
@@ -397,7 +398,7 @@ def upkeep(
 ) -> None:
     """Draws what methods reach with each database, a panel a metric.
 
-    Values are means over realisations of cities, with their 95 % t intervals.
+    Values are means over realisations of cities, with their 95 % intervals.
 
     Args:
         path: where to save the picture.

@@ -383,7 +383,7 @@ def test_variants_are_one_family_in_the_published_ranking(tmp_path):
 
 
 def test_tables_of_the_same_maps_are_drawn_alike(tmp_path):
-    """Each sample of a table then has the order of the same sample of a copy."""
+    """Each sample has the order of the same sample of a copy."""
     steps = (0.4, -0.2, 0.1, -0.3, 0.2, -0.1, 0.3, -0.4)
     towns = {
         town: {"x": 0.5 + step, "y": 0.5, "z": 0.5 - step}

@@ -1,6 +1,6 @@
 """Coverage of every printed interval, and size of every printed test.
 
-python tests/benchmarks/coverage.py [PART...] [--runs N]
+python tests/benchmarks/interval_coverage.py [PART...] [--runs N]
 
 Answers to queries and results of cities are made up at random. The table on
 stdout says for each quantity: in which share of the runs its interval is shown;
