@@ -5,8 +5,8 @@ python tests/benchmarks/interval_coverage.py [PART...] [--runs N]
 Answers to queries and results of cities are made up at random. The table on
 stdout says for each quantity: in which share of the runs its interval is shown;
 in which share of these it contains the true value; and, where there is no
-difference, how often a test finds one nevertheless. `docs/notes/coverage.csv`
-is the table of all parts with 1,000 runs. On one core, this takes five minutes.
+difference, how often a test finds one nevertheless. Redirect it to
+`docs/notes/coverage.csv`. On one core, this takes five minutes.
 """
 
 from __future__ import annotations
