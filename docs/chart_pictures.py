@@ -29,20 +29,23 @@ from docs.picture_parts import (
 )
 from evaluation.methods import method_facts, shipped_methods
 from evaluation.results import (
+    CANNOT_SHOW,
     INK,
+    MARGIN,
     OWN,
     PALE,
     STAGE,
     SURVIVES,
     Results,
     Row,
+    Survival,
     draw_chart,
     in_table_order,
+    judge_survival,
     listed,
     method_style,
     method_styles,
     rank_methods,
-    survivors,
     title,
 )
 
@@ -63,12 +66,13 @@ def survival(path: Path) -> str:
     """Draws what methods retain of their AUC strict; returns the title.
 
     Cities are the units: a point is the mean over a city's pairs, and a bar is
-    the 95 % t interval over the cities. The points stand below the bar, each
-    city's at a height of its own, so that none hides another or the bar's ends.
+    the 95 % interval over the cities, if there are eight. The points stand
+    below the bar, each city's at a height of its own, so that none hides
+    another or the bar's ends.
     """
     rows = kept_rows()
     # The best method without geometric verification is on top.
-    ranked = {gate: rank_methods(rows[gate])[0] for gate in rows}
+    ranked = {gate: rank_methods(rows[gate]) for gate in rows}
     order = [one.method for one in ranked[False]][::-1]
     styles = method_styles(order)
     figure = Figure(figsize=(WIDTH, 6.6), layout="constrained")
@@ -89,7 +93,9 @@ def survival(path: Path) -> str:
                 ]
                 at = 100.0 * np.mean(some)
                 axes.plot(at, y - below, marker, color=colour, ms=6)
-        axes.axvline(100.0 * SURVIVES, color=INK, lw=1.5, ls=":", zorder=0)
+        axes.axvline(
+            100.0 * (1.0 - MARGIN), color=INK, lw=1.5, ls=":", zorder=0
+        )
         axes.axvline(100.0, color=PALE, lw=1, zorder=0)
         axes.set(xlim=(-4.0, 119.0), ylim=(-0.7, len(order) - 0.45))
         axes.set_xlabel("retained AUC strict [%]")
@@ -108,7 +114,7 @@ def survival(path: Path) -> str:
         fontsize=12,
     )
     finding = survival_title(
-        {gate: survivors(some) for gate, some in ranked.items()}
+        {gate: judge_survival(some) for gate, some in rows.items()}
     )
     add_heading(figure, finding)
     figure.savefig(path, dpi=DPI)
@@ -127,15 +133,20 @@ _CITY_MARKERS = {
 }
 
 
-def survival_title(found: Mapping[bool, Collection[str]]) -> str:
+def survival_title(found: Mapping[bool, Collection[Survival]]) -> str:
     """Returns a title: which methods survive, without and with verification.
 
     Args:
-        found: whether geometric verification was used -> methods that survive.
+        found: whether geometric verification was used -> whether methods
+            survive.
     """
+    every = [one for some in found.values() for one in some]
+    if all(one.verdict == CANNOT_SHOW for one in every):
+        return f"{every[0].cities} cities cannot show what survives rebuilding"
 
-    def named(some: Collection[str]) -> str:
-        marked = [f"{title(n)}{'*' * (n in OURS)}" for n in sorted(some)]
+    def named(some: Collection[Survival]) -> str:
+        names = sorted(one.method for one in some if one.verdict == SURVIVES)
+        marked = [f"{title(n)}{'*' * (n in OURS)}" for n in names]
         return listed(marked).lower() if marked else "no method"
 
     alone, verified = named(found[False]), named(found[True])
@@ -228,7 +239,7 @@ def ranking(path: Path) -> None:
             found.setdefault(place, []).append(row)
     radii = sorted({radius for *_, radius in found})
     every = [row for rows in found.values() for row in rows]
-    order = [one.method for one in rank_methods(every)[0]]
+    order = [one.method for one in rank_methods(every)]
     figure = Figure(figsize=(WIDTH, 13.6), layout="constrained")
     blocks = list(itertools.product(metrics, gates))
     parts = figure.subfigures(len(blocks), 1)
@@ -240,7 +251,7 @@ def ranking(path: Path) -> None:
         for axes, radius in zip(panels, radii, strict=True):
             for k, (kind, look) in enumerate(kinds.items()):
                 rows = found.get((metric, gate, kind, radius), [])
-                for one in rank_methods(rows)[0] if rows else ():
+                for one in rank_methods(rows) if rows else ():
                     y = order.index(one.method) + 0.25 * (k - 1)
                     colour = METHOD_STYLES[one.method][0]
                     ends = [one.interval.low, one.interval.high]
@@ -387,7 +398,7 @@ def upkeep(
 ) -> None:
     """Draws what methods reach with each database, a panel a metric.
 
-    Values are means over realisations of cities, with their 95 % t intervals.
+    Values are means over realisations of cities, with their 95 % intervals.
 
     Args:
         path: where to save the picture.
@@ -414,7 +425,7 @@ def upkeep(
                 row = _realisation(line)
                 of_condition.setdefault(line["condition"], []).append(row)
         found = {
-            condition: rank_methods(rows)[0]
+            condition: rank_methods(rows)
             for condition, rows in of_condition.items()
         }
         measured = {one.method for some in found.values() for one in some}

@@ -31,13 +31,12 @@ def compare(
     command ranks the methods in these tables and in the shipped tables by their
     means over the conditions that all tables share.
 
-    From four maps on, each mean has a 95 % t interval over maps. With one map,
-    the interval is over conditions, if there are at least four conditions. With
-    two or three maps, there is no interval. If each table has a queries.csv
-    next to it, the command also prints the difference in AUC between any two
-    methods, with a p-value that Holm's method corrects for the number of
-    differences. With --rankings, the command prints Kendall's tau between the
-    rankings of any two tables.
+    From eight maps on, each mean has a 95 % interval over maps. If each table
+    has a queries.csv next to it, the command also prints the difference in R@1
+    between any two methods, with its interval and p-value, both corrected for
+    the number of differences. With --metric kept_strict, the command prints
+    which methods survive. With --rankings, the command prints Kendall's tau
+    between the rankings of any two tables.
 
     Args:
         tables: Tables of results to compare, or folders with a results.csv.
@@ -76,19 +75,35 @@ def compare(
         level = "  [95 %]" if known else ""
         rows.insert(0, ("method", f"{found.metric}, {where}{level}"))
     for compared in found.differences:
-        interval = interval_text(compared.difference.interval)
+        difference = compared.difference
         rows.append(
             (
-                f"{compared.first} - {compared.second}",
-                f"{number_text(compared.difference.value)}  {interval}"
-                f"  p {_p_text(compared.p_value)}",
+                f"R@1 of {compared.first} - {compared.second}",
+                f"{number_text(difference.value)}"
+                f"{_spaced_interval(difference.interval) or '  cannot show'}"
+                f"  p {_p_text(difference.p_value)}",
+            )
+        )
+    for one in found.survival:
+        rows.append(
+            (
+                f"{one.method}, loss in {one.cities} cities",
+                f"{number_text(one.loss)}{_spaced_interval(one.interval)}"
+                f"  {one.verdict}",
             )
         )
     for alike in found.agreements:
         rows.append(
             (
                 f"Kendall's tau, {alike.first} and {alike.second}",
-                f"{number_text(alike.tau)}  {interval_text(alike.interval)}",
+                f"{number_text(alike.tau)}{_spaced_interval(alike.interval)}",
+            )
+        )
+        families = number_text(alike.tau_of_families)
+        rows.append(
+            (
+                f"the same over {len(alike.families)} families of methods",
+                f"{families}  p {_p_text(alike.p_value)}",
             )
         )
     terminal.show(found.to_json(), rows, json=json)

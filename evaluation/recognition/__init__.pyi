@@ -1,19 +1,3 @@
-from evaluation.recognition.bootstrap import UNKNOWN as UNKNOWN
-from evaluation.recognition.bootstrap import Interval as Interval
-from evaluation.recognition.bootstrap import paired_samples as paired_samples
-from evaluation.recognition.bootstrap import (
-    percentile_interval as percentile_interval,
-)
-from evaluation.recognition.bootstrap import (
-    resampled_metrics as resampled_metrics,
-)
-from evaluation.recognition.bootstrap import (
-    resampled_weights as resampled_weights,
-)
-from evaluation.recognition.bootstrap import route_blocks as route_blocks
-from evaluation.recognition.bootstrap import (
-    weights_by_drive as weights_by_drive,
-)
 from evaluation.recognition.costs import NUM_TRIALS as NUM_TRIALS
 from evaluation.recognition.costs import Cost as Cost
 from evaluation.recognition.costs import QueryCost as QueryCost
@@ -75,6 +59,9 @@ from evaluation.recognition.pose_errors import PoseErrors as PoseErrors
 from evaluation.recognition.pose_errors import PoseMetrics as PoseMetrics
 from evaluation.recognition.pose_errors import pose_error as pose_error
 from evaluation.recognition.precision_recall import pr_curve as pr_curve
+from evaluation.recognition.precision_recall import (
+    weighted_metrics as weighted_metrics,
+)
 from evaluation.recognition.protocol import FAIR_PROTOCOL as FAIR_PROTOCOL
 from evaluation.recognition.protocol import PAPER_PROTOCOL as PAPER_PROTOCOL
 from evaluation.recognition.protocol import PROTOCOL_NAMES as PROTOCOL_NAMES
@@ -112,10 +99,20 @@ from evaluation.recognition.scan_folders import write_scores as write_scores
 from evaluation.recognition.scoring import score_places as score_places
 from evaluation.recognition.seen_surfaces import TOLERANCE as TOLERANCE
 from evaluation.recognition.seen_surfaces import SeenSurfaces as SeenSurfaces
-from evaluation.recognition.significance import Difference as Difference
-from evaluation.recognition.significance import (
-    compared_by_auc as compared_by_auc,
+from evaluation.recognition.sign_flips import LEAST_BLOCKS as LEAST_BLOCKS
+from evaluation.recognition.sign_flips import LEAST_CITIES as LEAST_CITIES
+from evaluation.recognition.sign_flips import SIGNIFICANT as SIGNIFICANT
+from evaluation.recognition.sign_flips import UNKNOWN as UNKNOWN
+from evaluation.recognition.sign_flips import Difference as Difference
+from evaluation.recognition.sign_flips import Interval as Interval
+from evaluation.recognition.sign_flips import city_interval as city_interval
+from evaluation.recognition.sign_flips import (
+    compared_by_right_answers as compared_by_right_answers,
 )
-from evaluation.recognition.significance import holm as holm
+from evaluation.recognition.sign_flips import (
+    jackknife_interval as jackknife_interval,
+)
+from evaluation.recognition.sign_flips import leave_one_out as leave_one_out
+from evaluation.recognition.sign_flips import route_blocks as route_blocks
 from evaluation.recognition.stored_places import MOST_BYTES as MOST_BYTES
 from evaluation.recognition.stored_places import StoredDrives as StoredDrives

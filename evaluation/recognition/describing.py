@@ -11,9 +11,9 @@ from cns_drake.base import InputError, track
 from cns_drake.drives import Drive
 from evaluation.drives import QuerySensor, cloud_at, sample_frames
 from evaluation.methods import Method, check_number
-from evaluation.recognition.bootstrap import route_blocks
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.sign_flips import route_blocks
 
 # What a drive's scans are used for: places of the database, or queries.
 Role = Literal["places", "queries"]

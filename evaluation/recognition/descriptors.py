@@ -24,7 +24,7 @@ class DescribedScans:
         clouds: the K described clouds if the method has a second stage;
             otherwise empty.
         blocks: (K,) block of the route in which each place or query lies, see
-            `evaluation.recognition.bootstrap.route_blocks`; None if the route
+            `evaluation.recognition.sign_flips.route_blocks`; None if the route
             is unknown.
         drive_of: (K,) number of the drive of each place, if the places are of
             several drives; None for one drive.

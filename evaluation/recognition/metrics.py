@@ -16,14 +16,18 @@ import numpy as np
 
 from cns_drake.base import InputError, did_you_mean, errors_at, repeated
 from evaluation.methods import as_users_code, run_module
-from evaluation.recognition.bootstrap import (
-    SampledMetrics,
-    own_samples,
-    resampled_metrics,
-    resampled_weights,
+from evaluation.recognition.precision_recall import (
+    WeightedMetrics,
+    pr_curve,
+    weighted_metrics,
 )
-from evaluation.recognition.precision_recall import pr_curve
 from evaluation.recognition.query_outcomes import QueryOutcomes
+from evaluation.recognition.sign_flips import (
+    UNKNOWN,
+    Interval,
+    jackknife_interval,
+    leave_one_out,
+)
 
 # Sums and quotients of floating-point numbers leave a range by this at most.
 _ROUNDING = 1e-9
@@ -54,8 +58,8 @@ class Metric:
             the growth.
         compute: returns the value from the outcomes of queries; None if a task
             computes it from something else.
-        has_interval: whether a bootstrap over the route gives the computed
-            values an interval.
+        has_interval: whether blocks of street give the computed values an
+            interval. A metric without a least or a greatest value has none.
         file: the user's file that defines the metric; None for a metric of this
             package.
 
@@ -120,7 +124,7 @@ class Metric:
 
     @property
     def is_resampled(self) -> bool:
-        """Whether a bootstrap over queries gives the values an interval."""
+        """Whether blocks of street give the values an interval."""
         return self.compute is not None and self.has_interval
 
     def of(self, outcomes: QueryOutcomes) -> float:
@@ -154,33 +158,51 @@ class Metric:
                 )
             return self.checked(float(array))
 
-    def samples(
-        self, outcomes: QueryOutcomes, weights: np.ndarray | None = None
+    def weighted(
+        self, outcomes: QueryOutcomes, weights: np.ndarray
     ) -> np.ndarray:
-        """Returns the values (B,) of bootstrap samples of queries.
+        """Returns the values (B,) of B weighted sets of queries.
 
         Args:
             outcomes: the outcomes of Q queries.
-            weights: (B, Q) how often each query is in each sample; by default,
-                whole blocks of the route are sampled.
+            weights: (B, Q) how often each query is in each set.
         """
-        if self.name in SampledMetrics._fields:
-            drawn = (
-                own_samples(outcomes)
-                if weights is None
-                else resampled_metrics(outcomes, weights)
-            )
-            return getattr(drawn, self.name)
-        if weights is None:
-            weights = resampled_weights(len(outcomes), blocks=outcomes.blocks)
-        counts = weights.astype(np.int64)
+        if self.name in WeightedMetrics._fields:
+            return getattr(weighted_metrics(outcomes, weights), self.name)
         every = np.arange(len(outcomes))
         return np.array(
             [
                 self._computed(outcomes.subset(np.repeat(every, n)))
-                for n in counts
+                for n in weights.astype(np.int64)
             ]
         )
+
+    def without_blocks(
+        self, outcomes: QueryOutcomes
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the values (N,) without each of N blocks, and their weights.
+
+        The weight of a block is its number of queries; only queries with a
+        match count if the value depends only on these.
+        """
+        left = leave_one_out(outcomes)
+        values = self.weighted(outcomes, left)
+        matched = outcomes.subset(outcomes.has_match)
+        counts = np.ones(len(outcomes), dtype=bool)
+        if len(matched) and self._computed(matched) == self.of(outcomes):
+            counts = outcomes.has_match
+        return values, (1.0 - left) @ counts
+
+    def interval(self, outcomes: QueryOutcomes) -> Interval:
+        """Returns the 95 % interval of the value, see `jackknife_interval`.
+
+        It is unknown if the metric has no least or no greatest value.
+        """
+        ends = self.least, self.greatest
+        if not self.is_resampled or not np.isfinite(ends).all():
+            return UNKNOWN
+        values, weights = self.without_blocks(outcomes)
+        return jackknife_interval(self.of(outcomes), values, weights, ends)
 
 
 def _metric(name: str, title: str, unit: str = "", **fields: Any) -> Metric:

@@ -28,15 +28,13 @@ from typing import Literal
 
 import numpy as np
 
-from evaluation.recognition.bootstrap import (
-    Interval,
-    bootstrap_intervals,
-)
+from evaluation.recognition.metrics import METRICS
 from evaluation.recognition.precision_recall import (
     PrCurve,
     pr_curve,
 )
 from evaluation.recognition.query_outcomes import QueryOutcomes
+from evaluation.recognition.sign_flips import Interval
 
 Mode = Literal["all", "filtered"]
 MODES: tuple[Mode, ...] = ("all", "filtered")
@@ -66,9 +64,9 @@ class PlaceRecognitionMetrics:
         num_with_match: N, the number of queries with a match.
         num_right: number of queries whose top-ranked place is right. R@1 =
             num_right / N.
-        auc_interval: 95 % interval of `auc`, by bootstrap over blocks of the
-            route.
-        recall_at_1_interval: 95 % interval of R@1, by the same bootstrap.
+        auc_interval: 95 % interval of `auc`, by sign flips over blocks of
+            street.
+        recall_at_1_interval: 95 % interval of R@1, by the same sign flips.
 
     Example:
         from evaluation import evaluate, judge
@@ -97,7 +95,7 @@ class PlaceRecognitionMetrics:
 
 
 def evaluate(
-    outcomes: QueryOutcomes, mode: Mode = "all", seed: int = 0
+    outcomes: QueryOutcomes, mode: Mode = "all"
 ) -> PlaceRecognitionMetrics:
     """Returns the scores of one method on one pair of drives.
 
@@ -105,7 +103,6 @@ def evaluate(
         outcomes: outcome of each query.
         mode: which queries the precision-recall curve counts: `all`, or only
             queries with a match (`filtered`).
-        seed: seed of the bootstrap.
 
     Example:
         from evaluation import evaluate, judge
@@ -118,7 +115,6 @@ def evaluate(
     curve = pr_curve(counted)
     num_with_match = int(outcomes.has_match.sum())
     best = int(curve.f1.argmax()) if len(curve.thresholds) else None
-    auc_interval, recall_interval = bootstrap_intervals(counted, seed)
     return PlaceRecognitionMetrics(
         mode=mode,
         curve=curve,
@@ -133,6 +129,6 @@ def evaluate(
         num_queries=len(outcomes),
         num_with_match=num_with_match,
         num_right=int(outcomes.is_right.sum()),
-        auc_interval=auc_interval,
-        recall_at_1_interval=recall_interval,
+        auc_interval=METRICS["auc"].interval(counted),
+        recall_at_1_interval=METRICS["r1"].interval(counted),
     )

@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 import math
 
 import numpy as np
 
-from evaluation.recognition.bootstrap import (
-    UNKNOWN,
-    SampledMetrics,
-    paired_samples,
-    percentile_interval,
-)
 from evaluation.recognition.faults import FAULTS
 from evaluation.recognition.metrics import METRICS, Metric
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.pose_errors import is_accepted
+from evaluation.recognition.precision_recall import WeightedMetrics
+from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.result_number import Number
+from evaluation.recognition.sign_flips import (
+    UNKNOWN,
+    Interval,
+    jackknife_interval,
+)
 
-# The retained shares of the resampled metrics, in their order.
+# The retained shares of the weighted metrics, in their order.
 _RETAINED = [
     next(one.name for one in METRICS.values() if one.share_of == name)
-    for name in SampledMetrics._fields
+    for name in WeightedMetrics._fields
 ]
 
 
@@ -31,9 +33,10 @@ def place_numbers(
 ) -> Iterator[Number]:
     """Yields a method's place recognition results in a condition, one by one.
 
-    Intervals come from a bootstrap over blocks of the route. Each bootstrap
-    sample contains the same blocks in the condition and in the baseline, in
-    which nothing differs between the drives.
+    Intervals come from sign flips over blocks of street, see
+    `jackknife_interval`. Without a block, a retained share has the block
+    neither in the condition nor in the baseline, in which nothing differs
+    between the drives.
 
     Args:
         now: outcome of the method in the condition.
@@ -50,12 +53,12 @@ def place_numbers(
         `_visible_change_added`.
     """
     outcomes = now.outcomes
-    for name in SampledMetrics._fields:
+    for name in WeightedMetrics._fields:
         yield _computed(now, METRICS[name])
     if before is not None:
         yield from _compared_numbers(now, before)
     for metric in METRICS.values():
-        if metric.compute and metric.name not in SampledMetrics._fields:
+        if metric.compute and metric.name not in WeightedMetrics._fields:
             yield _computed(now, metric)
     overlaps = now.columns["overlap"]
     for name in FAULTS:
@@ -68,10 +71,9 @@ def place_numbers(
 
 def _computed(now: PlaceOutcome, metric: Metric) -> Number:
     """Returns a metric that follows from the outcomes, with its interval."""
-    interval = UNKNOWN
-    if metric.has_interval:
-        interval = percentile_interval(metric.samples(now.outcomes))
-    return now.number(metric.name, metric.of(now.outcomes), interval)
+    outcomes = now.outcomes
+    interval = metric.interval(outcomes)
+    return now.number(metric.name, metric.of(outcomes), interval)
 
 
 def _compared_numbers(
@@ -84,14 +86,13 @@ def _compared_numbers(
     """
     outcomes = now.outcomes
     is_paired = len(before.outcomes) == len(outcomes)
-    for name, of in zip(_RETAINED, SampledMetrics._fields, strict=True):
+    for name, of in zip(_RETAINED, WeightedMetrics._fields, strict=True):
         metric = METRICS[of]
         share = kept_share(metric.of(outcomes), metric.of(before.outcomes))
         interval = UNKNOWN
         if is_paired:
-            then = getattr(paired_samples(before.outcomes, outcomes), of)
-            drawn = kept_share(metric.samples(outcomes), then)
-            interval = percentile_interval(drawn)
+            then = replace(before.outcomes, blocks=outcomes.own_blocks)
+            interval = _kept_interval(metric, outcomes, then)
         yield now.number(name, float(share), interval)
     if is_paired:
         right = outcomes.is_right
@@ -103,6 +104,24 @@ def _compared_numbers(
         )
         if not math.isnan(added):
             yield now.number("visible_change_added", added)
+
+
+def _kept_interval(
+    metric: Metric, now: QueryOutcomes, before: QueryOutcomes
+) -> Interval:
+    """Returns the 95 % interval of a retained share.
+
+    The two imaginary blocks of `jackknife_interval` are one in which nothing is
+    retained, and one in which the metric rises from 0 to 1.
+    """
+    unchanged = metric.of(before)
+    if not unchanged > 0.0:
+        return UNKNOWN
+    share = metric.of(now) / unchanged
+    values, weights = metric.without_blocks(now)
+    then, _ = metric.without_blocks(before)
+    ends = 0.0, share + 1.0 / unchanged
+    return jackknife_interval(share, kept_share(values, then), weights, ends)
 
 
 def pose_numbers(

@@ -12,10 +12,6 @@ import numpy as np
 
 from cns_drake.base import InputError, json_values
 from evaluation.methods import Method
-from evaluation.recognition.bootstrap import (
-    UNKNOWN,
-    Interval,
-)
 from evaluation.recognition.faults import faults
 from evaluation.recognition.pair_scores import (
     MODES,
@@ -34,6 +30,10 @@ from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.ranking import ranked_places
 from evaluation.recognition.result_number import Number
 from evaluation.recognition.retrieval import Retrieval
+from evaluation.recognition.sign_flips import (
+    UNKNOWN,
+    Interval,
+)
 
 # Further radii of a match for which AUC is computed [m].
 RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)

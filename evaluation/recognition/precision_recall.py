@@ -1,6 +1,7 @@
 """The precision-recall curve of place recognition, and the area under it."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -134,3 +135,53 @@ def recall_of(tp: np.ndarray, fn: np.ndarray) -> np.ndarray:
     The counts `tp` and `fn` and the result are arrays of the same shape.
     """
     return tp / np.maximum(tp + fn, 1)
+
+
+class WeightedMetrics(NamedTuple):
+    """The metrics of B weighted sets of queries, in the order of tables.
+
+    Attributes:
+        auc: (B,) AUC.
+        r1: (B,) R@1.
+        auc_strict: (B,) strict AUC, see `PrCurve.strict_auc`.
+    """
+
+    auc: np.ndarray
+    r1: np.ndarray
+    auc_strict: np.ndarray
+
+
+def weighted_metrics(
+    outcomes: QueryOutcomes, weights: np.ndarray
+) -> WeightedMetrics:
+    """Returns AUC, R@1 and strict AUC of B weighted sets of queries.
+
+    Args:
+        outcomes: outcomes of Q queries, all of which count.
+        weights: (B, Q) how often each query counts in each set.
+    """
+    _, tp, fp, fn = weighted_counts(outcomes, weights)
+    # Before a set's first query nothing is accepted; the curve there has the
+    # precision of its first point.
+    with np.errstate(invalid="ignore"):
+        precision = tp / (tp + fp)
+    precision = _filled_from_right(precision)
+    areas = areas_under(precision, recall_of(tp, fn))
+    with_match = (weights * outcomes.has_match).sum(axis=1)
+    stricts = areas_under(precision, recall_of(tp, with_match[:, None] - tp))
+    with np.errstate(invalid="ignore"):
+        recalls = (weights * outcomes.is_right).sum(axis=1) / with_match
+    return WeightedMetrics(areas, recalls, stricts)
+
+
+def _filled_from_right(values: np.ndarray) -> np.ndarray:
+    """Returns rows whose leading NaNs are replaced by the first number.
+
+    A row without any number becomes zeros.
+    """
+    if values.shape[1] == 0:
+        return values
+    known = ~np.isnan(values)
+    first = known.argmax(axis=1)[:, None]
+    start = np.nan_to_num(np.take_along_axis(values, first, axis=1))
+    return np.where(known, values, start)

@@ -24,7 +24,7 @@ class QueryOutcomes:
             infinite if no candidate is a true match.
         num_places: size of the database.
         blocks: (Q,) block of the route in which each query lies, see
-            `evaluation.recognition.bootstrap.route_blocks`; None if each query
+            `evaluation.recognition.sign_flips.route_blocks`; None if each query
             is a block of its own.
 
     Example:

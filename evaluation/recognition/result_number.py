@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from evaluation.recognition.bootstrap import (
+from evaluation.recognition.sign_flips import (
     UNKNOWN,
     Interval,
 )

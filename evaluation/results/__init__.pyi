@@ -3,9 +3,7 @@ from evaluation.results.charts.kinds import chart_factors as chart_factors
 from evaluation.results.charts.kinds import check_factors as check_factors
 from evaluation.results.charts.kinds import draw_chart as draw_chart
 from evaluation.results.figure_files import save_figure as save_figure
-from evaluation.results.headlines import SURVIVES as SURVIVES
 from evaluation.results.headlines import listed as listed
-from evaluation.results.headlines import survivors as survivors
 from evaluation.results.keys import CAUSE as CAUSE
 from evaluation.results.keys import FROZEN_REDRAW as FROZEN_REDRAW
 from evaluation.results.keys import LAST as LAST
@@ -57,6 +55,12 @@ from evaluation.results.styles import method_styles as method_styles
 from evaluation.results.styles import unit_rgb as unit_rgb
 from evaluation.results.summaries import LEAST_POINTS as LEAST_POINTS
 from evaluation.results.summaries import means as means
+from evaluation.results.survival import CANNOT_SHOW as CANNOT_SHOW
+from evaluation.results.survival import MARGIN as MARGIN
+from evaluation.results.survival import SURVIVES as SURVIVES
+from evaluation.results.survival import Survival as Survival
+from evaluation.results.survival import judge_survival as judge_survival
+from evaluation.results.survival import largest_loss_shown as largest_loss_shown
 from evaluation.results.table import QUERIES as QUERIES
 from evaluation.results.table import RESULTS as RESULTS
 from evaluation.results.table import Answers as Answers

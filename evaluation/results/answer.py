@@ -12,16 +12,13 @@ from dataclasses import dataclass
 import math
 from typing import Any, NamedTuple, TypeAlias
 
-import numpy as np
-
 from cns_drake.base import InputError
-from evaluation.recognition import holm, kept_share, metric_named
+from evaluation.recognition import SIGNIFICANT, kept_share, metric_named
 from evaluation.results.charts.words import change_words, in_words
 from evaluation.results.compared_answers import compared_answers
 from evaluation.results.headlines import (
-    SIGNIFICANT,
     from_least_to_greatest,
-    lead_by_auc,
+    lead_by_right_answers,
     listed,
 )
 from evaluation.results.keys import CAUSE, PROTOCOL_BASE, SETTINGS
@@ -319,7 +316,7 @@ def _without_baseline(rows: Iterable[Row]) -> str:
 
 
 def _evidence(change: Change, rows: Results, queries: QueryRows | None) -> str:
-    """Returns sentences on which differences are significant."""
+    """Returns sentences on which differences of R@1 are significant."""
     number = len(change.pairs)
     found = [f"Medians of {number} pairs of drives."] if number > 1 else []
     if queries is None:
@@ -333,17 +330,17 @@ def _evidence(change: Change, rows: Results, queries: QueryRows | None) -> str:
         asked = _number_of_queries(change, queries)
         found.append(
             f"With {asked} queries, this study cannot show that any difference"
-            " is more than chance."
+            " of R@1 is more than chance."
         )
     elif told:
         clauses = [
             f"{f'{_VERIFIED}, ' if gate else ''}for {_which(apart, rest)}"
             for gate, apart, rest in told
         ]
-        found.append(f"The change is significant {'; '.join(clauses)}.")
+        found.append(f"The change of R@1 is significant {'; '.join(clauses)}.")
     gate = change.gates[-1]
     at_end = rows.where({change.over: change.after}, gate=gate)
-    lead = lead_by_auc(at_end.rows, queries)
+    lead = lead_by_right_answers(at_end.rows, queries)
     if lead:
         where = f", {_VERIFIED}" if gate else ""
         found.append(f"After it{where}, {lead}.")
@@ -367,9 +364,8 @@ def _significant_losses(
     """Divides methods by whether the change makes a significant difference.
 
     Returns:
-        The methods with a p-value below 0.05, corrected by Holm's method for
-        the number of methods, and those with another p-value. Methods whose
-        p-value is unknown are in neither list.
+        The methods whose R@1 changes with a p-value below 0.05, corrected
+        (Bonferroni) for the number of methods, and all other methods.
     """
     ends: dict[str, dict[tuple, dict[object, Any]]] = {}
     for answers in queries.answers:
@@ -391,14 +387,12 @@ def _significant_losses(
             compared = compared_answers({"before": before, "after": after})
         except InputError:
             continue  # The change has other queries.
-        ((_, p_value),) = compared.values()
-        p_values[name] = p_value
-    corrected = dict(
-        zip(p_values, holm(np.array([*p_values.values()])), strict=True)
-    )
+        (difference,) = compared.values()
+        p_values[name] = difference.p_value
+    limit = SIGNIFICANT / max(1, len(p_values))
     return (
-        [name for name, p in corrected.items() if p < SIGNIFICANT],
-        [name for name, p in corrected.items() if p >= SIGNIFICANT],
+        [name for name, p in p_values.items() if p < limit],
+        [name for name, p in p_values.items() if p >= limit],
     )
 
 

@@ -13,7 +13,7 @@ from cns_drake.base import InputError, value_errors
 from evaluation.recognition import (
     Difference,
     common_blocks,
-    compared_by_auc,
+    compared_by_right_answers,
 )
 from evaluation.results.table import Answers
 
@@ -23,7 +23,7 @@ def check_same_queries(first: Answers, second: Answers) -> None:
 
     Raises:
         InputError: the two methods answered different queries, or the queries
-            are in other blocks of the route.
+            are in other blocks of street.
     """
     frames, others = (a.columns["query_frame"] for a in (first, second))
     two = (
@@ -43,16 +43,16 @@ def drive_number(queries: Answers) -> int:
 
 def compared_answers(
     answers: Mapping[str, Sequence[Answers]],
-) -> dict[tuple[Any, Any], tuple[Difference, float]]:
-    """Returns the difference of the mean AUC between any two methods.
+) -> dict[tuple[Any, Any], Difference]:
+    """Returns the difference of the mean R@1 between any two methods.
 
     Args:
         answers: method -> its answers in each condition. The conditions must be
             the same for all methods.
 
     Returns:
-        The differences and p-values, see
-        `evaluation.recognition.significance.compared_by_auc`.
+        The differences, see
+        `evaluation.recognition.sign_flips.compared_by_right_answers`.
 
     Raises:
         InputError: two methods answered different queries.
@@ -60,7 +60,7 @@ def compared_answers(
     for of_condition in zip(*answers.values(), strict=True):
         for pair in itertools.combinations(of_condition, 2):
             check_same_queries(*pair)
-    return compared_by_auc(
+    return compared_by_right_answers(
         {
             name: [in_condition.outcomes for in_condition in of_method]
             for name, of_method in answers.items()

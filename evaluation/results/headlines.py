@@ -1,24 +1,16 @@
 """Sentences on what a chart shows, and on what it does not show.
 
-Two methods differ significantly if the difference of their AUC has a corrected
-p-value below 0.05, see `evaluation.recognition.significance`.
+Two methods differ significantly if the difference of their R@1 has a corrected
+p-value below 0.05, see `evaluation.recognition.sign_flips`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 import math
 
+from evaluation.recognition import SIGNIFICANT, Difference
 from evaluation.results.compared_answers import compared_answers
 from evaluation.results.method_names import title
-from evaluation.results.ranking import Ranked
 from evaluation.results.table import Answers, QueryRows, Row
-
-# Methods differ significantly if the p-value is below this value.
-SIGNIFICANT = 0.05
-# The metric by which a method survives a change: the share of its AUC strict
-# that it retains.
-KEPT = "kept_strict"
-# A method survives if the lower limit of this share is at least that.
-SURVIVES = 0.9
 
 
 def listed(names: Iterable[str]) -> str:
@@ -47,50 +39,13 @@ def from_least_to_greatest(
     return f"from {least} ({lowest}) to {greatest} ({highest})"
 
 
-def by_significance(
-    best: str, p_values: Mapping[tuple[str, str], float]
-) -> tuple[list[str], list[str]]:
-    """Divides methods by whether they differ significantly from the best.
+def lead_by_right_answers(
+    rows: Sequence[Row], queries: QueryRows | None
+) -> str:
+    """Says from which methods the method with the greatest R@1 differs.
 
     Args:
-        best: label of the best method.
-        p_values: (one method, another) -> corrected p-value of their
-            difference; NaN if it is unknown.
-
-    Returns:
-        The methods that differ significantly, and all other methods.
-    """
-    apart: list[str] = []
-    rest: list[str] = []
-    for (one, another), p in p_values.items():
-        if best not in (one, another):
-            continue
-        other = title(another if one == best else one)
-        # The difference may be unknown: NaN is not below the limit.
-        if p < SIGNIFICANT:
-            apart.append(other)
-        else:
-            rest.append(other)
-    return apart, rest
-
-
-def survivors(ranked: Iterable[Ranked]) -> list[str]:
-    """Returns the labels of the methods that survive.
-
-    A method survives if it retains at least 90 % of its AUC strict, by the
-    lower limit of the 95 % interval.
-
-    Args:
-        ranked: the methods, with their means of `kept_strict`.
-    """
-    return [mean.method for mean in ranked if mean.interval.low >= SURVIVES]
-
-
-def lead_by_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:
-    """Says from which methods the best method differs significantly, by AUC.
-
-    Args:
-        rows: rows of the metric `auc`.
+        rows: rows of a metric of place recognition.
         queries: the answers from which the rows were computed.
 
     Returns:
@@ -102,48 +57,75 @@ def lead_by_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:
     if len(labels) < 2 or not common:
         return ""
     compared = compared_answers(
-        {n: [by_label[n][1] for by_label in common] for n in labels}
+        {n: [by_label[n] for by_label in common] for n in labels}
     )
-    best = max(labels, key=lambda n: sum(by_label[n][0] for by_label in common))
-    p_values = {pair: p for pair, (_, p) in compared.items()}
-    return _lead(best, *by_significance(best, p_values))
+    best = max(
+        labels,
+        key=lambda n: sum(
+            by_label[n].outcomes.recall_at(1) for by_label in common
+        ),
+    )
+    return _lead(best, *by_significance(best, compared))
+
+
+def by_significance(
+    best: str, differences: Mapping[tuple[str, str], Difference]
+) -> tuple[list[str], list[str]]:
+    """Divides methods by whether they differ significantly from the best.
+
+    Args:
+        best: label of the best method.
+        differences: (one method, another) -> their difference.
+
+    Returns:
+        The methods that differ significantly, and all other methods.
+    """
+    apart: list[str] = []
+    rest: list[str] = []
+    for (one, another), difference in differences.items():
+        if best not in (one, another):
+            continue
+        other = title(another if one == best else one)
+        is_apart = difference.p_value < SIGNIFICANT
+        (apart if is_apart else rest).append(other)
+    return apart, rest
 
 
 def _common_conditions(
     rows: Sequence[Row], labels: Sequence[str], queries: QueryRows | None
-) -> list[dict[str, tuple[float, Answers]]]:
+) -> list[dict[str, Answers]]:
     """Returns the conditions in which the answers of all methods are known.
 
     Args:
-        rows: rows of the metric `auc`.
+        rows: rows of a metric.
         labels: labels of all methods.
         queries: the answers from which the rows were computed.
 
     Returns:
-        For each condition: label -> AUC, and the answers.
+        For each condition: label -> the answers.
     """
     if queries is None:
         return []
     asked = {answers.identity: answers for answers in queries.answers}
-    table: dict[tuple, dict[str, tuple[float, Answers]]] = {}
+    table: dict[tuple, dict[str, Answers]] = {}
     for row in rows:
         if row.identity in asked:
             by_label = table.setdefault(row.without("method"), {})
-            by_label[row.label] = row.value, asked[row.identity]
+            by_label[row.label] = asked[row.identity]
     return [
         by_label for by_label in table.values() if len(by_label) == len(labels)
     ]
 
 
 def _lead(best: str, apart: Sequence[str], rest: Sequence[str]) -> str:
-    """Returns the clause of `lead_by_auc`.
+    """Returns the clause of `lead_by_right_answers`.
 
     Args:
-        best: label of the method with the greatest AUC.
+        best: label of the method with the greatest R@1.
         apart: titles of the methods that differ significantly from it.
         rest: titles of all other methods.
     """
-    text = f"the greatest AUC, of {title(best)}, "
+    text = f"the greatest R@1, of {title(best)}, "
     if not rest:
         return f"{text}differs significantly from all others"
     text += "does not differ significantly from "

@@ -1,10 +1,9 @@
 """Computes numbers from a table of results or of queries.
 
-Intervals of shares, of interaction effects of two causes (`excesses`), and of
-AUC differences come from a bootstrap over blocks of the route. For two results
-that are compared, the same blocks are sampled. Intervals of means are t
-intervals over maps or conditions. Intervals of rank correlations come from a
-bootstrap over conditions.
+Intervals of interaction effects of two causes (`excesses`) come from sign flips
+over blocks of street, see `evaluation.recognition.sign_flips`. Rank
+correlations have no interval, because conditions of one map are not
+independent.
 """
 
 from __future__ import annotations
@@ -20,11 +19,12 @@ import numpy as np
 
 from evaluation.recognition import (
     UNKNOWN,
+    jackknife_interval,
     kept_share,
+    leave_one_out,
     metric_named,
-    paired_samples,
-    percentile_interval,
     pr_curve,
+    weighted_metrics,
 )
 from evaluation.results.keys import CAUSE, LEVEL, NO_CAUSE, Key
 from evaluation.results.table import Answers, QueryRows, Results, Row
@@ -37,8 +37,6 @@ _NOT_MAINTAINED = "none"
 _EXACTLY = "truth"
 # Joins the names of causes that come together.
 _AND = "+"
-# Number of bootstrap samples.
-_SAMPLES = 1000
 # Least number of points that show a trend.
 LEAST_POINTS = 5
 
@@ -186,19 +184,23 @@ def excesses(queries: QueryRows) -> list[Summary]:
             float(kept_share(k, all_of_it)) for k in kept
         )
         interval = UNKNOWN
-        if len({len(g[0].outcomes) for g in (*groups, both)}) == 1:
-            base, *samples = (
-                np.mean(
-                    [
-                        paired_samples(a.outcomes, key.outcomes).auc
-                        for a in group
-                    ],
-                    axis=0,
-                )
+        if (
+            all_of_it > 0.0
+            and len({len(g[0].outcomes) for g in (*groups, both)}) == 1
+        ):
+            base, *without = (
+                np.mean([_auc_without_blocks(a, key) for a in group], axis=0)
                 for group in (*groups, both)
             )
-            a, b, ab = (kept_share(sample, base) for sample in samples)
-            interval = percentile_interval(a * b - ab)
+            a, b, ab = (kept_share(one, base) for one in without)
+            excess = first * second - together
+            reach = 1.0 / all_of_it
+            interval = jackknife_interval(
+                excess,
+                a * b - ab,
+                np.bincount(_numbered(key.outcomes.own_blocks)).astype(float),
+                (excess - reach, excess + reach),
+            )
         found.append(
             Summary.of(
                 f"excess of {' and '.join(names)}",
@@ -209,6 +211,17 @@ def excesses(queries: QueryRows) -> list[Summary]:
             )
         )
     return found
+
+
+def _numbered(blocks: np.ndarray) -> np.ndarray:
+    """Returns the number of each block, from 0 on."""
+    return np.unique(blocks, return_inverse=True)[1]
+
+
+def _auc_without_blocks(answers: Answers, key: Answers) -> np.ndarray:
+    """Returns the AUC (N,) without each of the blocks of other answers."""
+    left = leave_one_out(key.outcomes)
+    return weighted_metrics(answers.outcomes, left).auc
 
 
 def median_kept(shares: Iterable[float]) -> float:
@@ -385,10 +398,10 @@ def correlations(
     """Returns how well a factor or metric predicts where each method fails.
 
     For each method, the value is Spearman's rank correlation of `x` with 1 -
-    `metric`, over the conditions in which `x` and `metric` are known. The
-    interval of this correlation is by bootstrap over these conditions. Methods
-    with fewer than five such conditions are left out, since so few points show
-    no trend.
+    `metric`, over the conditions in which `x` and `metric` are known. It
+    describes these conditions and has no interval: conditions of one map share
+    its streets. Methods with fewer than five such conditions are left out,
+    since so few points show no trend.
 
     Args:
         results: the table of results. All rows must have been measured with
@@ -404,9 +417,6 @@ def correlations(
         if len(rows) < LEAST_POINTS:
             continue
         known = np.array(rows)
-        rng = np.random.default_rng(0)
-        draws = rng.integers(len(known), size=(_SAMPLES, len(known)))
-        interval = percentile_interval(_spearman(known[draws]))
         found.append(
             Summary(
                 f"rank correlation of 1 - {metric} with {x}",
@@ -415,9 +425,7 @@ def correlations(
                 method,
                 False,
                 float(_spearman(known)),
-                interval.low,
-                interval.high,
-                len(known),
+                n=len(known),
             )
         )
     return found

@@ -4,23 +4,26 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 import itertools
+import math
 from pathlib import Path
+import re
 from typing import Any, NamedTuple
+import zlib
 
 import numpy as np
 
 from cns_drake.base import InputError, json_values
 from evaluation.recognition import (
+    LEAST_CITIES,
     METRICS,
     PROTOCOL_NAMES,
+    UNKNOWN,
     Difference,
     Interval,
     Metric,
     common_blocks,
     load_metrics,
     metric_named,
-    percentile_interval,
-    weights_by_drive,
 )
 from evaluation.results.compared_answers import (
     check_same_queries,
@@ -36,30 +39,39 @@ from evaluation.results.metric_tables import (
     shipped_table,
     table_name,
 )
-from evaluation.results.ranking import LEAST_UNITS, Ranked, rank_methods
+from evaluation.results.ranking import Ranked, rank_methods
+from evaluation.results.survival import KEPT, Survival, judge_survival
 from evaluation.results.table import Answers, Results, Row
 
 # Values that differ by no more are the same result, with the digits that ship.
 _ALIKE = 1e-4
+# Metrics whose ranking is followed by the differences of right answers.
+_OF_ANSWERS = ("auc", "auc_strict", "r1")
+# Number of bootstrap samples of a ranking.
+_SAMPLES = 1000
+# Up to this number of families, all orders are counted.
+_MOST_ENUMERATED = 7
+# Number of random orders of more families.
+_ORDERS = 9999
+# Values of tau that differ by less are equal.
+_ROUNDING = 1e-9
 # Values that differ by no more can be those of the same program: a rounding
 # error that changes an answer changes a share of 100 queries by this.
 _ROUNDED = 0.01
 
 
 class Compared(NamedTuple):
-    """The mean AUC of one method minus the mean AUC of another.
+    """The mean R@1 of one method minus the mean R@1 of another.
 
     Attributes:
         first, second: names of the two methods.
-        difference: the difference.
-        p_value: p-value of the difference, corrected by Holm's method for the
-            number of differences in the comparison.
+        difference: the difference, whose interval and p-value are corrected
+            (Bonferroni) for the number of differences in the comparison.
     """
 
     first: str
     second: str
     difference: Difference
-    p_value: float
 
 
 class _Agreement(NamedTuple):
@@ -71,7 +83,14 @@ class _Agreement(NamedTuple):
         tau: Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if the two tables
             rank the methods in the same order, -1 if they rank them in opposite
             orders; NaN if all values of a table are equal.
-        interval: 95 % interval of `tau`.
+        interval: 95 % interval of `tau`; unknown if a table has fewer than
+            eight maps.
+        families: names of the methods without their settings.
+        tau_of_families: Kendall's tau-b over families. The value of a family is
+            the mean over its methods: variants of a method are ranked alike, so
+            they are no independent evidence.
+        p_value: probability that a random order of the families has a tau of
+            this magnitude or a greater one.
     """
 
     first: str
@@ -79,17 +98,15 @@ class _Agreement(NamedTuple):
     methods: tuple[str, ...]
     tau: float
     interval: Interval
+    families: tuple[str, ...]
+    tau_of_families: float
+    p_value: float
 
 
 def _rank_agreement(
     first: MetricTable, second: MetricTable, metric: str
 ) -> _Agreement:
     """Compares the rankings of two tables, each over its own conditions.
-
-    The interval is by bootstrap. For a table with four or more maps, maps are
-    sampled, because a ranking should hold on other maps, too. For a table with
-    fewer maps, blocks of the routes are sampled if the answers to all queries
-    are known, and otherwise the units of `rank_methods`.
 
     Raises:
         InputError: fewer than two methods have results in all conditions of
@@ -112,61 +129,108 @@ def _rank_agreement(
             f"{first.name}, {second.name}: fewer than two methods are on all"
             f" conditions of both ({', '.join(methods) or 'none'})"
         )
-    one, one_samples = _means_and_samples(first, methods, metric)
-    other, other_samples = _means_and_samples(second, methods, metric)
-    taus = _kendall_tau(one_samples, other_samples)
+    means = np.array([_means(table, methods) for table in (first, second)])
+    interval = UNKNOWN
+    if all(
+        len({row.map for row in table.rows.values()}) >= LEAST_CITIES
+        for table in (first, second)
+    ):
+        taus = _kendall_tau(
+            *(_samples(table, methods, metric) for table in (first, second))
+        )
+        low, high = np.nanquantile(taus, [0.025, 0.975]).tolist()
+        interval = Interval(low, high)
+    # Settings follow the name of a method.
+    names = np.array([re.split("[ ,]", name)[0] for name in methods])
+    families = tuple(dict.fromkeys(names.tolist()))
+    values = np.stack(
+        [means[:, names == family].mean(axis=1) for family in families], axis=1
+    )
     return _Agreement(
         first.name,
         second.name,
         methods,
-        float(_kendall_tau(one, other)),
-        percentile_interval(taus),
+        float(_kendall_tau(*means)),
+        interval,
+        families,
+        float(_kendall_tau(*values)),
+        _order_p_value(*values),
     )
 
 
-def _means_and_samples(
-    table: MetricTable, methods: Sequence[str], metric: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns means (M,) of methods, and their bootstrap samples (B, M).
+def _order_p_value(first: np.ndarray, second: np.ndarray) -> float:
+    """Returns the p-value of tau between two lists of values (F,).
 
-    `_rank_agreement` says what is sampled.
+    All orders are counted up to seven families, and random ones of more. NaN if
+    there is no tau.
     """
+    measured = abs(float(_kendall_tau(first, second)))
+    if math.isnan(measured):
+        return math.nan
+    number = len(first)
+    if number <= _MOST_ENUMERATED:
+        orders = np.array(list(itertools.permutations(range(number))))
+        found = np.abs(_kendall_tau(first, second[orders]))
+        return float(np.mean(found >= measured - _ROUNDING))
+    rng = np.random.default_rng(number)
+    orders = np.argsort(rng.random((_ORDERS, number)), axis=1)
+    found = np.abs(_kendall_tau(first, second[orders]))
+    more = np.count_nonzero(found >= measured - _ROUNDING)
+    return (1.0 + more) / (1.0 + _ORDERS)
+
+
+def _means(table: MetricTable, methods: Sequence[str]) -> list[float]:
+    """Returns the means of methods over all conditions of a table."""
     rows = [row for (method, _), row in table.rows.items() if method in methods]
-    ranked, samples = rank_methods(rows)
-    order = [[mean.method for mean in ranked].index(name) for name in methods]
-    means = np.array([mean.value for mean in ranked])[order]
-    measured = list(itertools.product(table.conditions, methods))
-    if (
-        len({row.map for row in table.rows.values()}) >= LEAST_UNITS
-        or not metric_named(metric).is_resampled
-        or any(
-            (method, condition) not in table.answers
-            for condition, method in measured
-        )
-    ):
-        return means, samples[:, order]
-    asked = [
-        [table.answers[method, condition] for method in methods]
-        for condition in table.conditions
-    ]
-    for of_condition in asked:
-        for pair in itertools.combinations(of_condition, 2):
-            check_same_queries(*pair)
-    drawn = weights_by_drive(
-        [
-            common_blocks([answers.outcomes for answers in of_condition])
-            for of_condition in asked
-        ],
-        [drive_number(of_condition[0]) for of_condition in asked],
-    )
-    samples_of_asked = [
-        [
-            metric_named(metric).samples(answers.outcomes, weights)
-            for answers in of_condition
-        ]
-        for of_condition, (_, weights) in zip(asked, drawn, strict=True)
-    ]
-    return means, np.mean(samples_of_asked, axis=0).T
+    mean = {one.method: one.value for one in rank_methods(rows)}
+    return [mean.get(name, math.nan) for name in methods]
+
+
+def _samples(
+    table: MetricTable, methods: Sequence[str], metric: str
+) -> np.ndarray:
+    """Returns means (B, M) of methods in bootstrap samples.
+
+    Maps are sampled, because a ranking should hold on other maps, too. If the
+    answers to all queries are known, blocks of street are sampled within the
+    maps as well. Tables of the same maps, or conditions of the same drive, get
+    the same samples.
+    """
+    conditions = table.conditions
+    towns = [table.rows[methods[0], one].map for one in conditions]
+    known, of_town = np.unique(towns, return_inverse=True)
+    rng = np.random.default_rng(zlib.crc32(" ".join(known).encode()))
+    size = _SAMPLES, len(known)
+    draws = rng.integers(len(known), size=size)
+    weights = np.stack([np.bincount(d, minlength=len(known)) for d in draws])
+    weights = weights[:, of_town].astype(float)
+    values = np.empty((len(conditions), len(methods), _SAMPLES))
+    is_drawn = metric_named(metric).is_resampled
+    for k, condition in enumerate(conditions):
+        keys = [(method, condition) for method in methods]
+        if is_drawn and all(key in table.answers for key in keys):
+            asked = [table.answers[key] for key in keys]
+            for pair in itertools.combinations(asked, 2):
+                check_same_queries(*pair)
+            of_query = _drawn_queries(asked)
+            values[k] = [
+                metric_named(metric).weighted(one.outcomes, of_query)
+                for one in asked
+            ]
+        else:
+            values[k] = [[table.rows[key].value] for key in keys]
+    total = weights.sum(axis=1, keepdims=True)
+    return np.einsum("bk,kmb->bm", weights, values) / total
+
+
+def _drawn_queries(asked: Sequence[Answers]) -> np.ndarray:
+    """Returns how often each query is in each sample of blocks, (B, Q)."""
+    blocks = common_blocks([answers.outcomes for answers in asked])
+    known, of_query = np.unique(blocks, return_inverse=True)
+    rng = np.random.default_rng(drive_number(asked[0]))
+    draws = rng.integers(len(known), size=(_SAMPLES, len(known)))
+    counts = [np.bincount(draw, minlength=len(known)) for draw in draws]
+    return np.stack(counts)[:, of_query].astype(float)
 
 
 def _kendall_tau(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -205,6 +269,8 @@ class Comparison:
             queries are known.
         agreements: how similarly any two tables rank their methods, if they
             have at least two method names in common.
+        survival: whether each method survives; empty unless the metric is
+            `kept_strict`.
         notes: what was left out.
     """
 
@@ -214,6 +280,7 @@ class Comparison:
     ranked: Sequence[Ranked]
     differences: Sequence[Compared]
     agreements: Sequence[_Agreement]
+    survival: Sequence[Survival]
     notes: Sequence[str]
 
     def to_json(self) -> dict[str, Any]:
@@ -238,8 +305,9 @@ class Comparison:
                     "first": compared.first,
                     "second": compared.second,
                     "difference": compared.difference.value,
+                    "metric": "r1",
                     "interval_95": compared.difference.interval.to_json(),
-                    "p": json_values(compared.p_value),
+                    "p": compared.difference.p_value,
                 }
                 for compared in self.differences
             ],
@@ -250,9 +318,15 @@ class Comparison:
                     "methods": list(agreement.methods),
                     "kendall_tau": json_values(agreement.tau),
                     "interval_95": agreement.interval.to_json(),
+                    "families": list(agreement.families),
+                    "kendall_tau_families": json_values(
+                        agreement.tau_of_families
+                    ),
+                    "p_families": json_values(agreement.p_value),
                 }
                 for agreement in self.agreements
             ],
+            "survival": [one.to_json() for one in self.survival],
             "notes": list(self.notes),
         }
 
@@ -362,9 +436,9 @@ def _compared_rankings(own: Sequence[MetricTable], metric: str) -> Comparison:
     ranked = [
         mean._replace(method=f"{mean.method} ({table.name})")
         for table in tables
-        for mean in rank_methods(table.rows.values())[0]
+        for mean in rank_methods(table.rows.values())
     ]
-    return Comparison(metric, "", 0, ranked, (), agreements, notes)
+    return Comparison(metric, "", 0, ranked, (), agreements, (), notes)
 
 
 def _compared_values(
@@ -393,9 +467,10 @@ def _compared_values(
         metric,
         "",
         len(common),
-        rank_methods(rows)[0],
-        _differences(entries, common) if metric == "auc" else (),
+        rank_methods(rows),
+        _differences(entries, common) if metric in _OF_ANSWERS else (),
         agreements,
+        judge_survival(rows) if metric == KEPT else (),
         notes,
     )
 
@@ -537,7 +612,7 @@ def _differences(
         if all(key in table.answers for key in keys):
             asked[name] = [table.answers[key] for key in keys]
     compared = compared_answers(asked)
-    return [Compared(*two, *found) for two, found in compared.items()]
+    return [Compared(*two, found) for two, found in compared.items()]
 
 
 def _common_conditions(

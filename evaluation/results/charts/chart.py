@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from evaluation.recognition import METRICS
 from evaluation.results.figure_text import escape_dollars
-from evaluation.results.headlines import lead_by_auc
+from evaluation.results.headlines import lead_by_right_answers
 from evaluation.results.styles import MethodStyle
 from evaluation.results.table import QueryRows, Results, Row
 
@@ -84,9 +84,9 @@ class Chart:
 
 
 def with_significance(message: str, chart: Chart, at: object) -> str:
-    """Adds to a chart's message which methods differ significantly by AUC.
+    """Adds to a chart's message which methods differ significantly by R@1.
 
-    The message stays unchanged if the chart shows another metric.
+    The message stays unchanged if the chart shows another metric than AUC.
 
     Args:
         message: the message.
@@ -96,7 +96,7 @@ def with_significance(message: str, chart: Chart, at: object) -> str:
     if chart.metric != "auc":
         return message
     rows = [row for row in chart.rows if row[chart.keys["over"]] == at]
-    clause = lead_by_auc(rows, chart.queries)
+    clause = lead_by_right_answers(rows, chart.queries)
     return f"{message}; {clause}" if clause else message
 
 

@@ -11,7 +11,7 @@ from cns_drake.base import InputError
 from evaluation.results.charts.chart import Chart, start_at_zero
 from evaluation.results.charts.words import in_words
 from evaluation.results.figure_text import escape_dollars
-from evaluation.results.headlines import from_least_to_greatest, listed
+from evaluation.results.headlines import from_least_to_greatest
 from evaluation.results.method_names import title
 from evaluation.results.summaries import (
     LEAST_POINTS,
@@ -81,37 +81,20 @@ def _trend_message(chart: Chart, points: Iterable[tuple[Row, float]]) -> str:
         + list(chart.rows)
     )
     # `correlations` are of 1 - metric: the signs change.
-    found = [
-        correlation._replace(
-            value=-correlation.value,
-            low=-correlation.high,
-            high=-correlation.low,
-        )
+    coefficients = {
+        title(correlation.method): -correlation.value
         for correlation in correlations(selected, x_name, y_name)
         if not math.isnan(correlation.value)
-    ]
-    if not found:
+    }
+    if not coefficients:
         message = f"{in_words(y_name)} over {in_words(x_name)}"
         number = len({row.without("method") for row, _ in points})
         if number < LEAST_POINTS:
             message += ", too few points for a trend"
         return message
-    coefficients = {
-        title(correlation.method): correlation.value for correlation in found
-    }
     text = from_least_to_greatest(coefficients, "{:+.2f}")
     names = f"{in_words(y_name)} with {in_words(x_name)}"
-    message = f"Rank correlation of {names}: {text}"
-    doubtful = [
-        title(correlation.method)
-        for correlation in found
-        if correlation.low <= 0 <= correlation.high
-    ]
-    if doubtful:
-        message += (
-            f"; not significantly different from 0 with {listed(doubtful)}"
-        )
-    return message
+    return f"Rank correlation of {names}: {text}"
 
 
 # Width of the Gaussian weights, as a part of the range of x.

@@ -96,9 +96,11 @@ def test_values_of_the_outcomes_lie_in_the_range():
                 continue
             value = metric.of(some)
             assert metric.checked(value) == value
+            interval = metric.interval(some)
             if metric.has_interval:
-                drawn = metric.samples(some)
-                assert drawn.min() <= value <= drawn.max()
+                assert interval.low <= value <= interval.high
+            else:
+                assert math.isnan(interval.low)
 
 
 def test_rounding_is_cut_off_and_no_more():
@@ -144,7 +146,7 @@ def test_a_name_like_a_metric_is_none(name):
 )
 def test_a_ranking_asks_for_the_direction(metric, best):
     rows = [row(0.2, metric, "low"), row(0.9, metric, "high")]
-    ranked, _ = rank_methods(rows)
+    ranked = rank_methods(rows)
     assert ranked[0].method == best
 
 
@@ -157,13 +159,12 @@ def test_a_file_adds_a_metric(tmp_path):
     some = outcomes()
     ranks = some.first_right_ranks[some.has_match]
     assert own.of(some) == pytest.approx(ranks.mean())
-    drawn = own.samples(some)
-    assert drawn.std() > 0.0
-    # Samples consist of whole blocks: each is a mean over drawn queries.
+    # Without a greatest value there is no interval.
+    assert math.isnan(own.interval(some).low)
     weights = np.zeros((1, len(some)))
     weights[0, :5] = 3.0
     first = some.subset(np.arange(len(some)) < 5)
-    assert own.samples(some, weights)[0] == pytest.approx(own.of(first))
+    assert own.weighted(some, weights)[0] == pytest.approx(own.of(first))
     # The same file may be read again, another with this name not.
     assert load_metrics(path)[0].title == own.title
     other = tmp_path / "other.py"

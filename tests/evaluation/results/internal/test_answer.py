@@ -194,16 +194,25 @@ def asked(number, after):
 @pytest.mark.parametrize(
     ("number", "after", "text"),
     [
-        (80, np.zeros(80, bool), "The change is significant for every method."),
+        (
+            80,
+            np.zeros(80, bool),
+            "The change of R@1 is significant for every method.",
+        ),
         # One wrong answer of many.
         (
             40,
             np.arange(40) != 20,
-            "With 40 queries, this study cannot show that any difference is"
-            " more than chance.",
+            "With 40 queries, this study cannot show that any difference of R@1"
+            " is more than chance.",
         ),
-        # One block of queries has no spread: significance is unknown.
-        (4, np.zeros(4, bool), ""),
+        # One block of queries cannot show anything.
+        (
+            4,
+            np.zeros(4, bool),
+            "With 4 queries, this study cannot show that any difference of R@1"
+            " is more than chance.",
+        ),
     ],
 )
 def test_the_evidence_says_what_is_significant(number, after, text):

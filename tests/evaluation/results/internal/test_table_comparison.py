@@ -4,6 +4,7 @@ import csv
 from dataclasses import replace
 import itertools
 import json
+import math
 import sys
 import warnings
 
@@ -27,7 +28,7 @@ from evaluation.results import (
     made_by,
 )
 from evaluation.results.metric_tables import _BASELINES
-from evaluation.results.table_comparison import _kendall_tau
+from evaluation.results.table_comparison import _kendall_tau, _order_p_value
 
 
 def key(method, town="town", **changes):
@@ -247,21 +248,6 @@ def test_differences_of_answers(tmp_path):
     (difference,) = found.differences
     assert (difference.first, difference.second) == ("x (one)", "x (two)")
     assert difference.difference.value == pytest.approx(0.2)
-    # It is 0.4 in a, with some deviation, and 0 in b, without any: the mean
-    # has half of that deviation.
-    (alone,) = compare_tables(
-        [
-            write_table(tmp_path / "three", {"a": {"x": 0.9}}, queries=True),
-            write_table(tmp_path / "four", {"a": {"x": 0.5}}, queries=True),
-        ]
-    ).differences
-    assert alone.difference.value == pytest.approx(0.4)
-    widths = [
-        one.difference.interval.high - one.difference.value
-        for one in (difference, alone)
-    ]
-    # More degrees of freedom make it a little less than half.
-    assert 0.9 < widths[0] / (0.5 * widths[1]) < 1.0
     fewer = write_table(
         tmp_path / "fewer", {"a": {"x": 0.5}, "b": {"x": 0.5}}, 8, queries=True
     )
@@ -303,8 +289,8 @@ def test_conditions_of_a_drive_are_not_independent(tmp_path):
     assert (once.conditions, again.conditions) == (1, 4)
     assert len(once.differences) == 6
     for one, other in zip(once.differences, again.differences, strict=True):
-        assert other.p_value == pytest.approx(one.p_value)
-    assert once.agreements[0].interval == again.agreements[0].interval
+        assert other.difference.p_value == one.difference.p_value
+        assert other.difference.value == pytest.approx(one.difference.value)
 
 
 def counted_tau(first, second):
@@ -375,40 +361,36 @@ def images_ranked(folder, real):
     return np.array([[value[one, m] for m in methods] for one in maps])
 
 
-def test_maps_are_drawn_for_the_published_ranking(tmp_path):
-    """All 256 x 256 samples of four sequences and of four cities."""
+def test_variants_are_one_family_in_the_published_ranking(tmp_path):
+    """Six methods have the same order, but only four are different."""
     paths = [tmp_path / "real.csv", tmp_path / "simulated.csv"]
-    signs = []
     for path, real in zip(paths, (True, False), strict=True):
-        r1 = images_ranked(path, real)
-        draws = np.array(list(itertools.product(range(4), repeat=4)))
-        means = np.vstack([r1.mean(axis=0), r1[draws].mean(axis=1)])
-        one, other = np.triu_indices(r1.shape[1], 1)
-        apart = np.round(means[:, one] - means[:, other], 9)
-        signs.append(np.sign(apart))
-    untied = [(one != 0).sum(axis=1) for one in signs]
-    taus = (signs[0] @ signs[1].T) / np.sqrt(np.outer(*untied))
-    assert taus[0, 0] == 1.0
+        images_ranked(path, real)
     (found,) = compare_tables(paths, "r1", rankings=True).agreements
     assert found.tau == pytest.approx(1.0)
-    assert found.interval.high == pytest.approx(1.0)
-    # As published, and between exact quantiles around 2.5 %.
-    assert found.interval.low == pytest.approx(0.55, abs=0.005)
-    low, high = np.quantile(taus[1:, 1:], [0.015, 0.035])
-    assert low - 1e-9 <= found.interval.low <= high + 1e-9
+    assert len(found.methods) == 6
+    assert found.families == (
+        "layered-overlap",
+        "probe",
+        "ring++",
+        "scan-context++",
+    )
+    assert found.tau_of_families == pytest.approx(1.0)
+    # Two of the 24 orders of four families: the same, and the opposite.
+    assert found.p_value == pytest.approx(2 / 24)
+    # Four sequences and four cities cannot show more.
+    assert math.isnan(found.interval.low)
 
 
 def test_tables_of_the_same_maps_are_drawn_alike(tmp_path):
-    """Each sample of a table then has the order of the same sample of a copy.
-
-    Answers to queries change nothing: maps are drawn, not blocks of routes.
-    """
+    """Each sample has the order of the same sample of a copy."""
+    steps = (0.4, -0.2, 0.1, -0.3, 0.2, -0.1, 0.3, -0.4)
     towns = {
         town: {"x": 0.5 + step, "y": 0.5, "z": 0.5 - step}
-        for town, step in zip("abcd", (0.4, -0.2, 0.1, -0.3), strict=True)
+        for town, step in zip("abcdefgh", steps, strict=True)
     }
     paths = [
-        write_table(tmp_path / "asked", towns, 10, queries=True),
+        write_table(tmp_path / "one", towns),
         write_table(tmp_path / "copy", towns),
     ]
     (same,) = compare_tables(paths, rankings=True).agreements
@@ -417,6 +399,26 @@ def test_tables_of_the_same_maps_are_drawn_alike(tmp_path):
     paths[1] = write_table(tmp_path / "elsewhere", elsewhere)
     (other,) = compare_tables(paths, rankings=True).agreements
     assert other.interval.low == pytest.approx(-1.0)
+    # With answers, blocks are drawn within the maps as well.
+    paths = [
+        write_table(tmp_path / f"asked {k}", towns, 10, queries=True)
+        for k in range(2)
+    ]
+    (asked,) = compare_tables(paths, rankings=True).agreements
+    assert asked.tau == pytest.approx(1.0)
+    assert asked.interval.low <= 1.0 == asked.interval.high
+
+
+def test_the_order_of_families_by_hand():
+    up = np.arange(5.0)
+    swapped = np.array([0.0, 1.0, 2.0, 4.0, 3.0])
+    assert _order_p_value(up, up) == pytest.approx(2 / 120)
+    # Four of the ten pairs of neighbours swap in one step: 4 orders, and the
+    # opposite of each.
+    assert _order_p_value(up, swapped) == pytest.approx(10 / 120)
+    assert math.isnan(_order_p_value(up, np.ones(5)))
+    many = np.arange(9.0)
+    assert _order_p_value(many, many) == pytest.approx(1e-4, abs=1e-4)
 
 
 def test_opposite_rankings(tmp_path):
@@ -430,8 +432,10 @@ def test_opposite_rankings(tmp_path):
     )
     (one,) = found.agreements
     assert one.tau == pytest.approx(-1.0)
-    # The values are far apart, so no sample swaps two of them.
-    assert one.interval.low == one.interval.high == pytest.approx(-1.0)
+    assert one.tau_of_families == one.tau
+    # One of six orders, and the opposite.
+    assert one.p_value == pytest.approx(2 / 6)
+    assert math.isnan(one.interval.low)
 
 
 def test_rankings_are_of_one_protocol(tmp_path):

@@ -1,0 +1,307 @@
+"""Coverage of every printed interval, and size of every printed test.
+
+python tests/benchmarks/interval_coverage.py [PART...] [--runs N]
+
+Answers to queries and results of cities are made up at random. The table on
+stdout says for each quantity: in which share of the runs its interval is shown;
+in which share of these it contains the true value; and, where there is no
+difference, how often a test finds one nevertheless. Redirect it to
+`docs/notes/coverage.csv`. On one core, this takes five minutes.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+import csv
+import sys
+
+import numpy as np
+
+from evaluation.recognition import (
+    METRICS,
+    SIGNIFICANT,
+    Interval,
+    PlaceOutcome,
+    QueryOutcomes,
+    RetrievalProtocol,
+    compared_by_right_answers,
+    place_numbers,
+)
+from evaluation.results import SURVIVES, Row, judge_survival, rank_methods
+
+COLUMNS = (
+    "part", "units", "conditions", "scenario", "quantity", "runs", "shown",
+    "coverage", "size",
+)  # fmt: skip
+# Shares of right answers before and after a change.
+CHANGES = ((0.9, 0.5), (1.0, 1.0), (1.0, 0.97), (0.5, 0.0))
+# Shares of right answers of methods.
+METHODS = (
+    (0.7, 0.7),
+    (0.95, 0.95),
+    (1.0, 1.0),
+    (1.0, 0.9),
+    (0.9, 0.6),
+    (0.0, 0.05),
+    (0.8, 0.8, 0.8, 0.8),
+)
+# Mean retained shares of cities, and how unlike each other the cities are.
+CITIES = (
+    (0.5, 0.1),
+    (0.9, 0.02),
+    (0.9, 0.1),
+    (0.97, 0.02),
+    (0.97, 0.1),
+    (1.0, 0.1),
+    (0.05, 0.1),
+)
+# Queries of a block: from 1 to twice the mean less 1.
+MEAN_QUERIES = 5
+# Correlation of the answers in a block.
+IN_BLOCK = 0.2
+# Share of the queries that have a match.
+WITH_MATCH = 0.9
+# Number of blocks from which true values are computed.
+MANY = 20000
+
+
+class Count:
+    """How often an interval is shown, and how often it contains the truth."""
+
+    def __init__(self, truth: float) -> None:
+        self.truth = truth
+        self.runs = self.shown = self.hits = self.found = 0
+
+    def add(self, interval: Interval, is_found: bool = False) -> None:
+        self.runs += 1
+        self.found += is_found
+        if not np.isnan(interval.low):
+            self.shown += 1
+            low, high = interval.low - 1e-9, interval.high + 1e-9
+            self.hits += low <= self.truth <= high
+
+    def columns(self, has_size: bool = False) -> dict[str, object]:
+        coverage = f"{self.hits / self.shown:.3f}" if self.shown else ""
+        return {
+            "runs": self.runs,
+            "shown": f"{self.shown / self.runs:.3f}",
+            "coverage": coverage,
+            "size": f"{self.found / self.runs:.3f}" if has_size else "",
+        }
+
+
+def beta(
+    rng: np.random.Generator, mean: float, correlation: float, size: int
+) -> np.ndarray:
+    """Returns shares (size,) with a mean; equal shares at 0 and 1."""
+    if mean in (0.0, 1.0):
+        return np.full(size, mean)
+    total = 1.0 / correlation - 1.0
+    return rng.beta(mean * total, (1.0 - mean) * total, size=size)
+
+
+def answers(
+    rng: np.random.Generator, shares: Sequence[float], num_blocks: int
+) -> list[QueryOutcomes]:
+    """Returns answers to the same queries with several shares of right ones.
+
+    All share the luck of a block; right answers tend to have better scores.
+    """
+    sizes = rng.integers(1, 2 * MEAN_QUERIES, size=num_blocks)
+    blocks = np.repeat(np.arange(num_blocks), sizes)
+    has_match = rng.random(len(blocks)) < WITH_MATCH
+    found = []
+    for share in shares:
+        chance = beta(rng, share, IN_BLOCK, num_blocks)
+        right = (rng.random(len(blocks)) < chance[blocks]) & has_match
+        scores = right + rng.normal(size=len(blocks))
+        ranks = np.where(right, 1.0, 2.0)
+        found.append(
+            QueryOutcomes(scores, right, has_match, ranks, 100, blocks)
+        )
+    return found
+
+
+def outcome(outcomes: QueryOutcomes) -> PlaceOutcome:
+    number = len(outcomes)
+    return PlaceOutcome(
+        method="solid",
+        database="a",
+        query="b",
+        protocol=RetrievalProtocol(),
+        protocol_name="own",
+        outcomes=outcomes,
+        columns={
+            "why": np.full(number, ""),
+            "overlap": np.full(number, np.nan),
+            "translation_error": np.full(number, np.nan),
+            "rotation_error_deg": np.full(number, np.nan),
+        },
+        place_frames=np.arange(100),
+        best_places=np.full((number, 5), -1),
+        best_scores=np.full((number, 5), np.nan),
+        matches=np.empty((0, 2), int),
+        nearest=np.full(number, np.inf),
+    )
+
+
+def drives(
+    runs: int, scenarios: Sequence[Sequence[float]] = CHANGES
+) -> Iterator[dict[str, object]]:
+    """Metrics of one method on one drive, with and without a change."""
+    names = ("auc", "auc_strict", "r1")
+    kept = ("kept", "kept_strict", "kept_r1")
+    for before, after in scenarios:
+        rng = np.random.default_rng(0)
+        control, changed = answers(rng, (before, after), MANY)
+        truth = {n: METRICS[n].of(changed) for n in names}
+        for name, of in zip(kept, names, strict=True):
+            truth[name] = truth[of] / METRICS[of].of(control)
+        for num_blocks in (4, 10, 24):
+            counts = {name: Count(truth[name]) for name in (*names, *kept)}
+            for _ in range(runs):
+                then, now = answers(rng, (before, after), num_blocks)
+                for one in place_numbers(outcome(now), outcome(then)):
+                    if one.metric in counts:
+                        counts[one.metric].add(one.interval)
+            for name, count in counts.items():
+                yield {
+                    "part": "drives",
+                    "units": num_blocks,
+                    "conditions": 1,
+                    "scenario": f"{before:g} right, then {after:g}",
+                    "quantity": name,
+                    **count.columns(),
+                }
+
+
+def differences(
+    runs: int, scenarios: Sequence[Sequence[float]] = METHODS
+) -> Iterator[dict[str, object]]:
+    """Differences of R@1 between methods, under several conditions."""
+    for shares in scenarios:
+        for conditions in (1, 2, 4, 12):
+            yield _differences(shares, conditions, 10, runs)
+        if len(shares) == 2:
+            yield _differences(shares, 1, 24, runs)
+
+
+def _differences(
+    shares: Sequence[float], conditions: int, num_blocks: int, runs: int
+) -> dict[str, object]:
+    """Returns the row of a scenario. All differences count together."""
+    rng = np.random.default_rng(conditions)
+    count = Count(0.0)
+    for _ in range(runs):
+        chances = [beta(rng, s, IN_BLOCK, num_blocks) for s in shares]
+        asked: dict[int, list[QueryOutcomes]] = {}
+        for _ in range(conditions):
+            # Other queries in each condition, along the same streets.
+            sizes = rng.integers(1, 2 * MEAN_QUERIES, size=num_blocks)
+            blocks = np.repeat(np.arange(num_blocks), sizes)
+            has_match = rng.random(len(blocks)) < WITH_MATCH
+            for k, chance in enumerate(chances):
+                right = rng.random(len(blocks)) < chance[blocks]
+                ranks = np.where(right & has_match, 1.0, 2.0)
+                some = QueryOutcomes(
+                    np.zeros(len(blocks)),
+                    right & has_match,
+                    has_match,
+                    ranks,
+                    100,
+                    blocks,
+                )
+                asked.setdefault(k, []).append(some)
+        found = compared_by_right_answers(asked, [0] * conditions)
+        is_hit = all(
+            np.isnan(one.interval.low)
+            or one.interval.low <= shares[a] - shares[b] <= one.interval.high
+            for (a, b), one in found.items()
+        )
+        first = next(iter(found.values())).interval
+        shown = Interval(-1.0, 1.0) if is_hit else Interval(2.0, 2.0)
+        count.add(
+            first if np.isnan(first.low) else shown,
+            any(one.p_value < SIGNIFICANT for one in found.values()),
+        )
+    return {
+        "part": "differences",
+        "units": num_blocks,
+        "conditions": conditions,
+        "scenario": " and ".join(f"{share:g}" for share in shares) + " right",
+        "quantity": "difference of r1",
+        **count.columns(has_size=len(set(shares)) == 1),
+    }
+
+
+def city_row(city: int, pair: int, value: float) -> Row:
+    return Row(
+        experiment="e",
+        map=f"city {city}",
+        database=f"drive {pair}",
+        query="query",
+        seed=1,
+        factors={},
+        task="place",
+        method="solid",
+        gate=False,
+        protocol="own",
+        metric="kept_strict",
+        value=value,
+    )
+
+
+def cities(
+    runs: int, scenarios: Sequence[Sequence[float]] = CITIES
+) -> Iterator[dict[str, object]]:
+    """Means over cities, and survival, with unequal numbers of pairs."""
+    for mean, correlation in scenarios:
+        for number in (1, 2, 4, 8, 12):
+            rng = np.random.default_rng(number)
+            count, kept = Count(mean), Count(1.0 - mean)
+            for _ in range(runs):
+                results = beta(rng, mean, correlation, number)
+                rows = [
+                    city_row(k, pair, float(value))
+                    for k, value in enumerate(results)
+                    for pair in range(int(rng.integers(1, 4)))
+                ]
+                (ranked,) = rank_methods(rows)
+                if len(rows) > 1:
+                    count.add(ranked.interval)
+                (one,) = judge_survival(rows)
+                kept.add(one.interval, one.verdict == SURVIVES)
+            spread = np.sqrt(mean * (1.0 - mean) * correlation)
+            for name, some, has_size in (
+                ("mean over cities", count, False),
+                ("loss, and survival", kept, mean <= 0.9),
+            ):
+                yield {
+                    "part": "cities",
+                    "units": number,
+                    "conditions": "",
+                    "scenario": f"mean {mean:g}, deviation {spread:.2f}",
+                    "quantity": name,
+                    **some.columns(has_size),
+                }
+
+
+PARTS = {"drives": drives, "differences": differences, "cities": cities}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("parts", nargs="*", default=list(PARTS), metavar="PART")
+    parser.add_argument("--runs", type=int, default=1000)
+    options = parser.parse_args()
+    table = csv.DictWriter(sys.stdout, COLUMNS, lineterminator="\n")
+    table.writeheader()
+    for name in options.parts:
+        for row in PARTS[name](options.runs):
+            table.writerow(row)
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+"""Survival: non-inferiority over cities, from made-up retained shares."""
+
+import math
+
+import pytest
+
+from evaluation.results import (
+    CANNOT_SHOW,
+    SURVIVES,
+    Row,
+    judge_survival,
+    largest_loss_shown,
+)
+
+
+def rows(shares, method="solid"):
+    """Returns rows of retained shares: a list of pairs for each city."""
+    return [
+        Row(
+            experiment="e",
+            map=f"city {city}",
+            database=f"drive {pair}",
+            query="query",
+            seed=1,
+            factors={},
+            task="place",
+            method=method,
+            gate=False,
+            protocol="own",
+            metric="kept_strict",
+            value=share,
+        )
+        for city, of_city in enumerate(shares)
+        for pair, share in enumerate(of_city)
+    ]
+
+
+def test_cities_decide_and_not_their_pairs():
+    """A city with many good pairs counts once; a gain makes up for nothing."""
+    shares = [[1.0]] * 7 + [[0.2, 0.2]] + [[1.0] * 20] + [[1.5]]
+    (found,) = judge_survival(rows(shares))
+    assert found.cities == 10
+    assert found.loss == pytest.approx(0.08)
+    assert found.verdict == CANNOT_SHOW
+
+
+@pytest.mark.parametrize(
+    ("shares", "verdict"),
+    [
+        ([0.99, 0.97, 0.98, 1.0, 0.96, 0.99, 0.98, 0.97], SURVIVES),
+        ([0.5, 0.6, 0.55, 0.4, 0.5, 0.6, 0.45, 0.5], "does not survive"),
+        ([0.99, 0.8, 0.98, 1.0, 0.96, 0.7, 0.98, 0.97], CANNOT_SHOW),
+        # Seven cities cannot show even that nothing is lost.
+        ([1.0] * 7, CANNOT_SHOW),
+        ([1.0] * 8, SURVIVES),
+        ([0.0] * 4, CANNOT_SHOW),
+    ],
+)
+def test_verdicts(shares, verdict):
+    (found,) = judge_survival(rows([[share] for share in shares]))
+    assert found.verdict == found.to_json()["verdict"] == verdict
+
+
+def test_only_conditions_of_all_methods_count():
+    some = rows([[0.9]] * 9) + rows([[0.95]] * 8, "btc")
+    found = judge_survival(some)
+    assert [(one.method, one.cities) for one in found] == [
+        ("btc", 8),
+        ("solid", 8),
+    ]
+    assert judge_survival([]) == []
+
+
+def test_power_grows_with_cities_and_falls_with_their_spread():
+    assert math.isnan(largest_loss_shown(7, 0.01))
+    few, many = (largest_loss_shown(number, 0.02) for number in (8, 20))
+    assert 0.0 < few < many < 0.1
+    assert many < largest_loss_shown(20, 0.01)
+    # Eight cities that differ this much cannot show even a loss of nothing.
+    assert math.isnan(largest_loss_shown(8, 0.1))
