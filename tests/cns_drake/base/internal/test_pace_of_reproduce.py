@@ -1,7 +1,8 @@
 """The time left of a real run is told within a third of the truth.
 
-`jobs_of_reproduce.csv` has the jobs of `cns-drake reproduce metropolis` in the
-order in which they started, with the expected times and the CPU times [s].
+`jobs_of_reproduce.csv` has the first 20 of the 32 jobs of `cns-drake reproduce
+metropolis --jobs 2` on two busy cores, in the order in which they started, with
+the expected times and the CPU times [s].
 """
 
 import csv
