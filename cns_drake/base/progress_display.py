@@ -98,11 +98,31 @@ class _JobState:
     is_ended: bool = False
 
 
+@dataclass
+class _PaceOfJobs:
+    """Time that jobs take, divided by their expected time.
+
+    Attributes:
+        expected: expected time of the jobs that have ended, a weighted sum [s].
+        taken: the time that these jobs took, with the same weights [s].
+    """
+
+    expected: float = 0.0
+    taken: float = 0.0
+
+    def measure(self, expected: float, taken: float, kept: float) -> None:
+        """Records a job, after all earlier jobs were weighted by `kept`."""
+        self.expected = kept * self.expected + expected
+        self.taken = kept * self.taken + taken
+
+
 class TimeLeft:
     """Estimates the time left for jobs from the jobs that have ended.
 
     The time that these jobs took, divided by their expected time, is the pace
-    of the jobs that are left. Jobs that ended lately count most.
+    of the jobs of the same kind that are left. Jobs that ended lately count
+    most. The pace of a kind of which no job has ended is that of all jobs,
+    because machines differ in how fast they do one kind of work.
 
     The methods take the present time `now` [s], always of the same clock.
     """
@@ -118,9 +138,9 @@ class TimeLeft:
         self._total = sum(costs.values())
         # Expected time of all jobs that gave a pace [s].
         self._measured = 0.0
-        # Expected and real times of these jobs, weighted sums [s].
-        self._expected = 0.0
-        self._taken = 0.0
+        self._of_all = _PaceOfJobs()
+        # Kind of jobs -> its pace.
+        self._of_kind: dict[str, _PaceOfJobs] = {}
 
     def start(self, name: str, now: float) -> None:
         """Records that a job starts, or is started again."""
@@ -143,8 +163,9 @@ class TimeLeft:
             expected = work.cost * (1.0 - (work.first or 0.0))
             kept = math.exp(-expected / (_MEMORY * self._total))
             self._measured += expected
-            self._expected = kept * self._expected + expected
-            self._taken = kept * self._taken + taken
+            of_kind = self._of_kind.setdefault(_kind(name), _PaceOfJobs())
+            for pace in (self._of_all, of_kind):
+                pace.measure(expected, taken, kept)
 
     def share(self) -> float:
         """Returns the share of all work that has ended, 0 to 1."""
@@ -154,25 +175,42 @@ class TimeLeft:
 
     def seconds(self, now: float) -> float | None:
         """Returns the time left [s]; None while it cannot be estimated."""
-        left = [work for work in self._works.values() if not work.is_ended]
+        left = [
+            (name, work)
+            for name, work in self._works.items()
+            if not work.is_ended
+        ]
         if not left:
             return 0.0
-        if self._measured < _LEAST_SHARE * self._total or not self._expected:
+        if not self._of_all.expected:
             return None
-        pace = self._taken / self._expected
         running, waiting = [], []
-        for work in left:
-            needed = pace * work.cost
+        begun = 0.0
+        for name, work in left:
+            pace = self._of_kind.get(_kind(name), self._of_all)
+            needed = work.cost * pace.taken / pace.expected
             if work.since is None:
                 waiting.append(needed)
             else:  # One that takes longer than expected soon ends, perhaps.
                 spent = now - work.since + needed * (work.first or 0.0)
                 running.append(max(needed - spent, 0.1 * needed))
+                begun += work.cost * min((now - work.since) / needed, 1.0)
+        if self._measured + begun < _LEAST_SHARE * self._total:
+            return None
         # As many jobs run side by side as before, and the longest job bounds
         # the time.
         side_by_side = min(self._most_running, len(left))
         even = (sum(running) + sum(waiting)) / side_by_side
         return max(even, *running, 0.0)
+
+
+def _kind(name: str) -> str:
+    """Returns the kind of a job, the first of several words of its name.
+
+    Jobs that record drives have the names of the drives, which are one word.
+    """
+    kind, *rest = name.split(maxsplit=1)
+    return kind if rest else ""
 
 
 @dataclass

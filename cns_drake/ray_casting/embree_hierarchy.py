@@ -1184,13 +1184,12 @@ def _list_triangles(
 
 def _spans(surface: TriangleSurface) -> np.ndarray:
     """Returns the square of the longest edge of each triangle [m^2]."""
+    corners = [surface.p_GVset[column] for column in surface.triangles.T]
     spans = np.zeros(len(surface.triangles), np.float32)
     for i in range(3):
-        edge = surface.p_GVset[surface.triangles[:, i]]
-        edge = edge - surface.p_GVset[surface.triangles[:, i - 1]]
-        np.maximum(
-            spans, (edge * edge).sum(axis=1), out=spans, casting="unsafe"
-        )
+        # The sum over an axis of three takes four times as long.
+        x, y, z = (corners[i] - corners[i - 1]).T
+        np.maximum(spans, x * x + y * y + z * z, out=spans, casting="unsafe")
     return spans
 
 

@@ -48,16 +48,8 @@ def collected_errors() -> Iterator[list[str]]:
     """
     errors: list[str] = []
     records: list[logging.LogRecord] = []
-
-    class Collector(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            if record.levelno >= logging.ERROR:
-                errors.append(record.getMessage())
-            else:
-                records.append(record)
-
     logger = logging.getLogger("drake")
-    collector = Collector()
+    collector = _Collector(errors, records)
     propagate = logger.propagate
     logger.addHandler(collector)
     logger.propagate = False
@@ -68,3 +60,18 @@ def collected_errors() -> Iterator[list[str]]:
         logger.propagate = propagate
     for record in records:
         logger.handle(record)
+
+
+class _Collector(logging.Handler):
+    """Sorts records into the messages of errors, and all others."""
+
+    def __init__(self, errors: list[str], others: list[logging.LogRecord]):
+        super().__init__()
+        self._errors = errors
+        self._others = others
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.levelno >= logging.ERROR:
+            self._errors.append(record.getMessage())
+        else:
+            self._others.append(record)

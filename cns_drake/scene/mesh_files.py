@@ -106,7 +106,8 @@ class MeshFiles:
         if not path.is_file():
             raise ValueError("no such mesh file")
         ending = path.suffix.lower()
-        check_mesh_file(path)
+        if ending != ".obj":  # `check_obj` checks these, and more.
+            check_mesh_file(path)
         if ending in _READERS:
             p_GVset, triangles = _READERS[ending](path)
         elif ending in GLTF:

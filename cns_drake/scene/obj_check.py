@@ -24,7 +24,12 @@ _REFUSED = (
     "trim", "hole", "scrv", "sp", "con", "vp", "call", "csh", "bsp", "bzp",
     "cdc", "cdp", "res", "ctech", "stech",
 )  # fmt: skip
-_STATEMENT = re.compile(rb"^[ \t]*([A-Za-z_]\w*)(?=[ \t\n]|\Z)", re.MULTILINE)
+# A statement that is not among the usual ones, of which a file has thousands.
+_STATEMENT = re.compile(
+    rb"^[ \t]*(?!(?:vn?|vt|f|o|g|usemtl|mtllib)[ \t\n])"
+    rb"([A-Za-z_]\w*)(?=[ \t\n]|\Z)",
+    re.MULTILINE,
+)
 # If a face refers to a missing vertex, Drake's reader reads outside its memory
 # and may end the process.
 _VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
@@ -45,7 +50,7 @@ _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
 
 # A face of one or two corners, which has no surface.
 _SHORT_FACE = re.compile(
-    rb"^[ \t]*(f[ \t](?:[ \t]*[^\s#]+){0,2})[ \t]*(?:[\n#]|\Z)",
+    rb"^[ \t]*(f(?=[ \t])(?:[ \t]+[^\s#]+){0,2})[ \t]*(?:[\n#]|\Z)",
     re.MULTILINE,
 )
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"

@@ -1,11 +1,15 @@
 """How the cost of a search grows with the number of places.
 
     python tests/benchmarks/many_places.py [--methods NAME ...]
-        [--places N ...] [--queries N] [--all-queries]
+        [--places N ...] [--queries N] [--all-queries] [--features FOLDER]
 
 Each place is another scene: a ground with walls and posts, drawn at random.
 Scenes have few points, so that many can be described; a search does not depend
-on the number of points. A query is a scene seen from elsewhere. Each method
+on the number of points. A query is a scene seen from elsewhere. With
+`--features`, the places are those of the recordings of a study instead, of all
+its drives together, and the queries are those of its last drive: FOLDER is
+`report/parts/features` of `cns-drake reproduce`, before the study is finished
+and removes its descriptors. Each method
 and number of places has a process of its own, of which the CPU time of the
 description, the database, a query without and with geometric verification and
 the peak of memory are printed. With `--all-queries`, there are as many queries
@@ -23,7 +27,16 @@ import time
 import numpy as np
 from processes import in_process
 
-# What it measures is imported in the processes that do it alone.
+from cns_drake.drives import DriveNames
+from evaluation.methods import Method, make_method
+from evaluation.recognition import (
+    FAIR_PROTOCOL,
+    DescribedScans,
+    DriveDescriptors,
+    compare_with_gates,
+)
+from evaluation.study import Part
+
 METHODS = ("scan-context++", "solid", "ring++", "btc", "layered-overlap")
 PLACES = (300, 3000)
 QUERIES = 20
@@ -60,33 +73,67 @@ def seen_again(points: np.ndarray, seed: int) -> np.ndarray:
     return shifted @ R + rng.normal(0.0, 0.01, points.shape)
 
 
-def measure(name: str, num_places: int, num_queries: int, file: Path) -> None:
-    """Writes what a method's search takes to a file, see `report`."""
-    from evaluation.methods import make_method
-    from evaluation.recognition import (
-        FAIR_PROTOCOL,
-        DescribedScans,
-        DriveDescriptors,
-        compare_with_gates,
-    )
+def described(frames: np.ndarray, descriptors: list) -> DescribedScans:
+    """Returns places or queries, each at a distance from all others."""
+    X_WS = np.tile(np.eye(4), (len(frames), 1, 1))
+    X_WS[:, 0, 3] = APART * frames
+    return DescribedScans(frames, frames, X_WS, descriptors)
 
-    method = make_method(name, {})
-    # The first call of a function loads and compiles.
-    method.describe(scene(0))
 
-    def described(frames: np.ndarray, descriptors: list) -> DescribedScans:
-        X_WS = np.tile(np.eye(4), (len(frames), 1, 1))
-        X_WS[:, 0, 3] = APART * frames
-        return DescribedScans(frames, frames, X_WS, descriptors)
-
-    start = time.process_time()
+def drawn(
+    method: Method, num_places: int, num_queries: int
+) -> tuple[DescribedScans, DescribedScans]:
+    """Returns places and queries of scenes that are drawn at random."""
     of_places = [method.describe_place(scene(k)) for k in range(num_places)]
-    describing = (time.process_time() - start) / num_places
     chosen = np.linspace(0, num_places - 1, num_queries).astype(int)
     of_queries = [
         method.describe(seen_again(scene(k), k)) for k in chosen.tolist()
     ]
     places = described(np.arange(num_places), of_places)
+    return places, described(chosen, of_queries)
+
+
+def recorded(
+    name: str, num_places: int, num_queries: int, features: Path
+) -> tuple[DescribedScans, DescribedScans]:
+    """Returns places and queries of the recordings of a study."""
+    files = sorted(features.glob(f"*/described_{name}.data"))
+    drives = []
+    for file in files:
+        names, drive = Part(file).read()
+        assert isinstance(names, DriveNames)
+        drives.append(drive)
+    of_places = [one for d in drives for one in d.places.descriptors]
+    asked = drives[-1].queries.descriptors
+    if num_places > len(of_places):
+        raise SystemExit(f"{features}: only {len(of_places)} places")
+    # Of all drives, if not all places are used.
+    used = np.linspace(0, len(of_places) - 1, num_places).astype(int)
+    chosen = np.linspace(0, len(asked) - 1, num_queries).astype(int)
+    return (
+        described(np.arange(num_places), [of_places[k] for k in used]),
+        described(chosen, [asked[k] for k in chosen]),
+    )
+
+
+def measure(
+    name: str,
+    num_places: int,
+    num_queries: int,
+    features: Path | None,
+    file: Path,
+) -> None:
+    """Writes what a method's search takes to a file, see `report`."""
+    method = make_method(name, {})
+    # The first call of a function loads and compiles.
+    method.describe(scene(0))
+    start = time.process_time()
+    if features is None:
+        places, asked = drawn(method, num_places, num_queries)
+    else:
+        places, asked = recorded(name, num_places, num_queries, features)
+    describing = (time.process_time() - start) / num_places
+    of_places = list(places.descriptors)
     none = described(np.arange(0), [])
     database = DriveDescriptors("places", places, none)
     method.build_database(of_places[:2])
@@ -98,8 +145,8 @@ def measure(name: str, num_places: int, num_queries: int, file: Path) -> None:
     for radii in ([None], [None, 7.5]):
         # The first query does not count: it compiles.
         for part in (slice(0, 1), slice(0, None)):
-            asked = described(chosen[part], of_queries[part])
-            query = DriveDescriptors("queries", none, asked)
+            rows = np.arange(len(asked.frames))[part]
+            query = DriveDescriptors("queries", none, asked.chosen(rows))
             start = time.process_time()
             for _, (found, *_) in compare_with_gates(
                 method, database, query, FAIR_PROTOCOL, radii
@@ -117,14 +164,19 @@ def _peak() -> float:
     return np.nan
 
 
-def report(name: str, numbers: list[int], num_queries: int | None) -> None:
+def report(
+    name: str,
+    numbers: list[int],
+    num_queries: int | None,
+    features: Path | None,
+) -> None:
     """Prints a line for each number of places, and the exponent."""
     spent = []
     for number in numbers:
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "times"
             asked = number if num_queries is None else min(num_queries, number)
-            in_process(measure, name, number, asked, file)
+            in_process(measure, name, number, asked, features, file)
             describing, building, alone, gated, _, peak = np.loadtxt(file)
         spent.append(gated)
         print(
@@ -145,10 +197,11 @@ def main() -> None:
     parser.add_argument("--places", nargs="+", type=int, default=PLACES)
     parser.add_argument("--queries", type=int, default=QUERIES)
     parser.add_argument("--all-queries", action="store_true")
+    parser.add_argument("--features", type=Path)
     arguments = parser.parse_args()
     queries = None if arguments.all_queries else arguments.queries
     for name in arguments.methods:
-        report(name, arguments.places, queries)
+        report(name, arguments.places, queries, arguments.features)
 
 
 if __name__ == "__main__":
