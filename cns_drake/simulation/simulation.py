@@ -40,8 +40,10 @@ from cns_drake.scenarios import (
 from cns_drake.scene import FileWatch
 from cns_drake.sensors import (
     KALIBR_FILE,
+    SpinningPattern,
     check_renderer,
     describe_unit,
+    make_pattern,
     optical_pose,
     sensor_pose,
 )
@@ -269,7 +271,7 @@ def _fingerprint(drive: LoadedDrive, inputs: dict[str, str]) -> str:
 
 def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
     scenario = drive.scenario
-    other, other_name = other_stage(scenario)
+    other, other_name, is_earlier = other_stage(scenario)
     stage = scenario.stage
     stages = () if stage is None else tuple(scenario.folder.stages())
     return MeshcatRecorder(
@@ -280,14 +282,39 @@ def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
         shown=ShownStages(
             None if other is None else load_stage(DrivePlan(other)),
             other_name,
+            is_earlier,
             stage,
             stages,
         ),
+        sensors=_sensor_texts(scenario),
         cameras={
             name: round(1 / (scenario.frame_period * camera.rate))
             for name, camera in scenario.cameras.items()
         },
     )
+
+
+def _sensor_texts(scenario: Scenario) -> list[str]:
+    """Returns a line for each LiDAR and camera of a drive."""
+    texts = []
+    for name, lidar in scenario.lidars.items():
+        model = lidar.preset or "LiDAR of a data sheet"
+        pattern = make_pattern(lidar)
+        beams = len(pattern.beams(0).d_Sset)
+        if isinstance(pattern, SpinningPattern):
+            rings = pattern.num_rings
+            beams_text = f"{rings} rings × {beams // rings} columns"
+        else:
+            beams_text = f"{beams:,} beams a scan"
+        texts.append(
+            f"{name}: {model}, {beams_text}, {pattern.min_range:g} to "
+            f"{pattern.max_range:g} m, {lidar.rate} Hz"
+        )
+    for name, camera in scenario.cameras.items():
+        texts.append(
+            f"{name}: {camera.width} × {camera.height} pixels, {camera.rate} Hz"
+        )
+    return texts
 
 
 def _simulate_frames(
