@@ -6,10 +6,11 @@ import base64
 from collections.abc import Iterator
 import contextlib
 from dataclasses import replace
-from html import escape
+from html import escape, unescape
 import logging
 from pathlib import Path
 import re
+from typing import NamedTuple
 import zlib
 
 import numpy as np
@@ -17,12 +18,13 @@ from pydrake import geometry
 from pydrake.geometry import FrameId, Meshcat, MeshcatParams
 from pydrake.math import RigidTransform
 
-from cns_drake.base import write_text
+from cns_drake.base import InputError, read_text, write_text
 from cns_drake.pictures import meshcat_drawing as drawing
 from cns_drake.pictures.city_parts import compare_parts, read_parts
 from cns_drake.pictures.drive_record import DriveRecord, ScanRecord
 from cns_drake.pictures.page_panel import (
     ShownStages,
+    fill_template,
     make_panel,
     read_template,
 )
@@ -101,6 +103,56 @@ def make_drive_page(
         for scan in scans.scans
     )
     return "".join([start, panel(scans), scene, *elements, module, end])
+
+
+class OtherPage(NamedTuple):
+    """The page of another drive in the same city.
+
+    Attributes:
+        title: its title.
+        html: its text.
+    """
+
+    title: str
+    html: str
+
+
+def read_drive_page(path: Path, city: str) -> OtherPage:
+    """Reads the page of a drive through a city.
+
+    Args:
+        path: the file.
+        city: name of the city's map, or of the world's file.
+
+    Raises:
+        InputError: the file is not the page of a drive through this city.
+    """
+    html = read_text(path, 2 * _MOST_BYTES)
+    title = re.search(r"<h1>(.*?)</h1>", html)
+    there = re.search(r'<header class="panel" data-city="(.*?)">', html)
+    if title is None or there is None:
+        raise InputError(f"{path}: not the page of a drive")
+    if unescape(there[1]) != city:
+        raise InputError(
+            f"{path}: a drive through {unescape(there[1])}, not {city}"
+        )
+    return OtherPage(unescape(title[1]), html)
+
+
+def make_pair_page(first: OtherPage, second: OtherPage) -> str:
+    """Returns a page of two drives side by side, each at the other's place.
+
+    Args:
+        first, second: pages of drives through the same city.
+    """
+    return fill_template(
+        "pair.html",
+        titles=(first.title, second.title),
+        pages=[
+            base64.b64encode(zlib.compress(one.html.encode(), 1)).decode()
+            for one in (first, second)
+        ],
+    )
 
 
 def moving_frames(world: World) -> tuple[FrameId, ...]:

@@ -14,7 +14,12 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
 
 from cns_drake.base import to_jpeg, write_text
-from cns_drake.pictures.drive_page import make_drive_page, moving_frames
+from cns_drake.pictures.drive_page import (
+    OtherPage,
+    make_drive_page,
+    make_pair_page,
+    moving_frames,
+)
 from cns_drake.pictures.drive_record import (
     DriveRecord,
     ScanRecord,
@@ -134,13 +139,27 @@ class MeshcatRecorder(LeafSystem):
         self.drive.names[leading] = name
         self.drive.limbs[leading] = dict.fromkeys(frames, RigidTransform())
 
-    def save(self, path: Path, *, title: str = "cns-drake") -> None:
+    def save(
+        self,
+        path: Path,
+        *,
+        title: str = "cns-drake",
+        beside: OtherPage | None = None,
+    ) -> None:
         """Writes the web page of the drive as recorded so far.
+
+        Args:
+            path: the file.
+            title: title of the page.
+            beside: page of another drive in the same city, to show it on the
+                left of this one.
 
         Raises:
             InputError: if the file cannot be written.
         """
         page = make_drive_page(self.drive, self._world, self._shown, title)
+        if beside is not None:
+            page = make_pair_page(beside, OtherPage(title, page))
         write_text(path, page)
 
     def _publish(self, context: Context) -> EventStatus:

@@ -7,6 +7,7 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from importlib import resources
 import math
+from typing import Any
 
 import numpy as np
 
@@ -50,6 +51,7 @@ class ShownStages:
         is_earlier: whether the other stage is the earlier one.
         stage: name of the stage of the drive; None if the drive has no map.
         stages: names of all stages of the map, the earliest first.
+        city: name of the map, or of the world's file.
     """
 
     other: World | None = None
@@ -57,6 +59,7 @@ class ShownStages:
     is_earlier: bool = False
     stage: str | None = None
     stages: Sequence[str] = ()
+    city: str = ""
 
     def sides(self) -> tuple[str, str]:
         """Returns the names of the earlier and of the later stage."""
@@ -77,7 +80,6 @@ def make_panel(
         shown: the stages of the city that the page shows.
     """
     # Only pages need templates, and the import takes a moment.
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     p_WBset = np.array([X_WB.translation() for X_WB in drive.X_WBs])
@@ -88,13 +90,8 @@ def make_panel(
     metres = round(length)
     way = f"{metres} m" if metres < 1000 else f"{length / 1000.0:.2f} km"
     lowest, highest = drawing.POINT_HEIGHTS
-    environment = Environment(
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
-    return environment.from_string(read_template("panel.html")).render(
+    return fill_template(
+        "panel.html",
         style=Markup(read_template("drive.css")),
         title=title,
         facts=f"{way} in {took}",
@@ -120,7 +117,22 @@ def make_panel(
         },
         stage=shown.stage,
         stages=shown.stages,
+        city=shown.city,
     )
+
+
+def fill_template(name: str, **values: Any) -> str:
+    """Returns a template of the page, filled in."""
+    # Only pages need templates, and the import takes a moment.
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    return environment.from_string(read_template(name)).render(**values)
 
 
 def _scans_text(record: ScanRecord) -> str:

@@ -18,7 +18,12 @@ from cns_drake.base import (
     interrupts_wait,
     write_text,
 )
-from cns_drake.pictures import MeshcatRecorder, ShownStages, other_stage
+from cns_drake.pictures import (
+    MeshcatRecorder,
+    ShownStages,
+    other_stage,
+    read_drive_page,
+)
 from cns_drake.recording import (
     START_NS,
     BackgroundWriter,
@@ -97,6 +102,7 @@ def simulate(
     output: Path | str,
     *,
     page_file: Path | str | None = None,
+    beside: Path | str | None = None,
     graphviz_file: Path | str | None = None,
     overwrite: bool = False,
     num_threads: int = 1,
@@ -112,6 +118,8 @@ def simulate(
         scenario: the scenario to run.
         output: folder for recordings.
         page_file: file for a web page of the drive, if any.
+        beside: page of another drive in the same city; `page_file` then shows
+            both drives side by side, at the same place.
         graphviz_file: file for the Diagram as Graphviz text, if any.
         overwrite: whether to replace an existing recording of the same name.
         num_threads: number of threads that cast the rays of a LiDAR. The
@@ -140,6 +148,11 @@ def simulate(
         for file in (page_file, graphviz_file):
             if file is not None:
                 check_writable(file)
+        other = None
+        if beside is not None:
+            if page_file is None:
+                raise InputError("beside: only with a page")
+            other = read_drive_page(Path(beside), _city(scenario))
         RecordingFolder(folder).check(overwrite)
         check_folder_writable(folder.parent)
         plan = DrivePlan(scenario)
@@ -182,7 +195,7 @@ def simulate(
         finished = time.perf_counter()
         if page is not None and page_file is not None:
             doing("writing the page of the drive")
-            page.save(page_file, title=scenario.name)
+            page.save(page_file, title=scenario.name, beside=other)
     return FinishedSimulation(
         name=scenario.name,
         folder=folder,
@@ -285,6 +298,7 @@ def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
             is_earlier,
             stage,
             stages,
+            _city(scenario),
         ),
         sensors=_sensor_texts(scenario),
         cameras={
@@ -292,6 +306,11 @@ def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
             for name, camera in scenario.cameras.items()
         },
     )
+
+
+def _city(scenario: Scenario) -> str:
+    """Returns the name of a scenario's map, or of its world's file."""
+    return Path(scenario.map or scenario.world or "").name
 
 
 def _sensor_texts(scenario: Scenario) -> list[str]:

@@ -310,6 +310,57 @@ function showTime() {
   }
 }
 
+// Where the car is at each frame of the animation, [x, y, z] in the world W, and
+// the frame's time.
+function carTrack() {
+  const clip = animator.actions.find((action) => action.getRoot() === car)
+    .getClip();
+  const {times: at, values} = clip.tracks.find(
+    ({name}) => name.endsWith("position"));
+  return [...at].map((time, k) => ({time, place: values.slice(3 * k, 3 * k + 3)}));
+}
+
+// In a page of two drives, one leads: the one that the user touched last. The
+// other one goes to the same place, and its camera looks from the same side.
+let leads = false;
+let track = null;
+
+function tell() {
+  if (!leads) return;
+  const {camera, controls} = viewer;
+  const {position, heading} = carPose();
+  const seen = (point) => (followed
+    ? point.clone().sub(position).applyAxisAngle(UP, -heading)
+    : point.clone()).toArray();
+  parent.postMessage({
+    place: car.position.toArray(),
+    follows: Boolean(followed),
+    camera: seen(camera.position),
+    target: seen(controls.target),
+  }, "*");
+}
+
+function listen({data}) {
+  leads = false;
+  if (animator.playing) animator.pause();
+  track ??= carTrack();
+  const far = ({place}) => Math.hypot(
+    place[0] - data.place[0], place[1] - data.place[1]);
+  // Where a route crosses itself, the nearer time counts.
+  const cost = (one) => far(one) + 0.02 * Math.abs(one.time - animator.time);
+  const {time} = track.reduce((a, b) => (cost(b) < cost(a) ? b : a));
+  setTime(time);
+  if (data.follows !== Boolean(followed)) byId("follow").click();
+  const {position, heading} = carPose();
+  const seen = (point) => {
+    const there = new MeshCat.THREE.Vector3(...point);
+    return data.follows
+      ? there.applyAxisAngle(UP, heading).add(position) : there;
+  };
+  if (followed) followed = carPose();
+  look(seen(data.camera), seen(data.target));
+}
+
 // Shows the latest image of each camera.
 function showImages() {
   for (const images of cameras) {
@@ -324,6 +375,7 @@ viewer.render_callback = () => {
   if (followed) follow();
   placeMarker();
   placeHole();
+  tell();
   showTime();
   showScan();
   showImages();
@@ -387,7 +439,13 @@ commands.then(() => {
     event.preventDefault();
     byId("play").click();
   });
-  fold(innerWidth <= 640);
+  fold(innerWidth <= 640 || parent !== window);
+  if (parent !== window) {
+    for (const kind of ["pointerdown", "keydown", "wheel"]) {
+      addEventListener(kind, () => { leads = true; }, {capture: true});
+    }
+    addEventListener("message", listen);
+  }
   // On a narrow screen, the camera must be farther away to show the city.
   const {camera, controls} = viewer;
   const farther = Math.max(1, 1.2 / camera.aspect);

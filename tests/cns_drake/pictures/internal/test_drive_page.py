@@ -9,8 +9,14 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
 from cns_drake import load_scenario
+from cns_drake.base import InputError
 from cns_drake.pictures import ShownStages
-from cns_drake.pictures.drive_page import make_drive_page, moving_frames
+from cns_drake.pictures.drive_page import (
+    make_drive_page,
+    make_pair_page,
+    moving_frames,
+    read_drive_page,
+)
 from cns_drake.pictures.drive_record import (
     DriveRecord,
     ScanRecord,
@@ -72,7 +78,7 @@ def packed(frame):
     return pack_scan(frame, p_WRset, np.zeros(len(p_WRset), int), p_WB)
 
 
-def make_page(folder, other_stage=None):
+def make_page(folder, other_stage=None, title="a < b"):
     vehicle = folder / "vehicle.sdf"
     vehicle.write_text(VEHICLE)
     world = stage(folder, "here", GROUND, HALL, KIOSK, vehicle=vehicle)
@@ -93,8 +99,10 @@ def make_page(folder, other_stage=None):
     return make_drive_page(
         drive,
         world,
-        ShownStages(other_stage, "stage <02>", False, "01", ("01", "02")),
-        title="a < b",
+        ShownStages(
+            other_stage, "stage <02>", False, "01", ("01", "02"), "a & b"
+        ),
+        title=title,
     )
 
 
@@ -128,6 +136,16 @@ def test_page_has_title_length_and_legend(page):
 def test_page_says_that_it_loads_before_the_city_comes(page):
     text = page.read_text()
     assert "Loading the city" in text[: text.index("<script")]
+
+
+def test_page_of_another_city_is_refused(page, tmp_path):
+    assert read_drive_page(page, "a & b").title == "a < b"
+    with pytest.raises(InputError, match="a drive through a & b, not town"):
+        read_drive_page(page, "town")
+    page = tmp_path / "other.html"
+    page.write_text("<h1>Other</h1>")
+    with pytest.raises(InputError, match="html: not the page of a drive"):
+        read_drive_page(page, "town")
 
 
 def test_without_another_stage_nothing_is_said_of_change(tmp_path):
@@ -177,7 +195,10 @@ def test_page_of_a_shipped_drive_is_small():
 def browser(tmp_path_factory):
     profile = tmp_path_factory.mktemp("profile")
     software = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-    with chromium(profile, *software) as browser:
+    # The test may look into the frames of a page.
+    with chromium(
+        profile, *software, "--allow-file-access-from-files"
+    ) as browser:
         yield browser
 
 
@@ -204,6 +225,31 @@ def opened(browser, page, request):
     if is_folded:
         click(browser, "fold")
     return browser
+
+
+@pytest.fixture
+def pair(browser, tmp_path):
+    """A page of two drives, both standing still."""
+    for name in ("first", "second"):
+        (tmp_path / f"{name}.html").write_text(make_page(tmp_path, title=name))
+    pages = [
+        read_drive_page(tmp_path / f"{name}.html", "a & b")
+        for name in ("first", "second")
+    ]
+    path = tmp_path / "pair.html"
+    path.write_text(make_pair_page(*pages))
+    browser.open(path.as_uri(), 1440, 900)
+    for k in range(2):
+        browser.wait_for(inside(k, "typeof commands !== 'undefined'"))
+        browser.evaluate(inside(k, "viewer.renderer.setPixelRatio(0.1)"))
+        browser.wait_for(inside(k, '!document.getElementById("loading")'))
+        browser.evaluate(inside(k, "viewer.animator.pause()"))
+    return browser
+
+
+def inside(k, expression):
+    """The expression in one of the two pages, which are frames."""
+    return f"window[{k}].eval({json.dumps(expression)})"
 
 
 @pytest.fixture
@@ -255,6 +301,32 @@ slow_in_chromium = [
     pytest.mark.slow,
     pytest.mark.skipif(not has_chromium(), reason="no chromium"),
 ]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not has_chromium(), reason="no chromium")
+@pytest.mark.parametrize("leader", [0, 1])
+def test_one_drive_follows_the_other_to_its_place(pair, leader):
+    follower = 1 - leader
+    pair.click(360 + 720 * leader, 300)
+    pair.evaluate(
+        inside(
+            leader,
+            """(() => {
+              const slider = document.getElementById("time");
+              slider.value = 6;
+              slider.dispatchEvent(new Event("input"));
+              viewer.render();
+            })()""",
+        )
+    )
+    pair.wait_for(inside(follower, "viewer.animator.time") + " === 6")
+    cameras = [
+        pair.evaluate(inside(k, "viewer.camera.position.toArray()"))
+        for k in range(2)
+    ]
+    np.testing.assert_allclose(*cameras, atol=1e-4)
+    assert not [c for c in pair.complaints if "'rendering'" not in c]
 
 
 @pytest.mark.usefixtures("reader")
