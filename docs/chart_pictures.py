@@ -39,6 +39,7 @@ from evaluation.results import (
     in_table_order,
     listed,
     method_style,
+    method_styles,
     rank_methods,
     survivors,
     title,
@@ -67,6 +68,7 @@ def survival(path: Path) -> str:
     ranked = {gate: rank_methods(rows[gate])[0] for gate in rows}
     # The best method with geometric verification is on top.
     order = [one.method for one in ranked[True]]
+    styles = method_styles(order)
     without = {one.method: 100.0 * one.value for one in ranked[False]}
     figure = Figure(figsize=(WIDTH, 6.2), layout="constrained")
     axes = figure.subplots()
@@ -76,7 +78,7 @@ def survival(path: Path) -> str:
         va="bottom", fontsize=11,
     )  # fmt: skip
     for y, one in enumerate(ranked[True]):
-        colour = METHOD_STYLES[one.method][0]
+        colour = styles[title(one.method)][0]
         ends = 100.0 * np.array([one.interval.low, one.interval.high])
         axes.plot(
             ends, [y, y], color=colour, lw=9, alpha=0.3, solid_capstyle="butt"
