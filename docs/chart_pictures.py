@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 import csv
-import itertools
 from pathlib import Path
 import re
 from typing import Any
@@ -16,6 +15,7 @@ from matplotlib.transforms import BboxTransformTo, ScaledTranslation
 import numpy as np
 from scipy.signal import welch
 from sklearn.isotonic import isotonic_regression
+import yaml
 
 from cns_drake.motion import RoadProfile
 from cns_drake.sensors import ImuErrors, ImuNoise
@@ -27,19 +27,17 @@ from docs.picture_parts import (
     add_heading,
     make_plain,
 )
+from docs.result_tables import kept_in_cities
 from evaluation.methods import method_facts, shipped_methods
 from evaluation.results import (
     CANNOT_SHOW,
     INK,
     MARGIN,
-    OWN,
     PALE,
-    STAGE,
     SURVIVES,
     Results,
     Row,
     Survival,
-    draw_chart,
     in_table_order,
     judge_survival,
     listed,
@@ -65,72 +63,57 @@ OURS = {
 def survival(path: Path) -> str:
     """Draws what methods retain of their AUC strict; returns the title.
 
-    Cities are the units: a point is the mean over a city's pairs, and a bar is
-    the 95 % interval over the cities, if there are eight. The points stand
-    below the bar, each city's at a height of its own, so that none hides
-    another or the bar's ends.
+    Cities are the units: a point is the mean over the cities, and a bar is the
+    95 % interval over them, with geometric verification. A gain in a city does
+    not make up for a loss in another, see `judge_survival`.
     """
-    rows = kept_rows()
-    # The best method without geometric verification is on top.
-    ranked = {gate: rank_methods(rows[gate]) for gate in rows}
-    order = [one.method for one in ranked[False]][::-1]
+    rows = {gate: kept_in_cities(gate) for gate in (False, True)}
+    judged = {gate: judge_survival(some) for gate, some in rows.items()}
+    # The best method with geometric verification is on top.
+    order = [one.method for one in judged[True]]
     styles = method_styles(order)
-    figure = Figure(figsize=(WIDTH, 6.6), layout="constrained")
-    panels = figure.subplots(1, 2, sharey=True)
-    for axes, gate in zip(panels, (False, True), strict=True):
-        for one in ranked[gate]:
-            y = order.index(one.method)
-            colour = styles[title(one.method)][0]
-            ends = 100.0 * np.array([one.interval.low, one.interval.high])
-            above = [y + _INTERVAL_ABOVE] * 2
-            axes.plot(ends, above, "|-", color=INK, lw=2, ms=7, mew=2)
-            axes.plot(100.0 * one.value, above[0], "|", color=INK, ms=13, mew=4)
-            for city, (marker, _, below) in _CITY_MARKERS.items():
-                some = [
-                    row.value
-                    for row in rows[gate]
-                    if (row.map, row.method) == (city, one.method)
-                ]
-                at = 100.0 * np.mean(some)
-                axes.plot(at, y - below, marker, color=colour, ms=6)
-        axes.axvline(
-            100.0 * (1.0 - MARGIN), color=INK, lw=1.5, ls=":", zorder=0
-        )
-        axes.axvline(100.0, color=PALE, lw=1, zorder=0)
-        axes.set(xlim=(-4.0, 119.0), ylim=(-0.7, len(order) - 0.45))
-        axes.set_xlabel("retained AUC strict [%]")
-        verified = "with" if gate else "without"
-        axes.set_title(f"{verified} verification", loc="left")
-        make_plain(axes)
+    without = {one.method: 100.0 * (1.0 - one.loss) for one in judged[False]}
+    figure = Figure(figsize=(WIDTH, 6.2), layout="constrained")
+    axes = figure.subplots()
+    least = 100.0 * (1.0 - MARGIN)
+    axes.axvspan(least, 130.0, color=PALE, alpha=0.25, lw=0)
+    axes.text(
+        least + 0.5, -0.75, "whole bar here:\nit survives",
+        va="bottom", fontsize=11,
+    )  # fmt: skip
+    for y, one in enumerate(judged[True]):
+        colour = styles[title(one.method)][0]
+        ends = [1.0 - one.interval.high, 1.0 - one.interval.low]
+        axes.plot(
+            100.0 * np.array(ends), [y, y], color=colour, lw=9, alpha=0.3,
+            solid_capstyle="butt",
+        )  # fmt: skip
+        cities = {row.map for row in rows[True]}
+        kept = [
+            np.mean([min(1.0, row.value) for row in rows[True]
+                     if (row.map, row.method) == (city, one.method)])
+            for city in sorted(cities)
+        ]  # fmt: skip
+        axes.plot(
+            100.0 * np.array(kept), [y + 0.3] * len(kept),
+            "|", color="#777777", ms=8, mew=1.5,
+        )  # fmt: skip
+        at = 100.0 * (1.0 - one.loss)
+        axes.plot([without[one.method], at], [y, y], color=colour, lw=1.5)
+        axes.plot(without[one.method], y, "o", color=colour, mfc="white", ms=9)
+        axes.plot(at, y, "o", color=colour, ms=9)
+    axes.set(xlim=(-4.0, 112.0), ylim=(len(order) - 0.5, -0.8))
+    axes.set_xlabel(
+        "retained AUC strict [%]:  ○ without, ● with geometric verification\n"
+        "bar: 95 % interval over cities;  | one city;  * made by this project"
+    )
     names = [f"{title(n)}*" if n in OURS else title(n) for n in order]
-    panels[0].set_yticks(range(len(order)), names)
-    signs = "  ".join(
-        f"{sign} {city.capitalize()}"
-        for city, (_, sign, _) in _CITY_MARKERS.items()
-    )
-    figure.supxlabel(
-        f"{signs}\n┃ mean over pairs, with a 95 % interval over cities   "
-        "⋮ survives from here on",
-        fontsize=12,
-    )
-    finding = survival_title(
-        {gate: judge_survival(some) for gate, some in rows.items()}
-    )
+    axes.set_yticks(range(len(order)), names)
+    make_plain(axes)
+    finding = survival_title(judged)
     add_heading(figure, finding)
     figure.savefig(path, dpi=DPI)
     return finding
-
-
-# Distance of an interval above the middle of a method's row [rows].
-_INTERVAL_ABOVE = 0.28
-# Of each shipped city: its marker, a character that looks like it, and the
-# marker's distance below the middle of a method's row [rows].
-_CITY_MARKERS = {
-    "downtown": ("o", "●", -0.07),
-    "metropolis": ("s", "■", 0.08),
-    "riverside": ("^", "▲", 0.23),
-    "suburbia": ("D", "◆", 0.38),
-}
 
 
 def survival_title(found: Mapping[bool, Collection[Survival]]) -> str:
@@ -158,27 +141,19 @@ def survival_title(found: Mapping[bool, Collection[Survival]]) -> str:
     )
 
 
-def kept_rows() -> dict[bool, list[Row]]:
-    """Returns the retained shares of AUC strict, one for each pair and method.
-
-    Returns:
-        Whether geometric verification was used -> rows of the shipped table.
-    """
-    file = ROOT / "evaluation/results/baselines/stages.csv"
-    found = Results.read(file).where({STAGE: OWN}, metric="kept_strict")
-    return {gate: list(found.where(gate=gate).rows) for gate in (False, True)}
-
-
 def assumptions(path: Path) -> None:
     """Draws what BTC retains after 40 years, by where new furniture stands."""
     head, *rows = _table("docs/ageing.md", "In the row *none*")
     colour, _, marker = METHOD_STYLES["btc"]
-    figure = Figure(figsize=(WIDTH, 6.6), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 6.8), layout="constrained")
     axes = figure.subplots()
     ticks: dict[float, str] = {}
     y = 0.0
     for place, *cells in rows:
+        # Only the first measure: AUC.
+        lasts = re.sub(r" \(.*?\)", "", cells[-1].partition(";")[0])
         axes.text(1.0, y, place, va="center", fontweight="bold")
+        axes.text(1.0, y + 0.95, f"a tenth lost after\n{lasts}", va="top")
         for city, cell in zip(head[1:-1], cells[:-1], strict=True):
             if "(" in cell:
                 y += 1.0
@@ -194,89 +169,77 @@ def assumptions(path: Path) -> None:
     axes.set_title(f"{head[0]}:", loc="left")
     make_plain(axes)
     add_heading(
-        figure,
-        "How long BTC's map lasts depends\n"
-        "on where new street furniture stands",
-    )
+        figure, f"As shipped, BTC loses a tenth within\n{lasts};"
+        " in place, never"
+    )  # fmt: skip
     figure.savefig(path, dpi=DPI)
 
 
 def ranking(path: Path) -> None:
-    """Draws mean AUC strict and AUC for each radius of a match.
+    """Draws the ranks of methods over the radius of a match, by AUC strict.
 
-    Means are over pairs of drives, and their 95 % intervals over cities.
+    Means are over the pairs of the shipped cities.
     """
-    metrics = {"auc_strict": "AUC strict", "auc": "AUC"}
-    gates = {
-        False: "without geometric verification",
-        True: "with geometric verification",
-    }
-    # Cities -> how their means look.
-    kinds: dict[str, dict[str, Any]] = {
-        "shipped": {"marker": "o", "ms": 6},
-        "fresh": {"marker": "o", "ms": 6, "mfc": "white"},
-        "plans": {"marker": "D", "ms": 5},
-    }
-    # Metric, gate, cities and radius -> rows.
-    found: dict[tuple[str, bool, str, float], list[Row]] = {}
+    found: dict[tuple[bool, float], list[Row]] = {}
     with open(ROOT / "docs/notes/ranking.csv", newline="") as stream:
-        for line, metric in itertools.product(csv.DictReader(stream), metrics):
+        for line in csv.DictReader(stream):
+            if line["cities"] != "shipped":
+                continue
             row = Row(
                 experiment="ranking",
                 map=line["map"],
                 database=line["database"],
                 query=line["query"],
                 seed=int(line["seed"]),
-                factors={"version": line["version"]},
+                factors={},
                 task="place",
                 method=line["method"],
                 gate=line["gate"] == "1",
                 protocol="own",
-                metric=metric,
-                value=float(line[metric]),
+                metric="auc_strict",
+                value=float(line["auc_strict"]),
             )
-            place = metric, row.gate, line["cities"], float(line["radius"])
-            found.setdefault(place, []).append(row)
-    radii = sorted({radius for *_, radius in found})
-    every = [row for rows in found.values() for row in rows]
-    order = [one.method for one in rank_methods(every)]
-    figure = Figure(figsize=(WIDTH, 13.6), layout="constrained")
-    blocks = list(itertools.product(metrics, gates))
-    parts = figure.subfigures(len(blocks), 1)
-    for part, (metric, gate) in zip(parts, blocks, strict=True):
-        part.suptitle(
-            f"{metrics[metric]}, {gates[gate]}", x=0.01, ha="left", fontsize=14
-        )
-        panels = part.subplots(1, len(radii), sharex=True, sharey=True)
-        for axes, radius in zip(panels, radii, strict=True):
-            for k, (kind, look) in enumerate(kinds.items()):
-                rows = found.get((metric, gate, kind, radius), [])
-                for one in rank_methods(rows) if rows else ():
-                    y = order.index(one.method) + 0.25 * (k - 1)
-                    colour = METHOD_STYLES[one.method][0]
-                    ends = [one.interval.low, one.interval.high]
-                    axes.plot(ends, [y, y], color=colour, lw=3, alpha=0.45)
-                    axes.plot(one.value, y, color=colour, **look)
-            axes.set(xlim=(-0.05, 1.05), ylim=(len(order) - 0.5, -0.5))
-            axes.set_xticks((0.0, 0.5, 1.0), ("0", "0.5", "1"))
-            axes.set_yticks(range(len(order)), [title(n) for n in order])
-            axes.set_title(f"{radius:g} m")
-            make_plain(axes)
-        panels[0].set_title(f"radius {radii[0]:g} m")
+            found.setdefault((row.gate, float(line["radius"])), []).append(row)
+    radii = sorted({radius for _, radius in found})
+    figure = Figure(figsize=(WIDTH, 5.0), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    firsts = []
+    for axes, gate in zip(panels, (False, True), strict=True):
+        ranked = [
+            {one.method: one for one in rank_methods(found[gate, radius])}
+            for radius in radii
+        ]
+        for method in ranked[-1]:
+            colour, style, marker = METHOD_STYLES[method]
+            ranks = [1 + list(some).index(method) for some in ranked]
+            axes.plot(
+                range(len(radii)), ranks, style, color=colour, marker=marker,
+                ms=9, lw=2.5, label=title(method),
+            )  # fmt: skip
+            axes.text(
+                len(radii) - 0.8, ranks[-1],
+                f"{title(method)} {ranked[-1][method].value:.2f}",
+                va="center", fontsize=11,
+            )  # fmt: skip
+        firsts.append({next(iter(some)) for some in ranked})
+        number = len(ranked[-1])
+        axes.set(ylim=(number + 0.5, 0.5), xlim=(-0.3, len(radii) + 2.2))
+        axes.set_xticks(range(len(radii)), [f"{one:g}" for one in radii])
+        axes.set_yticks(range(1, number + 1), range(1, number + 1))
+        axes.set_xlabel("radius of a match [m]", loc="left")
+        verified = "with" if gate else "without"
+        axes.set_title(f"{verified} verification", loc="left")
+        make_plain(axes, "y")
+    panels[0].set_ylabel("rank by AUC strict (at the right: its mean)")
+    alone, verified = (
+        listed([title(name) for name in METHOD_STYLES if name in some])
+        for some in firsts
+    )
     add_heading(
         figure,
-        "Layered overlap is best with geometric\n"
-        "verification; without it, the radius decides",
+        f"{verified} is first with verification;\n"
+        f"without it, {alone}{', by radius' * (len(firsts[0]) > 1)}",
     )
-    handles = [
-        Line2D([], [], color=INK, ls="", **one) for one in kinds.values()
-    ]
-    interval = Line2D([], [], color=INK, lw=3, alpha=0.45)
-    figure.legend(
-        [*handles, interval],
-        ["shipped cities", "fresh cities", "other streets", "95 % interval"],
-        loc="outside lower center", ncols=2, frameon=False,
-    )  # fmt: skip
     figure.savefig(path, dpi=DPI)
 
 
@@ -364,10 +327,12 @@ def sessions(path: Path) -> None:
     """Draws R@1 of a map of January in NCLT, and as predicted in Suburbia."""
     with open(ROOT / "docs/notes/nclt_sessions.csv", newline="") as file:
         rows = list(csv.DictReader(file))
-    figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
     axes = figure.subplots()
-    for where, name in (("suburbia", "layered-overlap"), ("nclt", "btc")):
-        colour, style, marker = METHOD_STYLES[name]
+    # No method has these colours.
+    looks = {"suburbia": ("#777777", "--"), "nclt": (INK, "-")}
+    falls = {}
+    for where, (colour, style) in looks.items():
         days, middle, low, high = np.array(
             [
                 [float(row[key]) for key in ("days", "r1", "low", "high")]
@@ -375,17 +340,61 @@ def sessions(path: Path) -> None:
                 if row["where"] == where
             ]
         ).T
+        falls[where] = middle[0] - middle.min()
         axes.fill_between(days, low, high, color=colour, alpha=0.15, lw=0)
-        label = {"suburbia": "Suburbia, predicted", "nclt": "NCLT"}[where]
-        axes.plot(days, middle, style, color=colour, marker=marker, label=label)
+        label = {
+            "suburbia": "predicted\n(Suburbia)", "nclt": "measured\n(NCLT)"
+        }[where]  # fmt: skip
+        axes.plot(days, middle, style, color=colour, marker="o", label=label)
     axes.axvspan(107, 288, color=PALE, alpha=0.25, lw=0)
     axes.text(197, 0.03, "leaves in Suburbia", ha="center", color=INK)
     axes.set_xlabel("days after the map of January 2012")
     axes.set_ylabel("R@1")
     axes.set_ylim(0.0, 1.02)
     make_plain(axes, "both")
-    axes.legend(loc="lower right", frameon=False)
-    add_heading(figure, "Leaves cost nothing in Suburbia")
+    _name_lines(figure, axes, 0.16, FONT["font.size"])
+    add_heading(
+        figure,
+        f"The real curve falls by {falls['nclt']:.2f},\n"
+        f"the predicted one by {falls['suburbia']:.2f}",
+    )
+    figure.savefig(path, dpi=DPI)
+
+
+def fleet(path: Path) -> None:
+    """Draws the share of changes that so many cars a year notice."""
+    noticed: dict[int, list[Row]] = {}
+    with open(ROOT / "docs/notes/upkeep.csv", newline="") as stream:
+        for line in csv.DictReader(stream):
+            wanted = line["experiment"], line["task"], line["metric"]
+            if wanted == ("fleet", "seen", "seen_here"):
+                row = _realisation(line)
+                noticed.setdefault(int(line["condition"]), []).append(row)
+    figure = Figure(figsize=(WIDTH, 3.4), layout="constrained")
+    axes = figure.subplots()
+    shares = {}
+    for cars, rows in sorted(noticed.items()):
+        ((_, value, interval),) = rank_methods(rows)
+        shares[cars] = round(100.0 * value)
+        ends = 100.0 * np.array([interval.low, interval.high])
+        axes.plot(ends, [cars, cars], color=INK, lw=5, alpha=0.3)
+        axes.plot(100.0 * value, cars, "o", color=INK, ms=10)
+        axes.text(
+            100.0 * value, cars - 0.28, f"{shares[cars]} %", ha="center",
+            fontweight="bold",
+        )  # fmt: skip
+    # A gap where a number of cars was not measured.
+    names = [f"{cars} {'car' if cars == 1 else 'cars'}" for cars in shares]
+    axes.set_yticks(list(shares), names)
+    axes.set(xlim=(0.0, 100.0), ylim=(max(shares) + 0.5, 0.3))
+    axes.set_xlabel("changes noticed [%]; bar: 95 % interval over realisations")
+    make_plain(axes)
+    one, *_, most = shares.values()
+    add_heading(
+        figure,
+        f"One car a year notices {one} % of the changes,\n"
+        f"two cars {shares[2]} %, {max(shares)} cars {most} %",
+    )
     figure.savefig(path, dpi=DPI)
 
 
@@ -482,12 +491,66 @@ def _realisation(line: Mapping[str, str]) -> Row:
 
 
 def ladder(path: Path) -> None:
-    """Draws the ladder of Suburbia."""
+    """Draws the ladder of Suburbia, what costs most on top."""
     results = Results.read(ROOT / "docs/notes/ladder_suburbia.csv")
-    chart = {"kind": "matrix", "over": "cause", "metric": "kept"}
-    drawn = draw_chart(chart, results, 480)
-    add_heading(drawn.figure, "Weather, lateral offset\nand sensor cost most")
-    drawn.figure.savefig(path, dpi=220)
+    rows = results.where(metric="kept", gate=False).rows
+    found: dict[str, dict[str, float]] = {}
+    for row in rows:
+        cause = str(row["cause"])
+        if cause != "none":
+            found.setdefault(cause, {})[row.method] = 100.0 * row.value
+    level = {str(row["cause"]): row["level"] for row in rows}
+    found = dict(
+        sorted(found.items(), key=lambda one: np.mean(list(one[1].values())))
+    )
+    # Methods from the most to the least robust.
+    methods = sorted(
+        found["all"],
+        key=lambda name: -np.mean([some[name] for some in found.values()]),
+    )
+    shares = np.array([[some[n] for n in methods] for some in found.values()])
+    texts = {cause: _cause_text(cause, level[cause]) for cause in found}
+    figure = Figure(figsize=(WIDTH, 9.4), layout="constrained")
+    axes = figure.subplots()
+    axes.imshow(
+        100.0 - np.clip(shares, 0.0, 100.0), cmap="Oranges", vmin=0.0,
+        vmax=130.0, aspect="auto",
+    )  # fmt: skip
+    for (y, x), share in np.ndenumerate(shares):
+        axes.text(x, y, f"{share:.0f}", ha="center", va="center")
+    axes.set_yticks(range(len(found)), texts.values())
+    axes.set_xticks(
+        range(len(methods)), [title(n).replace(" ", "\n") for n in methods]
+    )
+    axes.xaxis.tick_top()
+    axes.tick_params(length=0)
+    axes.spines[:].set_visible(False)
+    axes.set_xticks(np.arange(0.5, len(methods) - 1), minor=True)
+    axes.set_yticks(np.arange(0.5, len(found) - 1), minor=True)
+    axes.grid(which="minor", color="white", lw=2)
+    axes.tick_params(which="minor", length=0)
+    axes.set_xlabel("retained AUC [%] at the strongest level, in Suburbia")
+    single = [cause for cause in found if cause != "all"][:3]
+    names = listed([texts[cause].partition(":")[0].lower() for cause in single])
+    add_heading(figure, f"All at once costs most; alone,\n{names}")
+    figure.savefig(path, dpi=DPI)
+
+
+def _cause_text(cause: str, level: object) -> str:
+    """Returns the title of a cause, and its strength at a level."""
+    if cause == "all":
+        return "All at once"
+    sheet = yaml.safe_load(
+        (
+            ROOT / f"cns_drake/studies/experiments/causes/{cause}.yaml"
+        ).read_text()
+    )
+    value: Any = sheet["strengths"]["ladder"]
+    while isinstance(value, dict):
+        value = list(value.values())[-1]
+    if not isinstance(value, list):
+        return sheet["title"]
+    return f"{sheet['title']}: {value[int(str(level)) - 1]}"
 
 
 def noise(path: Path) -> None:

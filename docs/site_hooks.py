@@ -46,8 +46,16 @@ def on_files(files: Files, config: MkDocsConfig, **_: Any) -> Files:
 
 
 def on_config(config: MkDocsConfig, **_: Any) -> MkDocsConfig:
-    """Lists the pages of the API reference in the menu."""
+    """Lists the pages of the API reference in the menu, links the repository.
+
+    A workflow names the repository that it builds the site of.
+    """
     assert config.nav is not None
+    server, name = (
+        os.environ.get(f"GITHUB_{key}") for key in ("SERVER_URL", "REPOSITORY")
+    )
+    if server and name:
+        config.repo_url, config.repo_name = f"{server}/{name}", name
     for package in PACKAGES:
         own, *modules = _reference(package)
         entries: list[Any] = [f"api/{own}"]

@@ -38,6 +38,7 @@ def run_drive(
     imu_rate: int | None = None,
     camera: Mapping[str, int] | None = None,
     recording: Path | str | None = None,
+    beside: Path | str | None = None,
     graphviz: Path | str | None = None,
     overwrite: bool = False,
     json: bool = False,
@@ -70,6 +71,8 @@ def run_drive(
         camera: fields of an additional camera, named `camera`, which also
             records depth and label images; by default no camera is added.
         recording: file for a web page of the drive, if any.
+        beside: page of another drive in the same city, which the page of this
+            drive then shows as well.
         graphviz: file for the Diagram as Graphviz text, if any.
         overwrite: whether to replace an existing recording.
         json: whether to print the result as JSON.
@@ -106,6 +109,7 @@ def run_drive(
             scenario,
             output,
             page_file=recording,
+            beside=beside,
             graphviz_file=graphviz,
             overwrite=overwrite,
             num_threads=num_cores(),

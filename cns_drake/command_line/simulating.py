@@ -127,6 +127,7 @@ def simulate(
     imu_rate: Annotated[int | None, typer.Option(metavar="HZ")] = None,
     camera: Annotated[str | None, typer.Option(metavar="WxH@RATE")] = None,
     recording: options.Recording = None,
+    beside: Annotated[Path | None, typer.Option(metavar="PAGE.html")] = None,
     graphviz: options.Graphviz = None,
     overwrite: options.Overwrite = False,
     json: shared_options.Json = False,
@@ -158,10 +159,16 @@ def simulate(
         camera: Add a camera that looks ahead: width and height of an image in
             pixels, and images per second, such as 640x480@2. The camera also
             records depth images and images of semantic classes.
+        beside: Page that --recording wrote of another drive in the same city,
+            such as an earlier stage. The page of this drive then shows both
+            drives side by side: when you move in one of them, the other goes to
+            the same place.
     """
     with uninterrupted():
         from cns_drake.command_line.drive_script import run_drive
 
+    if beside is not None and recording is None:
+        raise InputError("--beside: needs --recording, the page to write")
     chosen, weather = choose_returns(returns, fog, rain, snowfall)
     run_drive(
         scenario,
@@ -177,6 +184,7 @@ def simulate(
         imu_rate=imu_rate,
         camera=None if camera is None else _camera_fields(camera),
         recording=recording,
+        beside=beside,
         graphviz=graphviz,
         overwrite=overwrite,
         json=json,

@@ -51,7 +51,7 @@ def reproduce(
     with uninterrupted():
         from cns_drake.base import choose_cluster
         from cns_drake.studies import reproduce_maps
-        from evaluation.command_line import name_tables, suggest_comparison
+        from evaluation.command_line import name_results
 
     cluster = choose_cluster(jobs, scheduler)
     if pages and not recordings:
@@ -72,8 +72,7 @@ def reproduce(
             on_note=note,
         )
     typer.echo(report)
-    name_tables(report.parent)
-    suggest_comparison(report.parent)
+    name_results(report)
 
 
 def study(
@@ -171,7 +170,7 @@ def study(
     with uninterrupted():
         from cns_drake.base import choose_cluster
         from cns_drake.studies import run_study
-        from evaluation.command_line import name_tables, suggest_comparison
+        from evaluation.command_line import name_results
 
     with resumable():
         page = run_study(
@@ -183,5 +182,4 @@ def study(
             on_note=note,
         )
     typer.echo(page)
-    name_tables(output)
-    suggest_comparison(output)
+    name_results(page)

@@ -52,15 +52,14 @@ class StageDifference:
         additional: what exists only in this stage: whole structures, and upper
             parts of structures that are higher in this stage than in the other
             stage.
-        absent: whole structures that exist only in the other stage.
-        lower: upper parts of structures that are lower in this stage than in
-            the other stage, with the shape in the other stage.
+        missing: what exists only in the other stage: whole structures, and
+            upper parts of structures that are lower in this stage, with the
+            shape in the other stage.
     """
 
     common: list[ColouredPart] = field(default_factory=list)
     additional: list[ColouredPart] = field(default_factory=list)
-    absent: list[ColouredPart] = field(default_factory=list)
-    lower: list[ColouredPart] = field(default_factory=list)
+    missing: list[ColouredPart] = field(default_factory=list)
 
 
 def read_parts(world: World) -> dict[str, list[ColouredPart]]:
@@ -119,10 +118,10 @@ def compare_parts(
             continue
         difference.common.extend(parts)
         if height_there > height + _HEIGHT_TOLERANCE:
-            difference.lower.extend(_split_at_height(other[name], height)[1])
+            difference.missing.extend(_split_at_height(other[name], height)[1])
     for name, parts in other.items():
         if name not in own:
-            difference.absent.extend(parts)
+            difference.missing.extend(parts)
     return difference
 
 

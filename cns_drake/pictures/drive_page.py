@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 import contextlib
 from dataclasses import replace
-from html import escape
+from html import escape, unescape
 import logging
 from pathlib import Path
 import re
+from typing import NamedTuple
 import zlib
 
 import numpy as np
@@ -17,31 +18,20 @@ from pydrake import geometry
 from pydrake.geometry import FrameId, Meshcat, MeshcatParams
 from pydrake.math import RigidTransform
 
-from cns_drake.base import write_text
+from cns_drake.base import InputError, read_text, write_text
 from cns_drake.pictures import meshcat_drawing as drawing
-from cns_drake.pictures.city_parts import (
-    ColouredPart,
-    compare_parts,
-    read_parts,
-)
-from cns_drake.pictures.drive_record import DriveRecord
+from cns_drake.pictures.city_parts import compare_parts, read_parts
+from cns_drake.pictures.drive_record import DriveRecord, ScanRecord
 from cns_drake.pictures.page_panel import (
-    CHANGE_RGB,
     ShownStages,
+    fill_template,
     make_panel,
     read_template,
 )
 from cns_drake.scene import PerceptionGeometry, World, read_perception_geometry
 
-# Opacity of absent structures. They are hidden behind present ones, and cast no
-# shadow.
-_OPACITY = 0.45
-_UNREAL = {
-    "castShadow": False,
-    "material.polygonOffset": True,
-    "material.polygonOffsetFactor": 1.0,
-    "material.polygonOffsetUnits": 4.0,
-}
+# Greatest size of a page [bytes].
+_MOST_BYTES = 20_000_000
 # Traffic gets a pose only every so many frames, which keeps pages small. In the
 # tightest turns at 10 m/s, the error between these frames is 0.1 m.
 _TRAFFIC_INTERVAL = 5
@@ -58,24 +48,27 @@ def make_drive_page(
 
     The page has layers, which can be switched on and off:
 
-    - `/city/<class>`: the structures of the stage in their own colours,
+    - `/city/<class>`: the structures that both stages have, in their own
+      colours,
+    - `/before/<class>`, `/after/<class>`: what only the earlier or only the
+      later of two stages has: whole structures, and the upper parts of
+      structures that are higher in one of them,
     - `/vehicle/<body>`, `/moving/<body>`: the moving bodies,
     - `/route`: a ribbon along the route,
-    - `/scans/<k>`: LiDAR points coloured by height; each point appears at the
-      time of its measurement,
-    - `/stage_difference/additional/<class>`: parts of the city that are missing
-      or lower in the other stage; they are not in `/city`,
-    - `/stage_difference/absent/<class>`: structures that exist only in the
-      other stage, translucent red, off when the page opens,
-    - `/stage_difference/lower/<class>`: upper parts, in the other stage, of
-      structures that are lower in this stage, translucent orange, off when the
-      page opens.
+    - `/scans`: the LiDAR points of the latest scan, coloured by height.
 
-    A panel shows the title, the stage and the switches, which are also the
-    legend. The switches let the camera follow the car, hide layers, and show
-    the change (additional parts in violet). Other panels show the images of
-    cameras. Below the time line are plots of the speed and the IMU. On a phone,
-    the panels are one sheet, which is folded when the page opens.
+    The page has every point of the scans that it has. If not all scans fit,
+    they are evenly spaced, and the page says so. A scan is decoded when the
+    play head comes near.
+
+    The camera is behind and above the car, and sees it through whatever is in
+    between. A panel shows the title, the stage, the sensors and the switches,
+    which are also the legend. With the switch "before | after", a divider
+    across the picture has the earlier stage on its left, where what is gone is
+    violet, and the later stage on its right, where what is new is red. Other
+    panels show the images of cameras. Below the time line are plots of the
+    speed and the IMU. On a phone, the panels are one sheet, which is folded
+    when the page opens.
 
     Args:
         drive: what is shown of the drive.
@@ -85,17 +78,80 @@ def make_drive_page(
     """
     with _without_port_message():
         meshcat = geometry.Meshcat(MeshcatParams(host="127.0.0.1", port=0))
-    changes = _draw_city(meshcat, world, shown.other)
+    changes = _draw_city(meshcat, world, shown)
     if len(drive.X_WBs) > 1:
         drawing.draw_route(meshcat, "/route", drive.X_WBs)
     _animate(meshcat, drive, world)
     p_WBset = np.array([X_WB.translation() for X_WB in drive.X_WBs])
     drawing.set_view(meshcat, p_WBset.min(axis=0), p_WBset.max(axis=0))
-    return make_static_page(
-        meshcat,
-        title,
-        body=make_panel(title, drive, changes, shown),
-        script=read_template("drive.js"),
+    start, scene, end = _static_parts(meshcat, title)
+    module = f'<script type="module">{read_template("drive.js")}</script>'
+
+    def panel(scans: ScanRecord) -> str:
+        return make_panel(title, replace(drive, scans=scans), changes, shown)
+
+    rest = start, panel(drive.scans), scene, module, end
+    free = _MOST_BYTES - sum(map(len, rest))
+    # Base64 has four bytes for three.
+    scans = drive.scans.within(3 * free // 4)
+    elements = (
+        f'<script type="text/plain" class="scan"'
+        f' data-time="{scan.frame * drive.period:.3f}"'
+        f' data-origin="{scan.origin[0]},{scan.origin[1]},{scan.origin[2]}"'
+        f' data-grid="{scan.grid:g}">'
+        f"{base64.b64encode(scan.data).decode()}</script>\n"
+        for scan in scans.scans
+    )
+    return "".join([start, panel(scans), scene, *elements, module, end])
+
+
+class OtherPage(NamedTuple):
+    """The page of another drive in the same city.
+
+    Attributes:
+        title: its title.
+        html: its text.
+    """
+
+    title: str
+    html: str
+
+
+def read_drive_page(path: Path, city: str) -> OtherPage:
+    """Reads the page of a drive through a city.
+
+    Args:
+        path: the file.
+        city: name of the city's map, or of the world's file.
+
+    Raises:
+        InputError: the file is not the page of a drive through this city.
+    """
+    html = read_text(path, 2 * _MOST_BYTES)
+    title = re.search(r"<h1>(.*?)</h1>", html)
+    there = re.search(r'<header class="panel" data-city="(.*?)">', html)
+    if title is None or there is None:
+        raise InputError(f"{path}: not the page of a drive")
+    if unescape(there[1]) != city:
+        raise InputError(
+            f"{path}: a drive through {unescape(there[1])}, not {city}"
+        )
+    return OtherPage(unescape(title[1]), html)
+
+
+def make_pair_page(first: OtherPage, second: OtherPage) -> str:
+    """Returns a page of two drives side by side, each at the other's place.
+
+    Args:
+        first, second: pages of drives through the same city.
+    """
+    return fill_template(
+        "pair.html",
+        titles=(first.title, second.title),
+        pages=[
+            base64.b64encode(zlib.compress(one.html.encode(), 1)).decode()
+            for one in (first, second)
+        ],
     )
 
 
@@ -116,41 +172,30 @@ def moving_frames(world: World) -> tuple[FrameId, ...]:
 
 
 def _draw_city(
-    meshcat: geometry.Meshcat, world: World, other_stage: World | None
+    meshcat: geometry.Meshcat, world: World, shown: ShownStages
 ) -> set[str]:
-    """Draws static structures; returns the kinds of change that exist."""
+    """Draws static structures; returns which of `before`, `after` exist."""
     own = read_parts(world)
-    other = own if other_stage is None else read_parts(other_stage)
+    other = own if shown.other is None else read_parts(shown.other)
     difference = compare_parts(own, other)
     drawing.draw_parts(meshcat, "/city", difference.common)
-    drawing.draw_parts(
-        meshcat, "/stage_difference/additional", difference.additional
-    )
-    _draw_missing(meshcat, "absent", difference.absent)
-    _draw_missing(meshcat, "lower", difference.lower)
-    return {name for name in CHANGE_RGB if getattr(difference, name)}
-
-
-def _draw_missing(
-    meshcat: geometry.Meshcat, name: str, parts: Sequence[ColouredPart]
-) -> None:
-    """Draws parts that only the other stage has; they are hidden at first."""
-    if not parts:
-        return
-    path = f"/stage_difference/{name}"
-    drawing.draw_parts(
-        meshcat, path, parts, geometry.Rgba(*CHANGE_RGB[name], _OPACITY)
-    )
-    for semantic_class in {part.semantic_class for part in parts}:
-        for key, value in _UNREAL.items():
-            meshcat.SetProperty(f"{path}/{semantic_class}/<object>", key, value)
-    meshcat.SetProperty(path, "visible", False)
+    drawn = set()
+    for here, parts in (
+        (True, difference.additional),
+        (False, difference.missing),
+    ):
+        if parts:
+            name = "before" if here != shown.is_earlier else "after"
+            drawn.add(name)
+            drawing.draw_parts(meshcat, f"/{name}", parts)
+            meshcat.SetProperty(f"/{name}", "visible", here)
+    return drawn
 
 
 def _animate(
     meshcat: geometry.Meshcat, drive: DriveRecord, world: World
 ) -> None:
-    """Draws moving bodies and scans, and animates them over the drive."""
+    """Draws moving bodies, and animates them over the drive."""
     animation = geometry.MeshcatAnimation(frames_per_second=1.0 / drive.period)
     # Frame of each limb -> the frame that leads it, and the pose of the limb in
     # it.
@@ -176,12 +221,6 @@ def _animate(
             animation.SetTransform(frame, path, X_WFs[frame])
     # The script of the page places it.
     drawing.draw_marker(meshcat)
-    for k, (frame, p_WRset) in enumerate(drive.scans):
-        path = f"/scans/{k:03d}"
-        drawing.draw_points(meshcat, path, p_WRset)
-        if frame > 0:
-            animation.SetProperty(0, path, "visible", False)
-            animation.SetProperty(frame, path, "visible", True)
     animation.set_autoplay(True)
     animation.set_loop_mode(geometry.MeshcatAnimation.LoopMode.kLoopOnce)
     animation.set_clamp_when_finished(True)
@@ -252,9 +291,7 @@ _QUEUE = """
 """.replace("ROW", str(_ROW))
 
 
-def make_static_page(
-    meshcat: Meshcat, title: str, *, body: str = "", script: str = ""
-) -> str:
+def make_static_page(meshcat: Meshcat, title: str) -> str:
     """Returns a Meshcat scene as a web page that needs no server.
 
     The page is Drake's page with compressed commands, so that a city takes a
@@ -264,9 +301,16 @@ def make_static_page(
     Args:
         meshcat: the server with the scene.
         title: title of the page, plain text.
-        body: HTML that precedes the scene and is visible while the scene loads.
-        script: JavaScript module that runs when the page is ready. In this
-            module, `commands` is a JavaScript promise of the scene's commands.
+    """
+    return "".join(_static_parts(meshcat, title))
+
+
+def _static_parts(meshcat: Meshcat, title: str) -> tuple[str, str, str]:
+    """Returns the start of the page of a scene, the scene, and the end.
+
+    HTML between the start and the scene is visible while the scene loads. A
+    JavaScript module between the scene and the end runs when the page is ready.
+    In this module, `commands` is a JavaScript promise of the scene's commands.
     """
     html = meshcat.StaticHtml()
     first = _COMMAND.search(html)
@@ -278,15 +322,16 @@ def make_static_page(
     head = html[: first.start()]
     rest = _COMMAND.sub(_compressed, html[first.start() :])
     viewport = '<meta name="viewport" content="width=device-width">'
-    head = _replace(
-        head,
-        "<title>Drake MeshCat</title>",
-        f"<title>{escape(title)}</title>\n  {viewport}",
+    start, library = _split(
+        _replace(
+            head,
+            "<title>Drake MeshCat</title>",
+            f"<title>{escape(title)}</title>\n  {viewport}",
+        ),
+        "<body>",
     )
-    head = _replace(head, "<body>", f"<body>\n{body}")
-    module = f'<script type="module">{script}</script>'
-    rest = _replace(rest, "</body>", f"{module}\n</body>")
-    return head + _QUEUE + rest
+    scene, end = _split(rest, "</body>")
+    return f"{start}<body>\n", library + _QUEUE + scene, f"\n</body>{end}"
 
 
 def save_meshcat_page(
@@ -336,6 +381,11 @@ def _compressed(command: re.Match) -> str:
 
 
 def _replace(html: str, old: str, new: str) -> str:
-    if html.count(old) != 1:
-        raise RuntimeError(f"Drake's Meshcat page must have exactly one {old}")
-    return html.replace(old, new)
+    return new.join(_split(html, old))
+
+
+def _split(html: str, mark: str) -> tuple[str, str]:
+    if html.count(mark) != 1:
+        raise RuntimeError(f"Drake's Meshcat page must have exactly one {mark}")
+    before, _, after = html.partition(mark)
+    return before, after

@@ -1,10 +1,113 @@
 """What is recorded of a drive for its web page."""
 
 from dataclasses import dataclass, field
+import math
+from typing import NamedTuple
+import zlib
 
 import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
+
+# Scans that are kept while the drive is recorded; no page has more [bytes].
+_MOST_KEPT = 26_000_000
+# Points are rounded to a grid of 2 cm, about the noise of a LiDAR.
+_GRID = 0.02
+_LEVEL = 4
+
+
+class PackedScan(NamedTuple):
+    """All points of a scan, as the page holds them.
+
+    Attributes:
+        frame: index of the frame.
+        num_points: number N of points.
+        origin: point of W from which the points are counted [m].
+        grid: step of the coordinates [m].
+        data: deflated bytes, 6 N before. The points go along one ring after the
+            other. Each coordinate is the difference from the point before, as
+            int16 modulo 2^16, with the sign in the lowest bit. First come the
+            low bytes of all x, then their high bytes, then y and z.
+    """
+
+    frame: int
+    num_points: int
+    origin: tuple[int, int, int]
+    grid: float
+    data: bytes
+
+
+def pack_scan(
+    frame: int, p_WRset: np.ndarray, rings: np.ndarray, p_WB: np.ndarray
+) -> PackedScan:
+    """Returns a scan as the page holds it.
+
+    Args:
+        frame: index of the frame.
+        p_WRset: (N, 3) points in W [m].
+        rings: (N,) ring of each point; points of a ring in their order of time.
+        p_WB: (3,) where the vehicle is [m].
+    """
+    origin = np.round(p_WB).astype(int)
+    p_ORset = (p_WRset - origin)[np.argsort(rings, kind="stable")]
+    grid = _GRID
+    while np.abs(p_ORset).max(initial=0.0) > 32_000 * grid:
+        grid *= 2.0
+    steps = np.diff(
+        np.round(p_ORset / grid).astype("<i2"),
+        axis=0,
+        prepend=np.zeros((1, 3), "<i2"),
+    )
+    signless = ((steps << 1) ^ (steps >> 15)).astype("<u2")
+    planes = signless.view(np.uint8).reshape(-1, 6).T.tobytes()
+    x, y, z = origin.tolist()
+    return PackedScan(
+        frame, len(p_WRset), (x, y, z), grid, zlib.compress(planes, _LEVEL)
+    )
+
+
+@dataclass
+class ScanRecord:
+    """Evenly spaced scans of a drive, each whole.
+
+    Attributes:
+        num_frames: number of frames that the drive will have, if known.
+        stride: one scan in so many frames is kept.
+        scans: the scans.
+    """
+
+    num_frames: int | None = None
+    stride: int = 1
+    scans: list[PackedScan] = field(default_factory=list)
+
+    def wants(self, frame: int) -> bool:
+        """Returns whether the scan of a frame is one of the kept."""
+        return frame % self.stride == 0
+
+    def add(self, scan: PackedScan) -> None:
+        """Adds a scan, and keeps fewer of them if they become too large."""
+        self.scans.append(scan)
+        if len(self.scans) == 1 and self.num_frames is not None:
+            expected = self.num_frames * len(scan.data)
+            self.stride = max(1, math.ceil(expected / _MOST_KEPT))
+        if sum(len(one.data) for one in self.scans) > _MOST_KEPT:
+            del self.scans[1::2]
+            self.stride *= 2
+
+    def within(self, num_bytes: int) -> "ScanRecord":
+        """Returns as many scans as fit, evenly spaced, and at least the first.
+
+        Args:
+            num_bytes: greatest size of all scans, deflated.
+        """
+        step = 1
+        while step < len(self.scans) and num_bytes < sum(
+            len(one.data) for one in self.scans[::step]
+        ):
+            step += 1
+        return ScanRecord(
+            self.num_frames, step * self.stride, self.scans[::step]
+        )
 
 
 @dataclass(frozen=True)
@@ -15,12 +118,11 @@ class DriveRecord:
         period: time between frames [s].
         X_WBs: poses of the vehicle.
         X_WFs: id of a geometry frame that moves -> its poses.
-        scans: for each scan to show, the index of the frame, and the positions
-            (N, 3) of the points in W [m].
+        scans: the scans.
+        sensors: a line of text for each sensor.
         speeds: forward speed of the vehicle [m/s].
         specific_forces_I: specific force in the IMU's frame I [m/s^2].
         angular_velocities_I: angular velocity w_WI_I [rad/s].
-        num_points: number of points in each scan as measured.
         limbs: maps the id of each moving object's root frame to the parts of
             the object. The parts map the id of a geometry frame to its constant
             pose in the root frame. Only the poses of the root frame are
@@ -33,11 +135,11 @@ class DriveRecord:
     period: float
     X_WBs: list[RigidTransform] = field(default_factory=list)
     X_WFs: dict[FrameId, list[RigidTransform]] = field(default_factory=dict)
-    scans: list[tuple[int, np.ndarray]] = field(default_factory=list)
+    scans: ScanRecord = field(default_factory=ScanRecord)
+    sensors: tuple[str, ...] = ()
     speeds: list[float] = field(default_factory=list)
     specific_forces_I: list[np.ndarray] = field(default_factory=list)
     angular_velocities_I: list[np.ndarray] = field(default_factory=list)
-    num_points: list[int] = field(default_factory=list)
     limbs: dict[FrameId, dict[FrameId, RigidTransform]] = field(
         default_factory=dict
     )

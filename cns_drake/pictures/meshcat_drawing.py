@@ -1,4 +1,4 @@
-"""Draws a city in daylight, a route and scans into a Meshcat scene."""
+"""Draws a city and a route into a Meshcat scene."""
 
 from collections.abc import Iterable, Sequence
 
@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import DTypeLike
 from pydrake.geometry import Meshcat, MeshcatCone, Rgba
 from pydrake.math import RigidTransform
-from pydrake.perception import BaseField, Fields, PointCloud
 
 from cns_drake.base import distances_along
 from cns_drake.pictures.city_parts import DEFAULT_RGB, ColouredPart
@@ -17,9 +16,9 @@ from cns_drake.scene import (
     merge_triangles,
 )
 
-# Vertices are rounded to an invisible grid of 4 mm, because the zeros at the
+# Vertices are rounded to an invisible grid of 16 mm, because the zeros at the
 # end of each float compress well.
-_VERTEX_GRID = 2.0**-8
+_VERTEX_GRID = 2.0**-6
 
 # One colour, since points have a colour map.
 ROUTE_RGB = (1.0, 0.75, 0.0)
@@ -33,8 +32,6 @@ _MARKER_HEIGHT = 7.0
 _MARKER_RADIUS = 2.5
 _MARKER_RGBA = Rgba(1.0, 0.75, 0.0)
 
-# Size of a point [pixels].
-_POINT_PIXELS = 2.0
 # Heights above the map's zero with the first and the last colour of points [m].
 POINT_HEIGHTS = (0.0, 25.0)
 # Number of colours between them.
@@ -148,32 +145,15 @@ def height_rgb(z: np.ndarray) -> np.ndarray:
     lowest, highest = POINT_HEIGHTS
     level = np.clip((z - lowest) / (highest - lowest), 0.0, 1.0)
     level = np.round(level * (_NUM_COLORS - 1)) / (_NUM_COLORS - 1)
-    # Without the dark ends of the colour map, which look much like asphalt and
-    # brick.
-    return colormaps["turbo"](0.15 + 0.75 * level)[:, :3]
-
-
-def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
-    """Draws points, coloured by height.
-
-    All points have the same size on the screen, whatever their distance.
-
-    Args:
-        meshcat: Meshcat's server.
-        path: path in Meshcat of the points.
-        p_WRset: (N, 3) points in W [m].
-    """
-    cloud = PointCloud(len(p_WRset), Fields(BaseField.kXYZs | BaseField.kRGBs))
-    cloud.mutable_xyzs()[:] = _on_grid(p_WRset).T
-    rgb = _linear_light(height_rgb(p_WRset[:, 2]))
-    cloud.mutable_rgbs()[:] = np.round(255.0 * rgb).T
-    meshcat.SetObject(path, cloud, point_size=_POINT_PIXELS)
-    meshcat.SetProperty(path, "color", _WHITE)
-    meshcat.SetProperty(f"{path}/<object>", "material.sizeAttenuation", False)
+    # Without the dark half of the colour map, which looks much like asphalt and
+    # brick, and like a city at night.
+    return colormaps["viridis"](0.5 + 0.5 * level)[:, :3]
 
 
 def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
-    """Lights a scene as in daylight; sets a view from the south and above.
+    """Lights a scene as at dusk; sets a view from the south and above.
+
+    The scene is dim, so that the points of a LiDAR stand out from it.
 
     Args:
         meshcat: Meshcat's server with the scene.
@@ -183,8 +163,8 @@ def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetProperty("/Axes", "visible", False)
     background = "/Background/<object>"
-    meshcat.SetProperty(background, "top_color", [0.42, 0.60, 0.84])
-    meshcat.SetProperty(background, "bottom_color", [0.90, 0.93, 0.96])
+    meshcat.SetProperty(background, "top_color", [0.03, 0.05, 0.08])
+    meshcat.SetProperty(background, "bottom_color", [0.12, 0.16, 0.21])
     _set_lights(meshcat, lower, upper)
     center = (lower + upper) / 2.0
     reach = float(np.linalg.norm((upper - lower)[:2])) / 2.0
@@ -203,9 +183,9 @@ def _set_lights(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
     # These lamps are near the origin and would light one block only.
     for lamp in ("SpotLight", "PointLightNegativeX", "PointLightPositiveX"):
         meshcat.SetProperty(f"/Lights/{lamp}", "visible", False)
-    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.6)
+    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.0)
     sun = "/Lights/FillLight/<object>"
-    meshcat.SetProperty(sun, "intensity", 2.6)
+    meshcat.SetProperty(sun, "intensity", 1.1)
     # The sun shines towards the origin, and casts shadows in a box along its
     # rays. The box must contain the whole view.
     low = np.array([*(lower[:2] - _SHADOW_MARGIN), lower[2] - 10.0])

@@ -14,21 +14,25 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
 
 from cns_drake.base import to_jpeg, write_text
-from cns_drake.pictures.drive_page import make_drive_page, moving_frames
-from cns_drake.pictures.drive_record import DriveRecord
+from cns_drake.pictures.drive_page import (
+    OtherPage,
+    make_drive_page,
+    make_pair_page,
+    moving_frames,
+)
+from cns_drake.pictures.drive_record import (
+    DriveRecord,
+    ScanRecord,
+    pack_scan,
+)
 from cns_drake.pictures.page_panel import ShownStages
 from cns_drake.scene import World
+from cns_drake.units import MOST_RINGS
 
-# These limits keep the page of any drive below 25 MB.
-_MAX_SCANS = 160
-_MAX_POINTS_PER_SCAN = 3000
 # Greatest number of images per camera.
 _MAX_IMAGES = 200
 # Longer side of an image [pixels].
 _IMAGE_SIDE = 400
-# One point is kept per cube of this size [m]. Otherwise nearly all points would
-# lie on the rings of ground around the vehicle.
-_THINNING_SIZE = 0.5
 
 
 class MeshcatRecorder(LeafSystem):
@@ -53,8 +57,8 @@ class MeshcatRecorder(LeafSystem):
     in S; `<camera>_image` is an ImageRgba8U.
 
     The poses of all moving frames are recorded at every frame. Scans are
-    recorded whenever the vehicle has driven another `scan_spacing` metres. On a
-    long drive, this spacing is doubled whenever the page has too many scans.
+    recorded with all of their points, of as many evenly spaced frames as a page
+    can hold.
 
     Attributes:
         drive: what was recorded so far.
@@ -68,7 +72,7 @@ class MeshcatRecorder(LeafSystem):
         period: float,
         num_frames: int | None = None,
         shown: ShownStages | None = None,
-        scan_spacing: float = 15.0,
+        sensors: Sequence[str] = (),
         cameras: Mapping[str, int] = MappingProxyType({}),
     ):
         """Declares the ports and the schedule.
@@ -79,7 +83,7 @@ class MeshcatRecorder(LeafSystem):
             period: time between two frames [s].
             num_frames: number of frames that are recorded; all if None.
             shown: stages whose differences the page shows; None for none.
-            scan_spacing: distance driven between two shown scans [m].
+            sensors: a line of text for each sensor.
             cameras: name of a camera -> number of frames from one image to the
                 next.
         """
@@ -87,11 +91,12 @@ class MeshcatRecorder(LeafSystem):
         self._world = world
         self._shown = shown or ShownStages()
         self._X_BSs = dict(X_BSs)
-        self._scan_spacing = scan_spacing
-        self._distance_to_scan = 0.0
         self._num_frames = num_frames
         self.drive = DriveRecord(
-            period, X_WFs={frame_id: [] for frame_id in moving_frames(world)}
+            period,
+            X_WFs={frame_id: [] for frame_id in moving_frames(world)},
+            scans=ScanRecord(num_frames),
+            sensors=tuple(sensors),
         )
 
         self._geometry_query = self.DeclareAbstractInputPort(
@@ -134,13 +139,27 @@ class MeshcatRecorder(LeafSystem):
         self.drive.names[leading] = name
         self.drive.limbs[leading] = dict.fromkeys(frames, RigidTransform())
 
-    def save(self, path: Path, *, title: str = "cns-drake") -> None:
+    def save(
+        self,
+        path: Path,
+        *,
+        title: str = "cns-drake",
+        beside: OtherPage | None = None,
+    ) -> None:
         """Writes the web page of the drive as recorded so far.
+
+        Args:
+            path: the file.
+            title: title of the page.
+            beside: page of another drive in the same city, to show it on the
+                left of this one.
 
         Raises:
             InputError: if the file cannot be written.
         """
         page = make_drive_page(self.drive, self._world, self._shown, title)
+        if beside is not None:
+            page = make_pair_page(beside, OtherPage(title, page))
         write_text(path, page)
 
     def _publish(self, context: Context) -> EventStatus:
@@ -166,14 +185,11 @@ class MeshcatRecorder(LeafSystem):
         self.drive.angular_velocities_I.append(
             self._angular_velocity.Eval(context).copy()
         )
-        X_WBs = self.drive.X_WBs
-        if X_WBs:
-            step = X_WB.translation() - X_WBs[-1].translation()
-            self._distance_to_scan -= float(np.linalg.norm(step))
-        X_WBs.append(X_WB)
-        if self._distance_to_scan <= 0.0:
-            self._take_scan(context, X_WB)
-        self._take_images(context, len(X_WBs) - 1)
+        frame = len(self.drive.X_WBs)
+        self.drive.X_WBs.append(X_WB)
+        if self.drive.scans.wants(frame):
+            self._take_scan(context, frame, X_WB)
+        self._take_images(context, frame)
         return EventStatus.Succeeded()
 
     def _take_images(self, context: Context, frame: int) -> None:
@@ -190,34 +206,23 @@ class MeshcatRecorder(LeafSystem):
                 del images[1::2]
                 self._cameras[name] *= 2
 
-    def _take_scan(self, context: Context, X_WB: RigidTransform) -> None:
-        p_WRset = np.concatenate(
-            [
-                _positions(X_WB @ self._X_BSs[name], scan.Eval(context))
-                for name, scan in self._scans.items()
-            ]
+    def _take_scan(
+        self, context: Context, frame: int, X_WB: RigidTransform
+    ) -> None:
+        p_WRsets, rings = [np.empty((0, 3))], [np.empty(0, int)]
+        for k, (name, port) in enumerate(self._scans.items()):
+            scan = port.Eval(context)
+            X_WS = X_WB @ self._X_BSs[name]
+            p_SRset = np.column_stack([scan["x"], scan["y"], scan["z"]])
+            p_WRsets.append(
+                p_SRset @ X_WS.rotation().matrix().T + X_WS.translation()
+            )
+            rings.append(scan["ring"].astype(int) + k * MOST_RINGS)
+        self.drive.scans.add(
+            pack_scan(
+                frame,
+                np.concatenate(p_WRsets),
+                np.concatenate(rings),
+                X_WB.translation(),
+            )
         )
-        frame = len(self.drive.X_WBs) - 1
-        self.drive.num_points.append(len(p_WRset))
-        self.drive.scans.append((frame, _thinned(p_WRset)))
-        if len(self.drive.scans) > _MAX_SCANS:
-            del self.drive.scans[1::2]
-            self._scan_spacing *= 2.0
-        self._distance_to_scan = self._scan_spacing
-
-
-def _positions(X_WS: RigidTransform, scan: np.ndarray) -> np.ndarray:
-    """Returns the positions (N, 3) of a scan's points in W [m]."""
-    p_SRset = np.column_stack([scan["x"], scan["y"], scan["z"]])
-    return p_SRset @ X_WS.rotation().matrix().T + X_WS.translation()
-
-
-def _thinned(p_WRset: np.ndarray) -> np.ndarray:
-    """Returns an evenly spread part of points (N, 3)."""
-    cubes = np.floor(p_WRset / _THINNING_SIZE).astype(np.int64)
-    _, first = np.unique(cubes, axis=0, return_index=True)
-    count = min(len(first), _MAX_POINTS_PER_SCAN)
-    # Points are dropped evenly from the sorted cubes, and thus evenly on all
-    # sides.
-    kept = first[np.linspace(0, len(first) - 1, count).astype(int)]
-    return p_WRset[np.sort(kept)]

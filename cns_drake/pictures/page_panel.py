@@ -7,27 +7,21 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from importlib import resources
 import math
+from typing import Any
 
 import numpy as np
 
 from cns_drake.base import length_of
 from cns_drake.pictures import meshcat_drawing as drawing
-from cns_drake.pictures.drive_record import DriveRecord
+from cns_drake.pictures.drive_record import DriveRecord, ScanRecord
 from cns_drake.scene import World
 
 Rgb = tuple[float, float, float]
 
-# Kind of change -> its colour.
+# Side of the divider -> colour of what only this side has.
 CHANGE_RGB: dict[str, Rgb] = {
-    "absent": (0.86, 0.08, 0.20),
-    "lower": (0.96, 0.50, 0.05),
-    "additional": (0.60, 0.42, 0.92),
-}
-# Kind of change -> its text in the legend.
-_CHANGE_TEXTS = {
-    "absent": "not here, but in {other}",
-    "lower": "higher in {other}",
-    "additional": "not in {other}, or lower there",
+    "before": (0.66, 0.48, 1.0),
+    "after": (1.0, 0.30, 0.26),
 }
 # Greatest number of samples in a plot; more would not be visible.
 _MAX_SAMPLES = 400
@@ -54,14 +48,24 @@ class ShownStages:
         other: a stage with which the stage of the drive is compared; None to
             show no differences.
         other_name: name of this other stage.
+        is_earlier: whether the other stage is the earlier one.
         stage: name of the stage of the drive; None if the drive has no map.
         stages: names of all stages of the map, the earliest first.
+        city: name of the map, or of the world's file.
     """
 
     other: World | None = None
     other_name: str = "the other stage"
+    is_earlier: bool = False
     stage: str | None = None
     stages: Sequence[str] = ()
+    city: str = ""
+
+    def sides(self) -> tuple[str, str]:
+        """Returns the names of the earlier and of the later stage."""
+        own = "this drive" if self.stage is None else f"stage {self.stage}"
+        names = own, self.other_name
+        return names[::-1] if self.is_earlier else names
 
 
 def make_panel(
@@ -72,11 +76,10 @@ def make_panel(
     Args:
         title: title of the page.
         drive: record of the drive.
-        changes: kinds of change that the page shows, keys of `CHANGE_RGB`.
+        changes: what the page shows of a change, keys of `CHANGE_RGB`.
         shown: the stages of the city that the page shows.
     """
     # Only pages need templates, and the import takes a moment.
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     p_WBset = np.array([X_WB.translation() for X_WB in drive.X_WBs])
@@ -87,26 +90,21 @@ def make_panel(
     metres = round(length)
     way = f"{metres} m" if metres < 1000 else f"{length / 1000.0:.2f} km"
     lowest, highest = drawing.POINT_HEIGHTS
-    environment = Environment(
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
-    return environment.from_string(read_template("panel.html")).render(
+    return fill_template(
+        "panel.html",
         style=Markup(read_template("drive.css")),
         title=title,
         facts=f"{way} in {took}",
-        points=_gradient(drawing.height_rgb(np.linspace(lowest, highest, 9))),
-        heights=f"{lowest:g} to {highest:g} m",
+        points=",".join(
+            map(_hex, drawing.height_rgb(np.linspace(lowest, highest, 9)))
+        ),
+        heights=(f"{lowest:g}", f"{highest:g}"),
         route=_hex(drawing.ROUTE_RGB),
         colours={name: _hex(rgb) for name, rgb in CHANGE_RGB.items()},
-        changes={
-            name: words.format(other=shown.other_name)
-            for name, words in _CHANGE_TEXTS.items()
-            if name in changes
-        },
-        shown_points=_shown_points(drive),
+        changes=changes,
+        sides=shown.sides(),
+        scans=_scans_text(drive.scans),
+        sensors=drive.sensors,
         plots=motion_plots(drive),
         times=_time_scale(duration),
         traffic=bool(drive.names),
@@ -119,28 +117,39 @@ def make_panel(
         },
         stage=shown.stage,
         stages=shown.stages,
+        city=shown.city,
     )
 
 
-def _shown_points(drive: DriveRecord) -> str:
-    """Returns a sentence that says which part of the points the page shows."""
-    if not drive.num_points:
+def fill_template(name: str, **values: Any) -> str:
+    """Returns a template of the page, filled in."""
+    # Only pages need templates, and the import takes a moment.
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    return environment.from_string(read_template(name)).render(**values)
+
+
+def _scans_text(record: ScanRecord) -> str:
+    """Returns a sentence that says which scans the page shows."""
+    if not record.scans:
         return ""
-    most = max(len(p_WRset) for _, p_WRset in drive.scans)
-    return (
-        f"Shown: {len(drive.scans)} of {len(drive.X_WBs)} scans, up to "
-        f"{most:,} of {max(drive.num_points):,} points"
+    most = max(scan.num_points for scan in record.scans)
+    part = (
+        "Every scan" if record.stride == 1 else f"One scan in {record.stride}"
     )
+    return f"{part}, every point: up to {most:,} a scan"
 
 
 def read_template(name: str) -> str:
     """Returns a file of the page, such as `drive.js`."""
     folder = resources.files("cns_drake.pictures") / "page_template"
     return (folder / name).read_text(encoding="utf-8")
-
-
-def _gradient(colours: Sequence[np.ndarray] | np.ndarray) -> str:
-    return f"linear-gradient(90deg, {', '.join(map(_hex, colours))})"
 
 
 def _hex(rgb: Rgb | np.ndarray) -> str:

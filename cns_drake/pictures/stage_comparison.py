@@ -3,7 +3,7 @@
 from cns_drake.scenarios import Scenario
 
 
-def other_stage(scenario: Scenario) -> tuple[Scenario | None, str]:
+def other_stage(scenario: Scenario) -> tuple[Scenario | None, str, bool]:
     """Returns a drive's scenario in another stage, and that stage's name.
 
     The other stage is the map's last stage or, for a drive in the last stage,
@@ -11,14 +11,16 @@ def other_stage(scenario: Scenario) -> tuple[Scenario | None, str]:
     stage is the drive's own stage with these structures.
 
     Returns:
-        The scenario in the other stage, and the stage's name for the page; None
-        and "" if there is no other stage.
+        The scenario in the other stage, the stage's name for the page, and
+        whether it is the earlier stage; None, "" and False if there is no other
+        stage.
     """
     if scenario.without:
-        return scenario.replaced(without=()), "the whole city"
+        return scenario.replaced(without=()), "the whole city", True
     stages = list(scenario.folder.stages())
     others = [stage for stage in stages if stage != scenario.stage]
     if scenario.stage is None or not others:
-        return None, ""
+        return None, "", False
     stage = others[-1] if stages[-1] in others else others[0]
-    return scenario.replaced(stage=stage), f"stage {stage}"
+    is_earlier = stages.index(stage) < stages.index(scenario.stage)
+    return scenario.replaced(stage=stage), f"stage {stage}", is_earlier

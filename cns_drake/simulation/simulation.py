@@ -18,7 +18,12 @@ from cns_drake.base import (
     interrupts_wait,
     write_text,
 )
-from cns_drake.pictures import MeshcatRecorder, ShownStages, other_stage
+from cns_drake.pictures import (
+    MeshcatRecorder,
+    ShownStages,
+    other_stage,
+    read_drive_page,
+)
 from cns_drake.recording import (
     START_NS,
     BackgroundWriter,
@@ -40,8 +45,10 @@ from cns_drake.scenarios import (
 from cns_drake.scene import FileWatch
 from cns_drake.sensors import (
     KALIBR_FILE,
+    SpinningPattern,
     check_renderer,
     describe_unit,
+    make_pattern,
     optical_pose,
     sensor_pose,
 )
@@ -95,6 +102,7 @@ def simulate(
     output: Path | str,
     *,
     page_file: Path | str | None = None,
+    beside: Path | str | None = None,
     graphviz_file: Path | str | None = None,
     overwrite: bool = False,
     num_threads: int = 1,
@@ -110,6 +118,8 @@ def simulate(
         scenario: the scenario to run.
         output: folder for recordings.
         page_file: file for a web page of the drive, if any.
+        beside: page of another drive in the same city; `page_file` then shows
+            both drives side by side, at the same place.
         graphviz_file: file for the Diagram as Graphviz text, if any.
         overwrite: whether to replace an existing recording of the same name.
         num_threads: number of threads that cast the rays of a LiDAR. The
@@ -138,6 +148,11 @@ def simulate(
         for file in (page_file, graphviz_file):
             if file is not None:
                 check_writable(file)
+        other = None
+        if beside is not None:
+            if page_file is None:
+                raise InputError("beside: only with a page")
+            other = read_drive_page(Path(beside), _city(scenario))
         RecordingFolder(folder).check(overwrite)
         check_folder_writable(folder.parent)
         plan = DrivePlan(scenario)
@@ -180,7 +195,7 @@ def simulate(
         finished = time.perf_counter()
         if page is not None and page_file is not None:
             doing("writing the page of the drive")
-            page.save(page_file, title=scenario.name)
+            page.save(page_file, title=scenario.name, beside=other)
     return FinishedSimulation(
         name=scenario.name,
         folder=folder,
@@ -269,7 +284,7 @@ def _fingerprint(drive: LoadedDrive, inputs: dict[str, str]) -> str:
 
 def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
     scenario = drive.scenario
-    other, other_name = other_stage(scenario)
+    other, other_name, is_earlier = other_stage(scenario)
     stage = scenario.stage
     stages = () if stage is None else tuple(scenario.folder.stages())
     return MeshcatRecorder(
@@ -280,14 +295,45 @@ def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
         shown=ShownStages(
             None if other is None else load_stage(DrivePlan(other)),
             other_name,
+            is_earlier,
             stage,
             stages,
+            _city(scenario),
         ),
+        sensors=_sensor_texts(scenario),
         cameras={
             name: round(1 / (scenario.frame_period * camera.rate))
             for name, camera in scenario.cameras.items()
         },
     )
+
+
+def _city(scenario: Scenario) -> str:
+    """Returns the name of a scenario's map, or of its world's file."""
+    return Path(scenario.map or scenario.world or "").name
+
+
+def _sensor_texts(scenario: Scenario) -> list[str]:
+    """Returns a line for each LiDAR and camera of a drive."""
+    texts = []
+    for name, lidar in scenario.lidars.items():
+        model = lidar.preset or "LiDAR of a data sheet"
+        pattern = make_pattern(lidar)
+        beams = len(pattern.beams(0).d_Sset)
+        if isinstance(pattern, SpinningPattern):
+            rings = pattern.num_rings
+            beams_text = f"{rings} rings × {beams // rings} columns"
+        else:
+            beams_text = f"{beams:,} beams a scan"
+        texts.append(
+            f"{name}: {model}, {beams_text}, {pattern.min_range:g} to "
+            f"{pattern.max_range:g} m, {lidar.rate} Hz"
+        )
+    for name, camera in scenario.cameras.items():
+        texts.append(
+            f"{name}: {camera.width} × {camera.height} pixels, {camera.rate} Hz"
+        )
+    return texts
 
 
 def _simulate_frames(

@@ -38,8 +38,7 @@ def report(
     """
     from cns_drake.base import choose_cluster
     from evaluation.command_line.suggestions import (
-        name_tables,
-        suggest_comparison,
+        name_results,
     )
     from evaluation.study import (
         choose_methods,
@@ -66,5 +65,4 @@ def report(
         on_note=terminal.note,
     )
     print(page)
-    name_tables(page.parent)
-    suggest_comparison(page.parent)
+    name_results(page)

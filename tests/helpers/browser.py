@@ -154,7 +154,14 @@ class Browser:
 
     def click(self, x: float, y: float) -> None:
         """Clicks on a point of the screen."""
-        for kind in ("mousePressed", "mouseReleased"):
+        self.drag((x, y))
+
+    def drag(self, *places: tuple[float, float]) -> None:
+        """Presses the mouse at the first place, and releases it at the last."""
+        kinds = ["mousePressed", *["mouseMoved"] * (len(places) - 1)]
+        for kind, (x, y) in zip(
+            [*kinds, "mouseReleased"], [*places, places[-1]], strict=True
+        ):
             self._send(
                 "Input.dispatchMouseEvent",
                 type=kind,

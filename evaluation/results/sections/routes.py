@@ -4,13 +4,12 @@ import base64
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import io
-import itertools
 
 from markupsafe import Markup
-from matplotlib import colormaps, image
-from matplotlib.colors import to_hex
+from matplotlib import image
 import numpy as np
 
+from cns_drake.base import distances_along
 from evaluation.drives import sample_frames
 from evaluation.results.page_frame import PageSection, page_section, rendered
 from evaluation.results.sections.camera_images import CameraImages
@@ -33,12 +32,8 @@ _MARGIN = 60.0
 _WEBP_QUALITY = 75
 # Between the points of a drawn route [m].
 _ROUTE_STEP = 2.0
-# Red at the start and blue at the end, as in the paper.
-_ROUTE_COLOURS = "turbo_r"
-# Number of colours in the legend of a route.
-_LEGEND_COLOURS = 9
-# Number of pieces of one colour in a drawn route.
-_NUM_PIECES = 48
+# Number of arrow heads on a drawn route.
+_NUM_ARROWS = 12
 # Size of the marks of start and end, as a part of the picture.
 _MARK = 0.016
 # Distance of the scale bar from the edges, as a part of the picture.
@@ -128,7 +123,6 @@ def routes_section(
         drives_of_maps=drives_of_maps,
         pages=pages,
         picture=_route_picture,
-        colours=_colours(_LEGEND_COLOURS),
         bar_length=round(_BAR_LENGTH),
     )
 
@@ -154,7 +148,8 @@ def _top_view(points: np.ndarray, positions: np.ndarray) -> Picture:
 def _route_picture(drive: PageDrive) -> Markup:
     """Returns a drive's route on its map from above, as an SVG element.
 
-    The route is red at its start and blue at its end. One unit is one metre;
+    Arrow heads show its direction, and numbers its kilometres. One unit is one
+    metre;
     the x axis is directed to the right, the y axis downwards. The picture of
     the map is an element `image` with the id `view-<name of the drive>`, which
     the query browser uses as well.
@@ -167,28 +162,34 @@ def _route_picture(drive: PageDrive) -> Markup:
     (x0, y0), (x1, y1) = route[0], route[-1]
     end, base = right - _INSET * width, -bottom - _INSET * height
     mark = [[x0, y0 - size], [x0 - size, y0 + size], [x0 + size, y0 + size]]
-    # Pieces are joined at their ends.
-    last = len(route) - 1
-    num = min(_NUM_PIECES, max(last, 1))
-    ends = np.linspace(0, last, num + 1).astype(int)
-    pieces = [route[a : b + 1] for a, b in itertools.pairwise(ends)]
+    arrows = []
+    for k in np.linspace(0, len(route) - 1, _NUM_ARROWS + 1).astype(int)[1:-1]:
+        ahead = route[min(k + 1, len(route) - 1)] - route[k - 1]
+        length = np.linalg.norm(ahead)
+        if length > 0.0:
+            along = size * ahead / length
+            side = 0.7 * np.array([-along[1], along[0]])
+            arrows.append(
+                route[k] + np.array([along, -along + side, -along - side])
+            )
+    travelled = distances_along(route)
+    kilometres = [
+        (number, _coordinates(route[np.searchsorted(travelled, 1e3 * number)]))
+        for number in range(1, int(travelled[-1] // 1000) + 1)
+    ]
     return rendered(
         "route.svg",
         name=drive.name,
         box=_coordinates([left, -top, width, height]),
         image=f"data:image/webp;base64,{data}",
         route=_point_list(route),
-        pieces=zip(_colours(num), map(_point_list, pieces), strict=True),
+        arrows=map(_point_list, arrows),
+        kilometres=kilometres,
+        size=f"{2.5 * size:.1f}",
         start=_point_list(np.array(mark)),
         end=_coordinates([x1 - size, y1 - size, 2 * size]),
         bar=_coordinates([end - _BAR_LENGTH, end, base]),
     )
-
-
-def _colours(num: int) -> list[str]:
-    """Returns colours from the start of a route to its end."""
-    colours = colormaps[_ROUTE_COLOURS](np.linspace(0.0, 1.0, num))
-    return [to_hex(colour) for colour in colours]
 
 
 def _point_list(line: np.ndarray) -> str:

@@ -40,26 +40,23 @@ def test_same_structures_are_common():
     difference = compare_parts(own, other)
     assert difference.common == own["a"]
     assert not difference.additional
-    assert not difference.absent
-    assert not difference.lower
+    assert not difference.missing
 
 
 def test_structures_of_one_stage_only():
     own, other = {"a": [house(*LOW)]}, {"b": [house(*HIGH)]}
     difference = compare_parts(own, other)
     assert difference.additional == own["a"]
-    assert difference.absent == other["b"]
+    assert difference.missing == other["b"]
     assert not difference.common
-    assert not difference.lower
 
 
 def test_lowered_structure_shows_what_rises_above_it():
     own, other = {"a": [house(*LOW)]}, {"a": [house(*HIGH)]}
     difference = compare_parts(own, other)
     assert difference.common == own["a"]
-    assert extent(difference.lower) == (4.0, 9.0, 8)
-    assert difference.lower[0].rgb == (0.7, 0.3, 0.2)
-    assert not difference.absent
+    assert extent(difference.missing) == (4.0, 9.0, 8)
+    assert difference.missing[0].rgb == (0.7, 0.3, 0.2)
     assert not difference.additional
 
 
@@ -68,14 +65,13 @@ def test_higher_structure_is_additional_above_the_other():
     difference = compare_parts(own, other)
     assert extent(difference.common) == (0.0, 4.0, 8)
     assert extent(difference.additional) == (4.0, 9.0, 8)
-    assert not difference.absent
-    assert not difference.lower
+    assert not difference.missing
 
 
 @pytest.mark.parametrize(("height", "count"), [(4.4, 0), (4.6, 8)])
 def test_half_a_metre_is_no_change(height, count):
     own, other = {"a": [house(*LOW)]}, {"a": [house(0.0, height)]}
-    lower = compare_parts(own, other).lower
+    lower = compare_parts(own, other).missing
     assert sum(len(part.surface.triangles) for part in lower) == count
 
 

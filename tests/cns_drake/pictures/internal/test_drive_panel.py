@@ -1,5 +1,6 @@
 """The plots below the time line show the values that they are given."""
 
+from dataclasses import replace
 import re
 
 import numpy as np
@@ -8,7 +9,7 @@ from pydrake.math import RigidTransform
 import pytest
 
 from cns_drake.pictures import ShownStages
-from cns_drake.pictures.drive_record import DriveRecord
+from cns_drake.pictures.drive_record import DriveRecord, ScanRecord, pack_scan
 from cns_drake.pictures.page_panel import TimePlot, make_panel, motion_plots
 
 
@@ -101,13 +102,20 @@ def test_panel_says_length_and_duration(length, frames, facts):
     assert f"<p>{facts}</p>" in html
 
 
-def test_page_says_which_points_it_shows():
-    assert 'id="shown"' not in make_panel("a", record(2), set(), ShownStages())
-    drive = record(40)
-    drive.scans.extend([(0, np.zeros((5, 3))), (30, np.zeros((3000, 3)))])
-    drive.num_points.extend([5, 61234])
-    html = make_panel("a", drive, set(), ShownStages())
-    assert ">Shown: 2 of 40 scans, up to 3,000 of 61,234 points<" in html
+@pytest.mark.parametrize(
+    ("stride", "text"), [(1, "Every scan"), (12, "One scan in 12")]
+)
+def test_page_says_which_scans_it_shows(stride, text):
+    html = make_panel("a", record(2), set(), ShownStages())
+    assert "every point" not in html
+    scans = ScanRecord(stride=stride)
+    for number in (5, 61234):
+        points = np.zeros((number, 3))
+        scans.add(pack_scan(0, points, np.zeros(number, int), np.zeros(3)))
+    html = make_panel(
+        "a", replace(record(40), scans=scans), set(), ShownStages()
+    )
+    assert f"<p>{text}, every point: up to 61,234 a scan</p>" in html
 
 
 @pytest.mark.parametrize("value", [0.0, 1e-9, -1e-9])
@@ -175,7 +183,7 @@ def test_layers_that_are_there_have_switches():
     drive = record(2)
     drive.names[FrameId.get_new_id()] = "traffic_car_001"
     drive.images["front"] = [(0, b"jpeg")]
-    assert switches(drive, {"absent"}) == always | {
+    assert switches(drive, {"before"}) == always | {
         "moving",
         "images",
         "change",

@@ -5,7 +5,6 @@ from dataclasses import replace
 import itertools
 import json
 import math
-import sys
 import warnings
 
 from helpers.internal.eval_program import assert_refused, run
@@ -14,7 +13,7 @@ import pytest
 from scipy.stats import kendalltau
 
 from cns_drake.base import InputError
-from evaluation.command_line import name_tables, suggest_comparison
+from evaluation.command_line import name_results
 from evaluation.recognition import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results import (
     LAST,
@@ -487,27 +486,6 @@ def test_the_command(tmp_path, capsys):
     assert found["agreements"][0]["kendall_tau"] == pytest.approx(1.0)
 
 
-def test_a_comparison_is_suggested_if_it_can_be_made(
-    tmp_path, capsys, monkeypatch
-):
-    """Results of the shipped cities, of another city, of another metric."""
-    monkeypatch.setattr(sys, "argv", ["cns-eval"])
-    folder = tmp_path / "of shipped"
-    folder.mkdir()
-    table = folder / "results.csv"
-    Results.of(shipped(map="suburbia", method="solid")).write_csv(table)
-    suggest_comparison(folder)
-    suggested = f"next: cns-eval compare '{folder}'\n"
-    assert capsys.readouterr().err == suggested
-    Results.of(shipped(map="suburbia", metric="r1")).write_csv(table)
-    suggest_comparison(folder)
-    suggest_comparison(
-        write_table(tmp_path / "own", {"a": {"x": 0.5}}, experiment="stages")
-    )
-    suggest_comparison(tmp_path / "none")
-    assert capsys.readouterr().err == ""
-
-
 def test_faults_are_one_line(tmp_path, capsys):
     one = write_table(tmp_path / "one", {"a": {"x": 0.5}})
     other = write_table(tmp_path / "other", {"b": {"x": 0.5}})
@@ -647,12 +625,16 @@ def test_what_a_table_does_not_say_is_unknown(tmp_path):
     )
 
 
-def test_tables_beside_a_page_are_named(tmp_path, capsys):
-    name_tables(tmp_path / "a")
-    assert capsys.readouterr().err == ""
+def test_the_page_and_the_tables_beside_it_are_named(tmp_path, capsys):
+    page = tmp_path / "a" / "index.html"
+    opened = f"next: open {page} in a browser\n"
+    name_results(page)
+    assert capsys.readouterr().err == opened
     write_table(tmp_path / "a", {"a": {"x": 0.5}})
-    name_tables(tmp_path / "a")
-    assert capsys.readouterr().err.startswith("wrote ")
+    name_results(page)
+    wrote, *rest = capsys.readouterr().err.splitlines(keepends=True)
+    assert wrote.startswith("wrote ")
+    assert rest == [opened]
 
 
 def test_kendall_tau_is_that_of_a_library():

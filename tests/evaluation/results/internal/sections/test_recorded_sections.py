@@ -1,7 +1,6 @@
 """Sections with what only recordings have: routes, changes and queries."""
 
 import base64
-import itertools
 import re
 
 from helpers.small_page import make_content
@@ -131,26 +130,24 @@ def test_maps_are_held_once(content, text):
         assert text.count(view) == 1
 
 
-def test_route_from_red_to_blue(content):
+def test_route_has_a_direction(content):
     drive = content.drives["metropolis_04"]
     picture = routes_section({"metropolis": [drive]}, {}).body
-    pieces = re.findall(
-        r'<polyline stroke="#(..)(..)(..)" points="([^"]*)"', picture
-    )
-    lines = [
-        [tuple(map(float, p.split(","))) for p in points.split()]
-        for *_, points in pieces
-    ]
-    # Each piece begins at the end of the one before; y points down.
-    assert all(a[-1] == b[0] for a, b in itertools.pairwise(lines))
-    assert lines[0][0] == (0.0, -2.0)
-    assert lines[-1][-1] == (100.0, -2.0)
-    first, last = (
-        [int(value, 16) for value in piece[:3]]
-        for piece in (pieces[0], pieces[-1])
-    )
-    assert first[0] > 2 * first[2]
-    assert last[2] > 1.1 * last[0]
+
+    def places(points):
+        return [tuple(map(float, p.split(","))) for p in points.split()]
+
+    (route, _) = re.findall(r'<polyline[^>]* points="([^"]*)"', picture)
+    # y points down.
+    assert places(route)[0] == (0.0, -2.0)
+    assert places(route)[-1] == (100.0, -2.0)
+    *arrows, _ = re.findall(r'<polygon points="([^"]*)"', picture)
+    assert len(arrows) == 11
+    for tip, left, right in map(places, arrows):
+        assert tip[1] == -2.0
+        assert tip[0] > left[0] == right[0]
+    # It is not a kilometre long.
+    assert " km</text>" not in picture
     left, right, bottom, top = drive.extent
     box = re.search(r'viewBox="([^"]*)"', picture)[1]
     assert [float(value) for value in box.split()] == pytest.approx(
