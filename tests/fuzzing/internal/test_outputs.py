@@ -28,7 +28,9 @@ from cns_drake.base import INTERRUPTED as INTERRUPTED_STATUS
 from cns_drake.base import program, progress_display
 from cns_drake.scenarios import write_scenarios
 from evaluation import command_line as evaluation
-from evaluation.map_update import SIDES
+from evaluation.clouds import read_cloud
+from evaluation.drives import open_drive
+from evaluation.map_update import SIDES, write_session
 
 pytestmark = pytest.mark.slow
 
@@ -143,9 +145,12 @@ def inputs(tmp_path_factory):
         "tasks: [place]\n"
     )
     (top / "real").mkdir()
-    for side in SIDES:
-        (top / "maps" / side).mkdir(parents=True)
-        np.save(top / "maps" / side / "truth.npy", np.zeros(1, np.uint8))
+    for side, name in zip(SIDES, ("town_01", "town_02"), strict=True):
+        folder = top / "maps" / side
+        folder.parent.mkdir(exist_ok=True)
+        write_session(open_drive(top / name), folder, 1.0)
+        size = len(read_cloud(folder / "map.ply"))
+        np.save(folder / "truth.npy", np.ones(size, np.uint8))
     return top
 
 
@@ -259,6 +264,7 @@ INTERRUPTED = {
         3,
         9,
     ),
+    f"{EVAL} map-update maps --output OUT": (2, 5),
     f"{EVAL} tcr town_01 town_02 --output OUT": (2, 9),
     f"{EVAL} pr town_01 town_02 --method ring++ --output OUT": (2, 9),
     f"{EVAL} pr town_01 town_02 --method learned --output OUT": (9,),
