@@ -24,14 +24,15 @@ def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
         cluster: runs the jobs that make cities.
 
     Raises:
-        InputError: the experiment cannot be used.
+        InputError: the experiment cannot be used, or a file is in the way.
     """
-    from cns_drake.scenarios import write_scenarios
+    from cns_drake.scenarios import check_written_scenarios, write_scenarios
     from cns_drake.studies import ExperimentRun, load_experiment, study_drives
 
     # Nothing is measured, and no program of the experiment runs.
     unused = {"tasks": {"place": {}}, "methods": {"solid": {}}, "charts": []}
     experiment = load_experiment(vary, list(unused.items()))
+    check_written_scenarios(output / "scenarios")
     run = ExperimentRun(experiment, output.absolute(), vary, cluster, note)
     members = study_drives(run)
     write_scenarios(members, output / "scenarios")

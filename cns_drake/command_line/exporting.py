@@ -157,10 +157,12 @@ def export(
             drive, for cns-eval pr --exact-overlaps), map-truth (two maps with
             labels of what changed), map-sessions (two maps without labels),
             bev-images (bird's-eye images with poses) or film.
-        output: Folder to write; created if it does not exist. With map-truth,
-            map-sessions and bev-images, the folder must be new or empty. With
-            film, the output is a file instead, and an existing file is
-            replaced; its name ends in .webp, or in .mp4, which needs ffmpeg.
+        output: Folder to write; created if it does not exist. The folder must
+            be new or empty, or contain earlier exports of the same format,
+            except with map-truth, map-sessions and bev-images, which need a new
+            or empty folder. With film, the output is a file instead, and an
+            existing file is replaced; its name ends in .webp, or in .mp4, which
+            needs ffmpeg.
         absent_in: Another stage of the map, such as 01. Points on structures
             that do not exist in that stage get SemanticKITTI's labels of moving
             objects (252 to 259). Only with a format that has labels, such as
@@ -195,8 +197,11 @@ def export(
     if layout in _PAIRS:
         with uninterrupted():
             from cns_drake.base import choose_cluster
+            from cns_drake.studies import claim_pairs
 
         cluster = choose_cluster(jobs, scheduler)
+        if vary is not None:  # Its scenarios are written to the same folder.
+            claim_pairs(output, layout)
         learned = _learned_drives(words, vary, output, cluster)
         spacing = spacing or _PAIR_SPACING
         if layout == Format.OVERLAP_TABLE:

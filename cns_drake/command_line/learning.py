@@ -51,10 +51,10 @@ def train(
     same weights. Needs the optional packages of the extra `train` (JAX).
 
     Args:
-        output: File for the weights; an existing file is replaced. The training
-            curve is written to FILE.png.
-            The state of the training is written to FILE.npz.training; after an
-            interruption, the same command resumes from this file.
+        output: File for the weights. The training curve is written to FILE.png.
+            Existing files are replaced. The state of the training is written to
+            FILE.npz.training; after an interruption, the same command resumes
+            from this file.
         minutes: Approximate computing time on one core in minutes. The numbers
             of cities and of training steps follow from this time. The training
             ends after these steps, however long they take.

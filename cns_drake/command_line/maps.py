@@ -142,7 +142,7 @@ def city(
     """
     with uninterrupted():
         from cns_drake.city import differing_files, generate_city, start_city
-        from cns_drake.scenarios import write_table
+        from cns_drake.scenarios import check_table, write_table
 
     if seed is not None and not new:
         raise InputError("--seed: has no effect without --new")
@@ -157,6 +157,7 @@ def city(
         if changed:
             raise typer.Exit(1)
         return
+    check_table(folder)
     if new:
         start_city(folder, seed or 0, note)
     files = generate_city(folder, note, repair_stages=repair_stages)

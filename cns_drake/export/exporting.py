@@ -14,6 +14,7 @@ import shutil
 
 from cns_drake.base import (
     InputError,
+    check_folder_writable,
     doing,
     make_folder,
     part_path,
@@ -34,8 +35,9 @@ from cns_drake.export.formats import ENDING, export_formats
 from cns_drake.export.layout import Layout
 from cns_drake.recording import to_yaml
 
-# File that shows that an export wrote a folder of drives.
+# File that shows that an export wrote a folder, and its field with the writer.
 _MARKER = "export.yaml"
+_WRITER = {"writer": "cns-drake export"}
 
 
 def _layout(format_name: str) -> Layout:
@@ -101,7 +103,7 @@ def export_drive(
     outer = {
         output / name: text for name, text in layout.outer_files(drive).items()
     }
-    _claim(output, format_name)
+    claim_folder(output, format_name, layout.explained)
     if folder.exists():
         raise InputError(
             f"{folder}: this drive is there already; remove it or give another "
@@ -170,23 +172,39 @@ def _notes(drive: McapDrive, layout: Layout) -> Iterator[str]:
         )
 
 
-def _claim(output: Path, format_name: str) -> None:
-    """Makes the folder of drives, or checks that an export has written it."""
+def claim_folder(
+    output: Path, format_name: str, explained: Mapping[str, str]
+) -> None:
+    """Makes a folder of exports, or checks that an export has written it.
+
+    Args:
+        output: the folder.
+        format_name: name of the format. All exports in a folder have the same
+            format.
+        explained: path -> content of each file, for readers of `export.yaml`.
+
+    Raises:
+        InputError: the folder contains anything but exports of this format, or
+            cannot be written.
+    """
     marker = output / _MARKER
     with user_errors(output):
         if marker.is_file():
             values = read_yaml(marker)
-            found = values.get("format") if isinstance(values, dict) else None
-            # A YAML list cannot be a key.
-            if not isinstance(found, str) or found not in export_formats():
+            if not isinstance(values, dict) or not _WRITER.items() <= (
+                values.items()
+            ):
                 raise InputError(
                     f"{marker}: not written by an export of cns-drake; give "
                     "another folder"
                 )
+            found = values.get("format")
             if found != format_name:
                 raise InputError(
-                    f"{marker}: format: the folder holds {found} drives"
+                    f"{marker}: format: the folder holds exports of the format"
+                    f" {found}; give another folder"
                 )
+            check_folder_writable(output)
             return
         if output.exists() and (not output.is_dir() or any(output.iterdir())):
             raise InputError(
@@ -194,11 +212,7 @@ def _claim(output: Path, format_name: str) -> None:
                 "empty one"
             )
     make_folder(output)
-    values = {
-        "writer": "cns-drake export",
-        "format": format_name,
-        "files": dict(_layout(format_name).explained),
-    }
+    values = {**_WRITER, "format": format_name, "files": dict(explained)}
     write_text(marker, to_yaml(values))
 
 

@@ -443,9 +443,9 @@ class RecordingFolder:
                     f"{self.path}: the folder already exists and holds a "
                     "recording (--overwrite replaces it)"
                 )
-            own = self.files()
-            names = {file.name for file in (*own, *map(part_path, own))}
-            names.add(f"{part_path(self.mcap).name}.lock")
+            # Completed last, so a killed run has left it.
+            part = part_path(self.mcap).name
+            names = {part, f"{part}.lock"}
             found = sorted(entry.name for entry in self.path.iterdir())
         if found and names.isdisjoint(found):
             raise InputError(

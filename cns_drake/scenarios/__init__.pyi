@@ -1,4 +1,5 @@
 from cns_drake.scenarios.drive_table import DriveRow as DriveRow
+from cns_drake.scenarios.drive_table import check_table as check_table
 from cns_drake.scenarios.drive_table import drive_rows as drive_rows
 from cns_drake.scenarios.drive_table import write_table as write_table
 from cns_drake.scenarios.planning import DrivePlan as DrivePlan
@@ -23,6 +24,9 @@ from cns_drake.scenarios.scenario import Scenario as Scenario
 from cns_drake.scenarios.scenario import TrafficConfig as TrafficConfig
 from cns_drake.scenarios.scenario import TransientConfig as TransientConfig
 from cns_drake.scenarios.scenario_files import check_files as check_files
+from cns_drake.scenarios.scenario_files import (
+    check_written_scenarios as check_written_scenarios,
+)
 from cns_drake.scenarios.scenario_files import (
     describe_scenario as describe_scenario,
 )

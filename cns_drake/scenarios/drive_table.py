@@ -13,6 +13,7 @@ import zlib
 
 from cns_drake.base import (
     InputError,
+    check_writable,
     doing,
     is_there,
     read_records,
@@ -96,6 +97,24 @@ def drive_rows(
     return rows
 
 
+def check_table(folder: Path) -> None:
+    """Checks that the table of drives in a map's folder may be written.
+
+    Raises:
+        InputError: a file that is no such table has its name, or it cannot be
+            written.
+    """
+    path = MapFolder(folder).drive_table
+    check_writable(path)
+    if is_there(path):
+        head = ",".join(field.name for field in fields(DriveRow)[:3])
+        with user_errors(path), path.open("rb") as stream:
+            if not stream.read(len(head)).startswith(head.encode()):
+                raise InputError(
+                    f"{path}: no table of drives; move it to another folder"
+                )
+
+
 def write_table(
     folder: Path,
     sizes: Mapping[str, tuple[int, int]] | None = None,
@@ -106,11 +125,12 @@ def write_table(
     `drive_rows`.
 
     Raises:
-        InputError: as `drive_rows`, or if the table cannot be written.
+        InputError: as `drive_rows` or `check_table`.
     """
     rows = drive_rows(folder, sizes)
     if not rows:
         return
+    check_table(folder)
     names = [field.name for field in fields(DriveRow)]
     write_csv(MapFolder(folder).drive_table, names, map(astuple, rows))
 

@@ -9,8 +9,11 @@ import yaml
 
 from cns_drake.base import (
     InputError,
+    check_writable,
     did_you_mean,
+    listed,
     make_folder,
+    read_bytes,
     read_yaml,
     validated,
     value_errors,
@@ -300,6 +303,26 @@ def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
     return values
 
 
+# What files of `write_scenarios` begin with.
+_MARK = "# Written by cns-drake; another run replaces it.\n"
+
+
+def check_written_scenarios(folder: Path) -> None:
+    """Checks that all scenario files in a folder are from `write_scenarios`.
+
+    Raises:
+        InputError: another file is there, or the folder is no folder.
+    """
+    if os.path.lexists(folder) and not folder.is_dir():
+        raise InputError(f"{folder}: not a folder")
+    for path in listed(folder, "*.yaml"):
+        check_writable(path)
+        if not read_bytes(path).startswith(_MARK.encode()):
+            raise InputError(
+                f"{path}: no earlier run wrote it; give another folder"
+            )
+
+
 def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
     """Writes scenarios as `<folder>/<name>.yaml`.
 
@@ -307,8 +330,10 @@ def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
     that map and folder can be moved together.
 
     Raises:
-        InputError: if a file cannot be written.
+        InputError: if a file cannot be written, or the folder is refused by
+            `check_written_scenarios`.
     """
+    check_written_scenarios(folder)
     make_folder(folder)
     here = folder.resolve()
     paths = []
@@ -317,6 +342,7 @@ def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
         values = scenario.model_dump(mode="json", exclude_none=True)
         if Path(values.get("map", "")).is_relative_to(here.parent):
             values["map"] = os.path.relpath(values["map"], here)
-        write_text(path, yaml.safe_dump(values, sort_keys=False))
+        text = yaml.safe_dump(values, sort_keys=False)
+        write_text(path, _MARK + text)
         paths.append(path)
     return paths

@@ -30,6 +30,7 @@ from cns_drake.studies.maps.experiment_maps import (
     ExperimentRun as ExperimentRun,
 )
 from cns_drake.studies.pair_export import ExportOptions as ExportOptions
+from cns_drake.studies.pair_export import claim_pairs as claim_pairs
 from cns_drake.studies.pair_export import export_pairs as export_pairs
 from cns_drake.studies.pair_export import (
     write_overlap_table as write_overlap_table,

@@ -30,6 +30,7 @@ from cns_drake.base import (
     track,
     user_errors,
 )
+from cns_drake.export import claim_folder
 from cns_drake.scenarios import Scenario
 from cns_drake.scene import CLASS_IDS, GROUND_CLASSES
 from cns_drake.simulation import SimulationSource
@@ -44,6 +45,22 @@ from evaluation.recognition import (
 from evaluation.study import MakePart, Part
 
 Format = Literal["pointnetvlad", "overlap"]
+# Format -> file or folder in the output -> content.
+_EXPLAINED = {
+    "pointnetvlad": {
+        "runs/NAME/NUMBER.bin": "clouds of the drive NAME, float64 x y z",
+        "runs/NAME/poses.txt": "poses of the LiDAR at the clouds, 3 x 4",
+        "*.pickle": "positives and negatives of each cloud",
+        "parts": "what another run need not compute again",
+    },
+    "overlap": {
+        "runs/NAME/NUMBER.bin": "scans of the drive NAME",
+        "runs/NAME/poses.txt": "poses of the LiDAR at the scans, 3 x 4",
+        "overlaps.npz": "overlap of each pair of scans",
+        "parts": "what another run need not compute again",
+    },
+    "overlap-table": {"overlaps.csv": "overlap of each query with each place"},
+}
 
 # As in PointNetVLAD (Uy and Lee, CVPR 2018): number of points of a cloud.
 _POINTS = 4096
@@ -75,6 +92,20 @@ class ExportOptions:
     half_extent: float = 50.0
 
 
+def claim_pairs(output: Path, format_name: str) -> None:
+    """Makes the folder of a set of training data, before minutes of work.
+
+    Args:
+        output: the folder.
+        format_name: `pointnetvlad`, `overlap` or `overlap-table`.
+
+    Raises:
+        InputError: the folder contains anything but an earlier export of this
+            format, or cannot be written.
+    """
+    claim_folder(output, format_name, _EXPLAINED[format_name])
+
+
 def write_overlap_table(
     database: Scenario,
     query: Scenario,
@@ -93,11 +124,10 @@ def write_overlap_table(
         protocol: protocol that determines queries, places and range.
 
     Raises:
-        InputError: the drives are through different maps, or cannot be
-            simulated.
+        InputError: the drives are through different maps or cannot be
+            simulated, or the folder is refused by `claim_pairs`.
     """
-    # Before minutes of work.
-    make_folder(output)
+    claim_pairs(output, "overlap-table")
     places, queries = (SimulationSource(one)() for one in (database, query))
     found = exact_overlaps(places, queries, protocol)
     path = output / "overlaps.csv"
@@ -130,8 +160,8 @@ def export_pairs(
 
     Raises:
         InputError: there is no drive to learn from, two drives have the same
-            name, or drives cannot be simulated; the error names all drives that
-            cannot be simulated.
+            name, or drives cannot be simulated (the error names all of these),
+            or the folder is refused by `claim_pairs`.
     """
     if not scenarios:
         raise InputError("export: no drive to learn from")
@@ -139,7 +169,7 @@ def export_pairs(
     names = [one.name for one in every]
     for name in repeated(names):
         raise InputError(f"export: two drives are named {name}")
-    make_folder(output)
+    claim_pairs(output, options.format)
     output = output.absolute()
     parts = {name: Part(output / "parts" / f"{name}.data") for name in names}
     jobs = [

@@ -76,6 +76,12 @@ _FASTEST = 80.0
 _FASTEST_OF = {"bicycle": 20.0, "person": 12.0}
 # A trace with more jumps has other units. Each would need a track of its own.
 _MOST_JUMPS = 1000
+# Greatest ratio between the distance by the places of a trace and the distance
+# by its speeds, or its inverse. In metres the ratio is about 1, in degrees
+# 1e-5, in feet 3.3.
+_MOST_RATIO = 3.0
+# Shorter distances by the speeds are not compared [m].
+_COMPARED = 10.0
 
 
 @dataclass(frozen=True)
@@ -91,6 +97,7 @@ class TracedObject:
         yaw: (M,) heading, from x towards y [rad].
         slope: (M,) slope of the road, positive upwards [rad].
         z: (M,) heights in the trace [m]; NaN without heights.
+        speed: (M,) speeds in the trace [m/s]; NaN without speeds.
     """
 
     name: str
@@ -100,6 +107,7 @@ class TracedObject:
     yaw: np.ndarray
     slope: np.ndarray
     z: np.ndarray
+    speed: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -133,7 +141,8 @@ def read_fcd(path: Path) -> FcdTrace:
 
     Raises:
         InputError: the file cannot be read or is not a trace, or the trace is
-            empty or has times that are not evenly spaced.
+            empty, has times that are not evenly spaced, or has places that are
+            not in metres.
     """
     root = read_elements(path, "fcd-export")
     steps = list(root.all("timestep"))
@@ -162,6 +171,7 @@ def read_fcd(path: Path) -> FcdTrace:
             f"{path}: {len(jumps)} jumps from one timestep to the next, such as"
             f" that of {jumps[0]}; times must be in seconds, places in metres"
         )
+    _check_unit(path, [*vehicles, *persons], dt)
     if jumps:
         notes.append(
             f"{path}: left out: {len(jumps)} jumps from one timestep to the"
@@ -258,19 +268,48 @@ def _traced_objects(steps: list[Element], tag: str) -> tuple[TracedObject, ...]:
                 )
             types.setdefault(name, element.value("type", ""))
             place = [element.number(key) for key in ("x", "y", "angle")]
-            z = element.number("z") if "z" in element.attrib else np.nan
-            rows.append((number, *place, element.number("slope", 0.0), z))
+            slope = element.number("slope", 0.0)
+            z, speed = (
+                element.number(key) if key in element.attrib else np.nan
+                for key in ("z", "speed")
+            )
+            rows.append((number, *place, slope, z, speed))
     objects = []
     for name, rows in found.items():
-        number, x, y, angle, slope, z = np.transpose(rows)
+        number, x, y, angle, slope, z, speed = np.transpose(rows)
         # In the file, angles are in degrees, clockwise from north, where y is
         # north.
         yaw = np.unwrap(np.pi / 2 - np.radians(angle))
         at, xy = number.astype(int), np.column_stack([x, y])
         objects.append(
-            TracedObject(name, types[name], at, xy, yaw, np.radians(slope), z)
+            TracedObject(
+                name, types[name], at, xy, yaw, np.radians(slope), z, speed
+            )
         )
     return tuple(objects)
+
+
+def _check_unit(path: Path, objects: Sequence[TracedObject], dt: float) -> None:
+    """Compares the places of a trace with its speeds, `dt` [s] apart.
+
+    Raises:
+        InputError: the places are not in metres.
+    """
+    by_places = by_speeds = 0.0
+    for one in objects:
+        # The speed at a time is that of the step before.
+        known = (np.diff(one.steps) == 1) & np.isfinite(one.speed[1:])
+        by_places += step_lengths(one.xy)[known].sum()
+        by_speeds += dt * np.abs(one.speed[1:][known]).sum()
+    if by_speeds < _COMPARED:
+        return
+    ratio = by_places / by_speeds
+    if not 1.0 / _MOST_RATIO < ratio < _MOST_RATIO:
+        raise InputError(
+            f"{path}: the places are not in metres: the way of all road users"
+            f" is {by_places:.3g} by their places, and {by_speeds:.3g} m by"
+            " their speeds; run SUMO without --fcd-output.geo"
+        )
 
 
 def _without_jumps(
@@ -310,7 +349,14 @@ def _without_jumps(
                     traced,
                     **{
                         name: getattr(traced, name)[part]
-                        for name in ("steps", "xy", "yaw", "slope", "z")
+                        for name in (
+                            "steps",
+                            "xy",
+                            "yaw",
+                            "slope",
+                            "z",
+                            "speed",
+                        )
                     },
                 )
             )

@@ -257,12 +257,16 @@ def _count_views(points: np.ndarray, other: Session) -> _Views:
             rows[found < -_SHOWN_WITHIN],
         ]
 
-    with ThreadPoolExecutor(num_cores()) as threads:
+    threads = ThreadPoolExecutor(num_cores())
+    try:
         found = threads.map(look, chosen)
         what = f"free space of {other.side}"
         for kinds in track(found, what, len(chosen), "views"):
             for count, rows in zip(counts, kinds, strict=True):
                 count[rows] += 1
+    finally:
+        # An interrupt does not wait for the views that have not begun.
+        threads.shutdown(cancel_futures=True)
     return _Views(*counts)
 
 

@@ -45,6 +45,7 @@ BY_HAND = {
     "evaluation_of_recordings.py",
     "first_hour.py",
     "growth.py",
+    "interruptions.py",
     "kills.py",
     "lidar_odometry.py",
     "memory.py",

@@ -210,7 +210,7 @@ def _grouped_by_building(
             alone.append((part, [part]))
     buildings = []
     for number, outline in enumerate(outlines):
-        solids = _with_parts(outline, of_outline.get(number, []))
+        solids = _with_parts(outline, of_outline.get(number, []), faults)
         own = [one for one in solids if _has_own_date(one, outline, faults)]
         for part in own:
             kind = "building part with a date of its own, made as a building"
@@ -351,7 +351,9 @@ def is_gone(tags: Tags) -> bool:
     )
 
 
-def _with_parts(outline: _Block, parts: list[_Block]) -> list[_Block]:
+def _with_parts(
+    outline: _Block, parts: list[_Block], faults: ImportFaults
+) -> list[_Block]:
     """Returns the solids of a building with an outline and parts.
 
     These are the parts, and the outline's own solid beside the parts, without
@@ -359,6 +361,10 @@ def _with_parts(outline: _Block, parts: list[_Block]) -> list[_Block]:
     own solid also fills the space below parts that begin above the ground.
     Otherwise the parts are meant as the whole building, and this space stays
     open. Without parts, the result is the outline's own solid.
+
+    `faults` counts outlines that are more than 10 % beside the parts: the file
+    does not state how high the rest is, because the height of an outline can be
+    that of its highest part.
     """
     if not parts:
         return [outline]
@@ -367,6 +373,11 @@ def _with_parts(outline: _Block, parts: list[_Block]) -> list[_Block]:
     solids = list(parts)
     if uncovered.area > _MOST_UNCOVERED * outline.polygon.area:
         solids += _solids_below(parts, outline, uncovered)
+        faults.add(
+            "building with parts for some of its outline, the rest as high as"
+            " the whole",
+            outline.name,
+        )
     solids += [
         outline.replaced(piece, outline.low, outline.high)
         for piece in _without_slivers(uncovered)

@@ -127,7 +127,9 @@ def make_weights(
             could not be generated.
     """
     import_jax()
-    check_writable(output)
+    picture = output.with_suffix(".png")
+    for file in (output, picture):
+        check_writable(file)
     work = output.absolute().with_name(output.name + ".training")
     make_folder(work)
     drawn = plan.drawn()
@@ -167,7 +169,6 @@ def make_weights(
         "plan": asdict(plan),
     }
     write_weights(output, values, (least, float(seen.max())), made_by)
-    picture = output.with_suffix(".png")
     _draw_curve(curve, picture.with_suffix(""))
     return picture
 

@@ -97,9 +97,9 @@ def test_a_drive_is_measured_again_when_its_base_changes(folder):
 @pytest.mark.parametrize(
     "text",
     [
-        pytest.param("", marks=pytest.mark.night),
-        pytest.param("drive\nboxes_01\n", marks=pytest.mark.night),
-        "\0,\x80",
+        pytest.param("sequence,map,stage", marks=pytest.mark.night),
+        pytest.param("sequence,map,stage\nboxes_01\n", marks=pytest.mark.night),
+        "sequence,map,stage,title\n\0,\x80",
     ],
 )
 def test_a_spoilt_table_is_measured_anew(folder, text):

@@ -951,6 +951,56 @@ for _name, _one in OSM.items():
         osm_ways(folder, one)
 
 
+def varint(number):
+    data = bytearray()
+    while number > 0x7F:
+        data.append(number & 0x7F | 0x80)
+        number >>= 7
+    return bytes([*data, number])
+
+
+def message(*fields):
+    """A message of Protocol Buffers: of numbers and bytes, with their keys."""
+    return b"".join(
+        varint(key << 3) + varint(value)
+        if isinstance(value, int)
+        else varint(key << 3 | 2) + varint(len(value)) + value
+        for key, value in fields
+    )
+
+
+def blob(kind, data, count=1):
+    packed = zlib.compress(data, 9)
+    body = message((2, len(data)), (3, packed))
+    header = message((1, kind), (3, len(body)))
+    return (len(header).to_bytes(4, "big") + header + body) * count
+
+
+# Nodes at one place, each id one more than the last.
+_MANY = 8_000_000
+_NODES = message(
+    (1, message((1, b""))),
+    (2, message((2, message((1, b"\x02" * _MANY), (8, bytes(_MANY)),
+                            (9, bytes(_MANY)))))),
+)  # fmt: skip
+_PBF_HEAD = blob(
+    b"OSMHeader", message((4, b"OsmSchema-V0.6"), (4, b"DenseNodes"))
+)
+for _name, _data in {
+    "nodes": _PBF_HEAD + blob(b"OSMData", _NODES, 30),
+    "a length": _PBF_HEAD
+    + struct.pack(">I", 20)
+    + message((1, b"OSMData"), (3, 2**62)),
+}.items():
+
+    @way(
+        f"osm: PBF, {_name}", "x.osm.pbf", "source OpenStreetMap",
+        "cns_drake.imports.import_openstreetmap", use=imported("x.osm.pbf"),
+    )  # fmt: skip
+    def _(folder, data=_data):
+        (folder / "x.osm.pbf").write_bytes(data)
+
+
 def city_json(folder, *faces, templates=0):
     from helpers.small_cityjson import CityWriter
 
@@ -1172,6 +1222,29 @@ def _(folder):
     path.write_text("".join(rows))
 
 
+# --- Options
+
+
+def jobs(folder):
+    from cns_drake.base import InputError, program
+    from cns_drake.command_line import app
+
+    words = ["generate", "--output", "x", "--jobs"]
+    number = (folder / "x.txt").read_text()
+    try:
+        app([*words, number], prog_name="cns-drake", standalone_mode=False)
+    except Exception as error:
+        text, _ = program._failure_of(error)
+        raise InputError(text) from error
+
+
+for _number in ("0", "-1", "1025", "1" + "0" * 4000, "9" * 6000, "1e9", "inf"):
+
+    @way(f"--jobs {_number[:9]}", "--jobs", "--jobs", use=jobs)
+    def _(folder, number=_number):
+        (folder / "x.txt").write_text(number)
+
+
 # --- The tests
 
 # Public names that look like readers, and read no file of a user by themselves.
@@ -1268,6 +1341,7 @@ def test_every_reader_has_a_way():
     claimed = {name for one in WAYS.values() for name in one.readers}
     assert offered - claimed - NO_FILES.keys() == set()
     assert (NO_FILES.keys() | claimed) - offered == {
+        "--jobs",
         "evaluation.methods.make_method",
         "evaluation.results.Results",
     }

@@ -378,7 +378,9 @@ def test_a_part_takes_the_place_of_what_it_covers(tmp_path):
     osm.box(20, 40, 40, 10, building__part="yes", height="9")
     osm.box(20, 50, 40, 10, building__part="yes", height="8", min_height="4")
     # The origin is the middle: (0, 25).
-    _, found = import_osm(osm.write(tmp_path / "city.osm"))
+    city, found = import_osm(osm.write(tmp_path / "city.osm"))
+    guessed = [row for row in city.faults.rows() if "parts for some" in row[0]]
+    assert [(number, name) for _, number, name in guessed] == [(1, f"w{tower}")]
     one = found[f"building_w{tower}"]
     # The block below the part stands, and the rest of the outline.
     assert height_above(one, 25.0, -25.0) == [30.0, 30.0, 40.0]

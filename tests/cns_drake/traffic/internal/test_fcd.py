@@ -300,6 +300,27 @@ def test_a_trace_of_jumps_has_other_units(tmp_path, monkeypatch):
             read_fcd(path)
 
 
+@pytest.mark.parametrize("tag", ["vehicle", "person"])
+@pytest.mark.parametrize(
+    ("metres", "is_refused"),
+    [(1.0, False), (1.2, False), (0.3048, True), (111e3, True)],
+)
+def test_speeds_tell_the_unit_of_places(tmp_path, tag, metres, is_refused):
+    """Such as degrees, of sumo --fcd-output.geo."""
+    rows = "".join(
+        f'<timestep time="{k * DT:.1f}"><{tag} id="a" speed="2" angle="90"'
+        f' x="{9 + 2 * k * DT / metres:.9f}" y="47"/></timestep>'
+        for k in range(80)
+    )
+    path = tmp_path / "x.xml"
+    path.write_text(f"<fcd-export>{rows}</fcd-export>")
+    if is_refused:
+        with pytest.raises(InputError, match=r"x\.xml: the places are not in"):
+            read_fcd(path)
+    else:
+        assert not read_fcd(path).notes
+
+
 def test_what_is_away_for_a_time_may_come_back_elsewhere(tmp_path):
     xs = [0.0, 3.0, None, None, 500.0, 503.0]
     path = write_moves(tmp_path / "a.xml", "vehicle", "passenger", 1.0, xs)

@@ -1,0 +1,195 @@
+"""Interrupts each command, again and again, and tells how long it takes to end.
+
+    python tests/benchmarks/interruptions.py FOLDER [NAME ...]
+
+At random moments, a command gets Ctrl-C, as its whole process group does in a
+terminal, or SIGTERM; or one of its jobs is killed by SIGKILL. A row tells the
+moment, the time and processor time from there to the end, the exit status, the
+last line, and what is left: processes, and files that are new. Recordings are
+made in FOLDER first, unless they are there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+from pathlib import Path
+import random
+import resource
+import shutil
+import signal
+import sys
+import time
+
+import psutil
+
+DRIVES = ("metropolis_01", "metropolis_04")
+PAIR = " ".join(f"drives/{name}" for name in DRIVES)
+DRAKE, EVAL = "cns_drake", "evaluation"
+# Name -> module and words of a command that runs for long.
+COMMANDS = {
+    "simulate": f"{DRAKE} simulate metropolis_01 --output out",
+    "generate": f"{DRAKE} generate {' '.join(DRIVES)} --jobs 2 --output out",
+    "study": f"{DRAKE} study ladder suburbia --jobs 2 --output out",
+    "reproduce": f"{DRAKE} reproduce metropolis --jobs 2 --output out",
+    "train": f"{DRAKE} train --minutes 1 --jobs 2 --output out/w.npz",
+    "age": f"{DRAKE} age suburbia --years 1 5 --output out",
+    "city": f"{DRAKE} city town",
+    "list": f"{DRAKE} list town",
+    "film": f"{DRAKE} export metropolis_01 --format film --output out.webp",
+    "kitti": f"{DRAKE} export drives/metropolis_01 --format kitti --output out",
+    "map-truth": f"{DRAKE} export {PAIR} --format map-truth --output out",
+    "pointnetvlad": (
+        f"{DRAKE} export {' '.join(DRIVES)} --format pointnetvlad --jobs 2"
+        " --output out"
+    ),
+    "overlap-table": (
+        f"{DRAKE} export {' '.join(DRIVES)} --format overlap-table --output out"
+    ),
+    "tcr": f"{EVAL} tcr {PAIR} --output out",
+    **{
+        f"pr-{name}": f"{EVAL} pr {PAIR} --method {name} --gate --output out"
+        for name in ("ring++", "btc", "learned", "solid", "scan-context++")
+    },
+    "pr-overlap": f"{EVAL} pr {PAIR} --method solid --truth overlap:0.5",
+    "report": f"{EVAL} report drives --jobs 2 --output out",
+    **{
+        f"localise-{jobs}": (
+            f"{EVAL} localise {PAIR} --method gicp --jobs {jobs} --output out"
+        )
+        for jobs in (1, 2)
+    },
+    "localise-track": f"{EVAL} localise {PAIR} --method gicp --track",
+    "map-update": f"{EVAL} map-update maps --baseline m3c2 --output out",
+}
+# These run jobs in processes of their own.
+WITH_JOBS = (
+    "generate",
+    "study",
+    "reproduce",
+    "train",
+    "pointnetvlad",
+    "report",
+    "localise-2",
+)
+# After a command has ended, its processes are given this time to end [s].
+GRACE = 1.0
+
+
+def make_inputs(folder: Path) -> None:
+    """Makes what the commands read, unless it is there."""
+    from cns_drake.scenarios import load_scenario, shipped_maps
+    from cns_drake.simulation import simulate
+
+    for name in DRIVES:
+        if not (folder / "drives" / name).exists():
+            drive = load_scenario(name).with_lidar("os1-32")
+            drive = drive.model_copy(update={"frames": 800})
+            simulate(drive, folder / "drives", overwrite=True)
+    if not (folder / "town").exists():
+        shutil.copytree(shipped_maps()["suburbia"], folder / "town")
+        (folder / "town" / "sequences.csv").unlink(missing_ok=True)
+
+
+def session_of(number: int) -> list[psutil.Process]:
+    """Returns the program with its descendants."""
+    with contextlib.suppress(psutil.NoSuchProcess):
+        main = psutil.Process(number)
+        return [main, *main.children(recursive=True)]
+    return []
+
+
+def time_of(processes: list[psutil.Process]) -> float:
+    """Returns the processor time of processes so far [s]."""
+    total = 0.0
+    for one in processes:
+        with contextlib.suppress(psutil.Error):
+            total += sum(one.cpu_times()[:2])
+    return total
+
+
+def strike(words: list[str], folder: Path, how: str, moment: float) -> str:
+    """Runs a command, interrupts it, and returns a row on its end."""
+    for path in (folder / "out", folder / "out.webp"):
+        shutil.rmtree(path, ignore_errors=True)
+        path.unlink(missing_ok=True)
+    before = set(folder.rglob("*"))
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    with open(folder / "log", "w+") as log:
+        program = psutil.Popen(
+            [sys.executable, "-m", *words],
+            stdout=log, stderr=log, cwd=folder, start_new_session=True,
+            preexec_fn=lambda: signal.signal(
+                signal.SIGINT, signal.default_int_handler
+            ),
+        )  # fmt: skip
+        with contextlib.suppress(psutil.TimeoutExpired):
+            program.wait(moment)
+        ended_before = not program.is_running()
+        processes = session_of(program.pid)
+        so_far = time_of(processes[:1])
+        jobs = [
+            one
+            for one in processes[1:]
+            if "forkserver" in " ".join(one.cmdline()) and one.children()
+        ]
+        if how == "SIGINT":
+            os.killpg(program.pid, signal.SIGINT)
+        elif how == "SIGTERM":
+            program.terminate()
+        elif jobs:
+            random.choice(jobs[0].children()).kill()
+        since = time.monotonic()
+        try:
+            status = program.wait(120.0)
+        except psutil.TimeoutExpired:
+            status = None
+        seconds = time.monotonic() - since
+        time.sleep(GRACE)
+        left = [one for one in processes[1:] if one.is_running()]
+        for one in (program, *left):
+            with contextlib.suppress(psutil.NoSuchProcess):
+                one.kill()
+        log.seek(0)
+        lines = [
+            line for line in log.read().splitlines() if "elapsed" not in line
+        ]
+    now = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = now.ru_utime + now.ru_stime - used.ru_utime - used.ru_stime - so_far
+    new = {
+        str(path.relative_to(folder))
+        for path in set(folder.rglob("*")) - before
+        if path.is_file() and "parts" not in path.parts
+    } - {"log"}
+    return (
+        f"{how:7} at {moment:5.1f} s{' (had ended)' if ended_before else ''}:"
+        f" {seconds:5.1f} s, {spent:4.1f} s of processors, status {status},"
+        f" {len(left)} processes left, {len(lines)} lines: {lines[-2:]},"
+        f" files: {sorted(new)[:4]}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("names", nargs="*", help="commands; all by default")
+    parser.add_argument("--times", type=int, default=3, help="of each command")
+    parser.add_argument("--longest", type=float, default=30.0)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    make_inputs(options.folder)
+    rng = random.Random(options.seed)
+    for name in options.names or COMMANDS:
+        words = COMMANDS[name].split()
+        ways = ["SIGINT", "SIGTERM", *(["SIGKILL"] * (name in WITH_JOBS))]
+        for number in range(options.times):
+            moment = rng.uniform(1.0, options.longest)
+            way = ways[number % len(ways)]
+            row = strike(words, options.folder, way, moment)
+            print(f"{name:15} {row}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
