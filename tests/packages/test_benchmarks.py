@@ -42,6 +42,7 @@ RUNS = {
 # files that cannot be shipped; what they share with others is run above.
 BY_HAND = {
     "any_diagram.py",
+    "class_shares.py",
     "evaluation_of_recordings.py",
     "first_hour.py",
     "growth.py",
@@ -52,6 +53,7 @@ BY_HAND = {
     "peers.py",
     "real_or_simulated.py",
     "real_scans.py",
+    "repeats.py",
     "scans_to_judge.py",
     "silences.py",
     "source_rays.py",
