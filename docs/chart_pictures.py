@@ -30,11 +30,11 @@ from docs.picture_parts import (
 from docs.result_tables import kept_in_cities
 from evaluation.methods import method_facts, shipped_methods
 from evaluation.results import (
-    CANNOT_SHOW,
     INK,
     MARGIN,
     PALE,
     SURVIVES,
+    SURVIVES_NOT,
     Results,
     Row,
     Survival,
@@ -103,9 +103,10 @@ def survival(path: Path) -> str:
         axes.plot(without[one.method], y, "o", color=colour, mfc="white", ms=9)
         axes.plot(at, y, "o", color=colour, ms=9)
     axes.set(xlim=(-4.0, 112.0), ylim=(len(order) - 0.5, -0.8))
-    axes.set_xlabel(
+    figure.supxlabel(
         "retained AUC strict [%]:  ○ without, ● with geometric verification\n"
-        "bar: 95 % interval over cities;  | one city;  * made by this project"
+        "bar: 95 % interval over cities;  | one city;  * made by this project",
+        fontsize=12,
     )
     names = [f"{title(n)}*" if n in OURS else title(n) for n in order]
     axes.set_yticks(range(len(order)), names)
@@ -117,27 +118,23 @@ def survival(path: Path) -> str:
 
 
 def survival_title(found: Mapping[bool, Collection[Survival]]) -> str:
-    """Returns a title: which methods survive, without and with verification.
+    """Returns a title: which methods survive with geometric verification.
 
     Args:
         found: whether geometric verification was used -> whether methods
             survive.
     """
-    every = [one for some in found.values() for one in some]
-    if all(one.verdict == CANNOT_SHOW for one in every):
-        return f"{every[0].cities} cities cannot show what survives rebuilding"
 
-    def named(some: Collection[Survival]) -> str:
-        names = sorted(one.method for one in some if one.verdict == SURVIVES)
+    def named(verdict: str) -> str:
+        names = [one.method for one in found[True] if one.verdict == verdict]
         marked = [f"{title(n)}{'*' * (n in OURS)}" for n in names]
-        return listed(marked).lower() if marked else "no method"
+        return listed(marked) if marked else "no method"
 
-    alone, verified = named(found[False]), named(found[True])
-    if alone == verified:
-        return f"{alone.capitalize()} survives a rebuilt city"
+    survives = named(SURVIVES)
+    verb = "survive" if " and " in survives else "survives"
     return (
-        f"{alone.capitalize()} survives a rebuilt city;\n"
-        f"with geometric verification, {verified} does"
+        f"With geometric verification, {survives} {verb}\n"
+        f"a rebuilt city; {named(SURVIVES_NOT)} do not"
     )
 
 

@@ -58,6 +58,7 @@ from evaluation.results.summaries import means as means
 from evaluation.results.survival import CANNOT_SHOW as CANNOT_SHOW
 from evaluation.results.survival import MARGIN as MARGIN
 from evaluation.results.survival import SURVIVES as SURVIVES
+from evaluation.results.survival import SURVIVES_NOT as SURVIVES_NOT
 from evaluation.results.survival import Survival as Survival
 from evaluation.results.survival import judge_survival as judge_survival
 from evaluation.results.survival import largest_loss_shown as largest_loss_shown
