@@ -133,8 +133,8 @@ def survival_title(found: Mapping[bool, Collection[Survival]]) -> str:
     survives = named(SURVIVES)
     verb = "survive" if " and " in survives else "survives"
     return (
-        f"With geometric verification, {survives} {verb}\n"
-        f"a rebuilt city; {named(SURVIVES_NOT)} do not"
+        f"{survives} {verb} with geometric\n"
+        f"verification; {named(SURVIVES_NOT)} do not"
     )
 
 
