@@ -133,8 +133,7 @@ def survival_title(found: Mapping[bool, Collection[Survival]]) -> str:
     survives = named(SURVIVES)
     verb = "survive" if " and " in survives else "survives"
     return (
-        f"{survives} {verb} with geometric\n"
-        f"verification; {named(SURVIVES_NOT)} do not"
+        f"With verification, {survives} {verb};\n{named(SURVIVES_NOT)} do not"
     )
 
 
