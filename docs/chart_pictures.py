@@ -539,7 +539,7 @@ def ladder(path: Path) -> None:
     axes.set_yticks(np.arange(0.5, len(found) - 1), minor=True)
     axes.grid(which="minor", color="white", lw=2)
     axes.tick_params(which="minor", length=0)
-    axes.set_xlabel("retained AUC [%] at the strongest level, in Suburbia")
+    axes.set_xlabel("retained AUC [%] in Suburbia", fontsize=11)
     single = [cause for cause in found if cause != "all"][:3]
     heads = [texts[cause].partition(":")[0] for cause in single]
     names = listed([head[0].lower() + head[1:] for head in heads])
