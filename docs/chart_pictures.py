@@ -144,12 +144,14 @@ def assumptions(path: Path) -> None:
     figure = Figure(figsize=(WIDTH, 6.8), layout="constrained")
     axes = figure.subplots()
     ticks: dict[float, str] = {}
+    durations = []
     y = 0.0
     for place, *cells in rows:
         # Only the first measure: AUC.
         lasts = re.sub(r" \(.*?\)", "", cells[-1].partition(";")[0])
+        durations.append(lasts)
         axes.text(1.0, y, place, va="center", fontweight="bold")
-        axes.text(1.0, y + 0.95, f"a tenth lost after\n{lasts}", va="top")
+        axes.text(1.0, y + 1.6, f"a tenth lost after\n{lasts}", va="top")
         for city, cell in zip(head[1:-1], cells[:-1], strict=True):
             if "(" in cell:
                 y += 1.0
@@ -165,9 +167,10 @@ def assumptions(path: Path) -> None:
     axes.set_title(f"{head[0]}:", loc="left")
     make_plain(axes)
     add_heading(
-        figure, f"As shipped, BTC loses a tenth within\n{lasts};"
-        " in place, never"
-    )  # fmt: skip
+        figure,
+        "As shipped, BTC loses a tenth after\n"
+        f"{lasts}; in place, after {durations[1]}",
+    )
     figure.savefig(path, dpi=DPI)
 
 
@@ -228,12 +231,12 @@ def ranking(path: Path) -> None:
         make_plain(axes, "y")
     panels[0].set_ylabel("rank by AUC strict (at the right: its mean)")
     alone, verified = (
-        listed([title(name) for name in METHOD_STYLES if name in some])
+        listed([title(name) for name in METHOD_STYLES if name in some]).lower()
         for some in firsts
     )
     add_heading(
         figure,
-        f"{verified} is first with verification;\n"
+        f"{verified.capitalize()} is first with verification;\n"
         f"without it, {alone}{', by radius' * (len(firsts[0]) > 1)}",
     )
     figure.savefig(path, dpi=DPI)
@@ -389,7 +392,7 @@ def fleet(path: Path) -> None:
     add_heading(
         figure,
         f"One car a year notices {one} % of the changes,\n"
-        f"two cars {shares[2]} %, {max(shares)} cars {most} %",
+        f"two cars {shares[2]} %, four cars {most} %",
     )
     figure.savefig(path, dpi=DPI)
 
@@ -516,7 +519,9 @@ def ladder(path: Path) -> None:
         axes.text(x, y, f"{share:.0f}", ha="center", va="center")
     axes.set_yticks(range(len(found)), texts.values())
     axes.set_xticks(
-        range(len(methods)), [title(n).replace(" ", "\n") for n in methods]
+        range(len(methods)),
+        [title(n).replace(" ", "\n") for n in methods],
+        fontsize=10,
     )
     axes.xaxis.tick_top()
     axes.tick_params(length=0)
@@ -525,9 +530,10 @@ def ladder(path: Path) -> None:
     axes.set_yticks(np.arange(0.5, len(found) - 1), minor=True)
     axes.grid(which="minor", color="white", lw=2)
     axes.tick_params(which="minor", length=0)
-    axes.set_xlabel("retained AUC [%] at the strongest level, in Suburbia")
+    axes.set_xlabel("retained AUC [%] in Suburbia", fontsize=11)
     single = [cause for cause in found if cause != "all"][:3]
-    names = listed([texts[cause].partition(":")[0].lower() for cause in single])
+    heads = [texts[cause].partition(":")[0] for cause in single]
+    names = listed([head[0].lower() + head[1:] for head in heads])
     add_heading(figure, f"All at once costs most; alone,\n{names}")
     figure.savefig(path, dpi=DPI)
 
@@ -546,7 +552,23 @@ def _cause_text(cause: str, level: object) -> str:
         value = list(value.values())[-1]
     if not isinstance(value, list):
         return sheet["title"]
-    return f"{sheet['title']}: {value[int(str(level)) - 1]}"
+    strongest = value[int(str(level)) - 1]
+    if not isinstance(strongest, str | float | int) or strongest is True:
+        return sheet["title"]
+    return f"{sheet['title']}: {strongest}{_UNITS.get(cause, '')}"
+
+
+# Cause -> what follows its strength.
+_UNITS = {
+    "hidden": "°",
+    "lateral": " m",
+    "leaves": " left",
+    "raised": " m",
+    "size": " places",
+    "snow": " m",
+    "tilt": "°",
+    "weather": " m",
+}
 
 
 def noise(path: Path) -> None:
