@@ -320,9 +320,10 @@ function carTrack() {
   return [...at].map((time, k) => ({time, place: values.slice(3 * k, 3 * k + 3)}));
 }
 
-// In a page of two drives, one leads: the one that the user touched last. The
+// In a page of two drives, one leads: the first, or the one that the user
+// touched last. The
 // other one goes to the same place, and its camera looks from the same side.
-let leads = false;
+let leads = window.name === "leader";
 let track = null;
 
 function tell() {
