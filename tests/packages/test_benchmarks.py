@@ -47,6 +47,7 @@ BY_HAND = {
     "first_hour.py",
     "growth.py",
     "interruptions.py",
+    "interval_coverage.py",
     "kills.py",
     "lidar_odometry.py",
     "memory.py",

@@ -373,11 +373,13 @@ def _with_parts(
     solids = list(parts)
     if uncovered.area > _MOST_UNCOVERED * outline.polygon.area:
         solids += _solids_below(parts, outline, uncovered)
-        faults.add(
-            "building with parts for some of its outline, the rest as high as"
-            " the whole",
-            outline.name,
-        )
+        # A building inside another one says nothing of the rest.
+        if any(has_tag(part.tags, "building:part") for part in parts):
+            faults.add(
+                "building with parts for some of its outline, the rest as high"
+                " as the whole",
+                outline.name,
+            )
     solids += [
         outline.replaced(piece, outline.low, outline.high)
         for piece in _without_slivers(uncovered)

@@ -149,9 +149,8 @@ def _route_picture(drive: PageDrive) -> Markup:
     """Returns a drive's route on its map from above, as an SVG element.
 
     Arrow heads show its direction, and numbers its kilometres. One unit is one
-    metre;
-    the x axis is directed to the right, the y axis downwards. The picture of
-    the map is an element `image` with the id `view-<name of the drive>`, which
+    metre; the x axis is directed to the right, the y axis downwards. The map's
+    picture is an element `image` with the id `view-<name of the drive>`, which
     the query browser uses as well.
     """
     left, right, bottom, top = drive.extent
@@ -164,7 +163,7 @@ def _route_picture(drive: PageDrive) -> Markup:
     mark = [[x0, y0 - size], [x0 - size, y0 + size], [x0 + size, y0 + size]]
     arrows = []
     for k in np.linspace(0, len(route) - 1, _NUM_ARROWS + 1).astype(int)[1:-1]:
-        ahead = route[min(k + 1, len(route) - 1)] - route[k - 1]
+        ahead = route[min(k + 1, len(route) - 1)] - route[max(k - 1, 0)]
         length = np.linalg.norm(ahead)
         if length > 0.0:
             along = size * ahead / length

@@ -1255,6 +1255,7 @@ NO_FILES = {
     "cns_drake.base.read_only": "an array",
     "cns_drake.city.start_city": "reads by load_road_network",
     "cns_drake.motion.load_car_masses": "a shipped model",
+    "cns_drake.pictures.read_drive_page": "bounded by the limit of a page",
     "cns_drake.scene.find_bus": "an object",
     "cns_drake.simulation.load_drive": "reads by load_world",
     "cns_drake.simulation.load_stage": "reads by load_world",

@@ -76,8 +76,9 @@ def test_options_replace_fields(capsys, tmp_path, asked):
     words = ["study", path, "town", "village", "--output", tmp_path / "out"]
     status, out, err = run(capsys, *words)
     # Nothing was measured that could be compared.
-    assert (status, err) == (0, "")
-    assert out == f"{tmp_path / 'out' / 'index.html'}\n"
+    page = tmp_path / "out" / "index.html"
+    assert (status, err) == (0, f"next: open {page} in a browser\n")
+    assert out == f"{page}\n"
     words += ["--quick", "--task", "change", "--task", "pose"]
     words += ["--method", "solid", "--set", "protocol.radius=5"]
     words += ["--set", "seeds=[3, 4]", "--jobs", "2"]
