@@ -105,6 +105,8 @@ def check_table(folder: Path) -> None:
             written.
     """
     path = MapFolder(folder).drive_table
+    if not path.parent.is_dir():
+        return  # The check would make a folder whose files nobody has written.
     check_writable(path)
     if is_there(path):
         head = ",".join(field.name for field in fields(DriveRow)[:3])

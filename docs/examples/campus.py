@@ -28,7 +28,10 @@ LOOP = (
     (3, 2), (3, 4), (0, 4), (0, 3), (2, 3), (2, 2), (0, 2), (0, 0), (1, 0),
     (1, 1), (2, 1), (2, 0), (3, 0), (3, 2),
 )  # fmt: skip
-COLUMNS, ROWS = 8, 5
+# Number of blocks from west to east.
+COLUMNS = 8
+# Number of blocks from south to north.
+ROWS = 5
 # What stands in a block. NOT MEASURED: a third of the blocks is open.
 SHARES = {"building": 0.55, "lawn": 0.30, "parking": 0.15}
 # Length of a degree at latitude 0 [m]: the file lies where degrees are equal.

@@ -25,8 +25,10 @@ import time
 import psutil
 
 DRIVES = ("metropolis_01", "metropolis_04")
+# Words of commands that take two drives.
 PAIR = " ".join(f"drives/{name}" for name in DRIVES)
-DRAKE, EVAL = "cns_drake", "evaluation"
+DRAKE = "cns_drake"
+EVAL = "evaluation"
 # Name -> module and words of a command that runs for long.
 COMMANDS = {
     "simulate": f"{DRAKE} simulate metropolis_01 --output out",

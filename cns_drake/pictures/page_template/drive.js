@@ -321,8 +321,8 @@ function carTrack() {
 }
 
 // In a page of two drives, one leads: the first, or the one that the user
-// touched last. The
-// other one goes to the same place, and its camera looks from the same side.
+// touched last. The other one goes to the same place, and its camera looks from
+// the same side.
 let leads = window.name === "leader";
 let track = null;
 

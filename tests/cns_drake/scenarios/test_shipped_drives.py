@@ -17,14 +17,14 @@ from cns_drake.scenarios import (
     count_frames,
     make_scenario,
     plan_drive,
-    shipped_drives,
+    recordable_drives,
 )
 from evaluation.drives import sample_frames
 from evaluation.recognition import PAPER_PROTOCOL
 
 pytestmark = pytest.mark.slow
 
-SHIPPED = sorted(shipped_drives())
+SHIPPED = sorted(recordable_drives())
 # Queries of the later drive that have a match in the earlier one, from the
 # paper's Table II (true positives over recall at 1).
 QUERIES_WITH_MATCH = {

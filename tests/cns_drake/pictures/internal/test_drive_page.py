@@ -321,6 +321,8 @@ def test_one_drive_follows_the_other_to_its_place(pair, leader):
         )
     )
     pair.wait_for(inside(follower, "viewer.animator.time") + " === 6")
+    # The camera follows the car when a picture is drawn.
+    pair.evaluate(inside(follower, "viewer.render()"))
     cameras = [
         pair.evaluate(inside(k, "viewer.camera.position.toArray()"))
         for k in range(2)
