@@ -303,6 +303,8 @@ slow_in_chromium = [
 ]
 
 
+# A software renderer takes minutes to draw two cities.
+@pytest.mark.night
 @pytest.mark.slow
 @pytest.mark.skipif(not has_chromium(), reason="no chromium")
 @pytest.mark.parametrize("leader", [0, 1])
