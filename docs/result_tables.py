@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 import csv
 from dataclasses import asdict, dataclass, fields, replace
+import functools
 import io
 import itertools
 from pathlib import Path
@@ -24,7 +25,6 @@ ROOT = Path(__file__).resolve().parents[1]
 # As a program, this file is not in the package `docs`.
 sys.path.insert(0, str(ROOT))
 
-from evaluation.recognition import city_interval  # noqa: E402
 from evaluation.results import (  # noqa: E402
     CANNOT_SHOW,
     LAST,
@@ -102,6 +102,7 @@ class Claim:
     source: str
 
 
+@functools.cache
 def shipped() -> Results:
     """Returns the results on the pairs of the four cities."""
     return Results.read(BASELINES / "stages.csv")
@@ -215,16 +216,15 @@ def losses_at(radius_m: float, gate: bool) -> list[Survival]:
         kept = float(row["auc_strict"]) / float(row["unchanged_auc_strict"])
         loss = max(0.0, 1.0 - kept)
         by_city.setdefault((row["method"], city), []).append(loss)
-    found = []
-    for method in METHODS:
-        losses = np.array(
-            [np.mean(v) for (name, _), v in by_city.items() if name == method]
+    return [
+        Survival.of(
+            method,
+            np.array(
+                [np.mean(v) for (m, _), v in by_city.items() if m == method]
+            ),
         )
-        interval = city_interval(losses, np.ones(len(losses)), (0.0, 1.0))
-        found.append(
-            Survival(method, float(losses.mean()), interval, len(losses))
-        )
-    return found
+        for method in METHODS
+    ]
 
 
 def claims() -> list[Claim]:

@@ -48,6 +48,12 @@ class Survival(NamedTuple):
     interval: Interval
     cities: int
 
+    @classmethod
+    def of(cls, method: str, losses: np.ndarray) -> Survival:
+        """Returns the survival of a method from its loss (C,) in each city."""
+        interval = city_interval(losses, np.ones(len(losses)), (0.0, 1.0))
+        return cls(method, float(losses.mean()), interval, len(losses))
+
     @property
     def verdict(self) -> str:
         """`survives`, `does not survive` or `cannot show`.
@@ -102,10 +108,7 @@ def judge_survival(rows: Iterable[Row]) -> list[Survival]:
                 for city in cities
             ]
         )
-        interval = city_interval(losses, np.ones(len(losses)), (0.0, 1.0))
-        found.append(
-            Survival(name, float(losses.mean()), interval, len(cities))
-        )
+        found.append(Survival.of(name, losses))
     return sorted(found, key=lambda one: (one.loss, one.method))
 
 
