@@ -5,6 +5,7 @@ import sys
 import types
 
 from helpers.internal import studies
+from helpers.internal.eval_program import run_program
 from helpers.tiny_drive import tiny_scenario, write_scenario
 import numpy as np
 import pytest
@@ -161,16 +162,12 @@ def test_two_drives_of_one_name_are_refused(tmp_path):
         export_pairs(both, [], tmp_path / "set", ExportOptions(), None)
 
 
-def test_submaps_have_no_overlaps(tmp_path, monkeypatch, capsys):
+def test_submaps_have_no_overlaps(tmp_path, capsys):
     file = write_scenario(tiny_scenario(tmp_path), tmp_path)
-    line = f"cns-drake export {file} --format overlap --scans 2 --output x"
-    monkeypatch.setattr(sys, "argv", line.split())
-    with pytest.raises(SystemExit) as end:
-        main()
-    assert end.value.code == 2
-    assert "--scans: not with --format overlap; only with pointnetvlad" in (
-        capsys.readouterr().err
-    )
+    line = f"export {file} --format overlap --scans 2 --output x"
+    status, _, err = run_program(capsys, "cns-drake", main, *line.split())
+    assert status == 2
+    assert "--scans: not with --format overlap; only with pointnetvlad" in err
 
 
 def test_clouds_without_positives_are_counted(tmp_path):
@@ -253,11 +250,9 @@ def test_a_held_out_drive_may_be_named_with_the_others(
 
     monkeypatch.setattr(pair_export, "export_pairs", take)
     line = (
-        "cns-drake export riverside_01 riverside_02 --held-out"
+        "export riverside_01 riverside_02 --held-out"
         f" riverside_02 --format pointnetvlad --output {tmp_path}"
     )
-    monkeypatch.setattr(sys, "argv", line.split())
-    with pytest.raises(SystemExit) as end:
-        main()
-    assert not end.value.code
+    status, *_ = run_program(capsys, "cns-drake", main, *line.split())
+    assert not status
     assert seen["names"] == [["riverside_01"], ["riverside_02"]]
