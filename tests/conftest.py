@@ -123,12 +123,13 @@ def pytest_collection_modifyitems(config, items):
     """Puts the longest files first, then those with slow tests.
 
     None of them is then left for one process at the end. Tests for the night
-    are left out in the day.
+    are left out in the day, and so are most cases of a test that is sampled.
     """
     if not config.option.night:
-        late = [item for item in items if item.get_closest_marker("night")]
-        config.hook.pytest_deselected(items=late)
-        items[:] = [item for item in items if item not in set(late)]
+        late = {item for item in items if item.get_closest_marker("night")}
+        late |= _beyond_samples(item for item in items if item not in late)
+        config.hook.pytest_deselected(items=list(late))
+        items[:] = [item for item in items if item not in late]
     for item in items:
         recorded = "short_recording" in item.fixturenames
         if recorded or hasattr(item.module, "simulate"):
@@ -139,6 +140,23 @@ def pytest_collection_modifyitems(config, items):
     items.sort(
         key=lambda item: (item.path.name not in _LONGEST, item.path not in slow)
     )
+
+
+def _beyond_samples(items):
+    """Returns the cases of sampled tests that the day leaves out.
+
+    Those that it runs are spread evenly over all cases.
+    """
+    cases = {}
+    for item in items:
+        if item.get_closest_marker("sampled"):
+            cases.setdefault(item.function, []).append(item)
+    left_out = set()
+    for some in cases.values():
+        (number,) = some[0].get_closest_marker("sampled").args
+        taken = {k * len(some) // number for k in range(number)}
+        left_out |= {one for k, one in enumerate(some) if k not in taken}
+    return left_out
 
 
 def pytest_collection_finish():

@@ -81,15 +81,18 @@ def _verbs(text: str) -> Iterator[str]:
             )
 
 
-def recordings(folder: Path) -> dict[str, str]:
-    """Simulates the three recordings; a line for each of their topics."""
-    shutil.copytree(_small_city(), folder / "town")
-    rows = []
-    for name in inputs.write_scenarios(folder):
+def recording(name: str) -> Callable[[Path], dict[str, str]]:
+    """Returns the edge of a recording: a line for each of its topics."""
+
+    def edge(folder: Path) -> dict[str, str]:
+        shutil.copytree(_small_city(), folder / "town")
+        inputs.write_scenarios(folder)
         words = "--output", "out", "--frames", 8
         run(folder, "cns_drake", "simulate", f"{name}.yaml", *words)
-        rows += _topics(folder / "out" / name)
-    return {"recordings.csv": _csv(rows)}
+        rows = _topics(folder / "out" / name)
+        return {f"recording-{name}.csv": _csv(rows)}
+
+    return edge
 
 
 def _topics(folder: Path) -> list[dict[str, object]]:
@@ -251,16 +254,18 @@ EDGES: dict[str, Callable[[Path], dict[str, str]]] = {
     "cns-eval-help": helps("evaluation", "cns-eval"),
     "city": city,
     "import-openstreetmap": imported(inputs.write_corner_osm, "corner.osm"),
-    "recordings": recordings,
-    "study": study,
+    "recording-plain": recording("plain"),
     "pr": pr,
     "tcr": tcr,
     "localise": localise,
     "map-update": map_update,
-    "real": real,
 }
 BY_NIGHT: dict[str, Callable[[Path], dict[str, str]]] = {
     "shipped-cities": shipped_cities,
+    "recording-rain_and_traffic": recording("rain_and_traffic"),
+    "recording-ride_and_camera": recording("ride_and_camera"),
+    "study": study,
+    "real": real,
     "age": age,
     "import-cityjson": imported(
         inputs.write_blocks_cityjson,

@@ -225,6 +225,7 @@ def test_what_is_in_the_way_stays(
         assert written(place) == before, (name, kind)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("kind", ["file", "link", "folder"])
 @pytest.mark.parametrize("name", CITY)
 def test_a_city_keeps_what_is_yours(tmp_path, capsys, name, kind):

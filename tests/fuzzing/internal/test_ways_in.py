@@ -1381,6 +1381,7 @@ def attempts(tmp_path_factory):
 
 
 @pytest.mark.slow
+@pytest.mark.sampled(30)
 @pytest.mark.parametrize("name", WAYS)
 def test_a_small_file_costs_little(attempts, name):
     size, end, message = attempts(name)

@@ -198,6 +198,7 @@ def test_replacements_are_of_another_kind(long):
 
 
 @pytest.mark.slow
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_rates_come_about(world, seed):
     """Numbers of 30 years are Poisson's, at one in a thousand for each."""
@@ -268,6 +269,7 @@ def with_kinds(town, folder, kinds):
 
 
 @pytest.mark.slow
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize(
     ("kind", "changes"),
     [
@@ -331,6 +333,7 @@ def test_trees_grow_about_their_feet_in_any_frame(town, world, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize(
     ("kind", "is_open"),
     [

@@ -419,6 +419,7 @@ def test_finished_jobs_start_no_process(
         (report / "aside").rename(picture)
 
 
+@pytest.mark.night
 @pytest.mark.usefixtures("unrendered_figures")
 def test_own_method_beside_the_others(
     recordings, few_methods, tmp_path, monkeypatch
