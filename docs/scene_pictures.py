@@ -235,8 +235,7 @@ def layers(path: Path) -> None:
     nearest = moments[np.linalg.norm(away, axis=1).argmin()]
     scans = []
     for drive, time in zip(drives, (20.0, nearest), strict=True):
-        scan, _ = scans_at(drive, np.array([time]))[0]
-        scans.append(np.stack([scan[axis] for axis in "xyz"], axis=1))
+        scans.append(_clouds_at(drive, np.array([time]))[0][0])
     method = LayeredOverlap(LayeredOverlapConfig())
     query, place = map(method.describe, scans)
     (X_PQ,) = method.relative_poses(query, method.build_database([place]), [0])
@@ -279,14 +278,85 @@ def layers(path: Path) -> None:
     figure.savefig(path, dpi=DPI, bbox_inches="tight", pad_inches=0.05)
 
 
+def one_query(path: Path) -> None:
+    """Draws a query from above, its place, and a wrong place that is alike.
+
+    Of the places at least 50 m away, the wrong one is that which layered
+    overlap scores highest.
+    """
+    drives = [load_scenario(f"metropolis_{n}") for n in ("04", "01")]
+    query_way, way = map(plan_drive, drives)
+    time = 20.0
+    moments = np.arange(0.0, way.duration, 2.0)
+    away = np.linalg.norm(
+        way.positions(moments) - query_way.positions(time), axis=1
+    )
+    nearest = int(away.argmin())
+    far = np.flatnonzero(away >= 50.0)
+    chosen = [nearest, *far.tolist()]
+    ((query, X_WQ),) = _clouds_at(drives[0], np.array([time]))
+    places = _clouds_at(drives[1], moments[chosen])
+    method = LayeredOverlap(LayeredOverlapConfig())
+    scores = method.score(
+        method.describe(query),
+        method.build_database([method.describe(one) for one, _ in places]),
+    )
+    alike = 1 + int(np.nanargmax(scores[1:]))
+    (place, X_WP), (wrong, _) = places[0], places[alike]
+    # The query and its place, both in the frame of the place.
+    moved = (X_WP.inverse() @ X_WQ @ query.T).T
+    figure = Figure(figsize=(WIDTH, 3.5), layout="constrained")
+    shown = (
+        ("a query, today", moved, place, NEW_RGB, "new"),
+        (
+            f"its place, {away[nearest]:.0f} m away",
+            place,
+            moved,
+            GONE_RGB,
+            "gone",
+        ),
+        (
+            f"a wrong place, {away[chosen[alike]]:.0f} m",
+            wrong,
+            wrong,
+            GONE_RGB,
+            "",
+        ),
+    )
+    for axes, (name, cloud, other, rgb, word) in zip(
+        figure.subplots(1, 3), shown, strict=True
+    ):
+        high = cloud[cloud[:, 2] > -1.0]
+        lone = cKDTree(other[:, :2]).query(high[:, :2])[0] > 1.5
+        axes.scatter(*high[~lone].T[:2], 1.0, INK, lw=0)
+        axes.scatter(*high[lone].T[:2], 1.6, color=unit_rgb(rgb), lw=0)
+        axes.plot(0.0, 0.0, "^", color="#e69f00", mec=INK, ms=9)
+        axes.set(xlim=(-45, 45), ylim=(-45, 45), aspect="equal")
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.set_title(name, loc="left", fontsize=11)
+        if word:
+            axes.text(-42, -42, word, color=unit_rgb(rgb), fontweight="bold")
+    figure.supxlabel("from above, 90 m wide; triangle: the car", fontsize=10)
+    figure.savefig(path, dpi=DPI, pil_kwargs={"quality": 80})
+
+
+def _clouds_at(scenario: Scenario, times: np.ndarray) -> list[tuple]:
+    """Returns the points (N, 3) of a scan at each time in S, and X_WS."""
+    return [
+        (np.stack([scan[axis] for axis in "xyz"], axis=1), X_WS)
+        for scan, X_WS in scans_at(scenario, times)
+    ]
+
+
 def taken(path: Path, file: str, below: str = "") -> None:
     """Takes a picture that a command made, and another one below it."""
     files = [ROOT / one for one in (file, below) if one]
-    shown = [Image.open(one).convert("RGB") for one in files]
+    shown = [Image.open(one).convert("RGBA") for one in files]
     width = max(one.width for one in shown)
     whole = Image.new("RGB", (width, sum(one.height for one in shown)), "white")
     for k, one in enumerate(shown):
-        whole.paste(one, (0, sum(other.height for other in shown[:k])))
+        whole.paste(one, (0, sum(other.height for other in shown[:k])), one)
     whole.thumbnail((1400, 1600))
     whole.save(path, quality=82)
 
