@@ -14,6 +14,7 @@ from typing import Any
 from matplotlib.figure import Figure
 import numpy as np
 from PIL import Image
+from pydrake.math import RigidTransform
 from scipy.spatial import cKDTree
 
 from cns_drake import Scenario, load_scenario, make_station
@@ -162,7 +163,9 @@ def scans_at(scenario: Scenario, times: np.ndarray) -> list[tuple]:
         context.SetTime(time)
         scan = diagram.GetOutputPort("lidar_scan").Eval(context).copy()
         own = lidar.GetMyContextFromRoot(context)
-        result.append((scan, lidar.GetOutputPort("X_WS").Eval(own)))
+        X_WS = lidar.GetOutputPort("X_WS").Eval(own)
+        # A copy: the port writes the next pose into the same object.
+        result.append((scan, RigidTransform(X_WS)))
     return result
 
 
@@ -235,7 +238,8 @@ def layers(path: Path) -> None:
     nearest = moments[np.linalg.norm(away, axis=1).argmin()]
     scans = []
     for drive, time in zip(drives, (20.0, nearest), strict=True):
-        scans.append(_clouds_at(drive, np.array([time]))[0][0])
+        scan, _ = scans_at(drive, np.array([time]))[0]
+        scans.append(np.stack([scan[axis] for axis in "xyz"], axis=1))
     method = LayeredOverlap(LayeredOverlapConfig())
     query, place = map(method.describe, scans)
     (X_PQ,) = method.relative_poses(query, method.build_database([place]), [0])
@@ -276,77 +280,6 @@ def layers(path: Path) -> None:
             )  # fmt: skip
     panels[0].set_ylabel("y [m]")
     figure.savefig(path, dpi=DPI, bbox_inches="tight", pad_inches=0.05)
-
-
-def one_query(path: Path) -> None:
-    """Draws a query from above, its place, and a wrong place that is alike.
-
-    Of the places at least 50 m away, the wrong one is that which layered
-    overlap scores highest.
-    """
-    drives = [load_scenario(f"metropolis_{n}") for n in ("04", "01")]
-    query_way, way = map(plan_drive, drives)
-    time = 20.0
-    moments = np.arange(0.0, way.duration, 2.0)
-    away = np.linalg.norm(
-        way.positions(moments) - query_way.positions(time), axis=1
-    )
-    nearest = int(away.argmin())
-    far = np.flatnonzero(away >= 50.0)
-    chosen = [nearest, *far.tolist()]
-    ((query, X_WQ),) = _clouds_at(drives[0], np.array([time]))
-    places = _clouds_at(drives[1], moments[chosen])
-    method = LayeredOverlap(LayeredOverlapConfig())
-    scores = method.score(
-        method.describe(query),
-        method.build_database([method.describe(one) for one, _ in places]),
-    )
-    alike = 1 + int(np.nanargmax(scores[1:]))
-    (place, X_WP), (wrong, _) = places[0], places[alike]
-    # The query and its place, both in the frame of the place.
-    moved = (X_WP.inverse() @ X_WQ @ query.T).T
-    figure = Figure(figsize=(WIDTH, 3.5), layout="constrained")
-    shown = (
-        ("a query, today", moved, place, NEW_RGB, "new"),
-        (
-            f"its place, {away[nearest]:.0f} m away",
-            place,
-            moved,
-            GONE_RGB,
-            "gone",
-        ),
-        (
-            f"a wrong place, {away[chosen[alike]]:.0f} m",
-            wrong,
-            wrong,
-            GONE_RGB,
-            "",
-        ),
-    )
-    for axes, (name, cloud, other, rgb, word) in zip(
-        figure.subplots(1, 3), shown, strict=True
-    ):
-        high = cloud[cloud[:, 2] > -1.0]
-        lone = cKDTree(other[:, :2]).query(high[:, :2])[0] > 1.5
-        axes.scatter(*high[~lone].T[:2], 1.0, INK, lw=0)
-        axes.scatter(*high[lone].T[:2], 1.6, color=unit_rgb(rgb), lw=0)
-        axes.plot(0.0, 0.0, "^", color="#e69f00", mec=INK, ms=9)
-        axes.set(xlim=(-45, 45), ylim=(-45, 45), aspect="equal")
-        axes.set_xticks([])
-        axes.set_yticks([])
-        axes.set_title(name, loc="left", fontsize=11)
-        if word:
-            axes.text(-42, -42, word, color=unit_rgb(rgb), fontweight="bold")
-    figure.supxlabel("from above, 90 m wide; triangle: the car", fontsize=10)
-    figure.savefig(path, dpi=DPI, pil_kwargs={"quality": 80})
-
-
-def _clouds_at(scenario: Scenario, times: np.ndarray) -> list[tuple]:
-    """Returns the points (N, 3) of a scan at each time in S, and X_WS."""
-    return [
-        (np.stack([scan[axis] for axis in "xyz"], axis=1), X_WS)
-        for scan, X_WS in scans_at(scenario, times)
-    ]
 
 
 def taken(path: Path, file: str, below: str = "") -> None:
