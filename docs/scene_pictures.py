@@ -14,10 +14,12 @@ from typing import Any
 from matplotlib.figure import Figure
 import numpy as np
 from PIL import Image
+from pydrake.math import RigidTransform
 from scipy.spatial import cKDTree
 
 from cns_drake import Scenario, load_scenario, make_station
 from cns_drake.ageing import air_view
+from cns_drake.base import GONE_RGB, NEW_RGB, UNSEEN_RGB
 from cns_drake.pictures import (
     StageScene,
     View,
@@ -39,14 +41,7 @@ from docs.picture_parts import (
 )
 from evaluation.map_update import Label, read_session
 from evaluation.methods import LayeredOverlap, LayeredOverlapConfig
-from evaluation.results import (
-    GONE,
-    INK,
-    NEW,
-    OrthographicView,
-    render,
-    unit_rgb,
-)
+from evaluation.results import INK, OrthographicView, render, unit_rgb
 
 
 def street(path: Path, rows: Sequence[dict[str, Any]]) -> None:
@@ -168,7 +163,9 @@ def scans_at(scenario: Scenario, times: np.ndarray) -> list[tuple]:
         context.SetTime(time)
         scan = diagram.GetOutputPort("lidar_scan").Eval(context).copy()
         own = lidar.GetMyContextFromRoot(context)
-        result.append((scan, lidar.GetOutputPort("X_WS").Eval(own)))
+        X_WS = lidar.GetOutputPort("X_WS").Eval(own)
+        # A copy: the port writes the next pose into the same object.
+        result.append((scan, RigidTransform(X_WS)))
     return result
 
 
@@ -262,7 +259,8 @@ def layers(path: Path) -> None:
         size = 9 if name == "poles" else 3
         panels[1].scatter(*some.T, size, colours[k], lw=0, label=name)
     for one, other, colour, text in (
-        (moved, cells[1], NEW, "new"), (cells[1], moved, GONE, "gone"),
+        (moved, cells[1], NEW_RGB, "new"),
+        (cells[1], moved, GONE_RGB, "gone"),
     ):  # fmt: skip
         # A cell meets those in 3 x 3.
         both = cKDTree(other).query(one, p=np.inf)[0] <= 0.75
@@ -287,11 +285,11 @@ def layers(path: Path) -> None:
 def taken(path: Path, file: str, below: str = "") -> None:
     """Takes a picture that a command made, and another one below it."""
     files = [ROOT / one for one in (file, below) if one]
-    shown = [Image.open(one).convert("RGB") for one in files]
+    shown = [Image.open(one).convert("RGBA") for one in files]
     width = max(one.width for one in shown)
     whole = Image.new("RGB", (width, sum(one.height for one in shown)), "white")
     for k, one in enumerate(shown):
-        whole.paste(one, (0, sum(other.height for other in shown[:k])))
+        whole.paste(one, (0, sum(other.height for other in shown[:k])), one)
     whole.thumbnail((1400, 1600))
     whole.save(path, quality=82)
 
@@ -299,10 +297,14 @@ def taken(path: Path, file: str, below: str = "") -> None:
 def maps(path: Path, file: str, middle: Sequence[float]) -> None:
     """Draws a street in the maps of two drives, by the labels of map-truth."""
     colours = np.zeros((5, 3))
-    colours[[Label.UNOBSERVED, Label.NEWLY_SEEN]] = (196, 200, 208)
-    colours[[Label.KEPT, Label.GONE, Label.NEW]] = (120, 126, 134), GONE, NEW
+    colours[[Label.UNOBSERVED, Label.NEWLY_SEEN]] = UNSEEN_RGB
+    colours[[Label.KEPT, Label.GONE, Label.NEW]] = (
+        (120, 126, 134),
+        GONE_RGB,
+        NEW_RGB,
+    )
     figure = Figure(figsize=(WIDTH, 2.7), layout="constrained")
-    words = "older map: gone is red", "newer map: new is blue"
+    words = "older map: gone is violet", "newer map: new is red"
     view = OrthographicView(-60.0, 28.0, 12.0)
     for axes, side, text in zip(
         figure.subplots(1, 2), "AB", words, strict=True

@@ -1,7 +1,9 @@
 """What the site has besides the pages of this folder.
 
 Pages of the repository's root become pages of the site, and the public names
-of each package a page of the API reference.
+of each package a page of the API reference. A drive and a report to look at are
+in the site if they were made before (see CONTRIBUTING.md), as the workflow
+`site.yml` does.
 """
 
 from __future__ import annotations
@@ -21,6 +23,15 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("cns_drake", "evaluation")
 # Root pages are below this folder of the site.
 _PROJECT = "project"
+# What a visitor can look at: page below `live` in the site -> its link. The
+# files are in a folder of the same layout.
+LIVE = ROOT / "output/live"
+_LIVE_PAGES = {
+    "drive.html": "a drive through Suburbia, with the points of its LiDAR",
+    "report/index.html": "the report on what a rebuilt city costs each method",
+}
+# What stands in index.md where the links are.
+_LIVE_MARK = "<!-- live -->"
 # Where `nav` in mkdocs.yml has the tab of the API reference.
 _API_TAB = -2
 # How much more a page of a tab counts in a search, and one of another tab.
@@ -42,6 +53,9 @@ def on_files(files: Files, config: MkDocsConfig, **_: Any) -> Files:
     for package in PACKAGES:
         for path, text in _reference(package).items():
             files.append(File.generated(config, f"api/{path}", content=text))
+    for path in _live_pages():
+        made = str(LIVE / path)
+        files.append(File.generated(config, f"live/{path}", abs_src_path=made))
     return files
 
 
@@ -74,6 +88,7 @@ def on_page_markdown(markdown: str, page: Page, files: Files, **_: Any) -> str:
     first.
     """
     page.meta.setdefault("search", _search_rank(page))
+    markdown = markdown.replace(_LIVE_MARK, _live_links())
     markdown = _FORMULA.sub(_set, markdown)
     src = page.file.src_uri
     folder = os.path.dirname(_in_repository(src))
@@ -85,6 +100,8 @@ def on_page_markdown(markdown: str, page: Page, files: Files, **_: Any) -> str:
             return match[0]
         there = os.path.normpath(os.path.join(folder, path))
         found = _in_site(there)
+        if target.startswith("live/"):
+            return match[0]
         if files.get_file_from_path(found) is None:
             if not (ROOT / there).exists():
                 return match[0]  # MkDocs reports it.
@@ -102,6 +119,21 @@ def on_page_content(html: str, **_: Any) -> str:
             r'<span class="whole">\g<0></span>', code[0]
         ),
         re.sub(r"(?<=\d) %", "&nbsp;%", html),
+    )
+
+
+def _live_pages() -> list[str]:
+    """Returns those live pages that were made."""
+    return [path for path in _LIVE_PAGES if (LIVE / path).is_file()]
+
+
+def _live_links() -> str:
+    """Returns a sentence that leads to the live pages."""
+    links = [f"[{_LIVE_PAGES[path]}](live/{path})" for path in _live_pages()]
+    if not links:
+        return ""
+    return (
+        f"**Look before you install**, in your browser: {' and '.join(links)}."
     )
 
 

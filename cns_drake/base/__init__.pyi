@@ -50,6 +50,9 @@ from cns_drake.base.errors import one_line as one_line
 from cns_drake.base.errors import validated as validated
 from cns_drake.base.errors import value_errors as value_errors
 from cns_drake.base.families import family_members as family_members
+from cns_drake.base.figures import GONE_RGB as GONE_RGB
+from cns_drake.base.figures import NEW_RGB as NEW_RGB
+from cns_drake.base.figures import UNSEEN_RGB as UNSEEN_RGB
 from cns_drake.base.figures import figure_style as figure_style
 from cns_drake.base.figures import save_figure as save_figure
 from cns_drake.base.file_locks import lock_file as lock_file

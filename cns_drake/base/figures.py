@@ -18,6 +18,16 @@ _DATES = {"pdf": "CreationDate", "svg": "Date"}
 _FILES = {"pdf.fonttype": 42, "svg.hashsalt": "cns", "svg.fonttype": "path"}
 
 
+Rgb = tuple[int, int, int]
+
+# What became of a place between two stages, the same colours in all pictures
+# and pages. Grey: one of the two drives did not see the place, so that nothing
+# is known of it.
+NEW_RGB: Rgb = (226, 52, 44)
+GONE_RGB: Rgb = (146, 96, 240)
+UNSEEN_RGB: Rgb = (178, 182, 190)
+
+
 @contextlib.contextmanager
 def figure_style(changes: Mapping[str, Any] | None = None) -> Iterator[None]:
     """Makes Matplotlib's defaults apply, as a `with` block or a decorator.

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import length_of
+from cns_drake.base import GONE_RGB, NEW_RGB, length_of
 from cns_drake.pictures import meshcat_drawing as drawing
 from cns_drake.pictures.drive_record import DriveRecord, ScanRecord
 from cns_drake.scene import World
@@ -19,10 +19,7 @@ from cns_drake.scene import World
 Rgb = tuple[float, float, float]
 
 # Side of the divider -> colour of what only this side has.
-CHANGE_RGB: dict[str, Rgb] = {
-    "before": (0.66, 0.48, 1.0),
-    "after": (1.0, 0.30, 0.26),
-}
+_CHANGE_RGB = {"before": GONE_RGB, "after": NEW_RGB}
 # Greatest number of samples in a plot; more would not be visible.
 _MAX_SAMPLES = 400
 # Size of a plot in units of its own, which the page stretches.
@@ -76,7 +73,7 @@ def make_panel(
     Args:
         title: title of the page.
         drive: record of the drive.
-        changes: what the page shows of a change, keys of `CHANGE_RGB`.
+        changes: what the page shows of a change, `before` and `after`.
         shown: the stages of the city that the page shows.
     """
     # Only pages need templates, and the import takes a moment.
@@ -100,7 +97,10 @@ def make_panel(
         ),
         heights=(f"{lowest:g}", f"{highest:g}"),
         route=_hex(drawing.ROUTE_RGB),
-        colours={name: _hex(rgb) for name, rgb in CHANGE_RGB.items()},
+        colours={
+            name: _hex(np.array(rgb) / 255.0)
+            for name, rgb in _CHANGE_RGB.items()
+        },
         changes=changes,
         sides=shown.sides(),
         scans=_scans_text(drive.scans),

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from matplotlib import colormaps
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 import numpy as np
 
@@ -16,6 +18,8 @@ _WIDTH = 704
 _HEIGHT = 396
 # Distance at which the colours of points end [m].
 _FARTHEST = 100.0
+# From dark where points are near; no yellow, which is pale on white.
+_COLOURS = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.8, 256)))
 # Height of the LiDAR, which stands below the camera [m].
 _SENSOR_HEIGHT = 1.6
 
@@ -47,7 +51,7 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
         axes[0, column].set_title(title)
         pixels, distances = _scan_seen_by(scene, view)
         points = axes[1, column].scatter(
-            *pixels.T, c=distances, s=0.4, cmap="viridis_r", vmin=0,
+            *pixels.T, c=distances, s=0.4, cmap=_COLOURS, vmin=0,
             vmax=_FARTHEST, linewidths=0, rasterized=True,
         )  # fmt: skip
         axes[1, column].set_xlim(0, _WIDTH)

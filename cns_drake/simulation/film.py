@@ -273,6 +273,7 @@ class _FilmStage(Step):
         drive = load_drive(DrivePlan(scenario))
         for text in drive.world.notes:
             reporter.note(text)
+        doing("filming", 0, len(self.times), "images")
         diagram = make_station(drive, cameras_see_vehicle=True)
         context = diagram.CreateDefaultContext()
         for k, time in enumerate(self.times):

@@ -32,7 +32,10 @@ from evaluation.results.sections.camera_images import (
     nearest_images as nearest_images,
 )
 from evaluation.results.sections.change_pictures import (
-    ChangePictures as ChangePictures,
+    ChangePicture as ChangePicture,
+)
+from evaluation.results.sections.change_pictures import (
+    DrivenMap as DrivenMap,
 )
 from evaluation.results.sections.change_pictures import (
     change_section as change_section,
@@ -46,9 +49,7 @@ from evaluation.results.sections.routes import (
     make_page_drive as make_page_drive,
 )
 from evaluation.results.sections.routes import routes_section as routes_section
-from evaluation.results.styles import GONE as GONE
 from evaluation.results.styles import INK as INK
-from evaluation.results.styles import NEW as NEW
 from evaluation.results.styles import PALE as PALE
 from evaluation.results.styles import method_style as method_style
 from evaluation.results.styles import method_styles as method_styles

@@ -34,7 +34,7 @@ _PERCENT = "{:.0f}\N{NO-BREAK SPACE}%"
 # From this value on, a share is 1.00 as texts show it.
 _CEILING = 0.995
 # Greatest number of words of a headline.
-_MOST_WORDS = 30
+_MOST_WORDS = 25
 # Greatest number of methods of which a sentence names each.
 _FEW = 2
 # Greatest number of methods that a sentence names with geometric verification.
@@ -152,7 +152,7 @@ def cost_sentence(change: Change) -> str:
     Without geometric verification, the sentence names the methods with the
     least and the greatest cost, or all if there are one or two. With it, the
     sentence names the methods that keep most: up to three, as long as the
-    sentence has at most 30 words.
+    sentence has at most 25 words.
     """
     subject = change_words(change.over, change.before, change.after)
     subject = subject[:1].upper() + subject[1:]

@@ -36,10 +36,6 @@ _OTHERS = (
 # Colours of what belongs to no method.
 INK = "#1C2430"
 PALE = "#7A8594"
-# Colour of points that are in the older of two maps alone.
-GONE = (214, 48, 49)
-# Colour of points that are in the newer of two maps alone.
-NEW = (38, 96, 214)
 # Colours (red, green, blue) and what they mean.
 Legend = tuple[tuple[tuple[int, int, int], str], ...]
 

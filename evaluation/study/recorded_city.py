@@ -18,7 +18,8 @@ from evaluation.recognition import (
 from evaluation.results import (
     OWN,
     STAGE,
-    ChangePictures,
+    ChangePicture,
+    DrivenMap,
     PageDrive,
     make_page_drive,
     nearest_images,
@@ -55,7 +56,7 @@ class ShownCity:
 
     city: MapDrives
     drives: Part
-    changes: tuple[ChangePictures, ...]
+    changes: tuple[ChangePicture, ...]
     places: tuple[tuple[Result, ...], ...]
 
     def outcomes(self) -> list[list[PlaceOutcome]]:
@@ -287,7 +288,7 @@ def _draw_changes(
     pairs: Sequence[Pair],
     planned: _ExtractionJobs,
     jobs: dict[str, Job],
-) -> list[ChangePictures]:
+) -> list[ChangePicture]:
     """Adds jobs that draw changes between stages; returns the pictures."""
     found = []
     for earlier, later in city.change_pairs():
@@ -302,7 +303,7 @@ def _draw_changes(
         if not parts:
             continue
         stages = earlier.stage, later.stage
-        pictures = ChangePictures(city.name, stages, planned.files.figures)
+        picture = ChangePicture(city.name, stages, planned.files.figures)
         first, last = (
             planned.features(one.named, []) for one in (earlier, later)
         )
@@ -312,16 +313,16 @@ def _draw_changes(
             (
                 city.name,
                 stages,
-                pictures.folder,
+                picture.folder,
                 parts[0],
                 (first.drive, last.drive),
                 (first.fine, last.fine),
             ),
-            pictures.files,
+            picture.files,
         )
         name = f"draw {city.name} {stages[0]} > {stages[1]}"
         jobs[name] = Job(name, step, (), _COST)
-        found.append(pictures)
+        found.append(picture)
     return found
 
 
@@ -368,19 +369,19 @@ def draw_change(
 
     Args:
         reporter: unused.
-        map_name, stages, folder: see `ChangePictures`.
+        map_name, stages, folder: see `ChangePicture`.
         change: file with the result of the task `change`.
         drives: files with a `DriveSummary` of the earlier and of the later
             drive, both in one world frame.
         clouds: files with the clouds of the earlier and the later drive.
     """
     doing("drawing the change")
-    earlier, later = (part.read().coarse for part in drives)
-    measured = change.read().change
     make_folder(folder)
-    ChangePictures(map_name, stages, folder).draw(
-        measured,
-        (clouds[0].read(), clouds[1].read()),
-        (earlier.merged(), later.merged()),
+    earlier, later = (
+        DrivenMap(cloud.read(), drive.coarse.merged(), drive.X_WS[:, :3, 3])
+        for drive, cloud in zip(
+            (part.read() for part in drives), clouds, strict=True
+        )
     )
-    return float(measured.symmetric)
+    ChangePicture(map_name, stages, folder).draw(earlier, later)
+    return float(change.read().change.symmetric)

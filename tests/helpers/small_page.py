@@ -19,7 +19,7 @@ from evaluation.results import (
     OWN,
     STAGE,
     Answers,
-    ChangePictures,
+    ChangePicture,
     PageDrive,
     QueryRows,
     Results,
@@ -56,8 +56,8 @@ class SmallPage:
     def write(self, folder):
         """Writes the page, and returns its path."""
         results, queries = tables(self.outcomes)
-        pictures = ChangePictures(MAP, self.stages, folder)
-        for path in pictures.files:
+        picture = ChangePicture(MAP, self.stages, folder)
+        for path in picture.files:
             path.write_bytes(b"a picture")
         return write_page(
             results,
@@ -67,7 +67,7 @@ class SmallPage:
             sections=[
                 browser_section(self.outcomes, self.drives, self.pages),
                 routes_section({MAP: self.drives.values()}, self.pages),
-                change_section(results, [pictures]),
+                change_section(results, [picture]),
             ],
         )
 

@@ -1,6 +1,9 @@
 // Connects the panels with the scene. `viewer` is Meshcat's viewer; `commands`
 // is a promise of the scene's commands.
 
+// Folded from the start, so that the sheet does not hide the city on a phone.
+document.body.classList.toggle("folded", innerWidth <= 640);
+
 const byId = (id) => document.getElementById(id);
 const node = (...path) => viewer.scene_tree.find(path);
 const car = node("vehicle", "base_link").object;

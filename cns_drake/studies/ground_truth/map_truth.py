@@ -9,7 +9,15 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
-from cns_drake.base import InputError, draft_folder, user_errors, write_text
+from cns_drake.base import (
+    GONE_RGB,
+    NEW_RGB,
+    UNSEEN_RGB,
+    InputError,
+    draft_folder,
+    user_errors,
+    write_text,
+)
 from cns_drake.drives import check_same_world
 from cns_drake.studies.ground_truth.exact_labels import label_points
 from cns_drake.studies.ground_truth.labelled_drive import LabelledDrive
@@ -24,7 +32,6 @@ from evaluation.map_update import (
     write_session,
     write_structures,
 )
-from evaluation.results import GONE, NEW
 
 
 def write_truth(
@@ -109,11 +116,11 @@ def _check_same_map(a: LabelledDrive, b: LabelledDrive) -> None:
 
 # Drawing order of the labels: changes are on top.
 _RGB = {
-    Label.UNOBSERVED: (178, 182, 190),
-    Label.NEWLY_SEEN: (120, 170, 230),
+    Label.UNOBSERVED: UNSEEN_RGB,
+    Label.NEWLY_SEEN: UNSEEN_RGB,
     Label.KEPT: (90, 96, 104),
-    Label.GONE: GONE,
-    Label.NEW: NEW,
+    Label.GONE: GONE_RGB,
+    Label.NEW: NEW_RGB,
 }
 _WORDS = {
     Label.UNOBSERVED: "unobserved: B's drive did not look there",

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
+import itertools
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,14 +14,18 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 import numpy as np
-from scipy.spatial import cKDTree
 
-from cns_drake.base import figure_style, file_name
-from evaluation.change import TemporalChange, judge_points
+from cns_drake.base import (
+    GONE_RGB,
+    NEW_RGB,
+    UNSEEN_RGB,
+    figure_style,
+    file_name,
+)
+from evaluation.change import judge_points
 from evaluation.maps import VoxelMap
 from evaluation.recognition import METRICS
 from evaluation.results.figure_files import PIXELS, save_figure
-from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import LAST, STAGE
 from evaluation.results.page_frame import PageSection, page_section
 from evaluation.results.sections.point_rendering import (
@@ -32,25 +37,16 @@ from evaluation.results.sections.point_rendering import (
 from evaluation.results.styles import Legend, unit_rgb
 from evaluation.results.table import Results
 
-_UNCHANGED = (214, 214, 214)
-_CHANGED = (196, 18, 24)
-_ABSENT_OUTSIDE = (240, 170, 160)
-# Sets O and H: blue and vermilion differ for all kinds of colour vision.
-_IN_O = (120, 170, 215)
-_ONLY_IN_H = (213, 94, 0)
-_OUTSIDE_H = (228, 228, 228)
-_CHANGE_LEGEND: Legend = (
-    (_CHANGED, "only in this map"),
-    (
-        _ABSENT_OUTSIDE,
-        "only in this map, where the maps' hulls do not overlap: not counted",
-    ),
-    (_UNCHANGED, "in both maps"),
-)
-_SETS_LEGEND: Legend = (
-    (_IN_O, "unchanged (set O)"),
-    (_ONLY_IN_H, "changed (in set H, not in O)"),
-    (_OUTSIDE_H, "outside the other map's hull H: not counted"),
+_UNCHANGED = (200, 203, 208)
+# Stripes of the hatching, and their width in the picture [m].
+_HATCHED = (UNSEEN_RGB, (96, 104, 116))
+_STRIPE = 2.5
+_HATCHING = "////"
+_LEGEND: Legend = (
+    (NEW_RGB, "new"),
+    (GONE_RGB, "gone"),
+    (UNSEEN_RGB, "hidden from one of the drives"),
+    (_UNCHANGED, "unchanged"),
 )
 # TCR_sym of the control, where nothing changed.
 _CONTROL = "control"
@@ -69,24 +65,46 @@ _HEADS = {
 }
 # Length of the scale bar [m].
 _SCALE_BAR = 50.0
-# Width of a panel [inches].
-_PANEL_INCHES = 4.2
+# Width of a picture [inches].
+_WIDTH_INCHES = 8.0
+# Lines of sight: their distance along the route, their greatest length [m].
+_SIGHT_SPACING = 15.0
+_SIGHT_RANGE = 80.0
+# A line of sight may end this much in front of a point [m].
+_SIGHT_SLACK = 1.0
+# Distance from which points of a map, 0.5 m apart, leave no gap between
+# directions so many degrees apart [m]: nearer points hide wider directions.
+_SIGHT_DEG = ((0.0, 8), (7.0, 4), (14.0, 2), (28.0, 1), (np.inf, 0))
 
 _OBLIQUE = OrthographicView(
-    azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=3.0
+    azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=4.0
 )
-_SMALL_OBLIQUE = replace(_OBLIQUE, pixels_per_metre=1.8)
 
 
 @dataclass(frozen=True)
-class ChangePictures:
-    """Two pictures of what changed between two stages of a map.
+class DrivenMap:
+    """A map with the route from which it was seen.
 
-    The first picture shows both maps. Points without a counterpart in the other
-    map are red; they are pale red outside the other map's convex hull, where
-    the change ratio (TCR) does not count them, because the other drive may not
-    have passed these points. The second picture shows the sets of points from
-    which TCR is computed: points in the other map's hull, and unchanged points.
+    Attributes:
+        cloud: (K, 3) points of the map in W, some 0.5 m apart [m].
+        voxels: the map in voxels, from which the change ratio is computed.
+        positions: (N, 3) positions of the sensor in W [m].
+    """
+
+    cloud: np.ndarray
+    voxels: VoxelMap
+    positions: np.ndarray
+
+
+@dataclass(frozen=True)
+class ChangePicture:
+    """A picture of what changed between two stages of a map.
+
+    Both maps are in one picture. Points that only the later map has are new,
+    points that only the earlier map has are gone; unless the drive of the other
+    map had no free line of sight to the place, such as to the street behind a
+    new building. These are hatched: nobody knows what became of them. The
+    change ratio (TCR) counts all three.
 
     Attributes:
         map_name: name of the map.
@@ -99,116 +117,122 @@ class ChangePictures:
     folder: Path
 
     @property
-    def stems(self) -> tuple[Path, Path]:
-        """Paths of the two pictures, without ending."""
+    def stem(self) -> Path:
+        """Path of the picture, without ending."""
         # Underscores join the parts. They are escaped in all but the first, so
         # that two pairs of stages never share a name.
         earlier, later = (
             one.replace("%", "%p").replace("_", "%u") for one in self.stages
         )
-        change, sets = (
-            self.folder / file_name(f"{kind}_{self.map_name}_{earlier}_{later}")
-            for kind in ("change", "sets")
+        return self.folder / file_name(
+            f"change_{self.map_name}_{earlier}_{later}"
         )
-        return change, sets
 
     @property
     def files(self) -> tuple[Path, ...]:
         """Paths of all files."""
-        return tuple(
-            stem.with_name(f"{stem.name}.{kind}")
-            for stem in self.stems
-            for kind in PIXELS
-        )
+        stem = self.stem
+        return tuple(stem.with_name(f"{stem.name}.{kind}") for kind in PIXELS)
 
-    def draw(
-        self,
-        change: TemporalChange,
-        clouds: tuple[np.ndarray, np.ndarray],
-        maps: tuple[VoxelMap, VoxelMap],
-    ) -> None:
-        """Draws both pictures.
-
-        Args:
-            change: the change between the stages.
-            clouds: (K, 3) clouds of the earlier and of the later stage in W
-                [m].
-            maps: voxel maps of the earlier and of the later stage.
-        """
-        titles, pictures = [], []
-        for one, other in ((0, 1), (1, 0)):
-            absent, in_hull = judge_points(clouds[one], maps[other].centroids_W)
-            rgb = np.full((len(absent), 3), _UNCHANGED, dtype=np.uint8)
-            rgb[absent] = _ABSENT_OUTSIDE
-            rgb[absent & in_hull] = _CHANGED
-            stage, lacking = self.stages[one], self.stages[other]
-            titles.append(f"{self.map_name} {stage}: what {lacking} lacks")
-            pictures.append(_render_shaded(clouds[one], rgb, _OBLIQUE))
-        _draw_panels(titles, pictures, self.stems[0], _CHANGE_LEGEND)
-        self._draw_sets(change, clouds, maps)
-
-    def _draw_sets(
-        self,
-        change: TemporalChange,
-        clouds: tuple[np.ndarray, np.ndarray],
-        maps: tuple[VoxelMap, VoxelMap],
-    ) -> None:
-        sides = (change.source_to_target, change.target_to_source)
-        colours = []
-        for cloud, coarse, side in zip(clouds, maps, sides, strict=True):
-            rgb = np.full((len(coarse), 3), _OUTSIDE_H, dtype=np.uint8)
-            rgb[side.in_hull] = _ONLY_IN_H
-            rgb[side.unchanged] = _IN_O
-            colours.append(rgb[voxel_of_each(cloud, coarse)])
-        (first, last), name = self.stages, self.map_name
-        _draw_panels(
-            [
-                f"{name} {first} beside {last}: TCR {sides[0].ratio:.4f}",
-                f"{name} {last} beside {first}: TCR {sides[1].ratio:.4f}",
-                f"{name}, both together: TCR_sym {change.symmetric:.4f}",
-            ],
-            [
-                _render_shaded(cloud, rgb, _SMALL_OBLIQUE)
-                for cloud, rgb in (
-                    *zip(clouds, colours, strict=True),
-                    (np.concatenate(clouds), np.concatenate(colours)),
-                )
-            ],
-            self.stems[1],
-            _SETS_LEGEND,
-        )
-
-    def shown(self) -> list[_ShownPicture]:
-        """Returns the two pictures as the page shows them."""
+    @property
+    def title(self) -> str:
+        """What the picture shows."""
         first, last = self.stages
-        titles = (
-            f"What changed in {self.map_name} between {first} and {last}",
-            f"What TCR_sym counts in {self.map_name}: {first} beside {last},"
-            f" {last} beside {first}, both together",
+        return f"What changed in {self.map_name} from {first} to {last}"
+
+    def draw(self, earlier: DrivenMap, later: DrivenMap) -> None:
+        """Draws the picture of two maps in one world frame."""
+        points, colours = [], []
+        for one, other, changed in (
+            (earlier, later, GONE_RGB),
+            (later, earlier, NEW_RGB),
+        ):
+            lacks, _ = judge_points(one.cloud, other.voxels.centroids_W)
+            rgb = np.full((len(lacks), 3), _UNCHANGED, dtype=np.uint8)
+            rows = np.flatnonzero(lacks)
+            seen = is_in_sight(one.cloud[rows], other)
+            rgb[rows[seen]] = changed
+            rgb[rows[~seen]] = _hatched(one.cloud[rows[~seen]])
+            # What is in both maps is drawn once.
+            kept = slice(None) if one is later else rows
+            points.append(one.cloud[kept])
+            colours.append(rgb[kept])
+        both = np.concatenate(points)
+        shaded = shade_by_height(
+            np.concatenate(colours), both[:, 2], darkest=0.85
         )
-        return [
-            _ShownPicture(title, _data_address(stem), num_panels, legend)
-            for stem, title, num_panels, legend in zip(
-                self.stems,
-                titles,
-                (2, 3),
-                (_CHANGE_LEGEND, _SETS_LEGEND),
-                strict=True,
+        _draw(render(both, shaded, _OBLIQUE), self.stem)
+
+    def shown(self) -> _ShownPicture:
+        """Returns the picture as the page shows it."""
+        return _ShownPicture(self.title, _data_address(self.stem), _LEGEND)
+
+
+def is_in_sight(points: np.ndarray, other: DrivenMap) -> np.ndarray:
+    """Returns whether a drive had a free line of sight to points, (N,) bool.
+
+    A line of sight is free if no point of the drive's map lies in its direction
+    and nearer. It is at most 80 m long, and begins at the sensor, every 15 m of
+    the route.
+
+    Args:
+        points: (N, 3) points in W [m].
+        other: the map of the drive.
+    """
+    found = np.zeros(len(points), dtype=bool)
+    steps = np.linalg.norm(np.diff(other.positions, axis=0), axis=1)
+    along = np.floor(np.cumsum([0.0, *steps]) / _SIGHT_SPACING)
+    _, chosen = np.unique(along, return_index=True)
+    for place in other.positions[chosen]:
+        rows = np.flatnonzero(~found)
+        ranges, asked = _directions(points[rows] - place)
+        near = ranges < _SIGHT_RANGE
+        rows, ranges, asked = rows[near], ranges[near], asked[near]
+        depths, angles = _directions(other.cloud - place)
+        is_free = np.ones(len(rows), dtype=bool)
+        for (low, degrees), (high, _) in itertools.pairwise(_SIGHT_DEG):
+            here = (depths >= low) & (depths < min(high, _SIGHT_RANGE))
+            nearest = np.full((181, 360), np.inf)
+            np.minimum.at(
+                nearest, tuple(angles[here].T // degrees), depths[here]
             )
-        ]
+            is_free &= (
+                nearest[tuple(asked.T // degrees)] > ranges - _SIGHT_SLACK
+            )
+        found[rows] = is_free
+    return found
+
+
+def _directions(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns lengths (N,) [m] of vectors, and directions (N, 2) [whole deg].
+
+    These are the angle from straight down, and the one around the vertical.
+    """
+    x, y, z = offsets.T
+    across = np.hypot(x, y)
+    up = np.rad2deg(np.arctan2(z, across)) + 90.0
+    around = np.rad2deg(np.arctan2(y, x)) % 360.0
+    angles = np.stack([up, np.minimum(around, 359.5)], axis=1)
+    return np.hypot(across, z), angles.astype(int)
+
+
+def _hatched(points: np.ndarray) -> np.ndarray:
+    """Returns colours (N, 3) uint8 that form stripes in the picture."""
+    right, up = (points @ _OBLIQUE.axes()[:2].T).T
+    stripe = np.floor((right + up) / _STRIPE).astype(int) % 2
+    return np.array(_HATCHED, dtype=np.uint8)[stripe]
 
 
 class _ShownPicture(NamedTuple):
-    """A picture on the page: panels side by side, and colours below them."""
+    """A picture on the page, with what its colours mean."""
 
     title: str
     address: str
-    num_panels: int
     legend: Legend
 
 
 def change_section(
-    results: Results, pictures: Iterable[ChangePictures]
+    results: Results, pictures: Iterable[ChangePicture]
 ) -> PageSection:
     """Returns the section with the change of each map.
 
@@ -241,7 +265,7 @@ def change_section(
             }
             for (map_name, drives), found in numbers.items()
         ],
-        pictures=[shown for one in pictures for shown in one.shown()],
+        pictures=[one.shown() for one in pictures],
     )
 
 
@@ -253,66 +277,32 @@ def _data_address(stem: Path) -> str:
     return f"data:image/{kind};base64,{data}"
 
 
-def voxel_of_each(points: np.ndarray, coarse: VoxelMap) -> np.ndarray:
-    """Returns the number (N,) of the voxel to which each point belongs.
-
-    This is the voxel that contains the point or, if rounding has put the point
-    across a border, the occupied voxel with the nearest centre.
-
-    Args:
-        points: (N, 3) points from which the map was made [m].
-        coarse: the voxel map.
-    """
-    owners = coarse.find(points)
-    elsewhere = np.flatnonzero(owners < 0)
-    if len(elsewhere):
-        _, nearest = cKDTree(coarse.centres_W).query(points[elsewhere])
-        owners[elsewhere] = nearest
-    return owners
-
-
-def _render_shaded(
-    points: np.ndarray, rgb: np.ndarray, view: OrthographicView
-) -> Picture:
-    return render(
-        points, shade_by_height(rgb, points[:, 2], darkest=0.85), view
-    )
-
-
 @figure_style()
-def _draw_panels(
-    titles: Sequence[str],
-    pictures: Sequence[Picture],
-    stem: Path,
-    legend: Legend,
-) -> None:
-    """Draws pictures side by side; the legend stands below.
-
-    All panels show the same part of the picture plane, at one scale.
-    """
-    extents = np.array([picture.extent for picture in pictures])
-    left, bottom = extents[:, [0, 2]].min(axis=0)
-    right, top = extents[:, [1, 3]].max(axis=0)
+def _draw(picture: Picture, stem: Path) -> None:
+    left, right, bottom, top = picture.extent
     shape = (top - bottom) / (right - left)
     figure = Figure(
-        figsize=(
-            _PANEL_INCHES * len(pictures),
-            _PANEL_INCHES * min(shape, 1.6) + 0.4,
-        ),
+        facecolor="none",
+        figsize=(_WIDTH_INCHES, _WIDTH_INCHES * min(shape, 1.6) + 0.7),
         layout="constrained",
     )
-    panels = figure.subplots(1, len(pictures), squeeze=False)[0]
-    for axes, title, picture in zip(panels, titles, pictures, strict=True):
-        _show(axes, picture, (left, right, bottom, top))
-        axes.set_title(escape_dollars(title), fontsize=9)
+    axes = figure.subplots()
+    _show(axes, picture, picture.extent)
     figure.legend(
         handles=[
-            Patch(color=unit_rgb(rgb), label=text) for rgb, text in legend
+            Patch(
+                facecolor=unit_rgb(rgb),
+                edgecolor=unit_rgb(_HATCHED[1]),
+                linewidth=0.0,
+                hatch=_HATCHING if rgb == UNSEEN_RGB else None,
+                label=text,
+            )
+            for rgb, text in _LEGEND
         ],
         loc="outside lower center",
-        ncols=len(legend),
+        ncols=len(_LEGEND),
         frameon=False,
-        fontsize=8,
+        fontsize=10,
     )
     save_figure(figure, stem, PIXELS)
 
@@ -327,8 +317,12 @@ def _show(
         picture: the picture.
         limits: left, right, bottom and top of the panel [m].
     """
+    # Without paper, so that the picture lies on a dark page, too.
+    alpha = np.where((picture.image < 255).any(axis=2), 255, 0)
     axes.imshow(
-        picture.image, extent=picture.extent, interpolation="antialiased"
+        np.dstack([picture.image, alpha.astype(np.uint8)]),
+        extent=picture.extent,
+        interpolation="antialiased",
     )
     axes.set_axis_off()
     left, right, bottom, top = limits

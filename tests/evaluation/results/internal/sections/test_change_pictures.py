@@ -1,18 +1,19 @@
+from matplotlib.colors import rgb_to_hsv
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Patch
 import numpy as np
 import pytest
 
-from cns_drake.base import from_xyz
-from evaluation.change import temporal_change
-from evaluation.maps import VoxelAccumulator, VoxelMap
+from cns_drake.base import GONE_RGB, NEW_RGB, from_xyz
+from evaluation.maps import VoxelAccumulator
 from evaluation.recognition import FAIR_PROTOCOL
 from evaluation.results import (
     LAST,
     OWN,
     STAGE,
-    ChangePictures,
+    ChangePicture,
+    DrivenMap,
     Results,
     Row,
     change_section,
@@ -20,30 +21,61 @@ from evaluation.results import (
     save_figure,
 )
 from evaluation.results.figure_files import PIXELS
-from evaluation.results.sections.change_pictures import voxel_of_each
+from evaluation.results.sections.change_pictures import is_in_sight
 
 
-def test_points_of_pictures_have_their_voxels():
+def driven_map(cloud, positions):
     accumulator = VoxelAccumulator(5.0, 10)
-    rng = np.random.default_rng(8)
-    accumulator.add(from_xyz(rng.uniform(-40, 40, (3000, 3))))
-    points, coarse = accumulator.samples(), accumulator.to_map()
-    owners = voxel_of_each(points, coarse)
-    np.testing.assert_array_equal(
-        coarse.indices[owners], np.floor((points - [0.0, 0.0, -2.5]) / 5.0)
+    accumulator.add(from_xyz(cloud))
+    return DrivenMap(cloud, accumulator.to_map(), np.array(positions))
+
+
+def wall(x, half_width, height=10.0):
+    """A wall across the x axis, of points 0.5 m apart."""
+    y, z = np.meshgrid(
+        np.arange(-half_width, half_width, 0.5), np.arange(0.0, height, 0.5)
     )
-    assert set(owners) == set(range(len(coarse)))
+    return np.stack([np.full(y.size, x), y.ravel(), z.ravel()], axis=1)
 
 
-@pytest.mark.parametrize("side", [-np.inf, 0.0, np.inf])
-def test_points_on_a_border_have_a_voxel_beside_them(side):
-    """This holds even if the voxel that seems to contain them is empty."""
-    indices = np.array([[-9, 0, 0], [2, 4, 3], [2, 4, 5], [9, 9, 9]], np.int32)
-    coarse = VoxelMap(indices, indices * 5.0, np.ones(4, np.int64), 5.0)
-    low, high = indices[1] * 5.0 + [0.0, 0.0, -2.5], coarse.centres_W[1] + 2.5
-    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).T
-    points = np.nextafter(corners.reshape(-1, 3), side)
-    assert voxel_of_each(points, coarse).tolist() == [1] * 8
+ROUTE = [[0.0, y, 2.0] for y in np.arange(-10.0, 10.0, 1.0)]
+
+
+@pytest.mark.parametrize("distance", [5.0, 12.0, 20.0, 50.0])
+def test_a_wall_hides_what_is_behind_it(distance):
+    other = driven_map(wall(distance, 40.0), ROUTE)
+    points = np.array(
+        [
+            [distance + 3.0, 0.0, 2.0],  # Behind.
+            [distance - 3.0, 0.0, 2.0],  # In front.
+            [distance, 3.0, 2.0],  # In the wall itself.
+            [-distance, 0.0, 2.0],  # On the other side of the car.
+            [-85.0, 0.0, 2.0],  # Too far.
+        ]
+    )
+    seen = is_in_sight(points, other)
+    assert seen.tolist() == [False, True, True, True, False]
+
+
+def test_new_gone_and_hidden_points_have_colours_of_their_own(tmp_path):
+    rng = np.random.default_rng(2)
+    ground = np.c_[rng.uniform(-70, 70, (20000, 2)), np.zeros(20000)]
+    # The new wall hides the hut behind it; the shed on the left is gone.
+    hut, new, shed = wall(40.0, 8.0, 6.0), wall(15.0, 30.0), wall(-20.0, 8.0)
+    earlier = driven_map(np.concatenate([ground, hut, shed]), ROUTE)
+    later = driven_map(np.concatenate([ground, new]), ROUTE)
+    picture = ChangePicture("town", ("01", "02"), tmp_path)
+    picture.draw(earlier, later)
+    assert [file.exists() for file in picture.files] == [True, True]
+    image = imread(picture.files[0])
+    # Without paper: it lies on light and on dark pages.
+    assert image[0, 0, 3] == 0.0
+    hue = rgb_to_hsv(image[..., :3])
+    is_strong = (hue[..., 1] > 0.5) & (image[..., 3] > 0.9)
+    for rgb, most in ((NEW_RGB, 40000), (GONE_RGB, 20000)):
+        wanted = rgb_to_hsv(np.array(rgb) / 255.0)[0]
+        number = (is_strong & (np.abs(hue[..., 0] - wanted) < 0.03)).sum()
+        assert 1000 < number < most
 
 
 def test_legend_of_a_figure_is_not_in_the_picture_of_the_page(tmp_path):
@@ -62,47 +94,9 @@ def test_legend_of_a_figure_is_not_in_the_picture_of_the_page(tmp_path):
     assert ratio == pytest.approx(0.5 * height, abs=0.01)
 
 
-def test_panels_show_the_same_part_with_a_legible_scale(tmp_path, monkeypatch):
-    drawn = []
-    monkeypatch.setattr(
-        "evaluation.results.sections.change_pictures.save_figure",
-        lambda figure, *_: drawn.append(figure),
-    )
-    rng = np.random.default_rng(2)
-    clouds = [
-        np.c_[rng.uniform(-40, 40, (3000, 2)), rng.uniform(0, high, 3000)]
-        for high in (5.0, 20.0)
-    ]
-    maps = []
-    for cloud in clouds:
-        accumulator = VoxelAccumulator(5.0, 10)
-        accumulator.add(from_xyz(cloud))
-        maps.append(accumulator.to_map())
-    change = temporal_change(*(one.centroids_W for one in maps))
-    pictures = ChangePictures("town", ("01", "02"), tmp_path)
-    pictures.draw(change, tuple(clouds), tuple(maps))
-    assert [len(figure.axes) for figure in drawn] == [2, 3]
-    for figure in drawn:
-        figure.draw_without_rendering()
-        first, *others = figure.axes
-        box = first.get_window_extent()
-        for axes in others:
-            assert axes.get_xlim() == first.get_xlim()
-            assert axes.get_ylim() == first.get_ylim()
-            other = axes.get_window_extent()
-            np.testing.assert_allclose(other.size, box.size, atol=0.01)
-            assert other.y0 == pytest.approx(box.y0, abs=0.01)
-        for axes in figure.axes:
-            (label,) = axes.texts
-            assert label.get_text() == "50 m"
-            assert label.get_path_effects()
-    titles = [axes.get_title() for axes in drawn[1].axes]
-    assert titles[2].endswith(f"TCR_sym {change.symmetric:.4f}")
-
-
 def test_pairs_of_stages_have_files_of_their_own(tmp_path):
     pairs = [("1_2", "3"), ("1", "2_3"), ("1%u2", "3"), ("1", "2%u3")]
-    stems = {ChangePictures("x", one, tmp_path).stems for one in pairs}
+    stems = {ChangePicture("x", one, tmp_path).stem for one in pairs}
     assert len(stems) == len(pairs)
 
 
