@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 # Numbers of poses and velocities that differ by less are equal [m, rad, m/s].
 _SAME = 1e-6
@@ -97,6 +96,9 @@ def interpolate(
     Returns:
         (N, 4, 4); rotations are made orthonormal.
     """
+    # Its import takes a third of the time of a short command.
+    from scipy.spatial.transform import Rotation
+
     R_0 = Rotation.from_matrix(X_0[:, :3, :3])
     turn = (R_0.inv() * Rotation.from_matrix(X_1[:, :3, :3])).as_rotvec()
     R = R_0 * Rotation.from_rotvec(fraction[:, None] * turn)

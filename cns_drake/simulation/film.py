@@ -161,7 +161,7 @@ def make_film(
             try:  # A diagram's memory is freed with its process only.
                 run_process(pickle.dumps(step), on_message, lambda: True)
             except (JobError, ProcessDiedError) as error:
-                raise InputError(str(error)) from None
+                raise InputError(f"{path}: {error}") from None
         doing("writing the film")
         _write_film(path, sorted(Path(folder).iterdir()))
     return total

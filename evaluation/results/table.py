@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 import math
 from pathlib import Path
@@ -25,6 +25,7 @@ from evaluation.results.cells import (
     TEXT,
     TRUTH,
     WHOLE,
+    CellKind,
 )
 from evaluation.results.keys import MEASURED, Key, key_columns
 from evaluation.results.table_lines import TableLine, TableLines
@@ -289,7 +290,11 @@ class QueryRows:
             # Tasks such as `change` and `map` have no queries.
             may_be_empty=True,
         )
-        names = [name for name in _ANSWERS if name in table.columns]
+        columns = [
+            _AnswerColumn(name, kind, table.columns[name])
+            for name, kind in _ANSWERS.items()
+            if name in table.columns
+        ]
         found: dict[tuple[object, ...], tuple[dict, list[TableLine]]] = {}
         for line, key, identity in table.keyed():
             found.setdefault(identity, (key, []))[1].append(line)
@@ -297,7 +302,7 @@ class QueryRows:
             table.factors,
             tuple(
                 Answers(
-                    **key, columns=_answer_columns(lines, names, key["task"])
+                    **key, columns=_answer_columns(lines, columns, key["task"])
                 )
                 for key, lines in found.values()
             ),
@@ -346,19 +351,49 @@ def _measured_cells(row: Row) -> list[str]:
     return [row.metric, *map(NUMBER.write, values), WHOLE.write(row.n)]
 
 
+@dataclass
+class _AnswerColumn:
+    """A column of answers to queries, which reads equal cells once.
+
+    Most cells are the same for each method and condition.
+
+    Attributes:
+        name, kind: name of the column, and kind of its cells.
+        place: position of the column in a line.
+    """
+
+    name: str
+    kind: CellKind
+    place: int
+    _known: dict[str, Any] = field(default_factory=dict)
+
+    def values(self, lines: Sequence[TableLine]) -> list[Any]:
+        """Returns the values of the column's cells in lines.
+
+        Raises:
+            InputError: a cell contains no value of this kind.
+        """
+        known, place = self._known, self.place
+        cells = [line.cells[place] for line in lines]
+        if not known.keys() >= set(cells):
+            for cell, line in zip(cells, lines, strict=True):
+                if cell not in known:
+                    known[cell] = line.value(self.name, self.kind)
+        return [known[cell] for cell in cells]
+
+
 def _answer_columns(
-    lines: Sequence[TableLine], names: Iterable[str], task: str
+    lines: Sequence[TableLine], read: Iterable[_AnswerColumn], task: str
 ) -> dict[str, np.ndarray]:
     """Returns the checked values of all lines with the same key, by column.
 
     The queries are in the order of their frames, whatever the order of lines.
     """
     lines = sorted(lines, key=lambda line: line.value("query_frame", WHOLE))
-    columns: dict[str, np.ndarray] = {}
-    for name in names:
-        kind = _ANSWERS[name]
-        values = [line.value(name, kind) for line in lines]
-        columns[name] = np.array(values, dtype=_TYPES[kind])
+    columns = {
+        one.name: np.array(one.values(lines), dtype=_TYPES[one.kind])
+        for one in read
+    }
     frames = columns["query_frame"]
     again = np.ones(len(frames), dtype=bool)
     again[np.unique(frames, return_index=True)[1]] = False

@@ -12,7 +12,7 @@ import zlib
 
 import numpy as np
 
-from cns_drake.base import InputError, json_values
+from cns_drake.base import InputError, doing, json_values
 from evaluation.recognition import (
     LEAST_CITIES,
     METRICS,
@@ -373,7 +373,10 @@ def compare_tables(
             f"{metric}: not known here; more is taken for better (with its"
             " Python file as --metric, its own direction counts)"
         )
-    read = [Results.read(path) for path in paths]
+    read = []
+    for path in paths:
+        doing(f"reading {path}")
+        read.append(Results.read(path))
     tasks = {
         row.task
         for results in read
@@ -389,6 +392,7 @@ def compare_tables(
         selection["protocol"] = protocol
     own: list[MetricTable] = []
     for path, results in zip(paths, read, strict=True):
+        doing(f"reading the answers beside {path}")
         table, found = read_metric_table(
             path,
             results,

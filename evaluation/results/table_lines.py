@@ -211,7 +211,12 @@ def _csv_lines(file: Path) -> list[tuple[int, list[str]]]:
         text = read_bytes(file).decode("utf-8-sig")
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)
         lines = [
-            (reader.line_num, [cell.strip(" ") for cell in row])
+            (
+                reader.line_num,
+                [cell.strip(" ") for cell in row]
+                if " " in "".join(row)
+                else row,
+            )
             for row in reader
         ] or [(1, [])]
     except UnicodeDecodeError:

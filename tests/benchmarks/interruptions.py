@@ -3,10 +3,11 @@
     python tests/benchmarks/interruptions.py FOLDER [NAME ...]
 
 At random moments, a command gets Ctrl-C, as its whole process group does in a
-terminal, or SIGTERM; or one of its jobs is killed by SIGKILL. A row tells the
-moment, the time and processor time from there to the end, the exit status, the
-last line, and what is left: processes, and files that are new. Recordings are
-made in FOLDER first, unless they are there.
+terminal, or SIGTERM; or one of its jobs is killed by SIGKILL. A row on stderr
+tells the moment, the time and processor time from there to the end, the exit
+status, the lines, and what is left: processes, and files that are new. In the
+end, a table has the longest time of each command. Recordings are made in FOLDER
+first, unless they are there.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import shutil
 import signal
 import sys
 import time
+from typing import NamedTuple
 
 import psutil
 
@@ -37,6 +39,8 @@ COMMANDS = {
     "reproduce": f"{DRAKE} reproduce metropolis --jobs 2 --output out",
     "train": f"{DRAKE} train --minutes 1 --jobs 2 --output out/w.npz",
     "age": f"{DRAKE} age suburbia --years 1 5 --output out",
+    "import": f"{DRAKE} import corner.osm --output out",
+    "scan": f"{DRAKE} scan town/stage_01.sdf --pose 0 0 2 0 0 0 --output o.pcd",
     "city": f"{DRAKE} city town",
     "list": f"{DRAKE} list town",
     "film": f"{DRAKE} export metropolis_01 --format film --output out.webp",
@@ -49,6 +53,7 @@ COMMANDS = {
     "overlap-table": (
         f"{DRAKE} export {' '.join(DRIVES)} --format overlap-table --output out"
     ),
+    "compare": f"{EVAL} compare tables",
     "tcr": f"{EVAL} tcr {PAIR} --output out",
     **{
         f"pr-{name}": f"{EVAL} pr {PAIR} --method {name} --gate --output out"
@@ -75,6 +80,7 @@ WITH_JOBS = (
     "report",
     "localise-2",
 )
+SIGNALS = ("SIGINT", "SIGTERM")
 # After a command has ended, its processes are given this time to end [s].
 GRACE = 1.0
 
@@ -83,6 +89,7 @@ def make_inputs(folder: Path) -> None:
     """Makes what the commands read, unless it is there."""
     from cns_drake.scenarios import load_scenario, shipped_maps
     from cns_drake.simulation import simulate
+    import evaluation
 
     for name in DRIVES:
         if not (folder / "drives" / name).exists():
@@ -92,6 +99,25 @@ def make_inputs(folder: Path) -> None:
     if not (folder / "town").exists():
         shutil.copytree(shipped_maps()["suburbia"], folder / "town")
         (folder / "town" / "sequences.csv").unlink(missing_ok=True)
+    sys.path.append(str(Path(__file__).resolve().parents[1]))
+    from helpers.small_osm import write_corner
+
+    write_corner(folder / "corner.osm")
+    shipped = Path(evaluation.__file__).parent / "results" / "baselines"
+    (folder / "tables").mkdir(exist_ok=True)
+    shutil.copy(min(shipped.glob("*.csv")), folder / "tables" / "results.csv")
+
+
+class Struck(NamedTuple):
+    """What an interrupted command did.
+
+    Attributes:
+        seconds: time from the signal to the end; None if the command had ended.
+        row: one line on everything.
+    """
+
+    seconds: float | None
+    row: str
 
 
 def session_of(number: int) -> list[psutil.Process]:
@@ -111,9 +137,9 @@ def time_of(processes: list[psutil.Process]) -> float:
     return total
 
 
-def strike(words: list[str], folder: Path, how: str, moment: float) -> str:
-    """Runs a command, interrupts it, and returns a row on its end."""
-    for path in (folder / "out", folder / "out.webp"):
+def strike(words: list[str], folder: Path, how: str, moment: float) -> Struck:
+    """Runs a command, interrupts it, and returns what it did."""
+    for path in (folder / "out", folder / "out.webp", folder / "o.pcd"):
         shutil.rmtree(path, ignore_errors=True)
         path.unlink(missing_ok=True)
     before = set(folder.rglob("*"))
@@ -164,12 +190,14 @@ def strike(words: list[str], folder: Path, how: str, moment: float) -> str:
         for path in set(folder.rglob("*")) - before
         if path.is_file() and "parts" not in path.parts
     } - {"log"}
-    return (
+    row = (
         f"{how:7} at {moment:5.1f} s{' (had ended)' if ended_before else ''}:"
         f" {seconds:5.1f} s, {spent:4.1f} s of processors, status {status},"
         f" {len(left)} processes left, {len(lines)} lines: {lines[-2:]},"
+        f" {sum('it is repeated' in line for line in lines)} on repeats,"
         f" files: {sorted(new)[:4]}"
     )
+    return Struck(None if ended_before else seconds, row)
 
 
 def main() -> None:
@@ -183,14 +211,22 @@ def main() -> None:
     options.folder.mkdir(parents=True, exist_ok=True)
     make_inputs(options.folder)
     rng = random.Random(options.seed)
+    longest: dict[str, dict[str, float]] = {}
     for name in options.names or COMMANDS:
         words = COMMANDS[name].split()
         ways = ["SIGINT", "SIGTERM", *(["SIGKILL"] * (name in WITH_JOBS))]
+        times = longest[name] = {}
         for number in range(options.times):
             moment = rng.uniform(1.0, options.longest)
             way = ways[number % len(ways)]
-            row = strike(words, options.folder, way, moment)
-            print(f"{name:15} {row}", flush=True)
+            struck = strike(words, options.folder, way, moment)
+            print(f"{name:15} {struck.row}", file=sys.stderr, flush=True)
+            if struck.seconds is not None:
+                times[way] = max(times.get(way, 0.0), struck.seconds)
+    print("| command | SIGINT [s] | SIGTERM [s] |\n|---|---|---|")
+    for name, times in longest.items():
+        cells = (f"{times[w]:.1f}" if w in times else "" for w in SIGNALS)
+        print(f"| {name} | {' | '.join(cells)} |")
 
 
 if __name__ == "__main__":

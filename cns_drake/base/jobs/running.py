@@ -53,7 +53,8 @@ def run_jobs(
     """Runs jobs on a cluster, the longest chains of dependent jobs first.
 
     Notes of the jobs are printed on stderr. A job whose process or worker dies
-    is started again. A job that fails stops only the jobs that need it.
+    is repeated, and a note says so. A job that fails stops only the jobs that
+    need it.
 
     Args:
         jobs: the jobs.
@@ -108,6 +109,10 @@ def _by_name(jobs: Iterable[Job]) -> dict[str, Job]:
             if need not in by_name:
                 raise ValueError(f"{job.name}: needs {need}, which is no job")
     return by_name
+
+
+def _repeated(name: str, why: object) -> str:
+    return f"job {name}: {why}; it is repeated"
 
 
 @dataclass
@@ -189,6 +194,8 @@ class _Run:
                 self._submitted.remove(name)
                 self._take_result(name, *values)
         elif kind == "started":
+            if name in self._running:  # Dask repeats it by itself.
+                note(_repeated(name, "its worker died"))
             self._running.add(name)
             self._shown.start(name)
         elif kind == "ended":
@@ -212,7 +219,7 @@ class _Run:
             and self._deaths[name] < _RETRIES
         ):
             self._deaths[name] += 1
-            note(f"{name}: {error}; it starts again")
+            note(_repeated(name, error))
             self._submit(name)
             return
         fault = str(error)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import json
 from pathlib import Path
+import shutil
 import signal
 from typing import NamedTuple
 
@@ -144,6 +145,9 @@ def inputs(tmp_path_factory):
         "drives: stages\nboth: {stage: [last]}\nmethods: [solid]\n"
         "tasks: [place]\n"
     )
+    shipped = Path(evaluation.__file__).parents[1] / "results/baselines"
+    (top / "tables").mkdir()
+    shutil.copy(min(shipped.glob("*.csv")), top / "tables" / "results.csv")
     (top / "real").mkdir()
     for side, name in zip(SIDES, ("town_01", "town_02"), strict=True):
         folder = top / "maps" / side
@@ -265,6 +269,7 @@ INTERRUPTED = {
         3,
         9,
     ),
+    f"{EVAL} compare tables": (2, 3),
     f"{EVAL} map-update maps --output OUT": (2, 5),
     f"{EVAL} tcr town_01 town_02 --output OUT": (2, 9),
     f"{EVAL} pr town_01 town_02 --method ring++ --output OUT": (2, 9),

@@ -210,6 +210,14 @@ def test_weights_in_other_precisions(tmp_path, kind):
     )
 
 
+def test_names_with_a_prefix(tmp_path):
+    """As those of a network that was trained on several devices."""
+    weights = {f"module.{k}": v for k, v in svt_weights().items()}
+    path = save_weights(tmp_path / "w.npz", weights)
+    with pytest.raises(InputError, match=r"begins with module\."):
+        make_method("svt-net", {"weights": path})
+
+
 class Ran:
     """Runs code when it is unpickled."""
 

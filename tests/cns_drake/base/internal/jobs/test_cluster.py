@@ -110,7 +110,7 @@ def test_jobs_end_with_the_client_that_wanted_them(dask, tmp_path, number):
     assert psutil.wait_procs([job], timeout=600)[1] == []
 
 
-def test_a_worker_that_dies_each_time_is_a_fault(dask, tmp_path):
+def test_a_worker_that_dies_each_time_is_a_fault(dask, tmp_path, capsys):
     # The scheduler tries three more times, and needs a worker for each.
     dask.add_workers(4)
     tries = tmp_path / "tries"
@@ -119,6 +119,8 @@ def test_a_worker_that_dies_each_time_is_a_fault(dask, tmp_path):
     with pytest.raises(InputError, match="murder: every worker that ran it"):
         run_jobs([job], Cluster(scheduler=dask.address))
     assert tries.read_text() == "xxxx"
+    told = "job murder: its worker died; it is repeated"
+    assert capsys.readouterr().err.splitlines() == [told] * 3
 
 
 @pytest.mark.parametrize(

@@ -156,6 +156,13 @@ def test_needs_come_first_and_faults_stay_alone(tmp_path, capsys):
     assert os.getpid() in parents
     reports = capsys.readouterr().err
     assert "here I am" in reports
+    killed = "its process was ended by SIGKILL, perhaps for lack of memory"
+    lines = reports.splitlines()
+    assert sorted(line for line in lines if "repeated" in line) == [
+        *[f"job dies: {killed}; it is repeated"] * 2,
+        "job survives: its process ended with status 3; it is repeated",
+        "job survives: not enough memory; it is repeated",
+    ]
     assert "ZeroDivisionError" in reports
     assert "last: done" in reports
 
@@ -190,7 +197,8 @@ def test_results_lost_with_a_worker_are_computed_again(capsys):
     cluster = ScriptedCluster(DIED, DIED, None)
     run_jobs([job("a", job_functions.refuse)], cluster)
     assert cluster.names == ["a"] * 3
-    assert "a: its worker died; it starts again" in capsys.readouterr().err
+    told = "job a: its worker died; it is repeated"
+    assert capsys.readouterr().err.splitlines() == [told] * 2
     with pytest.raises(FailedJobsError, match=r"^a: its worker died$"):
         run_jobs([job("a", job_functions.refuse)], ScriptedCluster(*[DIED] * 3))
 
