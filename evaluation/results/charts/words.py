@@ -78,7 +78,7 @@ def change_words(factor: str, before: object, after: object) -> str:
         factor: name of the factor.
         before, after: its values.
     """
-    drive, *_, name = factor.split(".")
+    drive, name = factor.partition(".")[0], factor.rpartition(".")[2]
     if name == "stage" and (before, after) == (LAST, OWN):
         return "a rebuilt city"
     thing = _DRIVES_ALONE.get(drive, "a city")

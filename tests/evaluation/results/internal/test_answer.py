@@ -231,6 +231,8 @@ def test_the_evidence_says_what_is_significant(number, after, text):
             0.6,
             "a map without 60\N{NO-BREAK SPACE}% of the buildings and plants",
         ),
+        ("level", 0, 4.0, "level 4 instead of 0"),
+        ("years", 0, 40, "a city of age 40 instead of 0 years"),
         ("database.years", 0, 40.0, "a map of age 40 instead of 0 years"),
         (
             "query.transient.snow",
