@@ -30,8 +30,10 @@ SIGNIFICANT = 0.05
 LEAST_BLOCKS = 6
 # Least number of cities that give a mean over cities an interval.
 LEAST_CITIES = 8
-# Distance between the centres of neighbouring blocks of street [m].
-BLOCK_LENGTH = 100.0
+# Distance between the centres of neighbouring blocks of street [m]. The answers
+# to queries 60 m apart are hardly correlated any more, and with shorter blocks
+# the intervals are too narrow; see docs/notes/coverage.md.
+BLOCK_LENGTH = 80.0
 # How far imaginary cities lie beyond all others, see `city_interval`.
 _BEYOND = 2.0
 # Up to this number of blocks, all splits of the blocks are counted.
@@ -140,8 +142,8 @@ def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
     on different passes of one street. Therefore a block is a piece of the world
     and not of the route: each position belongs to the nearest of some centres.
     The first position of the drive is a centre, and so is each further one that
-    is at least 100 m from all earlier centres. On a straight street, blocks are
-    100 m long, except for the first and the last.
+    is at least 80 m from all earlier centres. On a straight street, blocks are
+    80 m long, except for the first and the last.
 
     Args:
         positions: (N, 3) positions of the sensor along the drive [m].

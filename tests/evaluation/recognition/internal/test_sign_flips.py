@@ -190,10 +190,10 @@ def test_blocks_follow_the_street():
     every = np.arange(len(positions))
     blocks = route_blocks(positions, every)
     np.testing.assert_array_equal(blocks[:351], blocks[351:][::-1])
-    # Centres are 100 m apart; ends are halfway between them.
+    # Centres are 80 m apart; ends are halfway between them.
     edges = np.flatnonzero(np.diff(blocks[:351]))
-    assert edges.tolist() == [50, 150, 250]
-    assert blocks.max() == 3
+    assert edges.tolist() == [40, 120, 200, 280]
+    assert blocks.max() == 4
     np.testing.assert_array_equal(
         route_blocks(positions, every[5::40]), blocks[5::40]
     )
