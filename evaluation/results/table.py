@@ -390,7 +390,7 @@ def _answer_columns(
     The queries are in the order of their frames, whatever the order of lines.
     """
     lines = sorted(lines, key=lambda line: line.value("query_frame", WHOLE))
-    columns = {
+    columns: dict[str, np.ndarray] = {
         one.name: np.array(one.values(lines), dtype=_TYPES[one.kind])
         for one in read
     }
