@@ -572,12 +572,12 @@ def _claims_on_levels() -> list[Claim]:
             f" more than {least[second]:.2f} in its worst city.",
             page="levels.md",
             estimate=least[best],
-            unit="cities, Metropolis cleared among them",
+            unit="cities",
             n=len(found[best]),
             source="docs/notes/levels.csv",
             declared="the seed, by a commit before any method ran with it",
-            seen_before="an earlier version of the levels; level 4 of"
-            " Metropolis with another seed",
+            seen_before="earlier versions of the levels, and earlier stages of"
+            " Metropolis",
             overturned_by="a method with a greater AUC in its worst city",
             test="none: four cities give no interval",
         ),
