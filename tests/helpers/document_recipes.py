@@ -290,7 +290,8 @@ RECIPES = {
         changes=(
             ("metropolis_01", "town/sequence_01.yaml --size 64x36"),
             (" film.webp", " film.webp --seconds 1 --traffic 0"),
-            ("28.5 --seconds 8", "1 --seconds 1 --traffic 2"),
+            ("metropolis_04", "town/sequence_02.yaml --size 64x36"),
+            ("71 --seconds 8", "1 --seconds 1 --traffic 2"),
             ("docs/pictures/drive.webp", "drive.webp"),
         ),
         after=("own city",),
@@ -1012,6 +1013,9 @@ NOT_RUN = {
     "python3 -m venv .venv && .venv/bin/pip install -e": "installs from the "
     "network and runs these tests; `.ci/run` takes this very line",
     "apt install": "changes the system; `.ci/run` installs the same packages",
+    ".venv/bin/cns-drake simulate suburbia_01 --frames 200 --output output/live": (
+        "simulates a shipped city for minutes; the workflow `site.yml` runs it"
+    ),
     ".ci/drake_ends": "installs from the network; the workflow runs it",
     "npm ci": "installs from the network; `.ci/run` does it",
     ".venv/bin/mypy && .venv/bin/lint-imports": (
