@@ -1013,7 +1013,7 @@ NOT_RUN = {
     "python3 -m venv .venv && .venv/bin/pip install -e": "installs from the "
     "network and runs these tests; `.ci/run` takes this very line",
     "apt install": "changes the system; `.ci/run` installs the same packages",
-    ".venv/bin/cns-drake simulate suburbia_01 --frames 200 --output output/live": (
+    ".venv/bin/cns-drake simulate suburbia_01 --frames 200": (
         "simulates a shipped city for minutes; the workflow `site.yml` runs it"
     ),
     ".ci/drake_ends": "installs from the network; the workflow runs it",
