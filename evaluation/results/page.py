@@ -301,7 +301,7 @@ def _summary(
 ) -> dict[str, Any]:
     """Returns a table of a task's main results: a row for each method.
 
-    Results without and with geometric verification are in different rows. If
+    Results without and with geometric verification are different parts. If
     there are few conditions, each column is a condition with the task's main
     metric; otherwise each column is a metric, averaged over all conditions.
     """
@@ -333,18 +333,22 @@ def _summary(
         for metric in metrics
         for cell in (cells if by_condition else [()])
     ]
-    lines = [
+    parts = [
         {
-            "name": (title_of(name) or "–")
-            + (", with geometric verification" if gate else ""),
-            "cells": [
-                (found.get(key), intervals.get(key))
-                for key in ((name, gate, *column) for column in columns)
+            "verified": bool(gate),
+            "rows": [
+                {
+                    "name": title_of(name) or "–",
+                    "cells": [
+                        (found.get(key), intervals.get(key))
+                        for key in ((name, gate, *column) for column in columns)
+                    ],
+                }
+                for name in in_table_order(row.label for row in rows)
+                if any((name, gate, *column) in found for column in columns)
             ],
         }
         for gate in sorted({row.gate for row in rows})
-        for name in in_table_order(row.label for row in rows)
-        if any((name, gate, *column) in found for column in columns)
     ]
     heads = [metric_named(str(metric)).label for metric, *_ in columns]
     title = _TASKS.get(task, task)
@@ -356,7 +360,7 @@ def _summary(
             ", ".join(map(value_words, values, factors))
             for _, *values in columns
         ]
-    return {"name": title, "metrics": heads, "rows": lines}
+    return {"name": title, "metrics": heads, "parts": parts}
 
 
 def _told_factors(results: Results) -> list[str]:

@@ -110,10 +110,10 @@ def value_text(value: object) -> str:
         return "more"
     if isinstance(value, bool):
         return str(int(value))
-    if isinstance(value, float) and 0.0 < abs(value) < 0.01:
+    if isinstance(value, float) and 0.0 < abs(value) < 0.1:
         return f"{value:.2g}"
     if isinstance(value, float):
-        return f"{value:.3f}" if abs(value) < 100.0 else f"{value:.0f}"
+        return f"{value:.2f}" if abs(value) < 100.0 else f"{value:.0f}"
     return str(value)
 
 

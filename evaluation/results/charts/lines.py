@@ -20,6 +20,7 @@ from evaluation.results.charts.chart import (
 from evaluation.results.charts.words import in_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.headlines import from_least_to_greatest
+from evaluation.results.keys import LEVEL
 from evaluation.results.method_names import title
 from evaluation.results.summaries import means
 from evaluation.results.table import Row
@@ -57,9 +58,10 @@ def draw_lines(chart: Chart) -> tuple[str, Figure]:
         axes.set_xlabel(escape_dollars(in_words(over)))
     figure.supylabel(escape_dollars(in_words(chart.metric)), fontsize=FONT)
     found = {name: float(np.mean(values)) for name, values in last.items()}
+    words = f"{at[-1]:g}", in_words(over)
+    where = " ".join(words[::-1] if over == LEVEL else words)
     message = (
-        f"{in_words(chart.metric)} at {at[-1]:g} {in_words(over)}:"
-        f" {from_least_to_greatest(found)}"
+        f"{in_words(chart.metric)} at {where}: {from_least_to_greatest(found)}"
     )
     return with_significance(message, chart, at[-1]), figure
 

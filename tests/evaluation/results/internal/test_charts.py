@@ -704,13 +704,13 @@ def test_a_page_stands_alone(tmp_path):
     header, *lines = summary
     assert header == ["method", "0", "10", "30"]
     # The mean of both seeds, and their range: 0.01 less a year.
-    means = [f"{0.91 - 0.01 * year:.3f}" for year in (0, 10, 30)]
+    means = [f"{0.91 - 0.01 * year:.2f}" for year in (0, 10, 30)]
     assert lines[1][0] == "RING++"
-    assert [cell[:5] for cell in lines[1][1:]] == means
+    assert [cell[:4] for cell in lines[1][1:]] == means
     header, *lines = whole
     assert header == ["seed", "method", YEARS, "auc"]
     assert len(lines) == 3 * 3 * 2
-    assert ["2", "solid", "30", "0.220"] in lines
+    assert ["2", "solid", "30", "0.22"] in lines
     names = sorted(one.name for one in path.parent.iterdir())
     assert names == ["chart_1.pdf", "chart_1.png", "index.html"]
 
@@ -718,10 +718,10 @@ def test_a_page_stands_alone(tmp_path):
 @pytest.mark.parametrize(
     ("ends", "seeds", "cell"),
     [
-        ((0.4, 0.6), (0,), "0.50095\N{NO-BREAK SPACE}% 0.400 to 0.600"),
+        ((0.4, 0.6), (0,), "0.5095\N{NO-BREAK SPACE}% 0.40 to 0.60"),
         # An interval that is unknown, and results of several seeds.
-        ((math.nan, math.nan), (0,), "0.500"),
-        ((0.4, 0.6), (0, 1), "0.500least 0.500, greatest 0.500"),
+        ((math.nan, math.nan), (0,), "0.50"),
+        ((0.4, 0.6), (0, 1), "0.50least 0.50, greatest 0.50"),
     ],
 )
 def test_a_single_result_has_its_interval(tmp_path, ends, seeds, cell):
@@ -754,8 +754,8 @@ def test_counts_are_whole_on_a_page(tmp_path):
     header, *lines = page.tables[-1]
     columns = dict(zip(header, zip(*lines, strict=True), strict=True))
     assert columns["lost"] == ("29", "106")
-    assert columns["r1"] == ("0.000", "1.000")
-    assert columns["query_time"] == ("2.000", "3.000")
+    assert columns["r1"] == ("0.00", "1.00")
+    assert columns["query_time"] == ("2.00", "3.00")
     assert columns[YEARS] == ("0", "10")
 
 

@@ -121,4 +121,4 @@ def test_a_change_stands_once_beside_that_of_its_control():
     assert body.count("a ↔ b") == 1
     assert "b ↔ a" not in body
     cells = [one.split("<")[0] for one in body.split("<td>")[1:]]
-    assert cells == ["0.250", "0.020", "0.125", "", ""]
+    assert cells == ["0.25", "0.02", "0.12", "", ""]

@@ -46,7 +46,7 @@ def test_links_lead_to_sections(text):
 def test_names_are_escaped(tmp_path):
     content = make_content(stages=("<b>", "04"))
     text = content.write(tmp_path).read_text()
-    assert "What changed in metropolis between &lt;b&gt; and 04" in text
+    assert "What changed in metropolis from &lt;b&gt; to 04" in text
     section = routes_section({"<u>": content.drives.values()}, {})
     assert "<h3>&lt;u&gt;</h3>" in section.body
 
