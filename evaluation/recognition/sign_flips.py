@@ -135,19 +135,22 @@ def sign_flip_test(
     return Interval(float(lows[needed - 1]), float(highs[-needed])), p_value
 
 
-def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
+def route_blocks(
+    positions: np.ndarray, frames: np.ndarray, length: float = BLOCK_LENGTH
+) -> np.ndarray:
     """Returns the block (Q,) of street in which each query lies.
 
     Neighbouring queries tend to be right or wrong together, also if they lie
     on different passes of one street. Therefore a block is a piece of the world
     and not of the route: each position belongs to the nearest of some centres.
     The first position of the drive is a centre, and so is each further one that
-    is at least 80 m from all earlier centres. On a straight street, blocks are
-    80 m long, except for the first and the last.
+    is at least `length` from all earlier centres. On a straight street, blocks
+    are as long, except for the first and the last.
 
     Args:
         positions: (N, 3) positions of the sensor along the drive [m].
         frames: (Q,) frame numbers of the queries.
+        length: least distance between the centres of blocks [m].
 
     Example:
         from evaluation import evaluate, judge, route_blocks
@@ -162,7 +165,7 @@ def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
         found = np.linalg.norm(positions - positions[centre], axis=1)
         block[found < distance] = number
         distance = np.minimum(found, distance)
-        is_far = distance >= BLOCK_LENGTH
+        is_far = distance >= length
         if not is_far.any():
             break
         centre, number = int(is_far.argmax()), number + 1

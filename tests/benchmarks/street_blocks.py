@@ -18,7 +18,7 @@ from scipy.stats import norm
 from cns_drake import load_scenario
 from cns_drake.scenarios import DrivePlan
 from cns_drake.simulation import load_drive
-from evaluation.recognition import sign_flips
+from evaluation.recognition import jackknife_interval, route_blocks
 
 _DISTANCES = (0.0, 15.0, 30.0, 50.0, 70.0, 100.0, 140.0)
 _LENGTHS = (50.0, 70.0, 80.0, 100.0)
@@ -92,8 +92,7 @@ def _print_coverage(name: str) -> None:
         normal = factor @ rng.normal(size=(len(frames), _RUNS))
         answers = (normal < norm.ppf(share)).astype(float)
         for length in _LENGTHS:
-            sign_flips.BLOCK_LENGTH = length
-            blocks = sign_flips.route_blocks(p_WB, frames)
+            blocks = route_blocks(p_WB, frames, length)
             number, covered = _covered(blocks, answers, share)
             print(f"{name} R@1 {share} {length:g} m: {number} blocks", covered)
 
@@ -108,7 +107,7 @@ def _covered(
     for right in answers.T:
         others = len(right) - weights
         without = (right.sum() - np.bincount(block, right)) / others
-        interval = sign_flips.jackknife_interval(
+        interval = jackknife_interval(
             right.mean(), without, weights, (0.0, 1.0)
         )
         if np.isfinite(interval.low):

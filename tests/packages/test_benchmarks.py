@@ -58,6 +58,7 @@ BY_HAND = {
     "scans_to_judge.py",
     "silences.py",
     "source_rays.py",
+    "street_blocks.py",
     "table1_sources.py",
 }
 SHARED = {"processes.py", "stages.py"}
