@@ -371,7 +371,7 @@ def _claims_on_rebuilt_cities() -> list[Claim]:
         Claim(
             name="fronts",
             claim="Missing street fronts cost every method in each of four"
-            f" fresh cities, {title(most).lower()} least: it retains"
+            f" fresh cities, {title(most).lower()} least on average: it retains"
             f" {_percent(fronts[most])} of its AUC strict.",
             estimate=fronts[most],
             overturned_by="a method that retains more than"
@@ -382,7 +382,7 @@ def _claims_on_rebuilt_cities() -> list[Claim]:
             name="furniture",
             claim="Missing street furniture leaves BTC"
             f" {_percent(furniture['btc'])} of its AUC strict in four fresh"
-            " cities, and every other method at least"
+            " cities on average, and every other method at least"
             f" {_percent(min(v for m, v in furniture.items() if m != 'btc'))}.",
             estimate=furniture["btc"],
             overturned_by="a city in which BTC keeps its AUC strict without"
@@ -522,7 +522,7 @@ def _claims_on_causes() -> list[Claim]:
         ),
         Claim(
             name="roofs",
-            claim="Higher roofs alone cost less than new buildings: a city cut"
+            claim="Higher roofs alone cost little: a city cut"
             f" off at 5 m leaves every method {_percent(min(lower))} of its AUC"
             " or more, and all but SOLiD and Scan Context++ at least"
             f" {_percent(min(safe))}.",
@@ -830,8 +830,8 @@ def _claims_on_upkeep() -> list[Claim]:
         ),
         Claim(
             name="merging",
-            claim="Three drives of 20, 10 and 1 years, merged, change the AUC"
-            f" strict of BTC by {_signed(merged)} against the newest alone.",
+            claim="Three drives of 20, 10 and 1 years, merged into one map,"
+            f" change the AUC strict of BTC by {_signed(merged)} against the newest alone.",
             estimate=merged[0],
             low=merged[1],
             high=merged[2],
