@@ -1217,8 +1217,8 @@ def _claims_on_methods() -> list[Claim]:
         Claim(
             name="networks-unchanged",
             claim="SVT-Net and DPA-Net, trained on real drives alone,"
-            " recognise the places of an unchanged simulated city with an R@1 of"
-            f" {_pair(networks['unchanged'])}.",
+            " recognise the places of an unchanged simulated city with an R@1"
+            f" of {_pair(networks['unchanged'])}.",
             estimate=min(networks["unchanged"]),
             overturned_by="low values in other cities, or with more queries",
             **of_networks,
