@@ -68,10 +68,10 @@ def test_the_page_fits_and_sorts(tmp_path):
         assert browser.evaluate(COLUMN % 1) == ["0", "2", "10", "10"]
         browser.evaluate(CLICK % 2)
         assert browser.evaluate(COLUMN % 2) == [
-            "0.750",
-            "0.500",
-            "0.250",
-            "0.125",
+            "0.75",
+            "0.50",
+            "0.25",
+            "0.12",
         ]
         browser.evaluate(CLICK % 1)
         browser.evaluate(CLICK % 1)

@@ -454,7 +454,7 @@ def test_full_size(browser, address):
     browser.open(address, *PHONE)
     unfold(browser)
     figures = browser.evaluate('document.querySelectorAll(".enlarge").length')
-    assert figures == 4
+    assert figures == 3
     for index in range(figures):
         browser.evaluate(
             f'document.querySelectorAll(".enlarge input")[{index}].focus()'
