@@ -74,13 +74,20 @@ def pytest_runtest_call(item):
     """Measures a test; fails a quick one that does what only slow ones may."""
     started = time.process_time()
     result = yield
+    item.user_properties.append((_TAKEN, time.process_time() - started))
+    if _seen and not item.get_closest_marker("slow"):
+        pytest.fail(f"{item.nodeid} {_seen[0]}; mark it slow", pytrace=False)
+    return result
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown():
+    """Fails a test that leaves SIGINT with another handler."""
+    result = yield
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         # The tests that follow would hear of no interrupt.
         signal.signal(signal.SIGINT, signal.default_int_handler)
         pytest.fail("SIGINT is left with another handler", pytrace=False)
-    item.user_properties.append((_TAKEN, time.process_time() - started))
-    if _seen and not item.get_closest_marker("slow"):
-        pytest.fail(f"{item.nodeid} {_seen[0]}; mark it slow", pytrace=False)
     return result
 
 

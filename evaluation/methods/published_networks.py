@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 import hashlib
 from pathlib import Path
 from typing import ClassVar
-import zipfile
 
 import numpy as np
 from pydantic import computed_field
@@ -124,10 +123,8 @@ def _read_weights(
     except ValueError as error:
         raise InputError(f"{path}: {_ADVICE} ({error})") from error
     if not found:
-        with zipfile.ZipFile(path) as archive:
-            first = next(iter(archive.namelist()), "nothing")
         raise InputError(
-            f"{path}: {_ADVICE} (no array {next(iter(shapes))}; the file begins"
-            f" with {first.removesuffix('.npy')})"
+            f"{path}: {_ADVICE} (no array {next(iter(shapes))}, with just this"
+            " name and no prefix, such as module.)"
         )
     return checked_weights(found, shapes, path)

@@ -26,7 +26,8 @@ _DRIVES = ("metropolis_04", "suburbia_02", "downtown_04")
 # Correlation of the normal variables behind the answers: 0.65 exp(-d / 45 m).
 # For answers of which half are right, it gives .38, .27, .17 and .11 at 7, 22,
 # 40 and 60 m, by the arcsine law.
-_CLOSE, _SCALE = 0.65, 45.0
+_CLOSE = 0.65
+_SCALE = 45.0
 _RUNS = 1000
 
 

@@ -11,13 +11,15 @@ from cns_drake.base import (
     interrupts_wait,
     uninterrupted,
 )
+from cns_drake.base.interrupts import SIGNALS
 
 
 @pytest.fixture
 def handlers():
-    before = signal.getsignal(signal.SIGTERM)
+    before = {number: signal.getsignal(number) for number in SIGNALS}
     yield
-    signal.signal(signal.SIGTERM, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 def interrupt_and_go_on(number, done):

@@ -7,11 +7,12 @@ import pytest
 
 from cns_drake.base import InputError, start
 from cns_drake.base import launch as start_module
+from cns_drake.base.interrupts import SIGNALS
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_during_imports_waits(monkeypatch, capsys, number):
-    before = signal.getsignal(signal.SIGTERM)
+    before = {one: signal.getsignal(one) for one in SIGNALS}
     ended = []
     monkeypatch.setattr(
         start_module, "end_interrupted", lambda: ended.append("interrupted")
@@ -25,7 +26,8 @@ def test_an_interrupt_during_imports_waits(monkeypatch, capsys, number):
     try:
         start("program", load)
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for one, handler in before.items():
+            signal.signal(one, handler)
     assert ended == ["loaded", "interrupted"]
     assert capsys.readouterr() == ("", "program: interrupted\n")
 

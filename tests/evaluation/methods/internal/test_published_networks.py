@@ -214,7 +214,7 @@ def test_names_with_a_prefix(tmp_path):
     """As those of a network that was trained on several devices."""
     weights = {f"module.{k}": v for k, v in svt_weights().items()}
     path = save_weights(tmp_path / "w.npz", weights)
-    with pytest.raises(InputError, match=r"begins with module\."):
+    with pytest.raises(InputError, match=r"no prefix, such as module\."):
         make_method("svt-net", {"weights": path})
 
 
