@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-import csv
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,7 @@ from docs.picture_parts import (
     add_heading,
     make_plain,
 )
-from docs.result_tables import kept_in_cities
+from docs.result_tables import csv_rows, kept_in_cities
 from evaluation.methods import method_facts, shipped_methods
 from evaluation.results import (
     INK,
@@ -146,7 +145,7 @@ def assumptions(path: Path) -> None:
     }
     rows = [
         row
-        for row in _rows("docs/notes/ageing_means.csv")
+        for row in csv_rows("notes/ageing_means.csv")
         if (row["method"], row["metric"]) == ("btc", "auc")
         and (row["season"], row["random_yaw"]) == ("same", "1")
     ]
@@ -199,7 +198,7 @@ def ranking(path: Path) -> None:
     Means are over the pairs of the shipped cities.
     """
     found: dict[tuple[bool, float], list[Row]] = {}
-    for line in _rows("docs/notes/ranking.csv"):
+    for line in csv_rows("notes/ranking.csv"):
         if line["cities"] != "shipped":
             continue
         row = Row(
@@ -262,7 +261,7 @@ def ranking(path: Path) -> None:
 
 def years(path: Path) -> None:
     """Draws the table of what the age of a map costs."""
-    rows = _rows("docs/notes/years.csv")
+    rows = csv_rows("notes/years.csv")
     cities = list(dict.fromkeys(row["map"].capitalize() for row in rows))
     columns = (
         "years", "btc", "btc_low", "btc_high", "solid", "ring++", "others_best"
@@ -343,7 +342,7 @@ def _name_lines(figure: Figure, axes: Axes, gap: float, size: float) -> None:
 
 def sessions(path: Path) -> None:
     """Draws R@1 of a map of January in NCLT, and as predicted in Suburbia."""
-    rows = _rows("docs/notes/nclt_sessions.csv")
+    rows = csv_rows("notes/nclt_sessions.csv")
     figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
     axes = figure.subplots()
     # No method has these colours.
@@ -381,12 +380,11 @@ def sessions(path: Path) -> None:
 def fleet(path: Path) -> None:
     """Draws the share of changes that so many cars a year notice."""
     noticed: dict[int, list[Row]] = {}
-    with open(ROOT / "docs/notes/upkeep.csv", newline="") as stream:
-        for line in csv.DictReader(stream):
-            wanted = line["experiment"], line["task"], line["metric"]
-            if wanted == ("fleet", "seen", "seen_here"):
-                row = _realisation(line)
-                noticed.setdefault(int(line["condition"]), []).append(row)
+    for line in csv_rows("notes/upkeep.csv"):
+        wanted = line["experiment"], line["task"], line["metric"]
+        if wanted == ("fleet", "seen", "seen_here"):
+            row = _realisation(line)
+            noticed.setdefault(int(line["condition"]), []).append(row)
     figure = Figure(figsize=(WIDTH, 3.4), layout="constrained")
     axes = figure.subplots()
     shares = {}
@@ -433,12 +431,11 @@ def upkeep(
         panels: title of each panel -> values of columns of its rows.
         finding: title of the picture.
     """
-    with open(ROOT / "docs/notes/upkeep.csv", newline="") as stream:
-        lines = [
-            line
-            for line in csv.DictReader(stream)
-            if line["experiment"] == experiment
-        ]
+    lines = [
+        line
+        for line in csv_rows("notes/upkeep.csv")
+        if line["experiment"] == experiment
+    ]
     figure = Figure(
         figsize=(WIDTH, 2.2 + 0.7 * len(conditions)), layout="constrained"
     )
@@ -667,9 +664,3 @@ def _spectra(axes: Axes) -> None:
     axes.set_xlabel("spatial frequency [1/m]")
     axes.set_ylabel("spectral density of heights [m³]")
     axes.set_title("Roads are as rough as their ISO 8608 class", loc="left")
-
-
-def _rows(name: str) -> list[dict[str, str]]:
-    """Returns the rows of a CSV file of the project."""
-    with open(ROOT / name, newline="") as stream:
-        return list(csv.DictReader(stream))

@@ -193,11 +193,7 @@ def radius() -> str:
 
 def changes() -> str:
     """Returns the table of what is retained by what is missing."""
-    found: dict[tuple[str, str, str], list[float]] = {}
-    for row in _rows("notes/what_changes.csv"):
-        if row["metric"] == "kept_strict":
-            key = row["cause"], row["gate"], row["method"]
-            found.setdefault(key, []).append(float(row["value"]))
+    found = {gate: _kept_of_what_changes(gate) for gate in "01"}
     lines = []
     causes = {
         "missing": "fronts",
@@ -205,7 +201,7 @@ def changes() -> str:
         "both": "fronts and furniture",
     }
     for (cause, name), gate in itertools.product(causes.items(), "01"):
-        some = [found[cause, gate, method] for method in METHODS]
+        some = [found[gate][cause, method] for method in METHODS]
         cells = [f"{np.mean(v):.2f} ({min(v):.2f}–{max(v):.2f})" for v in some]
         lines.append((name, "yes" if gate == "1" else "no", *cells))
     head = "what the database lacks", "verified", *map(title, METHODS)
@@ -215,10 +211,10 @@ def changes() -> str:
 def losses_at(radius_m: float, gate: bool) -> list[Survival]:
     """Returns the lost shares of AUC strict at a radius, by method.
 
-    Each city counts once: the mean over its pairs and five draws of yaw.
+    Each city counts once: the mean over its pairs and draws of yaw.
     """
     by_city: dict[tuple[str, str], list[float]] = {}
-    for row in _rows("notes/ranking.csv"):
+    for row in csv_rows("notes/ranking.csv"):
         if (
             float(row["radius"]) != radius_m
             or bool(int(row["gate"])) != gate
@@ -282,7 +278,7 @@ def _claims_on_rebuilt_cities() -> list[Claim]:
             float(row["auc_low"]),
             float(row["auc_high"]),
         )
-        for row in _rows("notes/metropolis_prediction.csv")
+        for row in csv_rows("notes/metropolis_prediction.csv")
     }
     (turned,) = _values(
         "notes/metropolis_tcr.csv",
@@ -290,7 +286,7 @@ def _claims_on_rebuilt_cities() -> list[Claim]:
         database="metropolis_03_stage_04",
         choice="yaw of 1.5 deg, voxel centres",
     )
-    kept = _kept_of_what_changes()
+    kept = _kept_of_what_changes("0")
     furniture = {m: float(np.mean(kept["scattered", m])) for m in METHODS}
     others = min(share for name, share in furniture.items() if name != "btc")
     fronts = {m: float(np.mean(kept["missing", m])) for m in METHODS}
@@ -799,9 +795,7 @@ def _claims_on_upkeep() -> list[Claim]:
             name="old-drive",
             claim="For queries in summer, a database drive of 20 years changes"
             f" the AUC strict of BTC by {_signed(old)} against one of 1 year.",
-            estimate=old[0],
-            low=old[1],
-            high=old[2],
+            **_measured(old),
             overturned_by="other rates of ageing, or furniture replaced in"
             " place",
             **over_realisations,
@@ -814,9 +808,7 @@ def _claims_on_upkeep() -> list[Claim]:
             f" {_signed(winter['ring++'])}, and of BTC by"
             f" {_signed(winter['btc'])}; a drive in winter alone was not"
             " measured.",
-            estimate=winter["solid"][0],
-            low=winter["solid"][1],
-            high=winter["solid"][2],
+            **_measured(winter["solid"]),
             overturned_by="a single drive in winter that is as good; then the"
             " season counts, and not the number of drives",
             **over_realisations,
@@ -835,9 +827,7 @@ def _claims_on_upkeep() -> list[Claim]:
             claim="Three drives of 20, 10 and 1 years, merged into one map,"
             f" change the AUC strict of BTC by {_signed(merged)} against the"
             " newest alone, in maintenance.yaml.",
-            estimate=merged[0],
-            low=merged[1],
-            high=merged[2],
+            **_measured(merged),
             overturned_by="the same gain from a denser map of the newest drive",
             **over_realisations,
         ),
@@ -845,9 +835,7 @@ def _claims_on_upkeep() -> list[Claim]:
             name="updating",
             claim="Removing what is gone from the merged map by exact labels"
             f" changes the AUC strict of BTC by {_signed(exact)}.",
-            estimate=exact[0],
-            low=exact[1],
-            high=exact[2],
+            **_measured(exact),
             overturned_by="longer routes than 400 m, a rebuilt city, or many"
             " more drives than three",
             **over_realisations,
@@ -857,9 +845,7 @@ def _claims_on_upkeep() -> list[Claim]:
             claim="Within three years, four cars a year let verified RING++"
             f" answer {_share(four)} of the queries of a route of 500 m, one"
             f" car {_share(one)}.",
-            estimate=four[0],
-            low=four[1],
-            high=four[2],
+            **_measured(four),
             overturned_by="a larger area, or cars on fixed routes",
             **over_realisations,
         ),
@@ -918,9 +904,7 @@ def _claims_on_localisation() -> list[Claim]:
             claim="In a rebuilt city, point-to-plane ICP localises"
             f" {_share(plane)} of the queries from initial guesses 0.5 m off,"
             f" and GICP {_share(gicp)}.",
-            estimate=plane[0],
-            low=plane[1],
-            high=plane[2],
+            **_measured(plane),
             overturned_by="other settings: a correspondence distance that"
             " shrinks, or a robust kernel",
             **one_city,
@@ -931,9 +915,7 @@ def _claims_on_localisation() -> list[Claim]:
             " shrinks, point to plane localises"
             f" {_share(robust)} in a rebuilt city, and {_share(far)} from 2 m"
             " off.",
-            estimate=robust[0],
-            low=robust[1],
-            high=robust[2],
+            **_measured(robust),
             declared="the settings, before these stages existed",
             overturned_by="failures in another rebuilt city",
             **one_city,
@@ -1109,7 +1091,7 @@ def _claims_on_map_update() -> list[Claim]:
 
 
 def _claims_on_methods() -> list[Claim]:
-    best = 0
+    wins: list[bool] = []
     for radius_m in _RADII:
         found: dict[tuple[str, ...], dict[str, float]] = {}
         for row in _find(
@@ -1118,7 +1100,7 @@ def _claims_on_methods() -> list[Claim]:
         ):  # fmt: skip
             pair = row["map"], row["database"], row["query"]
             found.setdefault(pair, {})[row["method"]] = float(row["auc_strict"])
-        best += sum(
+        wins += (
             max(some, key=lambda m: some[m]) == "layered-overlap"
             for some in found.values()
         )
@@ -1171,12 +1153,13 @@ def _claims_on_methods() -> list[Claim]:
         Claim(
             name="best-verified",
             claim="With geometric verification, layered overlap has the"
-            f" greatest AUC strict in {best} of 40 combinations of ten shipped"
+            f" greatest AUC strict in {sum(wins)} of {len(wins)} combinations"
+            " of ten shipped"
             " pairs and four radii.",
             page="notes/ranking.md",
-            estimate=best / 40,
+            estimate=float(np.mean(wins)),
             unit="combinations, of pairs from four cities",
-            n=40,
+            n=len(wins),
             source="docs/notes/ranking.csv",
             seen_before="layered overlap was developed on versions of the"
             " shipped cities",
@@ -1262,7 +1245,7 @@ def _claims_on_methods() -> list[Claim]:
 def _claims_on_reality() -> list[Claim]:
     judged = {
         row["scans"]: float(row["all"])
-        for row in _rows("notes/judge_scans.csv")
+        for row in csv_rows("notes/judge_scans.csv")
     }
     nclt, ours = (
         {
@@ -1275,7 +1258,9 @@ def _claims_on_reality() -> list[Claim]:
     summer = ("132", "152", "218", "257")
     lost = [nclt["20"] - nclt[days] for days in summer]
     lost_here = [ours["20"] - ours[days] for days in summer]
-    campus = {row["condition"]: row for row in _rows("notes/nclt_campus.csv")}
+    campus = {
+        row["condition"]: row for row in csv_rows("notes/nclt_campus.csv")
+    }
     platform = campus["platform"]
     season = float(platform["r1"]) - float(campus["year"]["r1"])
 
@@ -1531,10 +1516,14 @@ def _claims_on_reality() -> list[Claim]:
     ]
 
 
-def _kept_of_what_changes() -> dict[tuple[str, str], list[float]]:
-    """Returns (cause, method) -> retained AUC strict in each fresh city."""
+def _kept_of_what_changes(gate: str) -> dict[tuple[str, str], list[float]]:
+    """Returns (cause, method) -> retained AUC strict in each fresh city.
+
+    Args:
+        gate: "1" with geometric verification, else "0".
+    """
     found: dict[tuple[str, str], list[float]] = {}
-    for row in _find("notes/what_changes.csv", metric="kept_strict", gate="0"):
+    for row in _find("notes/what_changes.csv", metric="kept_strict", gate=gate):
         key = row["cause"], row["method"]
         found.setdefault(key, []).append(float(row["value"]))
     return found
@@ -1543,7 +1532,7 @@ def _kept_of_what_changes() -> dict[tuple[str, str], list[float]]:
 def _hits(predicted: Mapping[tuple[str, str, str], tuple[float, float]]) -> int:
     measured = {
         (row["database"], row["method"], row["protocol"]): float(row["auc"])
-        for row in _rows("notes/metropolis_measured.csv")
+        for row in csv_rows("notes/metropolis_measured.csv")
     }
     return sum(
         low <= measured[key] <= high for key, (low, high) in predicted.items()
@@ -1554,6 +1543,11 @@ def _t_interval(values: Sequence[float]) -> tuple[float, float, float]:
     """Returns the mean, and the limits of its 95 % t interval."""
     low, high = stats.ttest_1samp(values, 0.0).confidence_interval()
     return float(np.mean(values)), float(low), float(high)
+
+
+def _measured(interval: tuple[float, float, float]) -> dict[str, float]:
+    """Returns the fields of a claim for an estimate with its interval."""
+    return dict(zip(("estimate", "low", "high"), interval, strict=True))
 
 
 def _percent(share: float) -> str:
@@ -1651,13 +1645,13 @@ def fair_table() -> str:
     return stream.getvalue()
 
 
-def claims_table() -> str:
+def claims_table(found: Sequence[Claim]) -> str:
     """Returns `claims.csv`."""
     stream = io.StringIO()
     names = [field.name for field in fields(Claim)]
     table = csv.DictWriter(stream, names, lineterminator="\n")
     table.writeheader()
-    for claim in claims():
+    for claim in found:
         cells = asdict(claim)
         for name in ("estimate", "low", "high"):
             value = cells[name]
@@ -1666,13 +1660,14 @@ def claims_table() -> str:
     return stream.getvalue()
 
 
-def limits() -> str:
+def limits(found: Sequence[Claim]) -> str:
     """Returns the tables of claims, one for each page."""
     parts = []
     for page, heading in HEADINGS.items():
-        found = [one for one in claims() if _page_of(one) == page]
         lines = [
-            (one.claim, _evidence(one), one.overturned_by) for one in found
+            (one.claim, _evidence(one), one.overturned_by)
+            for one in found
+            if _page_of(one) == page
         ]
         head = "claim", "evidence", "what would overturn it"
         parts.append(
@@ -1682,11 +1677,11 @@ def limits() -> str:
     return "\n".join(parts)
 
 
-def claims_on_reality() -> str:
+def claims_on_reality(found: Sequence[Claim]) -> str:
     """Returns the table of claims for the page on reality."""
     lines = [
         (one.claim, _evidence(one))
-        for one in claims()
+        for one in found
         if one.page == "how_real.md"
     ]
     return _table(("what real data say", "evidence"), lines)
@@ -1706,13 +1701,13 @@ def _evidence(claim: Claim) -> str:
     )
 
 
-def sentences(names: str) -> str:
-    """Returns the sentences of claims, as a list of a page."""
-    found = {one.name: one.claim for one in claims()}
+def sentences(found: Sequence[Claim], names: str) -> str:
+    """Returns the sentences of named claims, as a list of a page."""
+    by_name = {one.name: one.claim for one in found}
     lines = []
     for name in names.split(", "):
         # A number stays with its unit.
-        text = found[name].replace(" %", "\N{NO-BREAK SPACE}%")
+        text = by_name[name].replace(" %", "\N{NO-BREAK SPACE}%")
         lines += textwrap.wrap(
             f"- {text}",
             width=92,
@@ -1728,6 +1723,8 @@ TABLES: dict[str, Callable[[], str]] = {
     "survival": survival,
     "radius": radius,
     "changes": changes,
+}
+TABLES_OF_CLAIMS: dict[str, Callable[[Sequence[Claim]], str]] = {
     "limits": limits,
     "reality": claims_on_reality,
 }
@@ -1750,12 +1747,17 @@ HEADINGS = {
 
 def files() -> dict[Path, str]:
     """Returns path -> text of all files that this program writes."""
+    found = claims()
 
     def written(block: re.Match[str]) -> str:
-        makes = (
-            TABLES[block[3]]() if block[2] == "table" else sentences(block[3])
-        )
-        return f"{block[1]}\n{makes}{block[4]}"
+        start, kind, name, end = block.groups()
+        if kind == "claims":
+            made = sentences(found, name)
+        elif name in TABLES_OF_CLAIMS:
+            made = TABLES_OF_CLAIMS[name](found)
+        else:
+            made = TABLES[name]()
+        return f"{start}\n{made}{end}"
 
     pages = {
         path: _BLOCK.sub(written, text)
@@ -1764,20 +1766,21 @@ def files() -> dict[Path, str]:
     }
     return pages | {
         DOCS / "notes/results_fair.csv": fair_table(),
-        DOCS / "claims.csv": claims_table(),
+        DOCS / "claims.csv": claims_table(found),
     }
 
 
 def _find(name: str, **where: str) -> list[dict[str, str]]:
     """Returns the rows of a file that have these cells."""
-    return [row for row in _rows(name) if where.items() <= row.items()]
+    return [row for row in csv_rows(name) if where.items() <= row.items()]
 
 
 def _values(name: str, column: str = "value", **where: str) -> list[float]:
     return [float(row[column]) for row in _find(name, **where)]
 
 
-def _rows(name: str) -> list[dict[str, str]]:
+def csv_rows(name: str) -> list[dict[str, str]]:
+    """Returns the rows of a CSV file, whose path is relative to `docs`."""
     return _read(DOCS / name)
 
 

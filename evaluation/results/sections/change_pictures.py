@@ -287,7 +287,7 @@ def _draw(picture: Picture, stem: Path) -> None:
         layout="constrained",
     )
     axes = figure.subplots()
-    _show(axes, picture, picture.extent)
+    _show(axes, picture)
     figure.legend(
         handles=[
             Patch(
@@ -307,16 +307,8 @@ def _draw(picture: Picture, stem: Path) -> None:
     save_figure(figure, stem, PIXELS)
 
 
-def _show(
-    axes: Axes, picture: Picture, limits: tuple[float, float, float, float]
-) -> None:
-    """Shows a picture, axes in metres, with a scale bar.
-
-    Args:
-        axes: panel to draw in.
-        picture: the picture.
-        limits: left, right, bottom and top of the panel [m].
-    """
+def _show(axes: Axes, picture: Picture) -> None:
+    """Shows a picture, axes in metres, with a scale bar."""
     # Without paper, so that the picture lies on a dark page, too.
     alpha = np.where((picture.image < 255).any(axis=2), 255, 0)
     axes.imshow(
@@ -325,7 +317,7 @@ def _show(
         interpolation="antialiased",
     )
     axes.set_axis_off()
-    left, right, bottom, top = limits
+    left, right, bottom, top = picture.extent
     end = right - 0.03 * (right - left)
     base = bottom + 0.03 * (top - bottom)
     bar = [end - _SCALE_BAR, end]
