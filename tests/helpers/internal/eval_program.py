@@ -1,16 +1,15 @@
 """Running `cns-eval` in the process of a test, on two small drives."""
 
 import math
-import signal
 import sys
 
 import numpy as np
 import pytest
 
 from cns_drake.base import progress_display
-from cns_drake.base.interrupts import SIGNALS
 from evaluation import command_line as cli
 from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.internal.signal_handlers import handlers_kept
 
 
 def make_block_scene(seed):
@@ -50,19 +49,15 @@ def run(capsys, *arguments):
 def run_program(capture, name, main, *arguments):
     """Runs a program in this process; returns status, stdout, stderr."""
     old = sys.argv
-    # The program leaves signal handlers in a state for its end.
-    handlers = {number: signal.getsignal(number) for number in SIGNALS}
     sys.argv = [name, *map(str, arguments)]
     try:
-        with pytest.MonkeyPatch.context() as patch:
+        with handlers_kept(), pytest.MonkeyPatch.context() as patch:
             # No lines of progress appear, even on a slow machine.
             patch.setattr(progress_display, "PATIENCE", math.inf)
             with pytest.raises(SystemExit) as info:
                 main()
     finally:
         sys.argv = old
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
     out, err = capture.readouterr()
     return info.value.code, out, err
 

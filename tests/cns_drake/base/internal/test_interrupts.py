@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 
+from helpers.internal.signal_handlers import handlers_kept
 import pytest
 
 from cns_drake.base import (
@@ -11,15 +12,12 @@ from cns_drake.base import (
     interrupts_wait,
     uninterrupted,
 )
-from cns_drake.base.interrupts import SIGNALS
 
 
 @pytest.fixture
 def handlers():
-    before = {number: signal.getsignal(number) for number in SIGNALS}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
+    with handlers_kept():
+        yield
 
 
 def interrupt_and_go_on(number, done):

@@ -3,16 +3,15 @@
 import os
 import signal
 
+from helpers.internal.signal_handlers import handlers_kept
 import pytest
 
 from cns_drake.base import InputError, start
 from cns_drake.base import launch as start_module
-from cns_drake.base.interrupts import SIGNALS
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_during_imports_waits(monkeypatch, capsys, number):
-    before = {one: signal.getsignal(one) for one in SIGNALS}
     ended = []
     monkeypatch.setattr(
         start_module, "end_interrupted", lambda: ended.append("interrupted")
@@ -23,11 +22,8 @@ def test_an_interrupt_during_imports_waits(monkeypatch, capsys, number):
         ended.append("loaded")
         return lambda: pytest.fail("the program runs")
 
-    try:
+    with handlers_kept():
         start("program", load)
-    finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
     assert ended == ["loaded", "interrupted"]
     assert capsys.readouterr() == ("", "program: interrupted\n")
 
