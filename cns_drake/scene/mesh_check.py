@@ -13,7 +13,7 @@ import struct
 from cns_drake.base import read_bytes
 from cns_drake.scene.collada_check import check_collada
 from cns_drake.scene.gltf_check import check_gltf
-from cns_drake.scene.obj_check import LARGEST_FILE, obj_notes
+from cns_drake.scene.obj_check import LARGEST_FILE, check_obj
 from cns_drake.scene.ply_check import check_ply
 
 # File name extensions of glTF.
@@ -96,11 +96,13 @@ def _check_vtk(content: bytes) -> tuple[()]:
 
 
 # File name extension -> function that reads and checks a file.
-_CHECKS_OF_FILES = {".dae": check_collada}
+_CHECKS_OF_FILES = {
+    ".dae": check_collada,
+    ".obj": lambda path: check_obj(path).notes,
+}
 # File name extension -> function that checks the contents of a file.
 _CHECKS = {
     **dict.fromkeys(GLTF, check_gltf),
-    ".obj": obj_notes,
     ".ply": check_ply,
     ".stl": _check_stl,
     ".vtk": _check_vtk,

@@ -1,7 +1,6 @@
 """Reads the surfaces of meshes, from files or from memory."""
 
 from collections.abc import Sequence
-import functools
 from itertools import pairwise
 from pathlib import Path
 import tempfile
@@ -17,6 +16,7 @@ from pydrake.geometry import (
 
 from cns_drake.base import InputError, read_bytes
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
+from cns_drake.scene.file_watch import once_a_file
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.gltf_check import count_triangles, with_own_buffers
 from cns_drake.scene.mesh_check import GLTF, check_mesh_file
@@ -28,8 +28,6 @@ from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 _FACES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
 # Formats whose y axis points up. Drake rotates them so that z does.
 _Y_UP = (*GLTF, ".dae")
-# Larger files are parsed again each time, so that they do not stay in memory.
-_SMALL_BYTES = 1 << 18
 # Greatest number of triangles in all copies of meshes at further scales, of
 # which a small world can declare any number.
 _MOST_COPIED = 1 << 25
@@ -106,8 +104,7 @@ class MeshFiles:
         if not path.is_file():
             raise ValueError("no such mesh file")
         ending = path.suffix.lower()
-        if ending != ".obj":  # `check_obj` checks these, and more.
-            check_mesh_file(path)
+        check_mesh_file(path)
         if ending in _READERS:
             p_GVset, triangles = _READERS[ending](path)
         elif ending in GLTF:
@@ -215,12 +212,9 @@ def _read_hull(shape: Convex) -> TriangleSurface:
     )
 
 
+@once_a_file
 def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the surface of an OBJ file; small files come from a cache.
-
-    The key of the cache is the path with the size, the time of change and the
-    inode number of the file, so that a file that was written again is read
-    again.
+    """Returns the surface of an OBJ file.
 
     Returns:
         Vertices (N, 3), float64 [m], and triangles (M, 3), int32.
@@ -228,41 +222,17 @@ def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
     Raises:
         RuntimeError, ValueError: the file is not a valid OBJ file.
     """
-    status = path.stat()
-    if status.st_size > _SMALL_BYTES:
-        return _parse_obj(path)
-    return _parse_small_obj(
-        path, (status.st_size, status.st_mtime_ns, status.st_ino)
-    )
-
-
-@functools.lru_cache(maxsize=4096)
-def _parse_small_obj(
-    path: Path, identity: tuple[int, int, int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the vertices and triangles of a file, from a cache.
-
-    The stages of a city share most of their files. The arrays are read-only,
-    because all callers share them. `identity` is only part of the key of the
-    cache; see `_read_obj`.
-    """
-    p_GVset, triangles = _parse_obj(path)
+    expected = check_obj(path).num_triangles
+    mesh = ReadObjToTriangleSurfaceMesh(path)
+    triangles = np.array(
+        [(t.vertex(0), t.vertex(1), t.vertex(2)) for t in mesh.triangles()],
+        dtype=np.int32,
+    ).reshape(-1, 3)
+    _check_count(len(triangles), expected)
+    p_GVset = np.asarray(mesh.vertices(), dtype=float).reshape(-1, 3)
     for array in (p_GVset, triangles):
         array.setflags(write=False)
     return p_GVset, triangles
-
-
-def _parse_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    expected = check_obj(path)
-    mesh = ReadObjToTriangleSurfaceMesh(path)
-    triangles = [
-        (t.vertex(0), t.vertex(1), t.vertex(2)) for t in mesh.triangles()
-    ]
-    _check_count(len(triangles), expected)
-    return (
-        np.asarray(mesh.vertices(), dtype=float).reshape(-1, 3),
-        np.asarray(triangles, dtype=np.int32).reshape(-1, 3),
-    )
 
 
 def _read_vtk(path: Path) -> tuple[np.ndarray, np.ndarray]:

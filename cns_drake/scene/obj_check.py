@@ -3,10 +3,12 @@
 from collections import Counter
 from pathlib import Path
 import re
+from typing import NamedTuple
 
 import numpy as np
 
 from cns_drake.base import read_bytes
+from cns_drake.scene.file_watch import once_a_file
 
 # Larger mesh files are refused [bytes].
 LARGEST_FILE = 1 << 28
@@ -46,51 +48,24 @@ _FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
 # them.
 _OTHER_INDICES = re.compile(rb"/[^\s]*")
 _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
-
-
-# A face of one or two corners, which has no surface.
-_SHORT_FACE = re.compile(
-    rb"^[ \t]*(f(?=[ \t])(?:[ \t]+[^\s#]+){0,2})[ \t]*(?:[\n#]|\Z)",
-    re.MULTILINE,
-)
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
-def obj_notes(content: bytes) -> tuple[str, ...]:
-    """Returns notes on statements of an OBJ file that are not read.
+class ObjFaces(NamedTuple):
+    """The faces of a valid OBJ file.
 
-    Args:
-        content: the file.
-
-    Raises:
-        ValueError: there are surfaces other than faces; the message names the
-            statement.
+    Attributes:
+        notes: what is not read, such as lines; one note for each kind.
+        num_triangles: number of triangles into which the faces can be divided.
     """
-    counts: Counter[str] = Counter()
-    content = content.replace(b"\r", b"\n")
-    if content.startswith(_BYTE_ORDER_MARK):
-        raise ValueError("begins with a byte order mark; save it without")
-    if short := len(_SHORT_FACE.findall(content)):
-        counts["faces of OBJ with fewer than three corners ignored"] = short
-    for word, count in Counter(_STATEMENT.findall(content)).items():
-        name = word.decode("ascii", "replace")
-        if name in _REFUSED:
-            raise ValueError(
-                f"has the statement '{name}' of OBJ, which is not read; export"
-                " it with faces"
-            )
-        if name in _NOTED:
-            counts["points or lines of OBJ ignored"] += count
-        elif name not in _READ:
-            counts[f"statements '{name}' of OBJ ignored"] += count
-    return tuple(f"{count} {what}" for what, count in sorted(counts.items()))
+
+    notes: tuple[str, ...]
+    num_triangles: int
 
 
-def check_obj(path: Path) -> int:
-    """Checks that the faces of an OBJ file use only vertices that exist.
-
-    Returns:
-        Number of triangles into which the faces can be divided.
+@once_a_file
+def check_obj(path: Path) -> ObjFaces:
+    """Checks an OBJ file.
 
     Raises:
         ValueError: a face has a vertex that does not exist, a vertex is not
@@ -100,7 +75,9 @@ def check_obj(path: Path) -> int:
     """
     # Drake accepts carriage returns as line ends, too.
     content = read_bytes(path, LARGEST_FILE).replace(b"\r", b"\n")
-    obj_notes(content)
+    if content.startswith(_BYTE_ORDER_MARK):
+        raise ValueError("begins with a byte order mark; save it without")
+    counts = _count_ignored(content)
     if found := _NO_VERTEX.search(content):
         number = content.count(b"\n", 0, found.start()) + 1
         raise ValueError(
@@ -112,21 +89,51 @@ def check_obj(path: Path) -> int:
     faces = b" \n".join(rows)
     if b"/" in faces:
         faces = _OTHER_INDICES.sub(b"", faces)
-    if _are_valid_indices(faces, num_vertices):
-        short = [row.split() for row in _SHORT_FACE.findall(content)]
-        # Each face of n corners is n - 2 triangles, a short one none.
-        surplus = sum(2 - (len(row) - 1) for row in short)
-        return len(faces.split()) - 2 * len(rows) + surplus
+    if not _are_valid_indices(faces, num_vertices):
+        raise ValueError(_fault_of_a_face(content, num_vertices))
+    corners = [len(row.split()) for row in rows]
+    if short := sum(number < 3 for number in corners):
+        counts["faces of OBJ with fewer than three corners ignored"] = short
+    return ObjFaces(
+        tuple(f"{count} {what}" for what, count in sorted(counts.items())),
+        sum(max(number - 2, 0) for number in corners),
+    )
+
+
+def _count_ignored(content: bytes) -> Counter[str]:
+    """Counts the statements of an OBJ file that are not read, by their kind.
+
+    Raises:
+        ValueError: there are surfaces other than faces; the message names the
+            statement.
+    """
+    counts: Counter[str] = Counter()
+    for word, count in Counter(_STATEMENT.findall(content)).items():
+        name = word.decode("ascii", "replace")
+        if name in _REFUSED:
+            raise ValueError(
+                f"has the statement '{name}' of OBJ, which is not read; export"
+                " it with faces"
+            )
+        if name in _NOTED:
+            counts["points or lines of OBJ ignored"] += count
+        elif name not in _READ:
+            counts[f"statements '{name}' of OBJ ignored"] += count
+    return counts
+
+
+def _fault_of_a_face(content: bytes, num_vertices: int) -> str:
+    """Returns what is wrong with the first face that is not valid."""
     for number, line in enumerate(content.split(b"\n"), start=1):
         face = _FACE.match(line)
         indices = _OTHER_INDICES.sub(b"", face[1]) if face else b""
         if indices.rstrip().endswith(b"\\"):
-            raise ValueError(
+            return (
                 f"line {number}: a face that goes on in the next line, which is"
                 " not read; write it in one line"
             )
         if not _are_valid_indices(indices, num_vertices):
-            raise ValueError(
+            return (
                 f"line {number}: a face has a vertex that is not there (of"
                 f" {num_vertices})"
             )
