@@ -6,6 +6,7 @@ and files of all other formats.
 """
 
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 import re
 import struct
@@ -96,7 +97,7 @@ def _check_vtk(content: bytes) -> tuple[()]:
 
 
 # File name extension -> function that reads and checks a file.
-_CHECKS_OF_FILES = {
+_CHECKS_OF_FILES: dict[str, Callable[[Path], tuple[str, ...]]] = {
     ".dae": check_collada,
     ".obj": lambda path: check_obj(path).notes,
 }
