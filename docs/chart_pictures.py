@@ -379,30 +379,29 @@ def sessions(path: Path) -> None:
 
 def fleet(path: Path) -> None:
     """Draws the share of changes that so many cars a year notice."""
-    noticed: dict[int, list[Row]] = {}
+    noticed: dict[int, list[float]] = {}
     for line in csv_rows("notes/upkeep.csv"):
         wanted = line["experiment"], line["task"], line["metric"]
         if wanted == ("fleet", "seen", "seen_here"):
-            row = _realisation(line)
-            noticed.setdefault(int(line["condition"]), []).append(row)
+            share = 100.0 * float(line["value"])
+            noticed.setdefault(int(line["condition"]), []).append(share)
     figure = Figure(figsize=(WIDTH, 3.4), layout="constrained")
     axes = figure.subplots()
     shares = {}
-    for cars, rows in sorted(noticed.items()):
-        ((_, value, interval),) = rank_methods(rows)
-        shares[cars] = round(100.0 * value)
-        ends = 100.0 * np.array([interval.low, interval.high])
-        axes.plot(ends, [cars, cars], color=INK, lw=5, alpha=0.3)
-        axes.plot(100.0 * value, cars, "o", color=INK, ms=10)
+    for cars, values in sorted(noticed.items()):
+        value = float(np.mean(values))
+        shares[cars] = round(value)
+        axes.plot(values, [cars] * len(values), "|", color="#777777", ms=16)
+        axes.plot(value, cars, "o", color=INK, ms=10)
         axes.text(
-            100.0 * value, cars - 0.28, f"{shares[cars]} %", ha="center",
+            value, cars - 0.28, f"{shares[cars]} %", ha="center",
             fontweight="bold",
         )  # fmt: skip
     # A gap where a number of cars was not measured.
     names = [f"{cars} {'car' if cars == 1 else 'cars'}" for cars in shares]
     axes.set_yticks(list(shares), names)
     axes.set(xlim=(0.0, 100.0), ylim=(max(shares) + 0.5, 0.3))
-    axes.set_xlabel("changes noticed [%]; bar: 95 % interval over realisations")
+    axes.set_xlabel("changes noticed [%];  | one realisation of a city")
     make_plain(axes)
     one, *_, most = shares.values()
     add_heading(
@@ -422,7 +421,7 @@ def upkeep(
 ) -> None:
     """Draws what methods reach with each database, a panel a metric.
 
-    Values are means over realisations of cities, with their 95 % intervals.
+    Values are means over realisations of cities, and ticks the realisations.
 
     Args:
         path: where to save the picture.
@@ -442,27 +441,26 @@ def upkeep(
     shown: set[str] = set()
     grid = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for axes, (name, wanted) in zip(grid, panels.items(), strict=True):
-        of_condition: dict[str, list[Row]] = {}
+        found: dict[str, dict[str, list[float]]] = {}
         for line in lines:
             if wanted.items() <= line.items():
-                row = _realisation(line)
-                of_condition.setdefault(line["condition"], []).append(row)
-        found = {
-            condition: rank_methods(rows)
-            for condition, rows in of_condition.items()
-        }
-        measured = {one.method for some in found.values() for one in some}
+                some = found.setdefault(line["condition"], {})
+                value = float(line["value"])
+                some.setdefault(line["method"], []).append(value)
+        measured = {one for some in found.values() for one in some}
         shown |= measured - {""}
         # What a fleet notices depends on no method.
         here = [one for one in (*METHOD_STYLES, "") if one in measured]
         for condition, some in found.items():
-            for one in some:
-                colour = METHOD_STYLES[one.method][0] if one.method else INK
+            for method, values in some.items():
+                colour = METHOD_STYLES[method][0] if method else INK
                 y = list(conditions).index(condition)
-                y += 0.7 * ((here.index(one.method) + 0.5) / len(here) - 0.5)
-                ends = one.interval.low, one.interval.high
-                axes.plot(ends, [y, y], color=colour, lw=3, alpha=0.45)
-                axes.plot(one.value, y, color=colour, marker="o", ms=5)
+                y += 0.7 * ((here.index(method) + 0.5) / len(here) - 0.5)
+                axes.plot(
+                    values, [y] * len(values), "|", color=colour, ms=6,
+                    alpha=0.6,
+                )  # fmt: skip
+                axes.plot(np.mean(values), y, color=colour, marker="o", ms=5)
         axes.set(xlim=(-0.03, 1.03), ylim=(len(conditions) - 0.5, -0.5))
         axes.set_xticks((0.0, 0.5, 1.0), ("0", "0.5", "1"))
         axes.set_yticks(range(len(conditions)), list(conditions.values()))
@@ -475,33 +473,14 @@ def upkeep(
                alpha=0.8)
         for name in methods
     ]  # fmt: skip
+    handles.append(Line2D([], [], color=INK, marker="|", ms=8, ls=""))
     figure.legend(
         handles,
-        [title(name) for name in methods],
-        loc="outside lower center", ncols=3, frameon=False,
+        [*map(title, methods), "one realisation"],
+        loc="outside lower center", ncols=4, frameon=False,
+        handletextpad=0.3, columnspacing=1.0,
     )  # fmt: skip
     figure.savefig(path, dpi=DPI)
-
-
-def _realisation(line: Mapping[str, str]) -> Row:
-    """Returns a line of `upkeep.csv` as a row whose city is its realisation.
-
-    Realisations of cities are the units of a ranking's intervals.
-    """
-    return Row(
-        experiment=line["experiment"],
-        map=f"{line['map']} {line['seed']}",
-        database="",
-        query=line["query"],
-        seed=int(line["seed"]),
-        factors={},
-        task=line["task"],
-        method=line["method"],
-        gate=line["gate"] == "1",
-        protocol="",
-        metric=line["metric"],
-        value=float(line["value"]),
-    )
 
 
 def ladder(path: Path) -> None:

@@ -428,7 +428,7 @@ def _claims_on_rebuilt_cities() -> list[Claim]:
             "docs/notes/metropolis_measured.csv",
             declared="the intervals, in the commit that froze the stages",
             seen_before="five earlier versions of Metropolis, with all methods",
-            overturned_by="nothing: the predictions stand as committed",
+            overturned_by="a run of the frozen stages that gives other values",
             test="none: a count",
         ),
     ]
