@@ -8,7 +8,6 @@ influence numbers.
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Iterable, Iterator, Mapping
 import contextlib
 import functools
@@ -16,6 +15,7 @@ import hashlib
 import importlib.util
 import json
 from pathlib import Path
+import re
 from typing import NamedTuple
 
 from cns_drake.base.files import user_errors
@@ -205,6 +205,30 @@ def _source_files(
     return found
 
 
+# Python's own parser would take a second for the modules of a simulation, and
+# most of it for what is no import.
+_TEXTS_AND_COMMENTS = re.compile(
+    rb'"""(?:[^"\\]|\\.|"(?!""))*"""|'
+    rb"'''(?:[^'\\]|\\.|'(?!''))*'''|"
+    rb'"(?:[^"\\\n]|\\.)*"|'
+    rb"'(?:[^'\\\n]|\\.)*'|"
+    rb"#[^\n]*|\\\n",
+    re.DOTALL,
+)
+_FOR_TYPES_ALONE = re.compile(
+    rb"^([ \t]*)(?:el)?if TYPE_CHECKING:[^\n]*"
+    rb"(?:\n(?:\1[ \t]+[^\n]*|[ \t]*$))*",
+    re.MULTILINE,
+)
+_IMPORT = re.compile(
+    rb"(?:^|[:;])[ \t]*"
+    rb"(?:from[ \t]*(?P<home>[.\w \t]+?)[ \t]*\bimport\b[ \t]*"
+    rb"(?:\((?P<block>[^)]*)\)|(?P<line>[^\n;]*))|"
+    rb"import[ \t]+(?P<modules>[^\n;]*))",
+    re.MULTILINE,
+)
+
+
 @functools.cache
 def _find_imports(text: bytes, package: str) -> tuple[tuple[str, str], ...]:
     """Returns the imports that run in the source of a module of a package.
@@ -212,34 +236,22 @@ def _find_imports(text: bytes, package: str) -> tuple[tuple[str, str], ...]:
     Each is a module, and the name that is imported from it ("" for the module
     itself).
     """
-    try:
-        tree = ast.parse(text)
-    except (SyntaxError, ValueError):
-        return ()  # Running the file reports it.
+    text = _TEXTS_AND_COMMENTS.sub(b" ", text.replace(b"\r", b"\n"))
+    text = _FOR_TYPES_ALONE.sub(b"", text)
     names: list[tuple[str, str]] = []
-    waiting: list[ast.AST] = [tree]
-    while waiting:
-        node = waiting.pop()
-        test = getattr(getattr(node, "test", None), "id", None)
-        if isinstance(node, ast.If) and test == "TYPE_CHECKING":
-            waiting += node.orelse
-        elif isinstance(node, ast.Import | ast.ImportFrom):
-            names += _names_of(node, package)
-        else:  # Imports are statements: no expression holds one.
-            for block in ("body", "orelse", "finalbody", "handlers", "cases"):
-                waiting += getattr(node, block, [])
-    return tuple(names)
-
-
-def _names_of(node: ast.AST, package: str) -> Iterator[tuple[str, str]]:
-    """Yields (module, name in it or "") of one import."""
-    if isinstance(node, ast.Import):
-        yield from ((alias.name, "") for alias in node.names)
-    elif isinstance(node, ast.ImportFrom):
-        home = "." * node.level + (node.module or "")
+    for found in _IMPORT.finditer(text):
+        listed = found["block"] or found["line"] or found["modules"] or b""
+        parts = [
+            one.split()[0].decode() for one in listed.split(b",") if one.split()
+        ]
+        if found["home"] is None:
+            names += [(name, "") for name in parts]
+            continue
+        home = b"".join(found["home"].split()).decode()
         with contextlib.suppress(ImportError):  # Running the file reports it.
             home = importlib.util.resolve_name(home, package)
-        yield from ((home, alias.name) for alias in node.names)
+        names += [(home, name) for name in parts]
+    return tuple(names)
 
 
 def _data_files(module: Path) -> Iterator[Path]:

@@ -1,10 +1,17 @@
 """Fingerprints: the code that a result depends on."""
 
 import ast
+import asyncio
+import email
 import importlib.metadata
+import json
+import logging
+import multiprocessing
+from pathlib import Path
 import shutil
 import subprocess
 import sys
+import unittest
 
 from helpers.documents import ROOT
 import pytest
@@ -151,16 +158,41 @@ def test_a_family_counts_with_all_its_members(packages):
 )
 @pytest.mark.parametrize("start", ["", "import a\n", "a = 1\n"])
 def test_every_import_of_a_source_is_found(start, end):
-    found = fingerprints._find_imports((start + end).encode(), "evaluation")
-    expected = [
-        (node.module, name.name)
+    source = (start + end).encode()
+    found = fingerprints._find_imports(source, "evaluation")
+    assert set(found) == imports_by_python(source)
+
+
+def imports_by_python(source):
+    """Returns the imports of a source, as Python's own parser finds them."""
+    return {
+        ("." * node.level + (node.module or ""), name.name)
         if isinstance(node, ast.ImportFrom)
         else (name.name, "")
-        for node in ast.walk(ast.parse(start + end))
+        for node in ast.walk(ast.parse(source))
         if isinstance(node, (ast.Import, ast.ImportFrom))
         for name in node.names
-    ]
-    assert sorted(found) == sorted(expected)
+    }
+
+
+@pytest.mark.parametrize(
+    "package", [asyncio, email, json, logging, multiprocessing, unittest]
+)
+def test_imports_of_the_standard_library_are_found(package):
+    for path in Path(package.__file__).parent.glob("*.py"):
+        source = path.read_bytes()
+        # Without a package, relative imports stay as they are written.
+        found = fingerprints._find_imports(source, "")
+        assert set(found) == imports_by_python(source), path
+
+
+def test_imports_for_types_alone_do_not_count():
+    source = (
+        "if TYPE_CHECKING:\n    import a\n\n    from b import (\n        c,\n"
+        "    )\nelse:\n    import d\nimport e\n"
+    )
+    found = fingerprints._find_imports(source.encode(), "evaluation")
+    assert found == (("d", ""), ("e", ""))
 
 
 def test_packages_of_others_beside_ours_do_not_count(packages):
