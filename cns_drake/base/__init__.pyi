@@ -72,6 +72,9 @@ from cns_drake.base.images import to_jpeg as to_jpeg
 from cns_drake.base.input_models import InputModel as InputModel
 from cns_drake.base.interrupts import INTERRUPTED as INTERRUPTED
 from cns_drake.base.interrupts import (
+    ended_by_interrupts as ended_by_interrupts,
+)
+from cns_drake.base.interrupts import (
     interrupt_on_termination as interrupt_on_termination,
 )
 from cns_drake.base.interrupts import interrupts_wait as interrupts_wait

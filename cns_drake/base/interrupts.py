@@ -13,6 +13,8 @@ from typing import NoReturn
 INTERRUPTED = 130
 # The signals that interrupt.
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# The file descriptor of standard error.
+_STDERR = 2
 _Handler = Callable[[int, FrameType | None], object]
 
 
@@ -70,7 +72,7 @@ def _handled_by(handle: _Handler) -> Iterator[dict[int, _Handler]]:
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Delays interrupts until the end of the block, for example an import.
+    """Delays interrupts until the end of the block, an import in a library.
 
     An extension module that is interrupted during its initialisation fails with
     an unrelated error, or crashes the process later. Blocking the signals would
@@ -83,6 +85,26 @@ def uninterrupted() -> Iterator[None]:
     finally:
         if waiting:
             signal.raise_signal(waiting[0])
+
+
+@contextlib.contextmanager
+def ended_by_interrupts(program: str) -> Iterator[None]:
+    """Ends the process at the first interrupt of the block, an import.
+
+    For a program that has written nothing yet, so that nobody waits until all
+    is imported. No exception is raised, see `uninterrupted`.
+
+    Args:
+        program: name of the program, for the message.
+    """
+
+    def end(number: int, frame: FrameType | None) -> None:
+        # What is interrupted may hold the lock of `sys.stderr`.
+        os.write(_STDERR, f"{program}: interrupted\n".encode())
+        end_interrupted()
+
+    with _handled_by(end):
+        yield
 
 
 @contextlib.contextmanager
@@ -130,7 +152,8 @@ def end_interrupted() -> NoReturn:
     Only standard output and standard error are flushed, no other open files.
     """
     for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError, ValueError):
+        # An interrupted write cannot be flushed.
+        with contextlib.suppress(OSError, ValueError, RuntimeError):
             stream.flush()
     # Nothing of `multiprocessing` is left in the temporary folder. Processes of
     # jobs end with this process; it does not wait for them.

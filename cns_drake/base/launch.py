@@ -7,8 +7,8 @@ import sys
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import (
     end_interrupted,
+    ended_by_interrupts,
     interrupt_on_termination,
-    uninterrupted,
 )
 from cns_drake.base.process import ONE_CORE, collect_garbage_seldom
 
@@ -17,8 +17,7 @@ def start(program: str, load: Callable[[], Callable[[], None]]) -> None:
     """Imports and runs a program; reports errors and interrupts in one line.
 
     After an `InputError`, the process exits with the status of the error. After
-    an interrupt (Ctrl-C or SIGTERM), the process ends without a traceback. An
-    interrupt during the import takes effect when the import is complete.
+    an interrupt (Ctrl-C or SIGTERM), the process ends without a traceback.
 
     Args:
         program: name of the program.
@@ -30,7 +29,7 @@ def start(program: str, load: Callable[[], Callable[[], None]]) -> None:
     try:
         interrupt_on_termination()
         collect_garbage_seldom()
-        with uninterrupted():
+        with ended_by_interrupts(program):
             run = load()
         run()
     except InputError as error:

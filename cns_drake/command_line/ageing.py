@@ -10,10 +10,10 @@ import typer
 from cns_drake.base import (
     InputError,
     did_you_mean,
+    ended_by_interrupts,
     errors_at_option,
     shared_options,
     show,
-    uninterrupted,
     whole_number,
 )
 from cns_drake.command_line.suggestions import suggest_reproduction
@@ -109,7 +109,7 @@ def age(
     maps, wanted = _maps_and_years(source, years)
     if len(maps) != 1:
         raise InputError(f"give one map, not {' '.join(maps) or 'none'}")
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.ageing import age_map, draw_pictures, read_rates
         from cns_drake.scenarios import shipped_maps
 

@@ -14,11 +14,11 @@ from cns_drake.base import (
     InputError,
     commands,
     did_you_mean,
+    ended_by_interrupts,
     next_command,
     note,
     shared_options,
     show,
-    uninterrupted,
 )
 from cns_drake.command_line import options
 from cns_drake.command_line.experiment_drives import varied_drives
@@ -195,7 +195,7 @@ def export(
     _check_options(commands.given_options(context), layout)
     words = drives or []
     if layout in _PAIRS:
-        with uninterrupted():
+        with ended_by_interrupts("cns-drake"):
             from cns_drake.base import choose_cluster
             from cns_drake.studies import claim_pairs
 
@@ -211,7 +211,7 @@ def export(
             )
             _write_overlap_table(learned, named, output, protocol, json=json)
             return
-        with uninterrupted():
+        with ended_by_interrupts("cns-drake"):
             from cns_drake.studies import ExportOptions
 
         settings = ExportOptions(
@@ -304,7 +304,7 @@ def _export_recording(
     json: bool,
 ) -> None:
     """Converts a recording to the layout of a data set."""
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.export import export_drive
         from evaluation.drives import find_data_sets
 
@@ -333,7 +333,7 @@ def _export_film(
     json: bool,
 ) -> None:
     """Makes one film that shows a drive in every stage of its city."""
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.scenarios import load_scenario
         from cns_drake.simulation import make_film, with_some_traffic
 
@@ -373,7 +373,7 @@ def _learned_drives(
     These are the named drives and the drives of the experiment `vary`, or all
     shipped drives if neither is given.
     """
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.scenarios import load_scenario, recordable_drives
 
     if not names and vary is None:
@@ -397,7 +397,7 @@ def _write_overlap_table(
 
     `words` are the words of the command line that name the drives.
     """
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.studies import write_overlap_table
 
     if len(drives) != 2:
@@ -423,7 +423,7 @@ def _write_training_data(
     The clouds come from the simulated drives `learned`. `held_out` names the
     drives for evaluation, which are not used for training.
     """
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.scenarios import load_scenario
         from cns_drake.studies import export_pairs
 
@@ -453,7 +453,7 @@ def _write_truth(
         spacing: distance between two scans of a map [m].
         json: whether to print the counts of labels as JSON.
     """
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.base import check_new_folder
         from cns_drake.studies import open_labelled, write_truth
         from evaluation.map_update import Label
@@ -491,7 +491,7 @@ def _write_truth(
 def _open_drives(
     paths: Sequence[str], lidar: str | None, columns: int | None
 ) -> list[Drive]:
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from evaluation.drives import open_drive
 
     return [open_drive(Path(path), lidar, columns) for path in paths]
@@ -501,7 +501,7 @@ def _write_sessions(
     drives: Sequence[Drive], output: Path, spacing: float, *, json: bool
 ) -> None:
     """Writes maps of two drives without labels."""
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.base import draft_folder
         from cns_drake.drives import check_same_world
         from evaluation.map_update import SIDES, write_session
@@ -518,7 +518,7 @@ def _write_sessions(
 
 def _write_images(drive: Drive, output: Path, *, json: bool) -> None:
     """Writes bird's-eye images of a drive."""
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from evaluation.real import write_images
 
     write_images(drive, output, note)

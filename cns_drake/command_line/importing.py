@@ -11,12 +11,12 @@ import typer
 
 from cns_drake.base import (
     InputError,
+    ended_by_interrupts,
     errors_at_option,
     natural_key,
     note,
     shared_options,
     show,
-    uninterrupted,
     whole_number,
 )
 from cns_drake.imports import (
@@ -124,7 +124,7 @@ def import_city(
         grow,
         dressed=not plain,
     )
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.imports import import_city as write_city
         from cns_drake.scenarios import write_table
 

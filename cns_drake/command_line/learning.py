@@ -11,9 +11,9 @@ import typer
 from cns_drake.base import (
     Jobs,
     Scheduler,
+    ended_by_interrupts,
     errors_at_option,
     terminal,
-    uninterrupted,
 )
 from cns_drake.command_line import options
 
@@ -77,7 +77,7 @@ def train(
             7.5 m of a query are equally good matches. With --graded, the
             training takes about 1.5 times as long as without.
     """
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.base import choose_cluster
         from cns_drake.sensors import make_lidar_config
         from cns_drake.studies import TrainingPlan, make_weights

@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import InputError, note, shared_options, show, uninterrupted
+from cns_drake.base import (
+    InputError,
+    ended_by_interrupts,
+    note,
+    shared_options,
+    show,
+)
 from cns_drake.command_line.suggestions import suggest_reproduction
 
 if TYPE_CHECKING:
@@ -56,7 +62,7 @@ def list_drives(
         folders: Folders of your own maps, whose drives are listed; by default
             the drives of the shipped cities.
     """
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.scenarios import drive_rows, shipped_cities
         from cns_drake.scene import no_drives
 
@@ -140,7 +146,7 @@ def city(
             additions renumber the structures. The command recognises structures
             by their coordinates in the structures.csv of the last run.
     """
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.city import differing_files, generate_city, start_city
         from cns_drake.scenarios import check_table, write_table
 

@@ -12,12 +12,12 @@ import typer
 from cns_drake.base import (
     InputError,
     doing,
+    ended_by_interrupts,
     errors_at_option,
     next_command,
     note,
     shared_options,
     show,
-    uninterrupted,
 )
 from cns_drake.command_line import options
 from cns_drake.command_line.experiment_drives import varied_drives
@@ -164,7 +164,7 @@ def simulate(
             drives side by side: when you move in one of them, the other goes to
             the same place.
     """
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.command_line.drive_script import run_drive
 
     if beside is not None and recording is None:
@@ -249,7 +249,7 @@ def scan(
             this folder before the folders in the environment variables
             GZ_SIM_RESOURCE_PATH and SDF_PATH. May be repeated.
     """
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         import numpy as np
         from pydrake.math import RigidTransform, RollPitchYaw
 
@@ -306,7 +306,7 @@ def generate(
     says. To resume after an interruption, run the same command again: finished
     recordings are skipped.
     """
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.base import choose_cluster
         from cns_drake.scenarios import load_scenario, recordable_drives
         from cns_drake.studies import record_all
