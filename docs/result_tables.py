@@ -29,6 +29,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # As a program, this file is not in the package `docs`.
 sys.path.insert(0, str(ROOT))
 
+from evaluation.recognition import sign_flip_test  # noqa: E402
 from evaluation.results import (  # noqa: E402
     CANNOT_SHOW,
     LAST,
@@ -720,7 +721,7 @@ def _change(
     """Returns the change of a metric from one condition to another.
 
     Returns:
-        The mean over realisations, and its 95 % t interval.
+        The mean over realisations, and its 95 % interval.
     """
     by_condition = {
         one: {
@@ -731,7 +732,7 @@ def _change(
         }
         for one in (new, old)
     }
-    return _t_interval(
+    return _with_interval(
         [by_condition[new][key] - by_condition[old][key]
          for key in by_condition[old]]
     )  # fmt: skip
@@ -749,7 +750,7 @@ def _right_answers(cars: int, method: str) -> tuple[float, float, float]:
             found[key] = found.get(key, 1.0) * share
         elif row["metric"] == "r1" and row["gate"] == "1":
             found[key] = found.get(key, 1.0) * float(row["value"])
-    return _t_interval(list(found.values()))
+    return _with_interval(list(found.values()))
 
 
 def _claims_on_upkeep() -> list[Claim]:
@@ -793,7 +794,7 @@ def _claims_on_upkeep() -> list[Claim]:
         "unit": "realisations, three of each of two cities",
         "n": 6,
         "source": "docs/notes/upkeep.csv",
-        "test": "t interval over realisations, not corrected; two cities say"
+        "test": "sign flips over realisations, not corrected; two cities say"
         " nothing about others",
     }
     return [
@@ -1545,10 +1546,11 @@ def _hits(predicted: Mapping[tuple[str, str, str], tuple[float, float]]) -> int:
     )
 
 
-def _t_interval(values: Sequence[float]) -> tuple[float, float, float]:
-    """Returns the mean, and the limits of its 95 % t interval."""
-    low, high = stats.ttest_1samp(values, 0.0).confidence_interval()
-    return float(np.mean(values)), float(low), float(high)
+def _with_interval(values: Sequence[float]) -> tuple[float, float, float]:
+    """Returns the mean, and the limits of its 95 % interval by sign flips."""
+    array = np.array(values)
+    interval, _ = sign_flip_test(array, np.ones(len(array)))
+    return float(array.mean()), interval.low, interval.high
 
 
 def _measured(interval: tuple[float, float, float]) -> dict[str, float]:

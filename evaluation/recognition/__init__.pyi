@@ -114,5 +114,8 @@ from evaluation.recognition.sign_flips import (
 )
 from evaluation.recognition.sign_flips import leave_one_out as leave_one_out
 from evaluation.recognition.sign_flips import route_blocks as route_blocks
+from evaluation.recognition.sign_flips import (
+    sign_flip_test as sign_flip_test,
+)
 from evaluation.recognition.stored_places import MOST_BYTES as MOST_BYTES
 from evaluation.recognition.stored_places import StoredDrives as StoredDrives
