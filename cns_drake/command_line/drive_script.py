@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Literal
@@ -21,6 +21,13 @@ if TYPE_CHECKING:
     from cns_drake.scenarios import Scenario
     from cns_drake.sensors import WeatherConfig
     from cns_drake.simulation import FinishedSimulation
+
+
+def import_simulation() -> Callable[..., FinishedSimulation]:
+    """Imports the simulation, which is slow and not needed for `--help`."""
+    from cns_drake.simulation import simulate
+
+    return simulate
 
 
 def run_drive(
@@ -85,11 +92,11 @@ def run_drive(
 
         run_drive("downtown_01", "recordings", frames=20)
     """
-    with uninterrupted():  # Slow to import, not needed for `--help`.
-        from cns_drake.base import num_cores
-        from cns_drake.scenarios import load_scenario
-        from cns_drake.simulation import simulate
+    from cns_drake.base import num_cores
+    from cns_drake.scenarios import load_scenario
 
+    with uninterrupted():
+        simulate = import_simulation()
     scenario = _changed_scenario(
         load_scenario(name_or_file),
         lidar=lidar,

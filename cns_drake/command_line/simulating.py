@@ -165,12 +165,14 @@ def simulate(
             the same place.
     """
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.command_line.drive_script import run_drive
+        from cns_drake.command_line import drive_script
+
+        drive_script.import_simulation()
 
     if beside is not None and recording is None:
         raise InputError("--beside: needs --recording, the page to write")
     chosen, weather = choose_returns(returns, fog, rain, snowfall)
-    run_drive(
+    drive_script.run_drive(
         scenario,
         output,
         frames=frames,
