@@ -9,10 +9,10 @@ import typer
 
 from cns_drake.base import (
     InputError,
+    ended_by_interrupts,
     note,
     resumable,
     shared_options,
-    uninterrupted,
 )
 from cns_drake.command_line import options
 from evaluation.recognition import RetrievalProtocol, with_protocols
@@ -48,7 +48,7 @@ def reproduce(
             drives are simulated but not recorded. This saves time and disk
             space, and does not change the results.
     """
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.base import choose_cluster
         from cns_drake.studies import reproduce_maps
         from evaluation.command_line import name_results
@@ -129,7 +129,7 @@ def study(
         show: Print the experiment file, as a start for your own experiment, and
             do nothing else.
     """
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.studies import (
             experiment_text,
             load_experiment,
@@ -167,7 +167,7 @@ def study(
                         f"{name}: {field}: {file} is a program, and would run"
                         " with your permissions; read it, then add --allow-code"
                     )
-    with uninterrupted():
+    with ended_by_interrupts("cns-drake"):
         from cns_drake.base import choose_cluster
         from cns_drake.studies import run_study
         from evaluation.command_line import name_results
