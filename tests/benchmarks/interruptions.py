@@ -163,7 +163,8 @@ def strike(words: list[str], folder: Path, how: str, moment: float) -> Struck:
             if "forkserver" in " ".join(one.cmdline()) and one.children()
         ]
         if how == "SIGINT":
-            os.killpg(program.pid, signal.SIGINT)
+            with contextlib.suppress(ProcessLookupError):  # It has ended.
+                os.killpg(program.pid, signal.SIGINT)
         elif how == "SIGTERM":
             program.terminate()
         elif jobs:
