@@ -162,13 +162,14 @@ def strike(words: list[str], folder: Path, how: str, moment: float) -> Struck:
             for one in processes[1:]
             if "forkserver" in " ".join(one.cmdline()) and one.children()
         ]
-        if how == "SIGINT":
-            with contextlib.suppress(ProcessLookupError):  # It has ended.
+        # It may just have ended.
+        with contextlib.suppress(ProcessLookupError, psutil.NoSuchProcess):
+            if how == "SIGINT":
                 os.killpg(program.pid, signal.SIGINT)
-        elif how == "SIGTERM":
-            program.terminate()
-        elif jobs:
-            random.choice(jobs[0].children()).kill()
+            elif how == "SIGTERM":
+                program.terminate()
+            elif jobs:
+                random.choice(jobs[0].children()).kill()
         since = time.monotonic()
         try:
             status = program.wait(120.0)
