@@ -726,7 +726,11 @@ def test_a_page_stands_alone(tmp_path):
         ((0.4, 0.6), (0,), "0.5095\N{NO-BREAK SPACE}% 0.40 to 0.60"),
         # An interval that is unknown, and results of several seeds.
         ((math.nan, math.nan), (0,), "0.50"),
-        ((0.4, 0.6), (0, 1), "0.50least 0.50, greatest 0.50"),
+        (
+            (0.4, 0.6),
+            (0, 1),
+            "0.50least\N{NO-BREAK SPACE}0.50, greatest\N{NO-BREAK SPACE}0.50",
+        ),
     ],
 )
 def test_a_single_result_has_its_interval(tmp_path, ends, seeds, cell):
