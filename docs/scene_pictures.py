@@ -383,10 +383,7 @@ def one_query(
         handles, ("in both", "only in the query", "only in the place"),
         loc="outside lower center", ncols=3, frameon=False,
     )  # fmt: skip
-    figure.savefig(
-        path, dpi=DPI, bbox_inches="tight", pad_inches=0.05,
-        pil_kwargs={"quality": 82},
-    )  # fmt: skip
+    figure.savefig(path, dpi=DPI, bbox_inches="tight", pad_inches=0.05)
 
 
 def taken(path: Path, file: str, below: str = "") -> None:
