@@ -352,8 +352,8 @@ def one_query(
         axes.set(xlim=(-55, 55), ylim=(-55, 55), aspect="equal")
         axes.plot(0.0, 0.0, "^", color="#e69f00", mec=INK, ms=9)
     panels[1].set_aspect("equal", adjustable="datalim")
-    for drive, colour in ((places, PALE), (queries, INK)):
-        panels[1].plot(*drive.X_WS[:, :2, 3].T, color=colour, lw=1.5)
+    for drive, shade in ((places, PALE), (queries, INK)):
+        panels[1].plot(*drive.X_WS[:, :2, 3].T, color=shade, lw=1.5)
     p_W = [queries.X_WS[frame], *places.X_WS[found]]
     panels[1].plot(*p_W[0][:2, 3], "^", color="#e69f00", mec=INK, ms=9)
     panels[1].plot(*p_W[2][:2, 3], "X", color=INK, ms=9)
@@ -367,9 +367,9 @@ def one_query(
         axes.set_xticks([])
         axes.set_yticks([])
         axes.set_title(text, loc="left")
-    for panel, text, *place in notes:
+    for panel, text, x, y, *point in notes:
         panels[panel].annotate(
-            text, place[2:], place[:2], fontsize=12, color=INK,
+            text, point, (x, y), fontsize=12, color=INK,
             ha="center", va="center",
             bbox={"fc": "white", "ec": "none", "alpha": 0.85, "pad": 1.0},
             arrowprops={"arrowstyle": "-", "color": INK, "lw": 0.8},
