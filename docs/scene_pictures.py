@@ -12,6 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 import numpy as np
 from PIL import Image
 from pydrake.math import RigidTransform
@@ -39,9 +40,20 @@ from docs.picture_parts import (
     with_name,
     write_tiles,
 )
+from docs.result_tables import csv_rows
+from evaluation import make_method, open_drive
 from evaluation.map_update import Label, read_session
 from evaluation.methods import LayeredOverlap, LayeredOverlapConfig
-from evaluation.results import INK, OrthographicView, render, unit_rgb
+from evaluation.results import (
+    INK,
+    OWN,
+    PALE,
+    STAGE,
+    OrthographicView,
+    render,
+    title,
+    unit_rgb,
+)
 
 
 def street(path: Path, rows: Sequence[dict[str, Any]]) -> None:
@@ -279,6 +291,98 @@ def layers(path: Path) -> None:
                 columnspacing=0.5,
             )  # fmt: skip
     panels[0].set_ylabel("y [m]")
+    figure.savefig(path, dpi=DPI, bbox_inches="tight", pad_inches=0.05)
+
+
+def one_query(
+    path: Path,
+    drives: Sequence[str],
+    file: str,
+    frame: int,
+    methods: Sequence[str],
+    notes: Sequence[tuple[int, str, float, float, float, float]],
+) -> None:
+    """Draws a query, its place, and another one that a method preferred.
+
+    Args:
+        path: the picture.
+        drives: recordings of the query and of the places.
+        file: the table of queries.
+        frame: that of the query.
+        methods: one that finds the place, and one that does not. In the place
+            that it prefers, the query lies as this method estimates.
+        notes: panel, text and its position, and the point that it is about.
+    """
+    queries, places = (open_drive(ROOT / folder) for folder in drives)
+    answers = {
+        row["method"]: row
+        for row in csv_rows(str(ROOT / file))
+        if row["query_frame"] == str(frame)
+        and (row["query"], row["database"]) == (queries.session, places.session)
+        and (row[STAGE], row["protocol"], row["gate"]) == (OWN, "fair", "0")
+    }
+    found = [int(answers[name]["match_frame"]) for name in methods]
+    away = [float(answers[name]["distance"]) for name in methods]
+    scans = [
+        np.stack([scan[axis] for axis in "xyz"], axis=1).astype(float)
+        for scan in (queries.scan(frame), *map(places.scan, found))
+    ]
+    method = make_method(methods[1], {})
+    described = [method.describe(scans[k]) for k in (0, 2)]
+    wrong = method.build_database(described[1:])
+    poses = [
+        np.linalg.inv(places.X_WS[found[0]]) @ queries.X_WS[frame],
+        *method.relative_poses(described[0], wrong, [0]),
+    ]
+    figure = Figure(figsize=(WIDTH, 7.9), layout="constrained")
+    panels = figure.subplots(2, 2).ravel()
+    # What is higher than the cars' bonnets.
+    high = [scan[scan[:, 2] > -1.0] for scan in scans]
+    panels[0].scatter(*high[0].T[:2], 1.5, INK, lw=0)
+    for axes, X_PQ, place in zip(panels[2:], poses, high[1:], strict=True):
+        moved = high[0] @ X_PQ[:3, :3].T + X_PQ[:3, 3]
+        for one, other, colour in (
+            (place, moved, GONE_RGB),
+            (moved, place, NEW_RGB),
+        ):
+            both = cKDTree(other[:, :2]).query(one[:, :2])[0] <= 1.0
+            axes.scatter(*one[~both].T[:2], 1.5, color=unit_rgb(colour), lw=0)
+            axes.scatter(*one[both].T[:2], 1.5, color=INK, lw=0)
+    for axes in panels[[0, 2, 3]]:
+        axes.set(xlim=(-55, 55), ylim=(-55, 55), aspect="equal")
+        axes.plot(0.0, 0.0, "^", color="#e69f00", mec=INK, ms=9)
+    panels[1].set_aspect("equal", adjustable="datalim")
+    for drive, shade in ((places, PALE), (queries, INK)):
+        panels[1].plot(*drive.X_WS[:, :2, 3].T, color=shade, lw=1.5)
+    p_W = [queries.X_WS[frame], *places.X_WS[found]]
+    panels[1].plot(*p_W[0][:2, 3], "^", color="#e69f00", mec=INK, ms=9)
+    panels[1].plot(*p_W[2][:2, 3], "X", color=INK, ms=9)
+    words = (
+        "the query, today",
+        "where it is, and the answer",
+        f"its place, {away[0]:.1f} m away",
+        f"{title(methods[1])}'s answer, {away[1]:.0f} m away",
+    )
+    for axes, text in zip(panels, words, strict=True):
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.set_title(text, loc="left")
+    for panel, text, x, y, *point in notes:
+        panels[panel].annotate(
+            text, point, (x, y), fontsize=12, color=INK,
+            ha="center", va="center",
+            bbox={"fc": "white", "ec": "none", "alpha": 0.85, "pad": 1.0},
+            arrowprops={"arrowstyle": "-", "color": INK, "lw": 0.8},
+        )  # fmt: skip
+    handles = [
+        Line2D([], [], color=unit_rgb(rgb), marker="o", ls="", ms=7)
+        for rgb in (NEW_RGB, GONE_RGB)
+    ]
+    handles.insert(0, Line2D([], [], color=INK, marker="o", ls="", ms=7))
+    figure.legend(
+        handles, ("in both", "only in the query", "only in the place"),
+        loc="outside lower center", ncols=3, frameon=False,
+    )  # fmt: skip
     figure.savefig(path, dpi=DPI, bbox_inches="tight", pad_inches=0.05)
 
 

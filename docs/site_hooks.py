@@ -143,6 +143,8 @@ def _search_rank(page: Page) -> dict[str, Any]:
     if path == f"{_PROJECT}/CHANGELOG.md":
         return {"exclude": True}
     parents = {one.title for one in page.ancestors}
+    if path.startswith("reference/"):
+        parents.add("Reference")
     for tab, boost in _SEARCH_BOOSTS.items():
         if tab in parents:
             return {"boost": boost}

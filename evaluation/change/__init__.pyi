@@ -18,5 +18,5 @@ from evaluation.change.tcr import COVERAGE_RADIUS as COVERAGE_RADIUS
 from evaluation.change.tcr import GRIDS as GRIDS
 from evaluation.change.tcr import TemporalChange as TemporalChange
 from evaluation.change.tcr import covered as covered
-from evaluation.change.tcr import judge_points as judge_points
+from evaluation.change.tcr import lacks_counterpart as lacks_counterpart
 from evaluation.change.tcr import temporal_change as temporal_change

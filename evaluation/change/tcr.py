@@ -245,10 +245,10 @@ def covered(
     return np.all(near, axis=0)
 
 
-def judge_points(
+def lacks_counterpart(
     points: np.ndarray, other: np.ndarray, tau: float = TAU
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns how the change ratio (TCR) counts the points of a fine map.
+) -> np.ndarray:
+    """Returns which points of a fine map the change ratio (TCR) finds changed.
 
     Args:
         points: (N, 3) points of the map [m].
@@ -256,15 +256,14 @@ def judge_points(
         tau: distance up to which a point has a counterpart [m].
 
     Returns:
-        (N,) bool, whether a point lacks a counterpart in the other map; and
-        (N,) bool, whether a point is in the other map's convex hull and
-        therefore counts.
+        (N,) bool, whether a point lacks a counterpart in the other map, inside
+        or outside of its convex hull.
     """
     # The search stops at the bound, because all distances beyond `tau` count
     # alike. SciPy finds only neighbours that are nearer than the bound, so
     # `tau` itself, which still counts as near, has to lie well below it.
     distances, _ = cKDTree(other).query(points, distance_upper_bound=2.0 * tau)
-    return distances > tau, in_convex_hull(points, other, HULL_MARGIN)
+    return distances > tau
 
 
 def _directed_change(

@@ -111,29 +111,6 @@ class VoxelMap:
             origin,
         )
 
-    def find(self, points_W: np.ndarray) -> np.ndarray:
-        """Returns the voxel that contains each point.
-
-        The points (N, 3) are in the world [m].
-
-        Returns:
-            (N,) index of each point's voxel in the map; -1 if the map has no
-            such voxel.
-        """
-        if len(self) == 0 or len(points_W) == 0:
-            return np.full(len(points_W), -1)
-        lifted = points_W - np.array(self.origin_W)
-        wanted = np.floor(lifted / self.voxel_size).astype(np.int64)
-        # Both are encoded as numbers that sort like rows of indices.
-        low, high = self.indices.min(axis=0), self.indices.max(axis=0)
-        spans = (high - low).astype(np.int64) + 1
-        weights = np.array([spans[1] * spans[2], spans[2], 1])
-        keys = (self.indices - low) @ weights
-        sought = (wanted - low) @ weights
-        rows = np.minimum(np.searchsorted(keys, sought), len(keys) - 1)
-        inside = ((wanted >= low) & (wanted <= high)).all(axis=1)
-        return np.where(inside & (keys[rows] == sought), rows, -1)
-
 
 class VoxelAccumulator:
     """Makes a voxel map of clouds that are added one by one.

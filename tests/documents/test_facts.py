@@ -119,7 +119,7 @@ def test_topics(short_recording):
 
 
 def test_fields_of_points(short_recording):
-    page = documents.read("docs/how-to/open_recordings.md")
+    page = documents.read("docs/recordings.md")
     (example,) = (
         block.text
         for block in documents.fenced(page)

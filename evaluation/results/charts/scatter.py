@@ -1,6 +1,6 @@
 """Scatter: a metric over another metric or a numeric factor."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 import math
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from evaluation.results.summaries import (
     correlations,
     paired_values,
 )
-from evaluation.results.table import Results, Row
+from evaluation.results.table import Results
 
 
 def draw_scatter(chart: Chart) -> tuple[str, Figure]:
@@ -32,6 +32,12 @@ def draw_scatter(chart: Chart) -> tuple[str, Figure]:
     ]
     if not points:
         raise InputError(f"charts: scatter: no {y_name} has a {x_name}")
+    number = len({row.without("method") for row, _ in points})
+    if number < LEAST_POINTS:
+        raise InputError(
+            f"charts: scatter: a trend of {y_name} over {x_name} needs"
+            f" {LEAST_POINTS} points or more, not {number}"
+        )
     figure = chart.figure(380.0)
     axes = figure.subplots()
     has_points_beyond = False
@@ -42,9 +48,7 @@ def draw_scatter(chart: Chart) -> tuple[str, Figure]:
         if not known:
             continue
         x, y = np.array(known).T
-        few = len(x) < LEAST_POINTS
-        size, alpha = (8.0, 0.9) if few else (5.0, 0.55)
-        axes.plot(x, y, marker, color=colour, mew=0, ms=size, alpha=alpha)
+        axes.plot(x, y, marker, color=colour, mew=0, ms=5.0, alpha=0.55)
         drawn = list(curves(x, y))
         has_points_beyond |= bool(drawn) and not all(
             any(curve.x[0] <= at <= curve.x[-1] for curve in drawn) for at in x
@@ -62,19 +66,14 @@ def draw_scatter(chart: Chart) -> tuple[str, Figure]:
     # On a phone there is room for a few numbers.
     axes.locator_params(axis="x", nbins=6)
     axes.grid(alpha=0.3)
-    message = _trend_message(chart, points)
+    message = _trend_message(chart)
     if has_points_beyond:
         message += "; curves end where gaps between points are wide"
     return message, figure
 
 
-def _trend_message(chart: Chart, points: Iterable[tuple[Row, float]]) -> str:
-    """Returns the rank correlation of each method with what is on the x axis.
-
-    Args:
-        chart: the chart.
-        points: rows of the metric on the y axis, each with its x.
-    """
+def _trend_message(chart: Chart) -> str:
+    """Returns each method's rank correlation with what is on the x axis."""
     x_name, y_name = chart.keys["x"], chart.keys["y"]
     selected = Results.of(
         [row for row in chart.results.rows if row.metric != y_name]
@@ -87,11 +86,7 @@ def _trend_message(chart: Chart, points: Iterable[tuple[Row, float]]) -> str:
         if not math.isnan(correlation.value)
     }
     if not coefficients:
-        message = f"{in_words(y_name)} over {in_words(x_name)}"
-        number = len({row.without("method") for row, _ in points})
-        if number < LEAST_POINTS:
-            message += ", too few points for a trend"
-        return message
+        return f"{in_words(y_name)} over {in_words(x_name)}"
     text = from_least_to_greatest(coefficients, "{:+.2f}")
     names = f"{in_words(y_name)} with {in_words(x_name)}"
     return f"Rank correlation of {names}: {text}"

@@ -22,7 +22,7 @@ from cns_drake.base import (
     figure_style,
     file_name,
 )
-from evaluation.change import judge_points
+from evaluation.change import lacks_counterpart
 from evaluation.maps import VoxelMap
 from evaluation.recognition import METRICS
 from evaluation.results.figure_files import PIXELS, save_figure
@@ -147,7 +147,7 @@ class ChangePicture:
             (earlier, later, GONE_RGB),
             (later, earlier, NEW_RGB),
         ):
-            lacks, _ = judge_points(one.cloud, other.voxels.centroids_W)
+            lacks = lacks_counterpart(one.cloud, other.voxels.centroids_W)
             rgb = np.full((len(lacks), 3), _UNCHANGED, dtype=np.uint8)
             rows = np.flatnonzero(lacks)
             seen = is_in_sight(one.cloud[rows], other)

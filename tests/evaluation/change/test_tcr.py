@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import from_xyz
-from evaluation.change import covered, judge_points, temporal_change
+from evaluation.change import covered, lacks_counterpart, temporal_change
 from evaluation.maps import voxelise
 
 NO_POINTS = np.empty((0, 3))
@@ -248,6 +248,5 @@ def test_points_of_fine_maps_count_as_in_the_metric():
             [24.0, 0.0, 0.0],
         ]
     )
-    absent, in_hull = judge_points(points, other)
+    absent = lacks_counterpart(points, other)
     assert absent.tolist() == [False, True, True, True, False]
-    assert in_hull.tolist() == [True, True, True, False, False]

@@ -205,23 +205,6 @@ def test_map_of_a_recording(tmp_path):
     assert again.centroids_W.tobytes() == voxels.centroids_W.tobytes()
 
 
-def test_points_find_their_voxels():
-    rng = np.random.default_rng(11)
-    points = rng.normal(scale=12.0, size=(400, 3))
-    voxels, _ = voxelise(from_xyz(points), 5.0)
-    occupied = {tuple(index): k for k, index in enumerate(voxels.indices)}
-    # Half of the points lie elsewhere, some out of all bounds.
-    asked = np.concatenate([points, rng.normal(scale=40.0, size=(400, 3))])
-    lifted = asked + np.array([0.0, 0.0, 2.5])
-    cells = np.floor(lifted / 5.0).astype(int)
-    expected = [occupied.get(tuple(cell), -1) for cell in cells]
-    assert voxels.find(asked).tolist() == expected
-    assert -1 in expected[400:]
-    assert min(expected[:400]) >= 0
-    empty, _ = voxelise(from_xyz(np.empty((0, 3))), 5.0)
-    assert empty.find(asked[:2]).tolist() == [-1, -1]
-
-
 @pytest.mark.parametrize("shift", [(0, 0, 0), (2, -1, 4)], ids=str)
 def test_cells_make_larger_voxels(shift):
     """On aligned grids they are those of the points themselves."""
@@ -237,8 +220,6 @@ def test_cells_make_larger_voxels(shift):
         merged.centroids_W, direct.centroids_W + shift, rtol=0, atol=1e-8
     )
     np.testing.assert_allclose(merged.centres_W, direct.centres_W + shift)
-    owners = merged.find(points)
-    assert (np.bincount(owners) == merged.counts).all()
 
 
 def test_an_empty_map_has_no_larger_voxels():

@@ -344,7 +344,7 @@ def test_texts_and_charts_have_one_definition_of_what_is_kept():
     )
 
 
-@pytest.mark.parametrize("number", [1, 4, 5, 8])
+@pytest.mark.parametrize("number", [5, 8])
 def test_a_scatter_of_points_on_a_line(number):
     drawn = draw_chart(
         {"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered(number)
@@ -355,15 +355,20 @@ def test_a_scatter_of_points_on_a_line(number):
         np.testing.assert_allclose(
             line.get_ydata(), 0.9 - np.asarray(line.get_xdata())
         )
-    # Of two methods: points and, if they are enough, a curve with its band.
-    has_curve = number >= 5
-    assert len(axes.get_lines()) == 2 + 2 * has_curve
-    assert len(axes.collections) == 2 * has_curve
-    words = "Rank correlation of AUC with TCR_sym: -1.00"
-    few = "AUC over TCR_sym, too few points for a trend"
-    assert drawn.message == (words if has_curve else few)
+    # Of two methods: points, and a curve with its band.
+    assert len(axes.get_lines()) == 4
+    assert len(axes.collections) == 2
+    assert drawn.message == "Rank correlation of AUC with TCR_sym: -1.00"
     # A line in the legend stands for a curve.
-    assert {bool(style) for _, style, _ in drawn.legend.values()} == {has_curve}
+    assert all(style for _, style, _ in drawn.legend.values())
+
+
+@pytest.mark.parametrize("number", [1, 4])
+def test_a_few_points_are_no_scatter(number):
+    chart = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
+    words = f"needs 5 points or more, not {number}$"
+    with pytest.raises(InputError, match=words):
+        draw_chart(chart, scattered(number))
 
 
 def test_a_scatter_says_why_its_curves_end():
@@ -721,7 +726,11 @@ def test_a_page_stands_alone(tmp_path):
         ((0.4, 0.6), (0,), "0.5095\N{NO-BREAK SPACE}% 0.40 to 0.60"),
         # An interval that is unknown, and results of several seeds.
         ((math.nan, math.nan), (0,), "0.50"),
-        ((0.4, 0.6), (0, 1), "0.50least 0.50, greatest 0.50"),
+        (
+            (0.4, 0.6),
+            (0, 1),
+            "0.50least\N{NO-BREAK SPACE}0.50, greatest\N{NO-BREAK SPACE}0.50",
+        ),
     ],
 )
 def test_a_single_result_has_its_interval(tmp_path, ends, seeds, cell):
