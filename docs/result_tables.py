@@ -672,9 +672,9 @@ def _claims_on_ageing() -> list[Claim]:
         ),
         Claim(
             name="age-and-season",
-            claim="If queries also come from another season than a map of 40"
-            f" years, RING++ retains {_range(both['ring++'])} of its AUC, and"
-            f" SOLiD {_range(both['solid'])}.",
+            claim="If the season differs as well, a map of 40 years leaves"
+            f" RING++ {_range(both['ring++'])} of its AUC, and SOLiD"
+            f" {_range(both['solid'])}.",
             estimate=float(np.mean(both["ring++"])),
             overturned_by="real seasons: in NCLT they cost more than here",
             **aged,
