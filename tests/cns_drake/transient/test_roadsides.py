@@ -82,6 +82,7 @@ def test_a_part_has_some_of_the_things_of_the_whole(changed):
     assert abs(len(some) - expected) < 5 * spread
 
 
+@pytest.mark.slow
 def test_above_one_plants_come_again_in_the_room_that_is_left(changed):
     first = new_things(changed, roadsides=1.0)
     some = new_things(changed, roadsides=2.4)
