@@ -72,17 +72,17 @@ def fill_roadsides(around: Surroundings, density: float) -> None:
     standing = around.obstacles_except(GROUND_CLASSES)
     taken = [around.ground.carriageway]
     shapely.prepare(taken[0])
-    for round_, (name, row) in product(
-        range(max(math.ceil(density), 1)), _ROWS.items()
+    for earlier, (name, row) in product(
+        range(math.ceil(density)), _ROWS.items()
     ):
-        if round_ > 0:
+        if earlier > 0:
             if not row.is_of_plants:
                 continue
-            name = f"{name}_{round_ + 1}"
+            name = f"{name}_{earlier + 1}"
         seed = around.seed if row.moves else 0
         for stretch in stretches:
             rng = change_rng(seed, f"roadsides {name}", stretch.name)
-            is_put_up = rng.uniform() < density - round_
+            is_put_up = rng.uniform() < density - earlier
             if rng.uniform() >= row.share:
                 continue
             builder = OBJECTS[str(rng.choice(row.kinds))]
