@@ -145,9 +145,9 @@ def simulate(
             The switches are snow (depth of the snow [m]), leaves (share of the
             leaves that trees keep), parked_cars, scaffolds, works, furniture
             and roadsides (share of these things that is changed or added, from
-            0 to 1), height_limit (greatest height of buildings and plants [m])
-            and seed (an integer that selects the random changes). May be
-            repeated.
+            0 to 1; roadsides above 1 has more plants), height_limit (greatest
+            height of buildings and plants [m]) and seed (an integer that
+            selects the random changes). May be repeated.
         driver: Model of the driver. With real, the car wanders in its lane and
             changes lanes, as in published data sets. With none, the car stays
             in the middle of its lane. By default the driver of the scenario.

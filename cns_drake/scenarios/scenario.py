@@ -278,8 +278,9 @@ class TransientConfig(Section):
             poles, lamps and signs up to 2 m away.
         roadsides: share of the free places beside kerbs, within 30 m of the
             drive, that get hedges, garden walls, bushes, young trees, garages
-            or parked cars. Only the cars depend on the seed; all other added
-            objects are the same in every drive.
+            or parked cars. Each 1 above 1 adds hedges, bushes and trees once
+            more, in the room that is left. Only the cars depend on the seed;
+            all other added objects are the same in every drive.
         height_limit: greatest height of buildings and plants above their lowest
             point [m]. Buildings that exceed this height by at least 2.5 m (a
             storey) are cut off at this height, and get a flat roof; plants that
@@ -293,7 +294,7 @@ class TransientConfig(Section):
     scaffolds: float = Field(default=0.0, ge=0.0, le=1.0)
     works: float = Field(default=0.0, ge=0.0, le=1.0)
     furniture: float = Field(default=0.0, ge=0.0, le=1.0)
-    roadsides: float = field_off_by_default(0.0, ge=0.0, le=1.0)
+    roadsides: float = field_off_by_default(0.0, ge=0.0, le=10.0)
     height_limit: float | None = field_off_by_default(
         None, gt=2.0, allow_inf_nan=False
     )

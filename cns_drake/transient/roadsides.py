@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+import math
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,12 @@ class _Row:
     turns: Sequence[float] = (0.0,)
     moves: bool = False
 
+    @property
+    def is_of_plants(self) -> bool:
+        """Whether all objects of the row are plants."""
+        classes = {OBJECTS[kind].semantic_class for kind in self.kinds}
+        return classes == {"vegetation"}
+
 
 _ROWS = {
     name: _Row(**values)
@@ -47,8 +54,8 @@ _ROWS = {
 }
 
 
-def fill_roadsides(around: Surroundings, share: float) -> None:
-    """Adds objects to a share of the free places beside kerbs near a drive.
+def fill_roadsides(around: Surroundings, density: float) -> None:
+    """Adds objects to free places beside kerbs near a drive.
 
     The objects are, for example, parked cars, hedges, trees and garages. The
     seed of the temporary changes (`around.seed`) decides only where cars are
@@ -56,17 +63,26 @@ def fill_roadsides(around: Surroundings, share: float) -> None:
 
     Args:
         around: surroundings of the drive, to which the objects are added.
-        share: share of the free places that get an object, from 0 to 1.
+        density: up to 1, the share of the free places that get an object.
+            Above 1, all of these get one, and rows of plants come again in the
+            room that is left: once for each further 1, and the last time to a
+            share of the places.
     """
     stretches = straight_kerbs(around, "roadsides", _CELL, _SHORTEST)
     standing = around.obstacles_except(GROUND_CLASSES)
     taken = [around.ground.carriageway]
     shapely.prepare(taken[0])
-    for name, row in _ROWS.items():
+    for earlier, (name, row) in product(
+        range(math.ceil(density)), _ROWS.items()
+    ):
+        if earlier > 0:
+            if not row.is_of_plants:
+                continue
+            name = f"{name}_{earlier + 1}"
         seed = around.seed if row.moves else 0
         for stretch in stretches:
             rng = change_rng(seed, f"roadsides {name}", stretch.name)
-            is_put_up = rng.uniform() < share
+            is_put_up = rng.uniform() < density - earlier
             if rng.uniform() >= row.share:
                 continue
             builder = OBJECTS[str(rng.choice(row.kinds))]
@@ -87,7 +103,7 @@ def fill_roadsides(around: Surroundings, share: float) -> None:
             if found is None:
                 continue
             x, y, area = found
-            # Objects that a smaller share leaves out take up room as well.
+            # Objects that a lower density leaves out take up room as well.
             taken.append(area)
             if is_put_up:
                 stretch.put(

@@ -1,14 +1,14 @@
 """Simulated scans for `real_or_simulated.py`, as the notes describe them.
 
     python tests/benchmarks/scans_to_judge.py OUT [--scans N]
-        [--drive NAME ...] [--full-streets]
+        [--drive NAME ...] [--roadsides VALUE]
 
 Writes N scans of each drive, evenly over its time, into folders of their own:
 `hdl-64e` with calibrated returns, 1.73 m above the ground, among 60 vehicles on
 ride A, on roads that fall to the right by 3 %. The motion of the car during a
 turn is undone, as in KITTI's scans.
 
-With --full-streets, the switch `roadsides` puts cars, hedges and garages beside
+With --roadsides, this field of `transient` puts cars, hedges and garages beside
 the way. It shows how much of what a classifier sees is what stands in a city,
 and not how it is measured.
 """
@@ -41,7 +41,7 @@ _STEPS = 10
 _CROSSFALL = 0.03
 
 
-def judged(name: str, *, is_full: bool) -> Scenario:
+def judged(name: str, roadsides: float) -> Scenario:
     """Returns the scenario of a drive whose scans are judged."""
     own = load_scenario(name).model_dump(mode="json", exclude_none=True)
     key, lidar = next(iter(own["lidars"].items()))
@@ -58,8 +58,8 @@ def judged(name: str, *, is_full: bool) -> Scenario:
     own["lidars"] = {key: lidar}
     own.setdefault("traffic", {})["vehicles"] = 60
     own["ride"] = {"roughness": "A", "crossfall": _CROSSFALL}
-    if is_full:
-        own["transient"] = {"roadsides": 1.0}
+    if roadsides > 0.0:
+        own["transient"] = {"roadsides": roadsides}
     return make_scenario(own, name)
 
 
@@ -90,9 +90,9 @@ def undistorted(
     return result
 
 
-def write_scans(name: str, out: Path, number: int, *, is_full: bool) -> None:
+def write_scans(name: str, out: Path, number: int, roadsides: float) -> None:
     """Writes scans of a drive, ring by ring as KITTI's."""
-    scenario = judged(name, is_full=is_full)
+    scenario = judged(name, roadsides)
     loaded = load_drive(DrivePlan(scenario))
     trajectory = loaded.trajectory
     diagram = make_station(loaded)
@@ -117,12 +117,10 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--scans", type=int, default=7)
     parser.add_argument("--drive", action="append")
-    parser.add_argument("--full-streets", action="store_true")
+    parser.add_argument("--roadsides", type=float, default=0.0)
     options = parser.parse_args()
     for name in options.drive or DRIVES:
-        write_scans(
-            name, options.out, options.scans, is_full=options.full_streets
-        )
+        write_scans(name, options.out, options.scans, options.roadsides)
 
 
 if __name__ == "__main__":

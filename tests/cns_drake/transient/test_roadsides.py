@@ -82,6 +82,30 @@ def test_a_part_has_some_of_the_things_of_the_whole(changed):
     assert abs(len(some) - expected) < 5 * spread
 
 
+@pytest.mark.slow
+def test_above_one_plants_come_again_in_the_room_that_is_left(changed):
+    first = new_things(changed, roadsides=1.0)
+    some = new_things(changed, roadsides=2.4)
+    third = new_things(changed, roadsides=3.0)
+    for fewer, more in ((first, some), (some, third)):
+        assert fewer.keys() < more.keys()
+        for name, thing in fewer.items():
+            assert np.array_equal(thing.p_WPs, more[name].p_WPs)
+    # The last time, each stands by a draw of its own: five standard deviations.
+    last, whole = (
+        sum(name.endswith("_3") for name in things) for things in (some, third)
+    )
+    assert abs(last - 0.4 * whole) < 5 * np.sqrt(0.24 * whole)
+    plants = [thing for name, thing in third.items() if name not in first]
+    assert {thing.semantic_class for thing in plants} == {"vegetation"}
+    others = [thing.footprint for thing in first.values()]
+    feet = [thing.footprint for thing in plants]
+    for k, foot in enumerate(feet):
+        assert not shapely.intersects(LANES, foot)
+        assert not shapely.intersects(others, foot).any()
+        assert not shapely.intersects(feet[:k] + feet[k + 1 :], foot).any()
+
+
 def test_two_drives_along_a_road_have_the_same_things(sdf, changed):
     """Things that only one of them has are far from the other."""
     mine = new_things(changed, roadsides=1.0)
