@@ -8,7 +8,7 @@ import re
 from typing import ClassVar, Generic, Literal, TypeVar
 
 import numpy as np
-from pydantic import ConfigDict, NonNegativeFloat, StrictBool
+from pydantic import ConfigDict, NonNegativeFloat
 
 from cns_drake.base import InputError, InputModel, poses
 from cns_drake.drives import LidarField
@@ -51,7 +51,7 @@ class MethodConfig(InputModel):
     sensor_height: NonNegativeFloat = 1.6
     place: PlaceScan | None = None
     sequence: NonNegativeFloat = 0.0
-    center_scores: StrictBool = False
+    center_scores: bool = False
 
 
 class Method(abc.ABC, Generic[Descriptor, Database]):

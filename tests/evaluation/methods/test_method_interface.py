@@ -7,7 +7,12 @@ import pytest
 
 from cns_drake.base import InputError
 from evaluation.drives import open_drive
-from evaluation.methods import Method, MethodConfig
+from evaluation.methods import (
+    Method,
+    MethodConfig,
+    make_method,
+    shipped_methods,
+)
 from evaluation.recognition import retrieve, score_places, write_scores
 
 
@@ -245,3 +250,21 @@ def test_scores_that_are_nan_name_the_query(
         write_scores(SomeNan(), tmp_path / "db", tmp_path / "q", out)
     monkeypatch.setattr(SomeNan, "skips_places", True)
     assert np.isnan(retrieve(*drives, SomeNan()).scores).any()
+
+
+@pytest.mark.parametrize("name", shipped_methods())
+def test_each_setting_is_read_from_the_text_of_an_option(name):
+    method = make_method(name, {})
+    for setting, value in method.config:
+        if value is None:
+            continue
+        values = value if isinstance(value, tuple) else None
+        text = str(value) if values is None else tuple(map(str, values))
+        read = make_method(name, {setting: text})
+        assert getattr(read.config, setting) == value, setting
+
+
+def test_scores_are_centred_by_an_option():
+    for text, expected in (("true", True), ("false", False)):
+        method = make_method("ring++", {"center_scores": text})
+        assert method.config.center_scores is expected
