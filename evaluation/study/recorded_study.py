@@ -155,6 +155,9 @@ def study_recordings(
         engine.jobs[job.name] = job
     engine.jobs = {**{job.name: job for job in further_jobs}, **engine.jobs}
     results, queries = engine.run(cluster, space)
+    StudyFiles(output.absolute()).remove_other_changes(
+        [path for city in shown for one in city.changes for path in one.files]
+    )
     _note_missed_routes(results, on_note)
     return write_page(
         results,

@@ -1,10 +1,11 @@
 """Where the files of a study are in its folder."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 import os
 from pathlib import Path
 
-from cns_drake.base import InputError, file_name
+from cns_drake.base import InputError, file_name, user_errors
 from evaluation.results import check_output
 from evaluation.study.parts import Part
 
@@ -95,6 +96,19 @@ class StudyFiles:
     def figures(self) -> Path:
         """The folder of all figures."""
         return self.output / "figures"
+
+    def remove_other_changes(self, kept: Collection[Path]) -> None:
+        """Removes pictures of changes, except those that a run needs.
+
+        An earlier run drew them, of drives that are no longer there.
+
+        Raises:
+            InputError: a file cannot be removed.
+        """
+        for path in sorted({*self.figures.glob("change_*.*")} - {*kept}):
+            if path.is_file() and path.suffix in (".png", ".webp"):
+                with user_errors(path):
+                    path.unlink()
 
     def features(self, recording: str) -> FeatureFiles:
         """Returns the files with a recording's map and descriptors."""

@@ -27,3 +27,14 @@ def test_a_file_with_the_name_of_a_folder_is_found_first(tmp_path):
         StudyFiles(tmp_path).check()
     with pytest.raises(InputError, match=r"/parts: not a folder$"):
         StudyFiles(tmp_path / "parts").check()
+
+
+def test_pictures_of_drives_that_are_gone_go(tmp_path):
+    files = StudyFiles(tmp_path)
+    files.figures.mkdir()
+    gone = ("change_town_01_03.png", "change_town_01_03.webp")
+    stay = ("change_town_02_03.png", "change_notes.txt", "mine.png")
+    for name in (*gone, *stay):
+        (files.figures / name).write_bytes(b"")
+    files.remove_other_changes([files.figures / stay[0]])
+    assert {one.name for one in files.figures.iterdir()} == {*stay}
