@@ -146,6 +146,7 @@ def poses(city: City) -> list:
     return [(s.name, s.xyz, s.yaw) for s in city.structures]
 
 
+@pytest.mark.sampled(12)
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
@@ -203,6 +204,7 @@ def test_faults_are_named_in_one_line(lay_out_text, tmp_path, old, new, fault):
     assert "\n" not in message
 
 
+@pytest.mark.night
 def test_a_median_needs_no_trees(tmp_path):
     """Trees stand on a road's median only if the plan lists some."""
     (tmp_path / "roads.yaml").write_text(

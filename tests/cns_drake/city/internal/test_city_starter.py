@@ -16,7 +16,8 @@ from cns_drake.roads import load_road_network
 from cns_drake.scenarios import load_scenario, plan_drive
 from evaluation.drives import open_drive
 
-pytestmark = pytest.mark.slow
+# By day, the recipe "start a city" starts one.
+pytestmark = [pytest.mark.slow, pytest.mark.night]
 
 ROADS = """
 defaults: {lanes: [1, 1], lane_width: 3.5, sidewalk: 2.5, kerb_height: 0.15,

@@ -79,6 +79,7 @@ def plain(judge, program, tmp_path_factory):
     return features(judge, program, tmp_path_factory.mktemp("plain") / "set", 1)
 
 
+@pytest.mark.night
 def test_equal_sets_are_not_told_apart(judge, program, plain, tmp_path):
     result = judge.aucs_by_group(
         plain, features(judge, program, tmp_path / "set", 2)
