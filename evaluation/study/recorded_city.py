@@ -308,7 +308,7 @@ def _draw_changes(
             planned.features(one.named, []) for one in (earlier, later)
         )
         step = MakePart(
-            planned.files.part("changes", city.name, *stages),
+            planned.files.change(picture.stem.name),
             draw_change,
             (
                 city.name,

@@ -97,16 +97,21 @@ class StudyFiles:
         """The folder of all figures."""
         return self.output / "figures"
 
+    def change(self, stem: str) -> Part:
+        """Returns the part of a picture of a change, named `stem`."""
+        return self.part("changes", stem)
+
     def remove_other_changes(self, kept: Collection[Path]) -> None:
         """Removes pictures of changes, except those that a run needs.
 
-        An earlier run drew them, of drives that are no longer there.
+        An earlier run drew them, of drives that are no longer there. The
+        witness of a picture is its part, so no picture of the user's goes.
 
         Raises:
             InputError: a file cannot be removed.
         """
         for path in sorted({*self.figures.glob("change_*.*")} - {*kept}):
-            if path.is_file() and path.suffix in (".png", ".webp"):
+            if self.change(path.stem).path.is_file():
                 with user_errors(path):
                     path.unlink()
 

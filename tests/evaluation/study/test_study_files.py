@@ -33,8 +33,10 @@ def test_pictures_of_drives_that_are_gone_go(tmp_path):
     files = StudyFiles(tmp_path)
     files.figures.mkdir()
     gone = ("change_town_01_03.png", "change_town_01_03.webp")
-    stay = ("change_town_02_03.png", "change_notes.txt", "mine.png")
+    stay = ("change_town_02_03.png", "change_mine.png", "mine.png")
     for name in (*gone, *stay):
         (files.figures / name).write_bytes(b"")
+    for drawn in ("change_town_01_03", "change_town_02_03"):
+        files.change(drawn).write({}, [])
     files.remove_other_changes([files.figures / stay[0]])
     assert {one.name for one in files.figures.iterdir()} == {*stay}
