@@ -197,7 +197,7 @@ def export(
     if layout in _PAIRS:
         with ended_by_interrupts("cns-drake"):
             from cns_drake.base import choose_cluster
-            from cns_drake.studies import claim_pairs
+            from cns_drake.studies import ExportOptions, claim_pairs
 
         cluster = choose_cluster(jobs, scheduler)
         if vary is not None:  # Its scenarios are written to the same folder.
@@ -211,9 +211,6 @@ def export(
             )
             _write_overlap_table(learned, named, output, protocol, json=json)
             return
-        with ended_by_interrupts("cns-drake"):
-            from cns_drake.studies import ExportOptions
-
         settings = ExportOptions(
             "overlap" if layout == Format.OVERLAP else "pointnetvlad",
             spacing,
