@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
+import copy
 from dataclasses import dataclass, field
 import datetime
 import math
@@ -97,6 +98,10 @@ class _JobState:
     first: float | None = None
     is_ended: bool = False
 
+    def expected(self) -> float:
+        """Returns the expected time of what was not done before [s]."""
+        return self.cost * (1.0 - (self.first or 0.0))
+
 
 @dataclass
 class _PaceOfJobs:
@@ -114,6 +119,33 @@ class _PaceOfJobs:
         """Records a job, after all earlier jobs were weighted by `kept`."""
         self.expected = kept * self.expected + expected
         self.taken = kept * self.taken + taken
+
+
+@dataclass
+class _Paces:
+    """Paces of all jobs, and of each kind of jobs.
+
+    Attributes:
+        memory: expected time of later jobs after which a job hardly counts [s].
+        of_all: pace of all jobs.
+        of_kind: kind of jobs -> its pace.
+    """
+
+    memory: float
+    of_all: _PaceOfJobs = field(default_factory=_PaceOfJobs)
+    of_kind: dict[str, _PaceOfJobs] = field(default_factory=dict)
+
+    def measure(self, name: str, expected: float, taken: float) -> None:
+        """Records a job with its expected time and the time it took [s]."""
+        kept = math.exp(-expected / self.memory)
+        of_kind = self.of_kind.setdefault(_kind(name), _PaceOfJobs())
+        for pace in (self.of_all, of_kind):
+            pace.measure(expected, taken, kept)
+
+    def of(self, name: str) -> float:
+        """Returns the time that a job takes, divided by its expected time."""
+        pace = self.of_kind.get(_kind(name), self.of_all)
+        return pace.taken / pace.expected
 
 
 class TimeLeft:
@@ -138,9 +170,7 @@ class TimeLeft:
         self._total = sum(costs.values())
         # Expected time of all jobs that gave a pace [s].
         self._measured = 0.0
-        self._of_all = _PaceOfJobs()
-        # Kind of jobs -> its pace.
-        self._of_kind: dict[str, _PaceOfJobs] = {}
+        self._paces = _Paces(_MEMORY * self._total)
 
     def start(self, name: str, now: float) -> None:
         """Records that a job starts, or is started again."""
@@ -160,12 +190,8 @@ class TimeLeft:
         taken = 0.0 if work.since is None else now - work.since
         work.since, work.is_ended = None, True
         if taken >= _REAL_SHARE * work.cost:
-            expected = work.cost * (1.0 - (work.first or 0.0))
-            kept = math.exp(-expected / (_MEMORY * self._total))
-            self._measured += expected
-            of_kind = self._of_kind.setdefault(_kind(name), _PaceOfJobs())
-            for pace in (self._of_all, of_kind):
-                pace.measure(expected, taken, kept)
+            self._measured += work.expected()
+            self._paces.measure(name, work.expected(), taken)
 
     def share(self) -> float:
         """Returns the share of all work that has ended, 0 to 1."""
@@ -182,13 +208,19 @@ class TimeLeft:
         ]
         if not left:
             return 0.0
-        if not self._of_all.expected:
+        if not self._paces.of_all.expected:
             return None
+        # A job that takes longer than expected counts as if it ended now, since
+        # the machine may have become slower.
+        paces = copy.deepcopy(self._paces)
+        for name, work in left:
+            expected = work.expected() * self._paces.of(name)
+            if work.since is not None and now - work.since > expected:
+                paces.measure(name, work.expected(), now - work.since)
         running, waiting = [], []
         begun = 0.0
         for name, work in left:
-            pace = self._of_kind.get(_kind(name), self._of_all)
-            needed = work.cost * pace.taken / pace.expected
+            needed = work.cost * paces.of(name)
             if work.since is None:
                 waiting.append(needed)
             else:  # One that takes longer than expected soon ends, perhaps.

@@ -1,5 +1,7 @@
 """The remaining time follows the pace of the work."""
 
+import math
+
 import pytest
 
 from cns_drake.base.progress_display import Pace, TimeLeft
@@ -100,9 +102,28 @@ def test_jobs_side_by_side():
     left.end("b", now=10.0)
     left.start("e", now=10.0)
     left.end("c", now=10.0)
-    # d is late and soon ends; e has begun; f waits; four run at a time.
+    # d soon ends; e has begun; f waits; four run at a time.
     assert left.seconds(10.0) == pytest.approx(10.0)
-    assert left.seconds(16.0) == pytest.approx((1.0 + 4.0 + 10.0) / 3)
+    # d is late: it counts as if it had taken 16 s, and 10 s of later work leave
+    # exp(-10 / 15) of the weight of a, b and c, as each of them did to those before.
+    old = sum(10.0 * math.exp(-10.0 * k / 15.0) for k in (1, 2, 3))
+    pace = (old + 16.0) / (old + 10.0)
+    rest = [pace, 10.0 * pace - 6.0, 10.0 * pace]
+    assert left.seconds(16.0) == pytest.approx(sum(rest) / 3)
+
+
+def test_a_late_job_is_evidence_before_it_ends():
+    """The machine becomes four times slower in the second of ten jobs."""
+    names = [str(k) for k in range(10)]
+    left = TimeLeft(dict.fromkeys(names, 60.0))
+    now = ended(left, names[:1], 0.0, 60.0)
+    left.start(names[1], now)
+    told = [left.seconds(now + spent) for spent in range(0, 240, 20)]
+    # It falls until the job is late, and rises while the job is still not done.
+    assert told[:4] == pytest.approx([540.0, 520.0, 500.0, 480.0], abs=7.0)
+    assert all(a < b for a, b in zip(told[3:], told[4:], strict=False))
+    # 8 jobs of 240 s are left, most of which is told before the job ends.
+    assert told[-1] > 0.6 * 8 * 240.0
 
 
 def test_what_was_done_before_gives_no_pace():
