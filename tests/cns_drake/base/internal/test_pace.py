@@ -1,5 +1,6 @@
 """The remaining time follows the pace of the work."""
 
+from itertools import pairwise
 import math
 
 import pytest
@@ -105,7 +106,7 @@ def test_jobs_side_by_side():
     # d soon ends; e has begun; f waits; four run at a time.
     assert left.seconds(10.0) == pytest.approx(10.0)
     # d is late: it counts as if it had taken 16 s, and 10 s of later work leave
-    # exp(-10 / 15) of the weight of a, b and c, as each of them did to those before.
+    # exp(-10 / 15) of the weight of a, b and c, as c left of a and b.
     old = sum(10.0 * math.exp(-10.0 * k / 15.0) for k in (1, 2, 3))
     pace = (old + 16.0) / (old + 10.0)
     rest = [pace, 10.0 * pace - 6.0, 10.0 * pace]
@@ -121,7 +122,7 @@ def test_a_late_job_is_evidence_before_it_ends():
     told = [left.seconds(now + spent) for spent in range(0, 240, 20)]
     # It falls until the job is late, and rises while the job is still not done.
     assert told[:4] == pytest.approx([540.0, 520.0, 500.0, 480.0], abs=7.0)
-    assert all(a < b for a, b in zip(told[3:], told[4:], strict=False))
+    assert all(a < b for a, b in pairwise(told[3:]))
     # 8 jobs of 240 s are left, most of which is told before the job ends.
     assert told[-1] > 0.6 * 8 * 240.0
 
