@@ -61,8 +61,8 @@ def make_drive_page(
     they are evenly spaced, and the page says so. A scan is decoded when the
     play head comes near.
 
-    The camera is behind and above the car, and sees it through whatever is in
-    between. A panel shows the title, the stage, the sensors and the switches,
+    The camera is behind and above the car. It rises where a building would hide
+    the car, and sees the car through whatever else is in between. A panel shows the title, the stage, the sensors and the switches,
     which are also the legend. With the switch "before | after", a divider
     across the picture has the earlier stage on its left, where what is gone is
     violet, and the later stage on its right, where what is new is red. Other
