@@ -476,6 +476,9 @@ function carTrack() {
 // the same side.
 let leads = window.name === "leader";
 let track = null;
+// When the latest message was sent, or this page was touched [ms].
+let heard = 0;
+const present = () => performance.timeOrigin + performance.now();
 
 function tell() {
   if (!leads) return;
@@ -485,6 +488,7 @@ function tell() {
     ? point.clone().sub(position).applyAxisAngle(UP, -heading)
     : point.clone()).toArray();
   parent.postMessage({
+    sent: present(),
     place: car.position.toArray(),
     follows: Boolean(followed),
     camera: seen(camera.position),
@@ -493,6 +497,9 @@ function tell() {
 }
 
 function listen({data}) {
+  // Messages can overtake each other.
+  if (data.sent < heard) return;
+  heard = data.sent;
   leads = false;
   if (animator.playing) animator.pause();
   const far = ({place}) => Math.hypot(
@@ -596,7 +603,10 @@ commands.then(() => {
   fold(innerWidth <= 640 || parent !== window);
   if (parent !== window) {
     for (const kind of ["pointerdown", "keydown", "wheel"]) {
-      addEventListener(kind, () => { leads = true; }, {capture: true});
+      addEventListener(kind, () => {
+        leads = true;
+        heard = present();
+      }, {capture: true});
     }
     addEventListener("message", listen);
   }
