@@ -187,8 +187,8 @@ def pages() -> dict[str, str]:
         "lidars.md": _lidars_page(),
         "city.md": _fields_page(
             "Fields of a city",
-            "[Files of a city](../city.md#the-files) says what each file is for, and "
-            "lists the archetypes of buildings and the objects.",
+            "[Files of a city](../city.md#the-files) says what each file is "
+            "for, and lists the archetypes of buildings and the objects.",
             CITY,
         ),
         "experiment.md": _fields_page(
