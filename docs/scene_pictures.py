@@ -85,7 +85,10 @@ def growth(path: Path, city: str) -> None:
     folder = MapFolder(shipped_maps()[city])
     view = load_views(folder.views)["aerial"]
     pictures = [
-        with_name(StageScene(file).photograph(view, *TILE), f"stage {stage}")
+        with_name(
+            StageScene(file).photograph(view, *TILE, haze_length=np.inf),
+            f"stage {stage}",
+        )
         for stage, file in folder.stages().items()
     ]
     rows = [pictures[k : k + 2] for k in range(0, len(pictures), 2)]
