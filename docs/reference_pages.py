@@ -187,8 +187,8 @@ def pages() -> dict[str, str]:
         "lidars.md": _lidars_page(),
         "city.md": _fields_page(
             "Fields of a city",
-            "[Files of a city](../city.md) says what each file is for, and "
-            "lists the archetypes of buildings and the objects.",
+            "[Files of a city](../city.md#the-files) says what each file is "
+            "for, and lists the archetypes of buildings and the objects.",
             CITY,
         ),
         "experiment.md": _fields_page(
@@ -198,14 +198,14 @@ def pages() -> dict[str, str]:
             "paths start at the working folder, but those of data sheets of "
             "LiDARs at the folder of the experiment.",
             EXPERIMENT,
-        ),
+        )
+        + f"\n{_causes()}",
         "methods.md": _fields_page(
             "Settings of the methods",
             "[Methods](../methods.md) shows how to change these settings.\n\n"
             + _table_of_methods(),
             METHODS,
         ),
-        "causes.md": _causes_page(),
         "data.md": _data_page(),
         "metrics.md": _metrics_page(),
         "commands.md": _commands_page(),
@@ -223,7 +223,7 @@ def _data_page() -> str:
         "`cns-eval` reads these drives ([evaluation](../evaluation.md#data)):",
         _table(("drives of", "path that you give"), drives),
         "`cns-drake import` makes maps from these files"
-        " ([your own city](../how-to/own_city.md)):",
+        " ([imports](../imports.md)):",
         _table(("format", "files"), maps),
         "`cns-drake export` writes recordings in the formats"
         f" {listed(f'`{name}`' for name in export_formats())}"
@@ -258,7 +258,7 @@ def _table_of_methods() -> str:
     return _table(heading, rows)
 
 
-def _causes_page() -> str:
+def _causes() -> str:
     rows = [
         (
             f"`{cause.name}`",
@@ -271,7 +271,7 @@ def _causes_page() -> str:
         for cause in shipped_causes().values()
     ]
     parts = [
-        _heading("Causes of change"),
+        "## Causes of change",
         "The experiment [`ladder`](../ladder.md) measures each cause by itself,"
         " at up to four levels, and all of them together. The"
         " [levels](../levels.md) combine weaker causes.",

@@ -790,7 +790,7 @@ def _claims_on_upkeep() -> list[Claim]:
         for cars in (1, 2, 4)
     ]
     over_realisations: dict[str, Any] = {
-        "page": "upkeep.md",
+        "page": "map_update.md",
         "unit": "realisations, three of each of two cities",
         "n": 6,
         "source": "docs/notes/upkeep.csv",
@@ -1753,7 +1753,6 @@ HEADINGS = {
     "ladder.md": "One cause at a time",
     "levels.md": "Levels",
     "ageing.md": "Ageing",
-    "upkeep.md": "Keeping a map up to date",
     "localisation.md": "Localisation",
     "map_update.md": "Map update",
     "notes/ranking.md": "Which method is best",

@@ -85,7 +85,10 @@ def growth(path: Path, city: str) -> None:
     folder = MapFolder(shipped_maps()[city])
     view = load_views(folder.views)["aerial"]
     pictures = [
-        with_name(StageScene(file).photograph(view, *TILE), f"stage {stage}")
+        with_name(
+            StageScene(file).photograph(view, *TILE, haze_length=np.inf),
+            f"stage {stage}",
+        )
         for stage, file in folder.stages().items()
     ]
     rows = [pictures[k : k + 2] for k in range(0, len(pictures), 2)]
@@ -262,8 +265,7 @@ def layers(path: Path) -> None:
     moved = cells[0] @ X_PQ[:2, :2].T + X_PQ[:2, 3]
     figure = Figure(figsize=(WIDTH, 4.0), layout="constrained")
     panels = figure.subplots(1, 3, sharey=True)
-    p = scans[0][np.argsort(scans[0][:, 2])]
-    panels[0].scatter(*p.T[:2], 0.5, p[:, 2], cmap="viridis", lw=0, vmax=8)
+    panels[0].scatter(*scans[0].T[:2], 0.5, INK, lw=0)
     colours = ("#b9c2ce", "#7d8997", INK, "#8e44ad", "#00918f")
     names = ("low", "middle", "high", "poles", "kerbs")
     for k, name in enumerate(names):

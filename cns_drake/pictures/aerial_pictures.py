@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -12,7 +11,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 import numpy as np
 
-from cns_drake.base import figure_style, make_folder, save_figure
+from cns_drake.base import (
+    distances_along,
+    figure_style,
+    make_folder,
+    save_figure,
+)
 from cns_drake.pictures.camera_views import View
 from cns_drake.pictures.stage_scene import StageScene
 from cns_drake.scenarios import Scenario, plan_drive
@@ -23,10 +27,10 @@ _SIDE = 600
 _MARGIN = 40.0
 # Height of the camera: so high that towers hardly lean [m].
 _CAMERA_HEIGHT = 1200.0
-# Red at the start and blue at the end, as in the paper.
-_COLOURS = "turbo_r"
-# Values of the colours at the start and at the end of a route.
-_COLOUR_RANGE = 0.04, 0.92
+# As the routes in reports.
+_ROUTE_COLOUR = "#1c2430"
+# Parts of a route at which an arrow head points along it.
+_ARROW_HEADS = np.linspace(0.1, 0.9, 7)
 # Markers of the start and of the end of a route.
 _MARKERS = {"start": "o", "end": "s"}
 _MARKER_STYLE: dict[str, Any] = {
@@ -50,7 +54,7 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     """Draws drives in two columns of panels, seen from above, with north up.
 
     All panels show the same part of the world, so that they can be compared.
-    Each has a scale bar. A key at the bottom explains colours and markers.
+    Each has a scale bar. A key at the bottom explains the markers.
 
     Args:
         scenarios: title -> scenario of each drive.
@@ -107,7 +111,7 @@ def view_from_above(positions: np.ndarray) -> View:
 
 
 def _draw_route(axes: Axes, view: View, positions: np.ndarray) -> None:
-    """Draws a route through positions (N, 3) [m], from red to blue."""
+    """Draws a route through positions (N, 3) [m], with arrow heads."""
     # Slightly above the car, so that the line lies over everything that is
     # drawn.
     pixels, _ = view.project(positions, _SIDE, _SIDE)
@@ -116,13 +120,24 @@ def _draw_route(axes: Axes, view: View, positions: np.ndarray) -> None:
     # lines.
     widths = np.linspace(5.0, 2.0, len(segments))
     # A white rim distinguishes the line from roofs of the same colour.
-    axes.add_collection(
-        LineCollection(segments, colors="white", linewidths=widths + 1.5)
-    )
-    line = LineCollection(segments, cmap=_COLOURS, linewidths=widths)
-    line.set_array(np.linspace(*_COLOUR_RANGE, len(segments)))
-    line.set_clim(0, 1)
-    axes.add_collection(line)
+    for colour, wider in (("white", 1.5), (_ROUTE_COLOUR, 0.0)):
+        axes.add_collection(
+            LineCollection(
+                segments, colors=colour, linewidths=widths + wider,
+                capstyle="round",
+            )
+        )  # fmt: skip
+    travelled = distances_along(pixels)
+    for part in _ARROW_HEADS:
+        k = int(np.searchsorted(travelled, part * travelled[-1]))
+        k = min(max(k, 1), len(pixels) - 1)
+        right, down = pixels[k] - pixels[k - 1]
+        # A triangle that points up is turned against the clock.
+        angle = float(np.rad2deg(np.arctan2(-down, right))) - 90.0
+        axes.plot(
+            *pixels[k], marker=(3, 0, angle), markersize=10,
+            mfc=_ROUTE_COLOUR, mec="white",
+        )  # fmt: skip
     ends = pixels[0], pixels[-1]
     for place, marker in zip(ends, _MARKERS.values(), strict=True):
         axes.plot(*place, marker, **_MARKER_STYLE)
@@ -153,16 +168,13 @@ def _draw_scale_bar(axes: Axes, view: View) -> None:
 
 
 def _draw_key(figure: Figure) -> None:
-    colours = colormaps[_COLOURS](_COLOUR_RANGE)
     figure.legend(
         handles=[
             Line2D(
-                [], [], color=colour, lw=4, marker=marker, label=label,
-                **_MARKER_STYLE,
+                [], [], color=_ROUTE_COLOUR, lw=4, marker=marker,
+                label=label, **_MARKER_STYLE,
             )
-            for (label, marker), colour in zip(
-                _MARKERS.items(), colours, strict=True
-            )
+            for label, marker in _MARKERS.items()
         ],
         loc="outside lower center",
         ncols=len(_MARKERS),

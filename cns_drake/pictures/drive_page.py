@@ -61,14 +61,14 @@ def make_drive_page(
     they are evenly spaced, and the page says so. A scan is decoded when the
     play head comes near.
 
-    The camera is behind and above the car, and sees it through whatever is in
-    between. A panel shows the title, the stage, the sensors and the switches,
-    which are also the legend. With the switch "before | after", a divider
-    across the picture has the earlier stage on its left, where what is gone is
-    violet, and the later stage on its right, where what is new is red. Other
-    panels show the images of cameras. Below the time line are plots of the
-    speed and the IMU. On a phone, the panels are one sheet, which is folded
-    when the page opens.
+    The camera is behind and above the car. It rises where a building would hide
+    the car, and sees the car through whatever else is in between. A panel shows
+    the title, the stage, the sensors and the switches, which are also the
+    legend. With the switch "before | after", a divider across the picture has
+    the earlier stage on its left, where what is gone is violet, and the later
+    stage on its right, where what is new is red. Other panels show the images
+    of cameras. Below the time line are plots of the speed and the IMU. On a
+    phone, the panels are one sheet, which is folded when the page opens.
 
     Args:
         drive: what is shown of the drive.

@@ -7,7 +7,7 @@ import pytest
 
 def test_scans_are_in_the_order_of_their_numbers(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    page = documents.read("docs/how-to/my_own_data.md")
+    page = documents.read("docs/real.md")
     (program,) = (
         piece.text
         for piece in documents.fenced(page)

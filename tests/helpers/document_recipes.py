@@ -898,9 +898,13 @@ RECIPES = {
         all_methods=True,
     ),
     "home: localisation": Recipe(
-        ".venv/bin/cns-eval localise output/metropolis_01 "
-        "output/metropolis_04 --method gicp --track",
-        changes=(_FIRST, _LAST, ("output localisation", "output tracked")),
+        ".venv/bin/cns-eval localise output/suburbia_01 "
+        "output/suburbia_02 --method gicp --track",
+        changes=(
+            ("suburbia_01", "town_01"),
+            ("suburbia_02", "town_02"),
+            ("output localisation", "output tracked"),
+        ),
         after=("own city",),
         makes=("tracked/track.png",),
     ),

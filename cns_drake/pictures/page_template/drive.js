@@ -61,14 +61,154 @@ function placeMarker() {
   marker.scale.setScalar(away / 150);
 }
 
+// What the camera cannot look through: the heights [m] of the highest surfaces
+// over cells of 1 m, around the drive.
+const SEE_THROUGH = [
+  "vegetation", "trunk", "pole", "traffic-sign", "other-object"];
+const AROUND = 60;
+let roofs = null;
+
+function readRoofs() {
+  const [low, high] = [Math.min, Math.max].map((end, k) => [0, 1].map(
+    (axis) => Math.round(end(...track.map(({place}) => place[axis])))
+      + AROUND * (2 * k - 1)));
+  const columns = high[0] - low[0];
+  const tops = new Float32Array(columns * (high[1] - low[1])).fill(-Infinity);
+  const points = new Float32Array(9);
+  const layers = [node("city").object, ...sides.filter(({isOwn}) => isOwn)
+    .map(({layer}) => layer)].flatMap(({children}) => children);
+  for (const layer of layers) {
+    if ([...GROUND, ...SEE_THROUGH].includes(layer.name)) continue;
+    layer.traverse(({geometry}) => {
+      if (!geometry?.index) return;
+      const {array} = geometry.attributes.position;
+      const triangles = geometry.index.array;
+      for (let at = 0; at < triangles.length; at += 3) {
+        for (let k = 0; k < 9; ++k) {
+          points[k] = array[3 * triangles[at + Math.floor(k / 3)] + k % 3];
+        }
+        cover(points);
+      }
+    });
+  }
+  // Surfaces count a cell wider on all sides.
+  const beside = [-1, 0, 1].flatMap((k) => [-1, 0, 1].map(
+    (i) => k * columns + i));
+  roofs = {low, high, columns, tops: tops.map((_, cell) => Math.max(
+    ...beside.map((step) => tops[cell + step] ?? -Infinity)))};
+
+  // Samples a triangle, less than a cell apart.
+  function cover([ax, ay, az, bx, by, bz, cx, cy, cz]) {
+    if (Math.max(ax, bx, cx) < low[0] || Math.min(ax, bx, cx) > high[0]
+      || Math.max(ay, by, cy) < low[1]
+      || Math.min(ay, by, cy) > high[1]) return;
+    const n = Math.ceil(1.5 * Math.max(0.1, Math.hypot(bx - ax, by - ay),
+      Math.hypot(cx - ax, cy - ay), Math.hypot(cx - bx, cy - by)));
+    for (let i = 0; i <= n; ++i) {
+      for (let k = 0; k <= n - i; ++k) {
+        const z = az + ((bz - az) * i + (cz - az) * k) / n;
+        const x = Math.floor(
+          ax + ((bx - ax) * i + (cx - ax) * k) / n - low[0]);
+        const y = Math.floor(
+          ay + ((by - ay) * i + (cy - ay) * k) / n - low[1]);
+        const cell = y * columns + x;
+        if (x >= 0 && x < columns && tops[cell] < z) tops[cell] = z;
+      }
+    }
+  }
+}
+
+// Whether the car at a position is seen from another one. What is within 3 m of
+// it, such as a bridge over it, does not count.
+function isSeen(position, from) {
+  const {low, high, columns, tops} = roofs;
+  const length = Math.hypot(from.x - position.x, from.z - position.z);
+  for (let way = 3; way < length; way += 0.5) {
+    const share = way / length;
+    const x = position.x + share * (from.x - position.x);
+    const y = -position.z - share * (from.z - position.z);
+    if (x < low[0] || x >= high[0] || y < low[1] || y >= high[1]) return true;
+    const height = position.y + 1 + share * (from.y - position.y - 1);
+    const cell = Math.floor(y - low[1]) * columns + Math.floor(x - low[0]);
+    if (tops[cell] > height) return false;
+  }
+  return true;
+}
+
+// The view that the user chose: the camera seen from its target, and the target
+// seen from the car, both turning with the car; and the polar angle `phi` at
+// which the camera is: smaller than the chosen one where the camera rises.
+let chosen = null;
+// Time in steps -> by how much the chosen view must rise there [rad].
+const rises = new Map();
+const STEP = 0.25;
+const STEPS = 4;
+
+function seenFromCar(point, {position, heading}) {
+  return point.clone().sub(position).applyAxisAngle(UP, -heading);
+}
+
+function seenFromWorld(point, {position, heading}) {
+  return point.clone().applyAxisAngle(UP, heading).add(position);
+}
+
+function cameraAt(phi) {
+  const {arm, target} = chosen;
+  return new MeshCat.THREE.Vector3().setFromSphericalCoords(
+    arm.radius, phi, arm.theta).add(target);
+}
+
+function neededRise(step) {
+  if (rises.has(step)) return rises.get(step);
+  const interval = track.length > 1 ? track[1].time - track[0].time : 1;
+  const index = Math.round(step * STEP / interval);
+  const {place: [x, y, z], heading} =
+    track[Math.min(Math.max(index, 0), track.length - 1)];
+  const pose = {position: new MeshCat.THREE.Vector3(x, z, -y), heading};
+  let phi = chosen.arm.phi;
+  while (phi > 0.09
+    && !isSeen(pose.position, seenFromWorld(cameraAt(phi), pose))) phi -= 0.01;
+  // In a hall, nothing helps.
+  rises.set(step, phi > 0.09 ? chosen.arm.phi - phi : 0);
+  return rises.get(step);
+}
+
+// Depends on the time alone, and changes gently: the greatest rise within 1 s,
+// averaged over another second.
+function riseAt(time) {
+  const middle = time / STEP;
+  let [sum, weights] = [0, 0];
+  for (let k = Math.ceil(middle - STEPS); k <= middle + STEPS; ++k) {
+    let most = 0;
+    for (let j = k - STEPS - 1; j <= k + STEPS + 1; ++j) {
+      most = Math.max(most, neededRise(j));
+    }
+    const weight = STEPS + 0.1 - Math.abs(k - middle);
+    sum += weight * most;
+    weights += weight;
+  }
+  return sum / weights;
+}
+
 // Camera and target move and turn with the car, so that the user can look at
-// the car from all sides.
+// the car from all sides. Where a building would hide it, the camera rises.
 function follow() {
-  const now = carPose();
-  const moved = (point) => point.clone().sub(followed.position)
-    .applyAxisAngle(UP, now.heading - followed.heading).add(now.position);
-  look(moved(viewer.camera.position), moved(viewer.controls.target));
-  followed = now;
+  const target = seenFromCar(viewer.controls.target, followed);
+  const arm = new MeshCat.THREE.Spherical().setFromVector3(
+    seenFromCar(viewer.camera.position, followed).sub(target));
+  const turned = chosen && arm.phi - chosen.phi;
+  if (!chosen || Math.hypot(turned, Math.sin(arm.theta - chosen.arm.theta),
+    arm.radius - chosen.arm.radius, target.distanceTo(chosen.target)) > 1e-3) {
+    if (chosen) arm.phi = Math.min(chosen.arm.phi + turned, Math.PI - 0.01);
+    chosen = {arm, target};
+    rises.clear();
+  }
+  // Of two drives, the one that leads decides for both.
+  const rise = parent === window || leads ? riseAt(animator.time) : 0;
+  chosen.phi = chosen.arm.phi - rise;
+  followed = carPose();
+  look(seenFromWorld(cameraAt(chosen.phi), followed),
+    seenFromWorld(chosen.target, followed));
 }
 
 function setFollowing(on) {
@@ -78,6 +218,7 @@ function setFollowing(on) {
   if (on) {
     overview = [viewer.camera.position.clone(), viewer.controls.target.clone()];
     followed = carPose();
+    chosen = null;
     // On a narrow screen, the camera must be farther away to show the street.
     const far = viewer.camera.aspect < 1 ? 1.5 : 1;
     const fromCar = (x, y) => new MeshCat.THREE.Vector3(x, y, 0)
@@ -313,14 +454,21 @@ function showTime() {
   }
 }
 
-// Where the car is at each frame of the animation, [x, y, z] in the world W, and
-// the frame's time.
+// Where the car is at each frame of the animation, [x, y, z] in the world W,
+// its heading, and the frame's time.
 function carTrack() {
-  const clip = animator.actions.find((action) => action.getRoot() === car)
-    .getClip();
-  const {times: at, values} = clip.tracks.find(
-    ({name}) => name.endsWith("position"));
-  return [...at].map((time, k) => ({time, place: values.slice(3 * k, 3 * k + 3)}));
+  const {tracks} = animator.actions.find(
+    (action) => action.getRoot() === car).getClip();
+  const [places, turns] = ["position", "quaternion"].map(
+    (end) => tracks.find(({name}) => name.endsWith(end)));
+  return [...places.times].map((time, k) => {
+    const [x, y, z, w] = turns.values.slice(4 * k, 4 * k + 4);
+    return {
+      time,
+      place: places.values.slice(3 * k, 3 * k + 3),
+      heading: Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+    };
+  });
 }
 
 // In a page of two drives, one leads: the first, or the one that the user
@@ -328,6 +476,9 @@ function carTrack() {
 // the same side.
 let leads = window.name === "leader";
 let track = null;
+// When the latest message was sent, or this page was touched [ms].
+let heard = 0;
+const present = () => performance.timeOrigin + performance.now();
 
 function tell() {
   if (!leads) return;
@@ -337,6 +488,7 @@ function tell() {
     ? point.clone().sub(position).applyAxisAngle(UP, -heading)
     : point.clone()).toArray();
   parent.postMessage({
+    sent: present(),
     place: car.position.toArray(),
     follows: Boolean(followed),
     camera: seen(camera.position),
@@ -345,9 +497,11 @@ function tell() {
 }
 
 function listen({data}) {
+  // Messages can overtake each other.
+  if (data.sent < heard) return;
+  heard = data.sent;
   leads = false;
   if (animator.playing) animator.pause();
-  track ??= carTrack();
   const far = ({place}) => Math.hypot(
     place[0] - data.place[0], place[1] - data.place[1]);
   // Where a route crosses itself, the nearer time counts.
@@ -362,6 +516,7 @@ function listen({data}) {
       ? there.applyAxisAngle(UP, heading).add(position) : there;
   };
   if (followed) followed = carPose();
+  chosen = null;
   look(seen(data.camera), seen(data.target));
 }
 
@@ -404,6 +559,8 @@ commands.then(() => {
   }
   divide(viewer.renderer);
   for (const side of sides) side.isOwn = side.layer.visible;
+  track = carTrack();
+  readRoofs();
   byId("loading").remove();
   byId("time").max = animator.duration;
   byId("time").addEventListener("input", (event) => {
@@ -446,7 +603,10 @@ commands.then(() => {
   fold(innerWidth <= 640 || parent !== window);
   if (parent !== window) {
     for (const kind of ["pointerdown", "keydown", "wheel"]) {
-      addEventListener(kind, () => { leads = true; }, {capture: true});
+      addEventListener(kind, () => {
+        leads = true;
+        heard = present();
+      }, {capture: true});
     }
     addEventListener("message", listen);
   }

@@ -12,6 +12,7 @@ from cns_drake.pictures import draw_drives
 from cns_drake.pictures.aerial_pictures import (
     _SIDE,
     _draw_key,
+    _draw_route,
     _draw_scale_bar,
     view_from_above,
 )
@@ -52,9 +53,27 @@ def test_key_names_both_ends_of_a_route():
     _draw_key(figure)
     (key,) = figure.legends
     assert [text.get_text() for text in key.get_texts()] == ["start", "end"]
-    red, blue = (np.array(to_rgb(one.get_color())) for one in key.get_lines())
-    assert red.argmax() == 0
-    assert blue.argmax() == 2
+    circle, square = (one.get_marker() for one in key.get_lines())
+    assert (circle, square) == ("o", "s")
+
+
+@pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, 200.0])
+def test_arrow_heads_point_along_the_route(degrees):
+    heading = np.deg2rad(degrees)
+    along = np.array([np.cos(heading), np.sin(heading), 0.0])
+    positions = np.linspace(-200.0, 200.0, 400)[:, None] * along
+    axes = Figure().subplots()
+    _draw_route(axes, view_from_above(positions), positions)
+    heads = [
+        line.get_marker()
+        for line in axes.lines
+        if isinstance(line.get_marker(), tuple)
+    ]
+    assert len(heads) > 3
+    for corners, _, turned in heads:
+        assert corners == 3
+        # Zero points up, which is north; angles are against the clock.
+        assert np.cos(np.deg2rad(turned + 90.0 - degrees)) > 0.999
 
 
 @pytest.mark.night
@@ -74,9 +93,8 @@ def test_drives_are_drawn_over_their_stages(tmp_path):
     assert 1.7 < width / height < 2.1
     left, right = rgb[:, : width // 2], rgb[:, width // 2 :]
     for panel in (left, right):
-        r, g, b = np.moveaxis(panel, -1, 0)
-        # Saturated red and blue belong to the route: the boxes are grey.
-        assert np.count_nonzero((r > 0.6) & (g < 0.4) & (b < 0.2)) > 100
-        assert np.count_nonzero((b > 0.6) & (r < 0.4)) > 100
+        # The route is nearly black: the boxes are grey.
+        route = np.abs(panel - to_rgb("#1c2430")).max(axis=2) < 0.02
+        assert np.count_nonzero(route) > 100
     assert np.abs(left - right).max() > 0.5
     assert [path.name for path in picture.parent.iterdir()] == ["drives.png"]

@@ -303,6 +303,50 @@ slow_in_chromium = [
 ]
 
 
+# A ray from 1 m above the car to the camera is 6.96 m high where a wall, which
+# counts a cell wider, begins.
+@pytest.mark.slow
+@pytest.mark.skipif(not has_chromium(), reason="no chromium")
+@pytest.mark.parametrize("height", [6.9, 7.02, 15.0])
+def test_camera_rises_over_a_wall_that_hides_the_car(browser, tmp_path, height):
+    vehicle = tmp_path / "vehicle.sdf"
+    vehicle.write_text(VEHICLE)
+    place, size = f"-12 0 {height / 2}", f"1 20 {height}"
+    wall = visual("house/wall", place, size, "0.7 0.7 0.7")
+    world = stage(tmp_path, "here", GROUND, wall, vehicle=vehicle)
+    X_WBs = [RigidTransform([3.0 * k, 0.0, 0.5]) for k in range(NUM_FRAMES)]
+    drive = DriveRecord(
+        PERIOD, X_WBs, dict.fromkeys(moving_frames(world), X_WBs)
+    )
+    path = tmp_path / "page.html"
+    path.write_text(make_drive_page(drive, world))
+    browser.open(path.as_uri(), *SCREENS["desktop"])
+    browser.evaluate("viewer.renderer.setPixelRatio(0.1)")
+    browser.wait_for('!document.getElementById("loading")')
+    browser.evaluate("viewer.animator.pause()")
+    usual = [-25.0, 0.0, 14.0]
+    go_to(browser, 10.0)
+    p_WB = X_WBs[-1].translation()
+    np.testing.assert_allclose(p_WC(browser) - p_WB, usual, atol=1e-3)
+    go_to(browser, 0.0)
+    p_WB = X_WBs[0].translation()
+    x, y, z = p_BC = p_WC(browser) - p_WB
+    assert abs(y) < 1e-3
+    assert bool(z > 14.01) is (height > 6.96)
+    # Its distance from what it looks at stays.
+    target = np.array([5.0, 0.0, 0.0])
+    away = np.linalg.norm([usual - target, p_BC - target], axis=1)
+    assert away[0] == pytest.approx(away[1], abs=1e-3)
+    # The whole wall is below the line of sight.
+    for edge in (-11.5, -12.5):
+        assert x > edge or p_WB[2] + z * edge / x > height
+    # If the user looks from higher up, less of a rise is needed.
+    browser.evaluate("viewer.camera.position.y += 0.5; viewer.render()")
+    z_now = p_WC(browser)[2] - p_WB[2]
+    assert z_now == pytest.approx(max(z, usual[2] + 0.5), abs=0.4)
+    assert not [c for c in browser.complaints if "'rendering'" not in c]
+
+
 # A software renderer takes minutes to draw two cities.
 @pytest.mark.night
 @pytest.mark.slow
