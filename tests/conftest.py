@@ -187,6 +187,16 @@ def cities_of_this_run(tmp_path_factory, pytestconfig):
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def machine_of_this_run():
+    """Lets studies measure this machine in no time, not in a second each."""
+    from cns_drake.base.jobs import forecast
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(forecast, "_POINTS", 1000)
+        yield
+
+
 @pytest.fixture
 def unrendered_figures(monkeypatch):
     """See `studies.leave_figures_unrendered`."""
