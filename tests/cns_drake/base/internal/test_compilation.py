@@ -60,7 +60,7 @@ def test_nothing_is_kept_beside_the_code(tmp_path, is_there):
 
 
 @pytest.mark.slow
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize(
     "place", ["no home", "writable by all", "another's", "here"]
 )

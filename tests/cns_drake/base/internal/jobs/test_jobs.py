@@ -411,6 +411,7 @@ def test_a_job_survives_the_process_that_it_was_forked_from(tmp_path):
     assert [path.read_text() for path in paths] == ["at last"] * 2
 
 
+@pytest.mark.night
 def test_freed_memory_is_kept_whatever_dask_has_its_workers_do(tmp_path):
     script = (
         "import pickle, sys\n"
