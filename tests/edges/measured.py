@@ -274,14 +274,14 @@ EDGES: dict[str, Callable[[Path], dict[str, str]]] = {
     "import-openstreetmap": imported(inputs.write_corner_osm, "corner.osm"),
     "recording-plain": recording("plain"),
     "pr": pr,
-    "tcr": tcr,
-    "localise": localise,
-    "map-update": map_update,
 }
 BY_NIGHT: dict[str, Callable[[Path], dict[str, str]]] = {
     "shipped-cities": shipped_cities,
     "recording-rain_and_traffic": recording("rain_and_traffic"),
     "recording-ride_and_camera": recording("ride_and_camera"),
+    "tcr": tcr,
+    "localise": localise,
+    "map-update": map_update,
     "study": study,
     "real": real,
     "age": age,

@@ -228,7 +228,11 @@ def rates_of(tracks, duration):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("drive", "number"), [("metropolis_04", 40), ("downtown_02", 50)]
+    ("drive", "number"),
+    [
+        ("metropolis_04", 40),
+        pytest.param("downtown_02", 50, marks=pytest.mark.night),
+    ],
 )
 def test_nobody_accelerates_beyond_bounds(short, drive, number):
     """From the first frame to the last, and while lanes are changed."""

@@ -249,6 +249,7 @@ def test_command_tcr(capsys, recordings, truth):
     assert "'map'" in err
 
 
+@pytest.mark.night
 def test_command_pr(capsys, recordings):
     paths = recordings["first"], recordings["second"]
     method = ("--method", "scan-context++", "--json")

@@ -536,6 +536,7 @@ class _Page(HTMLParser):
             self.tables[-1][-1][-1] += data.strip()
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("width", [358, 480, 900])
 @pytest.mark.parametrize(
     "keys",

@@ -401,6 +401,7 @@ def test_jobs_leave_nothing_to_each_other(tmp_path):
     assert [(tmp_path / name).read_text() for name in "abc"] == ["nothing"] * 3
 
 
+@pytest.mark.night
 def test_a_job_survives_the_process_that_it_was_forked_from(tmp_path):
     """The jobs after it end as well."""
     paths = [tmp_path / name for name in "ab"]

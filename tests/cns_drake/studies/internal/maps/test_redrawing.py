@@ -135,6 +135,7 @@ def test_another_seed_gives_another_city_on_the_same_streets(drawn):
     )
 
 
+@pytest.mark.night
 def test_the_folder_is_a_map_like_any_other(drawn):
     folder = drawn[1][4]
     assert differing_files(folder) == []
