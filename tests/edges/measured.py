@@ -271,7 +271,6 @@ EDGES: dict[str, Callable[[Path], dict[str, str]]] = {
     "cns-drake-help": helps("cns_drake", "cns-drake"),
     "cns-eval-help": helps("evaluation", "cns-eval"),
     "city": city,
-    "import-openstreetmap": imported(inputs.write_corner_osm, "corner.osm"),
     "recording-plain": recording("plain"),
     "pr": pr,
 }
@@ -293,6 +292,7 @@ BY_NIGHT: dict[str, Callable[[Path], dict[str, str]]] = {
         1930,
         1980,
     ),
+    "import-openstreetmap": imported(inputs.write_corner_osm, "corner.osm"),
     "import-opendrive": imported(inputs.write_roads_opendrive, "bend.xodr"),
 }
 
