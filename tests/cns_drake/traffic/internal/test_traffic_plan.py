@@ -305,6 +305,7 @@ def test_a_third_of_walkers_walks_in_groups(short):
     assert 0.2 < (first & last).mean() < 0.7
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_seeds_mix_all_kinds():
     traffic = plan("downtown_03", 120, 1.0)
