@@ -262,6 +262,7 @@ def test_a_place_on_another_continent_is_no_way_to_go(tmp_path):
     assert all(length < 300.0 for length in report.drives)
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("barrier", ["house", "house around", "fence"])
 def test_no_drive_goes_through_a_wall(tmp_path, barrier):
