@@ -189,11 +189,11 @@ def cities_of_this_run(tmp_path_factory, pytestconfig):
 
 @pytest.fixture(scope="session", autouse=True)
 def machine_of_this_run():
-    """Lets studies measure this machine in no time, not in a second each."""
-    from cns_drake.base.jobs import forecast
+    """See `forecasts.measure_in_no_time`."""
+    from helpers.internal.forecasts import measure_in_no_time
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(forecast, "_POINTS", 1000)
+        measure_in_no_time(patch)
         yield
 
 

@@ -32,9 +32,10 @@ from _pytest.monkeypatch import MonkeyPatch
 import cns_drake
 from cns_drake.base import ALLOCATION, code_digest, collect_garbage_seldom
 from cns_drake.base.compilation import start_compiler
-from cns_drake.base.jobs import forecast, processes
+from cns_drake.base.jobs import processes
 from cns_drake.simulation import simulate
 from evaluation.study import chosen_methods
+from helpers.internal.forecasts import measure_in_no_time
 from helpers.internal.studies import leave_figures_unrendered
 from helpers.tiny_drive import tiny_scenario
 
@@ -141,7 +142,7 @@ def _serve(listener: socket.socket) -> None:
     with tempfile.TemporaryDirectory() as folder:
         simulate(tiny_scenario(Path(folder), frames=2), folder)
     code_digest("cns_drake.*", "evaluation.*")
-    forecast._POINTS = 1000  # As in the process of the tests.
+    measure_in_no_time(MonkeyPatch())
     # Jobs are forks, too: else each command would import all modules again.
     processes._context = multiprocessing.get_context("fork")
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
