@@ -84,6 +84,7 @@ def test_the_imu_integrates_to_the_odometry(small_map, drive):
     assert drift.max() < 0.001
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_motion_distortion_takes_each_column_from_its_own_pose(small_map):
     scenario = rough(small_map, columns=64, motion_distortion=True)

@@ -258,6 +258,7 @@ def test_traffic_is_under_way_in_the_first_and_the_last_frame(short):
         assert np.abs(last - first)[:, :2].max() < 0.2 * 6.0
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_walkers_pass_what_stands_on_sidewalks():
     _, graph, walkways = roads("riverside")
