@@ -16,7 +16,8 @@ import cns_drake
 import evaluation
 
 COMMAND = (sys.executable, "-m", "mkdocs", "build", "--strict")
-pytestmark = pytest.mark.slow
+# By day, `test_links` follows the links of the sources.
+pytestmark = [pytest.mark.slow, pytest.mark.night]
 
 
 @pytest.fixture(scope="module")

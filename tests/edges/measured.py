@@ -42,8 +42,12 @@ def run(folder: Path, program: str, *words: object) -> str:
     Raises:
         RuntimeError: it fails.
     """
+    return _python(folder, "-m", program, *words)
+
+
+def _python(folder: Path, *words: object) -> str:
     done = subprocess.run(
-        [sys.executable, "-m", program, *map(str, words)],
+        [sys.executable, *map(str, words)],
         cwd=folder,
         env=os.environ | {"COLUMNS": "100"},
         capture_output=True,
@@ -51,20 +55,34 @@ def run(folder: Path, program: str, *words: object) -> str:
         check=False,
     )
     if done.returncode:
-        raise RuntimeError(f"{program} {words}: {done.stderr}")
+        raise RuntimeError(f"{words}: {done.stderr}")
     return done.stdout
+
+
+# Runs a program for each line of words, as forks of one process: to import it
+# takes far longer than to show a help.
+_FORKS = """
+import importlib, os, runpy, sys
+program, *lines = sys.argv[1:]
+importlib.import_module(f"{program}.command_line.cli")
+for number, line in enumerate(lines):
+    print("\\n" * (number > 0) + f"$ {line}", flush=True)
+    if os.fork() == 0:
+        sys.argv = line.split()
+        sys.exit(runpy.run_module(program, run_name="__main__"))
+    if os.wait()[1]:
+        sys.exit(f"{line}: it fails")
+"""
 
 
 def helps(program: str, name: str) -> Callable[[Path], dict[str, str]]:
     """Returns the edge of all help texts of a program."""
 
     def edge(folder: Path) -> dict[str, str]:
-        first = run(folder, program, "--help")
-        texts = [f"$ {name} --help\n{first}"]
-        for verb in _verbs(first):
-            text = run(folder, program, verb, "--help")
-            texts.append(f"$ {name} {verb} --help\n{text}")
-        return {f"{name}-help.txt": "\n".join(texts)}
+        verbs = _verbs(run(folder, program, "--help"))
+        lines = [f"{name} --help", *(f"{name} {verb} --help" for verb in verbs)]
+        text = _python(folder, "-c", _FORKS, program, *lines)
+        return {f"{name}-help.txt": text}
 
     return edge
 
@@ -253,17 +271,16 @@ EDGES: dict[str, Callable[[Path], dict[str, str]]] = {
     "cns-drake-help": helps("cns_drake", "cns-drake"),
     "cns-eval-help": helps("evaluation", "cns-eval"),
     "city": city,
-    "import-openstreetmap": imported(inputs.write_corner_osm, "corner.osm"),
     "recording-plain": recording("plain"),
     "pr": pr,
-    "tcr": tcr,
-    "localise": localise,
-    "map-update": map_update,
 }
 BY_NIGHT: dict[str, Callable[[Path], dict[str, str]]] = {
     "shipped-cities": shipped_cities,
     "recording-rain_and_traffic": recording("rain_and_traffic"),
     "recording-ride_and_camera": recording("ride_and_camera"),
+    "tcr": tcr,
+    "localise": localise,
+    "map-update": map_update,
     "study": study,
     "real": real,
     "age": age,
@@ -275,6 +292,7 @@ BY_NIGHT: dict[str, Callable[[Path], dict[str, str]]] = {
         1930,
         1980,
     ),
+    "import-openstreetmap": imported(inputs.write_corner_osm, "corner.osm"),
     "import-opendrive": imported(inputs.write_roads_opendrive, "bend.xodr"),
 }
 

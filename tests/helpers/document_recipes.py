@@ -148,7 +148,7 @@ RECIPES = {
     "own city": Recipe(
         ".venv/bin/cns-drake list town\n",
         changes=(("town_output", "output"),),
-        after=("repair stages",),
+        after=("start a city",),
         prints=("town_01", "town_02", "output/town_01: 40 frames"),
         makes=(
             "output/town_0[12]/metadata.yaml",
@@ -537,7 +537,11 @@ RECIPES = {
     ),
     "decay": Recipe(
         "maps: riverside\ndrives: stages",
-        changes=(("riverside", "town"), ("0, 0.3, 0.6", "0, 0.6")),
+        changes=(
+            ("riverside", "town"),
+            ("0, 0.3, 0.6", "0, 0.6"),
+            ("[place, change]", "[place]"),
+        ),
         file="decay.yaml",
     ),
     "first finding": Recipe(

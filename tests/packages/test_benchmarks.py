@@ -65,15 +65,6 @@ BY_HAND = {
     "table1_sources.py",
 }
 SHARED = {"processes.py", "stages.py"}
-# It compiles all loops anew, to see how long that takes.
-BY_NIGHT = {
-    "effects.py",
-    "many_houses.py",
-    "ray_casting_rates.py",
-    "recording.py",
-    "start.py",
-    "tcr_of_large_maps.py",
-}
 # A process that imports what benchmarks need, and forks for each one. Their own
 # new processes are forks, too: they import nothing anew. Functions are found by
 # name, as new interpreters find them.
@@ -148,14 +139,9 @@ def run(forking, folder, *words):
     return printed.read_text()
 
 
+@pytest.mark.night
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.night if name in BY_NIGHT else ())
-        for name in RUNS
-    ],
-)
+@pytest.mark.parametrize("name", RUNS)
 def test_it_runs(name, drive, forking, tmp_path):
     arguments, word = RUNS[name]
     words = [str(argument).format(drive=drive) for argument in arguments]
@@ -166,8 +152,7 @@ def test_it_runs(name, drive, forking, tmp_path):
 @pytest.mark.slow
 def test_the_others_are_imported(forking, tmp_path):
     """Whatever they import is still there."""
-    found = (BY_HAND | BY_NIGHT) - {"peers.py"}
-    names = sorted(Path(name).stem for name in found)
+    names = sorted(Path(name).stem for name in BY_HAND - {"peers.py"})
     program = tmp_path / "program.py"
     program.write_text(f"import {', '.join(names)}\nprint('all')")
     assert run(forking, tmp_path, program) == "all\n"

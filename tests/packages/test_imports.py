@@ -4,6 +4,7 @@ Steps of `.ci/run` check who imports whom, types and spelling.
 """
 
 import ast
+import functools
 from importlib.metadata import packages_distributions, requires
 from pathlib import Path
 import re
@@ -46,6 +47,10 @@ def modules_imported(package: str) -> set[str]:
     return tops - sys.stdlib_module_names - set(PACKAGES)
 
 
+# It reads the lists of files of all that is installed.
+_origins = functools.cache(packages_distributions)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("package", PACKAGES)
 def test_all_that_is_imported_is_required(package):
@@ -53,7 +58,7 @@ def test_all_that_is_imported_is_required(package):
     asked = {
         re.match(r"[\w-]+", one)[0].lower() for one in requires("cns-drake")
     }
-    origins = packages_distributions()
+    origins = _origins()
     lacking = {
         module
         for module in modules_imported(package)

@@ -78,10 +78,12 @@ def test_no_structure_stands_in_a_lane(standing, network):
     check_no_structure_stands_in_a_lane(standing, network)
 
 
+@pytest.mark.night
 def test_nothing_low_reaches_far_out_of_its_footprint(standing, network):
     check_nothing_low_reaches_far_out_of_its_footprint(standing, network)
 
 
+@pytest.mark.night
 def test_things_of_all_stages_stand_on_the_ground(name):
     # What is the same at several stages is checked once.
     found = {id(s): s for part in drawn(name).standing.values() for s in part}

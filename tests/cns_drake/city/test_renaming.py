@@ -147,6 +147,7 @@ def test_patterns_that_match_others_are_noted(grown):
     assert "office_00?" in (grown / "stages.yaml").read_text()
 
 
+@pytest.mark.night
 def test_a_plan_that_has_not_grown_is_left_alone(generated, tmp_path):
     folder = shutil.copytree(generated, tmp_path / "small")
     generate_city(folder, repair_stages=True)

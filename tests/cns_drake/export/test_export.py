@@ -4,11 +4,10 @@ import io
 import itertools
 import json
 import shutil
-import subprocess
-import sys
 
 from helpers.bent_drive import NUM_SCANS, P_BS, QUAT_BS, write_drive
 from helpers.contradictions import read_messages, write_messages
+from helpers.internal.eval_program import run_program
 from mcap.reader import make_reader
 from mcap.writer import Writer
 import numpy as np
@@ -16,6 +15,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 import yaml
 
+from cns_drake.__main__ import main
 from cns_drake.base import InputError, Listener, heard_by
 from cns_drake.base import InputError as ReadingError
 from cns_drake.export import export_drive
@@ -276,27 +276,18 @@ def test_same_recording_gives_same_bytes(drive, kitti, tmp_path):
 
 
 @pytest.mark.slow
-def test_command(drive, tmp_path):
-    def run(*arguments):
-        return subprocess.run(
-            [sys.executable, "-m", "cns_drake", "export", *arguments],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-
-    arguments = (drive, "--format", "kitti", "--output", tmp_path / "out")
-    done = run(*arguments)
-    assert done.returncode == 0
-    assert done.stdout == f"{tmp_path / 'out/sequences/07'}\n"
-    assert done.stderr.splitlines()[-1] == (
-        f"next: cns-eval tcr {drive} {tmp_path / 'out/sequences/07'}"
+def test_command(drive, tmp_path, capsys):
+    output = tmp_path / "out"
+    words = ("export", drive, "--format", "kitti", "--output", output)
+    status, out, err = run_program(capsys, "cns-drake", main, *words)
+    assert (status, out) == (0, f"{output / 'sequences/07'}\n")
+    assert err.splitlines()[-1] == (
+        f"next: cns-eval tcr {drive} {output / 'sequences/07'}"
     )
-    again = run(*arguments)
-    assert again.returncode == 2
-    assert again.stdout == ""
-    assert again.stderr.splitlines()[-1] == (
-        f"cns-drake: error: {tmp_path / 'out/sequences/07'}: this drive is"
+    status, out, err = run_program(capsys, "cns-drake", main, *words)
+    assert (status, out) == (2, "")
+    assert err.splitlines()[-1] == (
+        f"cns-drake: error: {output / 'sequences/07'}: this drive is"
         " there already; remove it or give another folder"
     )
 

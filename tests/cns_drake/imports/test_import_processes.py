@@ -73,6 +73,7 @@ def test_an_interrupted_import_leaves_nothing(tmp_path, line):
     assert [path.name for path in Path(tmp_path).iterdir()] == ["city.osm"]
 
 
+@pytest.mark.night
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "line",

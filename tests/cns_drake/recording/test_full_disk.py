@@ -96,9 +96,8 @@ def recorded(folder):
     return files
 
 
-@pytest.mark.parametrize(
-    "disk", [pytest.param("tmpfs", marks=pytest.mark.night), "limit"]
-)
+@pytest.mark.night
+@pytest.mark.parametrize("disk", ["tmpfs", "limit"])
 def test_a_real_run_ends_in_one_line(tmp_path, request, disk):
     scenario = tiny_scenario(tmp_path)
     file = tmp_path / "tiny_01.yaml"

@@ -50,6 +50,7 @@ def test_all_twelve_are_there():
     assert len(SHIPPED) == 12
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("name", SHIPPED)
 def test_it_starts_and_ends_at_rest(drives, name):
     _, path, trajectory = drives[name]
@@ -66,6 +67,7 @@ def test_it_starts_and_ends_at_rest(drives, name):
             )
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("name", SHIPPED)
 def test_bounds_hold_at_every_instant(drives, name):
     scenario, path, trajectory = drives[name]
@@ -93,6 +95,7 @@ def test_bounds_hold_at_every_instant(drives, name):
     assert np.all(speed <= limits + 1e-9)
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("name", SHIPPED)
 def test_acceleration_is_continuous(drives, name):
     _, _, trajectory = drives[name]
@@ -127,6 +130,7 @@ def _accelerations(trajectory, t):
     )
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_vehicle_stays_in_its_lane(drives, name):
     scenario, path, trajectory = drives[name]
@@ -147,6 +151,7 @@ def test_the_vehicle_stays_in_its_lane(drives, name):
     assert contains(area, polygons(corners)).all()
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_vehicle_follows_the_road_up_and_down(drives, name):
     scenario, _, trajectory = drives[name]
@@ -231,6 +236,7 @@ def _meeting(frames, database, query):
     return distances, np.abs((turns + np.pi) % (2 * np.pi) - np.pi)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("pair", QUERIES_WITH_MATCH)
 def test_pairs_meet_as_often_as_the_papers(frames, pair):
     distances, turns = _meeting(frames, *pair)
@@ -244,6 +250,7 @@ def test_pairs_meet_as_often_as_the_papers(frames, pair):
     assert np.count_nonzero(turns[matched] > np.radians(160)) >= 12
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("pair", QUERIES_WITH_MATCH)
 def test_pairs_see_nearly_the_same_streets(drives, frames, pair):
     # Structures that only one drive sees would count as change.

@@ -65,6 +65,7 @@ def test_what_is_read_in_part_is_refused_in_every_format(tmp_path):
         assert len(meshes.read(tmp_path / "rock.off")[1]) == 4
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_a_world_with_a_damaged_mesh(tmp_path):
     (tmp_path / "rock.ply").write_text(PLY[:-20])

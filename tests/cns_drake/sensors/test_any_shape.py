@@ -123,6 +123,7 @@ def test_a_shape_is_where_drake_measures_it(name, meshes):
     assert differing <= 1
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("scale", [[1.0, 1.0, 1.0], [0.5, 2.0, -1.3]])
 def test_a_gltf_mesh_is_where_drake_renders_it(scale, meshes):
@@ -197,6 +198,7 @@ def look_at(d_W):
     return RotationMatrix(np.column_stack([x, np.cross(z, x), z]))
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["obj", "gltf", "vtk"])
 def test_a_mesh_in_memory_is_that_of_the_file(kind, meshes, tmp_path):

@@ -57,6 +57,7 @@ def test_an_example_runs_and_shows_its_points(name, small_map, tmp_path):
     assert any(key.startswith(path) for key in points)
 
 
+@pytest.mark.night
 def test_a_scenario_file_runs_and_publishes_its_scans():
     """In a process of its own, where messages stay."""
     code = """

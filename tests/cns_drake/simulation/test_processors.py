@@ -13,7 +13,9 @@ import pytest
 
 from cns_drake.simulation import simulate
 
-pytestmark = pytest.mark.slow
+# By day, `test_equal_scores` takes another processor, and `tests/edges` pins a
+# recording.
+pytestmark = [pytest.mark.slow, pytest.mark.night]
 
 FRAMES = 6
 
@@ -57,9 +59,7 @@ def messages(folder):
 ANY = {"NUMBA_CPU_NAME": "generic"}
 
 
-@pytest.mark.parametrize(
-    "loops", [{}, pytest.param(ANY, marks=pytest.mark.night)]
-)
+@pytest.mark.parametrize("loops", [{}, ANY])
 def test_messages_are_those_of_another_processor(scenario, tmp_path, loops):
     file = write_scenario(scenario, tmp_path)
     extensions = np.show_config(mode="dicts")["SIMD Extensions"]["found"]

@@ -72,6 +72,7 @@ def test_a_map_without_sidewalks(town):
     )
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("who", "where"), [("vehicles", "roads"), ("walkers", "sidewalks")]

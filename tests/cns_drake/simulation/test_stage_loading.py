@@ -82,6 +82,7 @@ def test_recordings_and_simulations_see_the_same_changes(scenario, tmp_path):
     assert any(name.startswith("parked_car_") for name in causes)
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_the_change_of_a_cause_is_that_of_its_instances_alone(scenario):
     """TCR of a cause is that of replacing the points on its instances alone."""

@@ -180,6 +180,7 @@ def test_without_roads_there_is_a_note(tmp_path, sdf):
     ]
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_what_is_put_up_loses_its_leaves(changed):
     """It changes as all else does, with the part of its leaves that is left."""

@@ -55,7 +55,7 @@ def seen_again(points, seed):
 
 def answers():
     """Returns the hash of the points, and of each method's results."""
-    scans = [town(seed) for seed in range(5)]
+    scans = [town(seed) for seed in range(3)]
     asked = [seen_again(scan, k) for k, scan in enumerate(scans)]
     found = {"points": digest([*scans, *asked])}
     for name in METHODS:

@@ -3,7 +3,8 @@
 A command takes seconds to import its modules, and often little else. In a
 folder like that of a virtual environment, `cns-drake` and `cns-eval` are small
 clients, which pass their words, folder, environment and standard streams to a
-server. The server forks, and the fork runs the program.
+server. The server forks, and the fork runs the program. So does `python`, if it
+is to run a file.
 
 The program is that of the checkout. If `INSTALLED_VARIABLE` names the Python of
 another environment, it is the one that is installed there.
@@ -18,6 +19,7 @@ import multiprocessing
 import os
 from pathlib import Path
 import pkgutil
+import runpy
 import select
 import signal
 import socket
@@ -33,6 +35,7 @@ from cns_drake.base.compilation import start_compiler
 from cns_drake.base.jobs import processes
 from cns_drake.simulation import simulate
 from evaluation.study import chosen_methods
+from helpers.internal.forecasts import measure_in_no_time
 from helpers.internal.studies import leave_figures_unrendered
 from helpers.tiny_drive import tiny_scenario
 
@@ -47,6 +50,9 @@ INSTALLED_VARIABLE = "CNS_DRAKE_TEST_INSTALLED"
 _CLIENT = """#!{python} -IS
 import json, os, socket, sys
 
+program, *words = sys.argv
+if program.endswith("/python") and not "".join(words[:1]).endswith(".py"):
+    os.execv({python!r}, [{python!r}, *words])
 with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as server:
     server.connect({address!r})
     request = [sys.argv, os.getcwd(), dict(os.environ)]
@@ -58,6 +64,7 @@ _PROGRAMS = {
     "cns-drake": "cns_drake.__main__",
     "cns-eval": "evaluation.command_line.cli",
 }
+_CLIENTS = {*_PROGRAMS, "python"}
 _TESTS = Path(__file__).parents[2]
 _LONGEST = 1 << 17
 # Those of the processes of jobs; a fork cannot change them any more.
@@ -82,11 +89,11 @@ class CommandServer:
         prefix = Path(python).parents[1]
         _link_all(prefix, environment, but={"bin"})
         programs = environment / "bin"
-        _link_all(prefix / "bin", programs, but=_PROGRAMS.keys())
+        _link_all(prefix / "bin", programs, but=_CLIENTS)
         if installed:  # Programs of extras are those of the tests.
             known = {path.name for path in programs.iterdir()}
-            _link_all(Path(sys.prefix) / "bin", programs, known | {*_PROGRAMS})
-        for name in _PROGRAMS:
+            _link_all(Path(sys.prefix) / "bin", programs, known | _CLIENTS)
+        for name in _CLIENTS:
             text = _CLIENT.format(python=python, address=address)
             (programs / name).write_text(text)
             (programs / name).chmod(0o755)
@@ -135,6 +142,7 @@ def _serve(listener: socket.socket) -> None:
     with tempfile.TemporaryDirectory() as folder:
         simulate(tiny_scenario(Path(folder), frames=2), folder)
     code_digest("cns_drake.*", "evaluation.*")
+    measure_in_no_time(MonkeyPatch())
     # Jobs are forks, too: else each command would import all modules again.
     processes._context = multiprocessing.get_context("fork")
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
@@ -163,13 +171,18 @@ def _answer(client: socket.socket) -> None:
         os.chdir(folder)
         os.environ.clear()
         os.environ.update(environment)
+        name = Path(words[0]).name
+        if name == "python":
+            sys.argv = words[1:]
+            sys.path.insert(0, str(Path(words[1]).resolve().parent))
+            runpy.run_path(words[1], run_name="__main__")
+            sys.exit()
         sys.argv = words
         if METHODS_VARIABLE in environment:
             methods = tuple(environment[METHODS_VARIABLE].split())
             chosen_methods.shipped_methods = lambda: methods
             leave_figures_unrendered(MonkeyPatch())
-        module = _PROGRAMS[Path(words[0]).name]
-        sys.exit(importlib.import_module(module).main())
+        sys.exit(importlib.import_module(_PROGRAMS[name]).main())
     status = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
     client.send(bytes([status if status >= 0 else 128 - status]))
 

@@ -22,10 +22,9 @@ print(len(group_alike(np.zeros((1, 3)), np.zeros((1, 3)), 0.1, 0.3)))
 """
 
 
+@pytest.mark.night
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "is_there", [True, pytest.param(False, marks=pytest.mark.night)]
-)
+@pytest.mark.parametrize("is_there", [True, False])
 def test_nothing_is_kept_beside_the_code(tmp_path, is_there):
     """This holds with and without a folder of the user."""
     ours = tmp_path / "installed"
@@ -60,7 +59,7 @@ def test_nothing_is_kept_beside_the_code(tmp_path, is_there):
 
 
 @pytest.mark.slow
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize(
     "place", ["no home", "writable by all", "another's", "here"]
 )

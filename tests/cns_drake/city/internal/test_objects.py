@@ -39,6 +39,7 @@ def build(name, seed):
     return OBJECTS[name].build(np.random.default_rng([seed, 11]))
 
 
+@pytest.mark.sampled(30)
 @pytest.mark.parametrize("name", OBJECTS)
 def test_same_generator_same_bytes(name):
     a, b = build(name, 1), build(name, 1)
@@ -63,6 +64,7 @@ def test_every_mesh_is_used():
     assert all(name.startswith(others) for name in set(MESHES) - used)
 
 
+@pytest.mark.sampled(30)
 @pytest.mark.parametrize("name", OBJECTS)
 def test_model_is_complete(name):
     assert OBJECTS[name].semantic_class in CLASS_IDS
@@ -85,6 +87,7 @@ def test_model_is_complete(name):
                 assert min(part.shape.scale) > 0
 
 
+@pytest.mark.sampled(30)
 @pytest.mark.parametrize("name", OBJECTS)
 def test_its_lowest_point_is_on_the_ground_or_below(name):
     model = build(name, 2)
@@ -92,6 +95,7 @@ def test_its_lowest_point_is_on_the_ground_or_below(name):
     assert min(low) < 0.02
 
 
+@pytest.mark.sampled(30)
 @pytest.mark.parametrize("name", OBJECTS)
 def test_footprint_contains_the_geometry_near_the_ground(name):
     rng = np.random.default_rng(12)
@@ -110,6 +114,7 @@ def test_footprint_contains_the_geometry_near_the_ground(name):
         assert hull.buffer(0.3).covers(model.footprint)
 
 
+@pytest.mark.sampled(30)
 @pytest.mark.parametrize("name", MESHES)
 def test_meshes_obey_the_mesh_contract(name):
     vertices, faces = parse_obj(object_mesh(name).to_obj())
@@ -121,6 +126,7 @@ def test_meshes_obey_the_mesh_contract(name):
     assert area.min() > 0
 
 
+@pytest.mark.sampled(30)
 @pytest.mark.parametrize("name", MESHES)
 def test_meshes_are_as_written(name):
     vertices, faces = parse_obj((OBJECT_MESHES / f"{name}.obj").read_text())

@@ -433,6 +433,7 @@ def test_plain_is_what_an_import_gave_before_there_was_dressing(tmp_path):
     assert digest(run_import(tmp_path, "--plain")) == PLAIN
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_the_notes_count_details_of_the_file_and_at_random(tmp_path):
     folder = run_import(tmp_path, "--grow", "0.5")

@@ -453,6 +453,7 @@ def test_lanes_have_the_heights_of_the_file(tmp_path):
     assert ground(20.3, 5.6) == pytest.approx(0.3, abs=0.02)
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("roll", [0.1, -0.08])
 def test_a_level_lane_is_not_banked(tmp_path, roll):

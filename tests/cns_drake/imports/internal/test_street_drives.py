@@ -67,6 +67,7 @@ def drives_of(folder):
         yield jet.p[:, :2], np.column_stack([np.cos(jet.yaw), np.sin(jet.yaw)])
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("side", ["right", "left"])
 @pytest.mark.parametrize(
     "one_way",
@@ -261,6 +262,7 @@ def test_a_place_on_another_continent_is_no_way_to_go(tmp_path):
     assert all(length < 300.0 for length in report.drives)
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("barrier", ["house", "house around", "fence"])
 def test_no_drive_goes_through_a_wall(tmp_path, barrier):
@@ -319,6 +321,7 @@ def test_a_path_is_as_the_vehicle_drives_it():
         )
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("columns", [2, 3, 5])
 def test_no_import_refuses_its_own_drives(tmp_path, columns):

@@ -450,6 +450,7 @@ def as_open3d_writes_it(top, data):
     return b""
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("place", [in_chunk, beside, as_open3d_writes_it])
 def test_a_binary_gltf_has_its_buffer_at_any_place(tmp_path, place):

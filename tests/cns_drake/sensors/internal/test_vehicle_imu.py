@@ -130,6 +130,7 @@ def error_of_integration(trajectory, rate):
     return np.linalg.norm(places - exact, axis=1).max()
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("riding", [False, True])
 def test_integration_is_ten_times_better_with_many_samples(riding):

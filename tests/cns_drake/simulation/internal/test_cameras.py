@@ -179,6 +179,7 @@ def test_images_are_jpegs_of_what_is_there(messages):
     assert small.size == (64, 32)
 
 
+@pytest.mark.night
 def test_other_messages_are_those_without_cameras(recording, tmp_path):
     """And the same recording has the same bytes."""
     again = load_scenario(recording / "scenario.yaml")

@@ -23,8 +23,6 @@ from cns_drake.base import INTERRUPTED
 
 pytestmark = pytest.mark.slow
 
-KILLS_EACH = 5
-
 
 class Runner:
     """Starts runs of one scenario."""
@@ -85,11 +83,11 @@ def uninterrupted(runner, tmp_path_factory):
     return contents(output / "tiny_01")
 
 
-def kill_often(runner, output, seed, uninterrupted):
+def kill_often(runner, output, seed, kills, uninterrupted):
     """Kills runs of one recording after the other, then lets the last end."""
     rng = np.random.default_rng(seed)
     folder = output / "0" / "tiny_01"
-    for _ in range(KILLS_EACH):
+    for _ in range(kills):
         kill_signal = (signal.SIGKILL, signal.SIGTERM)[rng.integers(2)]
         runner.run(folder.parent, kill_signal, rng.integers(FRAMES + 1))
         # A kill may come after the work, just before the process ends.
@@ -101,16 +99,16 @@ def kill_often(runner, output, seed, uninterrupted):
 
 
 @pytest.mark.parametrize(
-    "drives", [1, pytest.param(8, marks=pytest.mark.night)]
+    ("drives", "kills"), [(1, 3), pytest.param(8, 5, marks=pytest.mark.night)]
 )
 def test_kills_leave_a_whole_recording_or_none(
-    runner, uninterrupted, tmp_path, drives
+    runner, uninterrupted, tmp_path, drives, kills
 ):
     with ThreadPoolExecutor(2) as pool:
         list(
             pool.map(
                 lambda k: kill_often(
-                    runner, tmp_path / str(k), k, uninterrupted
+                    runner, tmp_path / str(k), k, kills, uninterrupted
                 ),
                 range(drives),
             )

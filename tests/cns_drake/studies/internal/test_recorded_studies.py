@@ -290,6 +290,7 @@ def test_sessions_later_than_the_query(tmp_path):
         )
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_a_recording_is_read_once_and_its_descriptions_are_removed(
     folder, tmp_path

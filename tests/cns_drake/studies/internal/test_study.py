@@ -37,9 +37,9 @@ TABLES = ("results.csv", "queries.csv")
 
 @pytest.fixture(scope="module")
 def town(tmp_path_factory):
-    """Folder of a map with two drives of 40 frames along one route."""
+    """Folder of a map with two drives of 24 frames along one route."""
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
-    return write_town(tmp_path_factory.mktemp("maps") / "town", routes, 40)
+    return write_town(tmp_path_factory.mktemp("maps") / "town", routes, 24)
 
 
 @pytest.fixture
@@ -248,6 +248,7 @@ def test_an_interrupted_study_goes_on(town, tmp_path, jobs_done, monkeypatch):
     assert contents(tmp_path / "parts") == contents(tmp_path / "whole")
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_processes_change_nothing(town, tmp_path, jobs_done, capsys):
     wanted = experiment(town, **STAGES)
@@ -275,6 +276,7 @@ def test_processes_change_nothing(town, tmp_path, jobs_done, capsys):
     assert contents(tmp_path / "there") == contents(tmp_path / "here")
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_protocols_are_factors(town, tmp_path, jobs_done):
     """Each radius has numbers and a baseline of its own."""
@@ -513,6 +515,7 @@ def test_maps_are_labelled(town, tmp_path, jobs_done, monkeypatch):
     assert after["gone"] + after["new"] > 0.0
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_scans_are_localised(town, tmp_path, jobs_done):
     own = tmp_path / "stay.py"
@@ -562,6 +565,7 @@ def test_scans_are_localised(town, tmp_path, jobs_done):
     assert len(jobs_done[-1]) == 2
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_costs_follow_the_number_of_places(town, tmp_path, jobs_done):
     results = measure(experiment(town, tasks=["cost", "place"]), tmp_path)

@@ -134,6 +134,7 @@ def test_most_drivers_go_straight_on_and_few_turn_round():
     np.testing.assert_allclose(shares / shares[1], [3.0, 1.0, 1.0, 0.02])
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["metropolis", "downtown"])
 def test_walkers_cross_while_vehicles_before_them_wait(name):

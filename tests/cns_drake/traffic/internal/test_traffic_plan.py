@@ -228,7 +228,11 @@ def rates_of(tracks, duration):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("drive", "number"), [("metropolis_04", 40), ("downtown_02", 50)]
+    ("drive", "number"),
+    [
+        ("metropolis_04", 40),
+        pytest.param("downtown_02", 50, marks=pytest.mark.night),
+    ],
 )
 def test_nobody_accelerates_beyond_bounds(short, drive, number):
     """From the first frame to the last, and while lanes are changed."""
@@ -254,6 +258,7 @@ def test_traffic_is_under_way_in_the_first_and_the_last_frame(short):
         assert np.abs(last - first)[:, :2].max() < 0.2 * 6.0
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_walkers_pass_what_stands_on_sidewalks():
     _, graph, walkways = roads("riverside")
@@ -301,6 +306,7 @@ def test_a_third_of_walkers_walks_in_groups(short):
     assert 0.2 < (first & last).mean() < 0.7
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_seeds_mix_all_kinds():
     traffic = plan("downtown_03", 120, 1.0)

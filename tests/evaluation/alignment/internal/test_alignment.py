@@ -249,6 +249,7 @@ def test_command_tcr(capsys, recordings, truth):
     assert "'map'" in err
 
 
+@pytest.mark.night
 def test_command_pr(capsys, recordings):
     paths = recordings["first"], recordings["second"]
     method = ("--method", "scan-context++", "--json")
@@ -283,6 +284,7 @@ def test_map_files_are_taken_as_they_are(recordings, drives, tmp_path):
         maps_in_one_world(paths, "always")
 
 
+@pytest.mark.night
 def test_mulran_and_helipr(capsys, tmp_path, drives, truth):
     """The paper's KAIST row has two data sets on one grid, metres apart."""
     stamps_ns = [T0_NS + 100_000_000 * i for i in range(len(drives.X_first))]

@@ -19,6 +19,7 @@ def judge():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(judge, "_TREES", 10)
+        patch.setattr(judge, "_PATCHES", 8)
         patch.setattr(judge, "_NEIGHBOURHOODS", 40)
         yield judge
 

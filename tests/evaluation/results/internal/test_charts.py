@@ -536,6 +536,7 @@ class _Page(HTMLParser):
             self.tables[-1][-1][-1] += data.strip()
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("width", [358, 480, 900])
 @pytest.mark.parametrize(
     "keys",
@@ -858,6 +859,7 @@ def draw_all(folder):
         save_figure(drawn.figure, folder / chart["kind"], ("svg", "png"))
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_settings_of_the_user_do_not_reach_our_figures(tmp_path):
     for name, settings in (("plain", {}), ("changed", SETTINGS)):

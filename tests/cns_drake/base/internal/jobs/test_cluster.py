@@ -110,6 +110,7 @@ def test_jobs_end_with_the_client_that_wanted_them(dask, tmp_path, number):
     assert psutil.wait_procs([job], timeout=600)[1] == []
 
 
+@pytest.mark.night
 def test_a_worker_that_dies_each_time_is_a_fault(dask, tmp_path, capsys):
     # The scheduler tries three more times, and needs a worker for each.
     dask.add_workers(4)

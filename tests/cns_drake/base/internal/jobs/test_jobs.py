@@ -401,6 +401,7 @@ def test_jobs_leave_nothing_to_each_other(tmp_path):
     assert [(tmp_path / name).read_text() for name in "abc"] == ["nothing"] * 3
 
 
+@pytest.mark.night
 def test_a_job_survives_the_process_that_it_was_forked_from(tmp_path):
     """The jobs after it end as well."""
     paths = [tmp_path / name for name in "ab"]
@@ -411,6 +412,7 @@ def test_a_job_survives_the_process_that_it_was_forked_from(tmp_path):
     assert [path.read_text() for path in paths] == ["at last"] * 2
 
 
+@pytest.mark.night
 def test_freed_memory_is_kept_whatever_dask_has_its_workers_do(tmp_path):
     script = (
         "import pickle, sys\n"

@@ -55,7 +55,7 @@ def test_the_levels_are_as_they_were_frozen(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize(
     "change",
     [

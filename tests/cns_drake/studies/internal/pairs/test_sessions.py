@@ -423,6 +423,7 @@ def measure(town, output, **fields):
     return Results.read(output / "results.csv")
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_rows_of_one_session_are_those_without_sessions(
     town, tmp_path, jobs_done
@@ -445,6 +446,7 @@ def test_rows_of_one_session_are_those_without_sessions(
     assert tables[0] == tables[1]
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_places_memory_and_answers_of_several_sessions(
     town, tmp_path, jobs_done

@@ -86,6 +86,7 @@ def test_drives_that_never_meet_are_refused():
         BatchSampler(away, seed=1).batch(0)
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_jax_scores_as_the_method_does(tmp_path):
     values = start_parameters(5)
