@@ -58,6 +58,10 @@ _NUMBERS = (
     "six",
     "seven",
     "eight",
+    "nine",
+    "ten",
+    "eleven",
+    "twelve",
 )
 # Radii of a match in `ranking.csv` [m].
 _RADII = (5.0, 7.5, 10.0, 15.0)
