@@ -66,8 +66,8 @@ def survival(path: Path) -> str:
     95 % interval over them, with geometric verification. A gain in a city does
     not make up for a loss in another, see `judge_survival`.
     """
-    rows = {gate: kept_in_cities(gate) for gate in (False, True)}
-    judged = {gate: judge_survival(some) for gate, some in rows.items()}
+    rows = {verified: kept_in_cities(verified) for verified in (False, True)}
+    judged = {verified: judge_survival(some) for verified, some in rows.items()}
     # The best method with geometric verification is on top.
     order = [one.method for one in judged[True]]
     styles = method_styles(order)
@@ -211,19 +211,19 @@ def ranking(path: Path) -> None:
             factors={},
             task="place",
             method=line["method"],
-            gate=line["gate"] == "1",
+            verified=line["verified"] == "1",
             protocol="own",
             metric="auc_strict",
             value=float(line["auc_strict"]),
         )
-        found.setdefault((row.gate, float(line["radius"])), []).append(row)
+        found.setdefault((row.verified, float(line["radius"])), []).append(row)
     radii = sorted({radius for _, radius in found})
     figure = Figure(figsize=(WIDTH, 5.0), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     firsts = []
-    for axes, gate in zip(panels, (False, True), strict=True):
+    for axes, verified in zip(panels, (False, True), strict=True):
         ranked = [
-            {one.method: one for one in rank_methods(found[gate, radius])}
+            {one.method: one for one in rank_methods(found[verified, radius])}
             for radius in radii
         ]
         for method in ranked[-1]:
@@ -244,8 +244,8 @@ def ranking(path: Path) -> None:
         axes.set_xticks(range(len(radii)), [f"{one:g}" for one in radii])
         axes.set_yticks(range(1, number + 1), range(1, number + 1))
         axes.set_xlabel("radius of a match [m]", loc="left")
-        verified = "with" if gate else "without"
-        axes.set_title(f"{verified} verification", loc="left")
+        word = "with" if verified else "without"
+        axes.set_title(f"{word} verification", loc="left")
         make_plain(axes, "y")
     panels[0].set_ylabel("rank by AUC strict (at the right: its mean)")
     alone, verified = (
@@ -543,7 +543,7 @@ def upkeep(
 def ladder(path: Path) -> None:
     """Draws the ladder of Suburbia, what costs most on top."""
     results = Results.read(ROOT / "docs/notes/ladder_suburbia.csv")
-    rows = results.where(metric="kept", gate=False).rows
+    rows = results.where(metric="relative_auc", verified=False).rows
     found: dict[str, dict[str, float]] = {}
     for row in rows:
         cause = str(row["cause"])

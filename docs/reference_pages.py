@@ -165,7 +165,7 @@ _FILLED_IN = {
     (Experiment, "maps"): "all shipped maps",
     (Experiment, "tasks"): "`place`",
     (Experiment, "methods"): "all that ship",
-    (Experiment, "protocol"): "`fair`",
+    (Experiment, "protocol"): "`random-yaw`",
     (Experiment, "baseline"): "the first values",
     (Fleet, "seed"): "the condition's seed",
     (LidarSheet, "pattern"): "`spinning`",

@@ -2,9 +2,10 @@
 
     python docs/result_tables.py
 
-writes the tables between the marks of the pages, `notes/results_fair.csv`, and
-`claims.csv` with a row for each claim. A test compares them with what the
-program would write, and each claim's sentence with the pages.
+writes the tables between the marks of the pages,
+`notes/results_random_yaw.csv`, and `claims.csv` with a row for each claim. A
+test compares them with what the program would write, and each claim's sentence
+with the pages.
 """
 
 from __future__ import annotations
@@ -128,7 +129,7 @@ def shipped() -> Results:
     return Results.read(BASELINES / "stages.csv")
 
 
-def kept_in_cities(gate: bool) -> list[Row]:
+def kept_in_cities(verified: bool) -> list[Row]:
     """Returns retained shares of AUC strict in the shipped and fresh cities.
 
     A fresh city counts as a city of its own: it has the streets of a shipped
@@ -136,9 +137,13 @@ def kept_in_cities(gate: bool) -> list[Row]:
     """
     fresh = Results.read(BASELINES / "fresh.csv")
     rows = list(
-        shipped().where({STAGE: OWN}, metric="kept_strict", gate=gate).rows
+        shipped()
+        .where({STAGE: OWN}, metric="relative_auc_strict", verified=verified)
+        .rows
     )
-    for row in fresh.where({STAGE: OWN}, metric="kept_strict", gate=gate).rows:
+    for row in fresh.where(
+        {STAGE: OWN}, metric="relative_auc_strict", verified=verified
+    ).rows:
         number = row["both.redraw.frozen"]
         rows.append(replace(row, map=f"{row.map}, fresh {number}"))
     return [row for row in rows if row.method in METHODS]
@@ -155,7 +160,7 @@ def pairs() -> str:
         found = {
             (row.method, row[STAGE]): row.value
             for row in shipped()
-            .where(metric="auc", gate=False, database=database, query=query)
+            .where(metric="auc", verified=False, database=database, query=query)
             .rows
         }
         best = max(round(found[method, OWN], 2) for method in METHODS)
@@ -172,12 +177,12 @@ def pairs() -> str:
 def survival() -> str:
     """Returns the table of what survives in shipped and fresh cities."""
     lines = []
-    for gate in (False, True):
-        for one in judge_survival(kept_in_cities(gate)):
+    for verified in (False, True):
+        for one in judge_survival(kept_in_cities(verified)):
             lines.append(
                 (
                     title(one.method),
-                    "yes" if gate else "no",
+                    "yes" if verified else "no",
                     _loss(one),
                     one.verdict,
                 )
@@ -189,33 +194,33 @@ def survival() -> str:
 def radius() -> str:
     """Returns the table of what survives at each radius of a match."""
     lines = []
-    for gate in (False, True):
+    for verified in (False, True):
         for wanted in _RADII:
-            verified = ", verified" if gate else ""
-            found = {one.method: one for one in losses_at(wanted, gate)}
+            word = ", verified" if verified else ""
+            found = {one.method: one for one in losses_at(wanted, verified)}
             cells = [_loss(found[m], bold=True) for m in METHODS]
-            lines.append((f"{wanted:g} m{verified}", *cells))
+            lines.append((f"{wanted:g} m{word}", *cells))
     return _table(("radius of a match", *map(title, METHODS)), lines)
 
 
 def changes() -> str:
     """Returns the table of what is retained by what is missing."""
-    found = {gate: _kept_of_what_changes(gate) for gate in "01"}
+    found = {verified: _kept_of_what_changes(verified) for verified in "01"}
     lines = []
     causes = {
         "missing": "fronts",
         "scattered": "furniture",
         "both": "fronts and furniture",
     }
-    for (cause, name), gate in itertools.product(causes.items(), "01"):
-        some = [found[gate][cause, method] for method in METHODS]
+    for (cause, name), verified in itertools.product(causes.items(), "01"):
+        some = [found[verified][cause, method] for method in METHODS]
         cells = [f"{np.mean(v):.2f} ({min(v):.2f}–{max(v):.2f})" for v in some]
-        lines.append((name, "yes" if gate == "1" else "no", *cells))
+        lines.append((name, "yes" if verified == "1" else "no", *cells))
     head = "what the database lacks", "verified", *map(title, METHODS)
     return _table(head, lines)
 
 
-def losses_at(radius_m: float, gate: bool) -> list[Survival]:
+def losses_at(radius_m: float, verified: bool) -> list[Survival]:
     """Returns the lost shares of AUC strict at a radius, by method.
 
     Each city counts once: the mean over its pairs and draws of yaw.
@@ -224,7 +229,7 @@ def losses_at(radius_m: float, gate: bool) -> list[Survival]:
     for row in csv_rows("notes/ranking.csv"):
         if (
             float(row["radius"]) != radius_m
-            or bool(int(row["gate"])) != gate
+            or bool(int(row["verified"])) != verified
             or row["cities"] != "shipped"
         ):
             continue
@@ -265,7 +270,9 @@ def _claims_on_rebuilt_cities() -> list[Claim]:
     ring = [
         row.value
         for row in shipped()
-        .where({STAGE: OWN}, metric="kept", gate=False, method="ring++")
+        .where(
+            {STAGE: OWN}, metric="relative_auc", verified=False, method="ring++"
+        )
         .rows
         if row.map == "metropolis"
     ]
@@ -460,12 +467,15 @@ def _claims_on_causes() -> list[Claim]:
     both = "notes/ladder_construction.csv"
 
     def kept(cause: str) -> dict[str, float]:
-        rows = _find(suburbia, cause=cause, metric="kept")
+        rows = _find(suburbia, cause=cause, metric="relative_auc")
         return {row["method"]: float(row["value"]) for row in rows}
 
     fog = kept("weather")
     (row,) = _find(
-        suburbia, cause="weather", metric="kept", method="layered-overlap"
+        suburbia,
+        cause="weather",
+        metric="relative_auc",
+        method="layered-overlap",
     )
     others = max(v for m, v in fog.items() if m != "layered-overlap")
     aside, sensor, built = (
@@ -476,15 +486,19 @@ def _claims_on_causes() -> list[Claim]:
         float(
             np.mean(
                 _values(
-                    both, map=one, cause="construction", metric="kept",
-                    gate="0",
+                    both, map=one, cause="construction", metric="relative_auc",
+                    verified="0",
                 )
             )
         )
         for one in ("metropolis", "metropolis_cleared")
     )  # fmt: skip
     raised = _find(
-        both, cause="raised", height_limit="5", metric="kept", gate="0"
+        both,
+        cause="raised",
+        height_limit="5",
+        metric="relative_auc",
+        verified="0",
     )
     lower = [float(r["value"]) for r in raised]
     safe = [
@@ -492,7 +506,7 @@ def _claims_on_causes() -> list[Claim]:
         for r in raised
         if r["method"] not in ("solid", "scan-context++")
     ]
-    everything = max(_values(both, cause="all", metric="kept"))
+    everything = max(_values(both, cause="all", metric="relative_auc"))
     one_city: dict[str, Any] = {
         "page": "ladder.md",
         "unit": "queries of Suburbia",
@@ -585,7 +599,7 @@ def _claims_on_causes() -> list[Claim]:
 
 def _claims_on_levels() -> list[Claim]:
     found: dict[str, list[float]] = {}
-    for row in _find("notes/levels.csv", level="4", gate="0", metric="auc"):
+    for row in _find("notes/levels.csv", level="4", verified="0", metric="auc"):
         found.setdefault(row["method"], []).append(float(row["value"]))
     least = {method: min(some) for method, some in found.items()}
     best, second = sorted(least, key=lambda m: -least[m])[:2]
@@ -625,16 +639,19 @@ def _aged(
 
 def _claims_on_ageing() -> list[Claim]:
     last = ("ring++", "scan-context++", "layered-overlap", "learned")
-    early, late = (_aged("kept", "btc", years) for years in (5, 20))
+    early, late = (_aged("relative_auc", "btc", years) for years in (5, 20))
     # The claim `btc-ages` says so.
     assert min(early) > 0.9 > max(late)
-    in_place = _aged("kept", "btc", 40, furniture="in place")
-    lasting = [min(_aged("kept", method, 40)) for method in last]
-    lasting_strict = [min(_aged("kept_strict", method, 40)) for method in last]
-    solid = _aged("kept", "solid", 40)
-    solid_strict = _aged("kept_strict", "solid", 40)
+    in_place = _aged("relative_auc", "btc", 40, furniture="in place")
+    lasting = [min(_aged("relative_auc", method, 40)) for method in last]
+    lasting_strict = [
+        min(_aged("relative_auc_strict", method, 40)) for method in last
+    ]
+    solid = _aged("relative_auc", "solid", 40)
+    solid_strict = _aged("relative_auc_strict", "solid", 40)
     both = {
-        m: _aged("kept", m, 40, season="other") for m in ("ring++", "solid")
+        m: _aged("relative_auc", m, 40, season="other")
+        for m in ("ring++", "solid")
     }
     young = _values("notes/years.csv", "tcr_sym", years="5")
     aged: dict[str, Any] = {
@@ -768,7 +785,7 @@ def _right_answers(cars: int, method: str) -> tuple[float, float, float]:
         if row["metric"] == "with_match":
             share = float(row["value"]) / float(row["n"])
             found[key] = found.get(key, 1.0) * share
-        elif row["metric"] == "r1" and row["gate"] == "1":
+        elif row["metric"] == "r1" and row["verified"] == "1":
             found[key] = found.get(key, 1.0) * float(row["value"])
     return _with_interval(list(found.values()))
 
@@ -779,7 +796,7 @@ def _claims_on_upkeep() -> list[Claim]:
     ) -> tuple[float, float, float]:
         return _change(
             "auc_strict", new, old, experiment="sessions", method=method,
-            query=query, gate="0",
+            query=query, verified="0",
         )  # fmt: skip
 
     old = sessions("20", "1", "btc", "summer")
@@ -795,7 +812,7 @@ def _claims_on_upkeep() -> list[Claim]:
     merged, exact = (
         _change(
             "auc_strict", new, than, experiment="maintenance", method="btc",
-            gate="0",
+            verified="0",
         )
         for new, than in (
             ("20, 10, 1: none", "1"),
@@ -1122,7 +1139,7 @@ def _claims_on_methods() -> list[Claim]:
     for radius_m in _RADII:
         found: dict[tuple[str, ...], dict[str, float]] = {}
         for row in _find(
-            "notes/ranking.csv", cities="shipped", gate="1",
+            "notes/ranking.csv", cities="shipped", verified="1",
             radius=f"{radius_m:g}",
         ):  # fmt: skip
             pair = row["map"], row["database"], row["query"]
@@ -1133,7 +1150,7 @@ def _claims_on_methods() -> list[Claim]:
         )
     plans: dict[str, dict[str, float]] = {}
     for row in _find(
-        "notes/ranking.csv", cities="plans", gate="0", radius="7.5"
+        "notes/ranking.csv", cities="plans", verified="0", radius="7.5"
     ):
         plans.setdefault(row["map"], {})[row["method"]] = float(
             row["auc_strict"]
@@ -1145,7 +1162,7 @@ def _claims_on_methods() -> list[Claim]:
     graded = {
         variant: np.mean(
             _values("notes/learned_graded.csv", "auc_strict", variant=variant,
-                    radius="7.5", gate="0")
+                    radius="7.5", verified="0")
         )
         for variant in ("radius", "graded")
     }  # fmt: skip
@@ -1296,7 +1313,7 @@ def _claims_on_reality() -> list[Claim]:
     def replica(map_of: str, max_range: str) -> float:
         (value,) = _values(
             "notes/nclt_replica.csv", map_of=map_of, max_range=max_range,
-            method="scan-context++", gate="0", metric="r1",
+            method="scan-context++", verified="0", metric="r1",
         )  # fmt: skip
         return value
 
@@ -1554,14 +1571,18 @@ def _claims_on_reality() -> list[Claim]:
     ]
 
 
-def _kept_of_what_changes(gate: str) -> dict[tuple[str, str], list[float]]:
+def _kept_of_what_changes(verified: str) -> dict[tuple[str, str], list[float]]:
     """Returns (cause, method) -> retained AUC strict in each fresh city.
 
     Args:
-        gate: "1" with geometric verification, else "0".
+        verified: "1" with geometric verification, else "0".
     """
     found: dict[tuple[str, str], list[float]] = {}
-    for row in _find("notes/what_changes.csv", metric="kept_strict", gate=gate):
+    for row in _find(
+        "notes/what_changes.csv",
+        metric="relative_auc_strict",
+        verified=verified,
+    ):
         key = row["cause"], row["method"]
         found.setdefault(key, []).append(float(row["value"]))
     return found
@@ -1646,25 +1667,33 @@ def _loss(one: Survival, *, bold: bool = False) -> str:
     return f"**{text}**" if bold and one.verdict == SURVIVES else text
 
 
-def fair_table() -> str:
-    """Returns `results_fair.csv`: each pair and method by the fair protocol."""
+def random_yaw_table() -> str:
+    """Returns `results_random_yaw.csv`: each pair and method."""
     columns = {
         "auc_unchanged": (LAST, False, "auc"),
         "auc": (OWN, False, "auc"),
         "auc_strict": (OWN, False, "auc_strict"),
         "auc_strict_unchanged": (LAST, False, "auc_strict"),
-        "kept": (OWN, False, "kept"),
-        "kept_low": (OWN, False, "kept"),
-        "kept_high": (OWN, False, "kept"),
-        "kept_strict": (OWN, False, "kept_strict"),
+        "relative_auc": (OWN, False, "relative_auc"),
+        "relative_auc_low": (OWN, False, "relative_auc"),
+        "relative_auc_high": (OWN, False, "relative_auc"),
+        "relative_auc_strict": (OWN, False, "relative_auc_strict"),
         "r1": (OWN, False, "r1"),
         "recall_at_full_precision": (OWN, False, "recall_at_full_precision"),
         "visible_change": (OWN, False, "visible_change"),
-        "gate_unchanged_auc": (LAST, True, "auc"),
-        "gate_auc": (OWN, True, "auc"),
+        "verified_unchanged_auc": (LAST, True, "auc"),
+        "verified_auc": (OWN, True, "auc"),
     }
     rows = {
-        (r.map, r.database, r.query, r.method, r[STAGE], r.gate, r.metric): r
+        (
+            r.map,
+            r.database,
+            r.query,
+            r.method,
+            r[STAGE],
+            r.verified,
+            r.metric,
+        ): r
         for r in shipped().rows
     }
     stream = io.StringIO()
@@ -1674,8 +1703,8 @@ def fair_table() -> str:
         {key[:4] for key in rows if key[3]}
     ):
         cells = []
-        for name, (stage, gate, metric) in columns.items():
-            row = rows[city, database, query, method, stage, gate, metric]
+        for name, (stage, verified, metric) in columns.items():
+            row = rows[city, database, query, method, stage, verified, metric]
             end = name.rpartition("_")[2]
             value = getattr(row, end if end in ("low", "high") else "value")
             cells.append("" if np.isnan(value) else f"{value:.4f}")
@@ -1803,7 +1832,7 @@ def files() -> dict[Path, str]:
         if _BLOCK.search(text := path.read_text("utf-8"))
     }
     return pages | {
-        DOCS / "notes/results_fair.csv": fair_table(),
+        DOCS / "notes/results_random_yaw.csv": random_yaw_table(),
         DOCS / "claims.csv": claims_table(found),
     }
 

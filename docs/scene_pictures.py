@@ -321,7 +321,8 @@ def one_query(
         for row in csv_rows(str(ROOT / file))
         if row["query_frame"] == str(frame)
         and (row["query"], row["database"]) == (queries.session, places.session)
-        and (row[STAGE], row["protocol"], row["gate"]) == (OWN, "fair", "0")
+        and (row[STAGE], row["protocol"], row["verified"])
+        == (OWN, "random-yaw", "0")
     }
     found = [int(answers[name]["match_frame"]) for name in methods]
     away = [float(answers[name]["distance"]) for name in methods]

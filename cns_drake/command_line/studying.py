@@ -18,7 +18,7 @@ from cns_drake.command_line import options
 from evaluation.recognition import RetrievalProtocol, with_protocols
 
 
-@with_protocols("fair", "paper")
+@with_protocols("random-yaw", "paper")
 def reproduce(
     maps: options.Maps = None,
     *,
@@ -38,8 +38,8 @@ def reproduce(
 
     Records all drives of the maps, and measures place recognition and
     structural change between these drives, as the experiment stages does. By
-    default the results are by two protocols: by fair, and by paper to compare
-    them with the paper.
+    default the results are by two protocols: by random-yaw, and by paper to
+    compare them with the paper.
 
     Args:
         pages: Whether to write a web page of each drive as well. By default

@@ -153,7 +153,7 @@ class ChangeReport:
             "tau": TAU,
             "hull_margin": HULL_MARGIN,
             "coverage_masked": None,
-            "control": None,
+            "no_change": None,
             "alignment": None,
         }
         if change.undefined_because:
@@ -163,7 +163,7 @@ class ChangeReport:
             values["coverage_masked"] = masked | {"radius": COVERAGE_RADIUS}
         if self.control is not None and self.control_names is not None:
             names = list(self.control_names)
-            values["control"] = _numbers_of_change(self.control) | {
+            values["no_change"] = _numbers_of_change(self.control) | {
                 "between": names
             }
         if self.registered is not None:

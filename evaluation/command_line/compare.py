@@ -19,7 +19,7 @@ def compare(
     tables: Annotated[list[Path], typer.Argument(metavar="RESULTS")],
     metric: str = "auc",
     protocol: Annotated[
-        str | None, typer.Option(metavar="fair|paper|recorded|own")
+        str | None, typer.Option(metavar="random-yaw|paper|recorded|own")
     ] = None,
     verified: Annotated[bool, typer.Option("--verified")] = False,
     rankings: Annotated[bool, typer.Option("--rankings")] = False,
@@ -34,9 +34,9 @@ def compare(
     From eight maps on, each mean has a 95 % interval over maps. If each table
     has a queries.csv next to it, the command also prints the difference in R@1
     between any two methods, with its interval and p-value, both corrected for
-    the number of differences. With --metric kept_strict, the command prints
-    which methods survive. With --rankings, the command prints Kendall's tau
-    between the rankings of any two tables.
+    the number of differences. With --metric relative_auc_strict, the command
+    prints which methods survive. With --rankings, the command prints Kendall's
+    tau between the rankings of any two tables.
 
     Args:
         tables: Tables of results to compare, or folders with a results.csv.
@@ -58,7 +58,7 @@ def compare(
     from evaluation.results import compare_tables
 
     found = compare_tables(
-        tables, metric, protocol, gate=verified, rankings=rankings
+        tables, metric, protocol, verified=verified, rankings=rankings
     )
     for note in found.notes:
         terminal.note(note)

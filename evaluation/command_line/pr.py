@@ -41,7 +41,7 @@ _WITH_SCORES = (
     "method",
     "parameter",
     "sensor_height",
-    "gate",
+    "verified",
     "radius",
     "columns",
 )
@@ -259,7 +259,7 @@ def _measured(
     (outcome,) = (
         replace(outcome, method=method[0].name)
         for outcome in engine.found(pair, PlaceTask.name)
-        if outcome.is_gated == protocol.gate
+        if outcome.is_gated == protocol.verified
     )
     check_has_match(outcome)
     return engine, outcome

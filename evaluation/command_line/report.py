@@ -11,7 +11,7 @@ from cns_drake.base import shared_options, terminal
 from evaluation.recognition import RetrievalProtocol, with_protocols
 
 
-@with_protocols("fair")
+@with_protocols("random-yaw")
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option()],

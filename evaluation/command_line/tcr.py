@@ -25,7 +25,7 @@ def tcr(
     context: typer.Context,
     source: Annotated[Path, typer.Argument(metavar="A")],
     target: Annotated[Path, typer.Argument(metavar="B")],
-    control: Annotated[Path | None, typer.Option(metavar="C")] = None,
+    no_change: Annotated[Path | None, typer.Option(metavar="C")] = None,
     align: options.Align = "auto",
     lidar: shared_options.LidarName = None,
     columns: shared_options.Columns = None,
@@ -46,9 +46,9 @@ def tcr(
     Args:
         source: Drive or map before the change.
         target: Drive or map after the change.
-        control: Third drive, on A's route in B's stage or on B's route in A's
-            stage. With the control, the command also prints TCR_sym between C
-            and the drive in the same stage. These two drives differ only in
+        no_change: Control: a third drive, on A's route in B's stage or on B's
+            route in A's stage. With it, the command also prints TCR_sym between
+            C and the drive in the same stage. These two drives differ only in
             their routes.
         paths: Compare the paths and speeds of the two drives, instead of
             measuring change. Every 5 m along A, the command measures how B
@@ -76,7 +76,7 @@ def tcr(
     from evaluation.results import LAST, OWN, STAGE, make_output
     from evaluation.study import ChangeTask, measure_pairs, pair_of_drive_maps
 
-    named = [path for path in (source, target, control) if path is not None]
+    named = [path for path in (source, target, no_change) if path is not None]
     maps, alignments = maps_in_one_world(named, align, lidar, columns)
     before, after, *controls = maps
     compared = [(before, after)] + [

@@ -101,7 +101,7 @@ def _measured(queries: QueryRows, stages: Mapping[str, str]) -> list[Measured]:
         )
         for answers in queries.answers
         if answers.task == "place"
-        and not answers.gate
+        and not answers.verified
         and answers[STAGE] == OWN
         and answers.outcomes.has_match.any()
         and (pair := _pair(answers, stages)) is not None

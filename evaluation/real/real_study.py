@@ -3,10 +3,10 @@
 Each scan of a data set with poses is a query. The query is searched among all
 other scans of the same model of LiDAR: scans of its data set, of other data
 sets and of simulated recordings. A place is a single scan; queries get a random
-yaw and tilt, as in the protocol `fair`. Each scan is also localised, from a
-random initial guess, in a map of the scans around it. In addition, a classifier
-is trained to distinguish each data set from simulated scans of the same model
-of LiDAR (see `evaluation.real.judge`).
+yaw and tilt, as in the protocol `random-yaw`. Each scan is also localised, from
+a random initial guess, in a map of the scans around it. In addition, a
+classifier is trained to distinguish each data set from simulated scans of the
+same model of LiDAR (see `evaluation.real.judge`).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -35,7 +35,7 @@ from evaluation.real.image_sequences import (
     open_sequences,
 )
 from evaluation.recognition import (
-    FAIR_PROTOCOL,
+    RANDOM_YAW_PROTOCOL,
     RECORDED_PROTOCOL,
     Number,
     RetrievalProtocol,
@@ -64,7 +64,7 @@ from evaluation.study import (
     choose_methods,
 )
 
-_SIMULATED = replace(FAIR_PROTOCOL, scans_per_place=1)
+_SIMULATED = replace(RANDOM_YAW_PROTOCOL, scans_per_place=1)
 # Every real scan is a query and a place.
 _REAL = replace(_SIMULATED, query_spacing=1e-6, place_spacing=1e-6)
 # Every image is a query or a place.

@@ -62,10 +62,12 @@ from evaluation.recognition.precision_recall import pr_curve as pr_curve
 from evaluation.recognition.precision_recall import (
     weighted_metrics as weighted_metrics,
 )
-from evaluation.recognition.protocol import FAIR_PROTOCOL as FAIR_PROTOCOL
 from evaluation.recognition.protocol import PAPER_PROTOCOL as PAPER_PROTOCOL
 from evaluation.recognition.protocol import PROTOCOL_NAMES as PROTOCOL_NAMES
 from evaluation.recognition.protocol import PROTOCOLS as PROTOCOLS
+from evaluation.recognition.protocol import (
+    RANDOM_YAW_PROTOCOL as RANDOM_YAW_PROTOCOL,
+)
 from evaluation.recognition.protocol import (
     RECORDED_PROTOCOL as RECORDED_PROTOCOL,
 )

@@ -9,8 +9,8 @@ from evaluation.recognition.query_outcomes import QueryOutcomes
 # The reason for a wrong top-ranked place to which no other one applies.
 ELSEWHERE = "elsewhere"
 # Reasons for wrong top-ranked places, in order of precedence.
-FAULTS = ("no_place", "no_candidate", "other_city", "too_far", ELSEWHERE)
-# Up to this multiple of the radius, a wrong place is `too_far`; beyond it,
+FAULTS = ("no_place", "no_candidate", "other_city", "near_miss", ELSEWHERE)
+# Up to this multiple of the radius, a wrong place is `near_miss`; beyond it,
 # `elsewhere`.
 NEARLY = 2.0
 
@@ -37,7 +37,7 @@ def faults(
         (Q,) "" if the top-ranked place is a match, and otherwise the first
         reason that applies: `no_place` if the query has no match;
         `no_candidate` if the method finds no place, or rejects all places;
-        `other_city` if the top-ranked place is in another city; `too_far` if
+        `other_city` if the top-ranked place is in another city; `near_miss` if
         the top-ranked place is at most twice the radius away; `elsewhere` if no
         other reason applies.
     """

@@ -290,16 +290,20 @@ def _shipped() -> Iterator[Metric]:
             over_queries="share of the queries whose pose is so accurate",
             main_in=("localise",),
         )
+    yield _retained("relative_auc", "auc", "relative AUC", main_in=_MAIN_PLACE)
     yield _retained(
-        "kept", "auc", "retained share", main_in=("place", "pose", "localise")
-    )
-    yield _retained(
-        "kept_strict",
+        "relative_auc_strict",
         "auc_strict",
-        "retained share of AUC strict",
+        "relative AUC strict",
         main_in=_MAIN_PLACE,
     )
-    yield _retained("kept_r1", "r1", "retained share of R@1")
+    yield _retained("relative_r1", "r1", "relative R@1")
+    yield _retained(
+        "relative_success",
+        "pose_success",
+        "relative success rate",
+        main_in=("pose", "localise"),
+    )
     yield _count(
         "lost",
         "answers lost",
@@ -340,7 +344,7 @@ def _shipped() -> Iterator[Metric]:
         ("no_place", "queries without a match"),
         ("no_candidate", "queries without a candidate"),
         ("other_city", "answers in another city"),
-        ("too_far", "answers just too far"),
+        ("near_miss", "answers just too far"),
         ("elsewhere", "answers elsewhere"),
     ):
         yield _count(

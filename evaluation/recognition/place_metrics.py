@@ -45,10 +45,11 @@ def place_numbers(
 
     Yields:
         The metrics of the condition. If there is a baseline, the following
-        results come in addition. `kept`, `kept_r1` and `kept_strict` are AUC,
-        R@1 and strict AUC in the condition, divided by the same metric in the
-        baseline. `lost` is the number of queries that are right only in the
-        baseline; `found` is the number of queries that are right only in the
+        results come in addition. `relative_auc`, `relative_r1` and
+        `relative_auc_strict` are AUC, R@1 and AUC strict in the condition,
+        divided by the same metric in the baseline. `lost` is the number of
+        queries that are right only in the baseline; `found` is the number of
+        queries that are right only in the
         condition. The last result comes from the function
         `_visible_change_added`.
     """
@@ -82,7 +83,8 @@ def _compared_numbers(
     """Yields the results that compare a condition with the baseline.
 
     The docstring of `place_numbers` lists these results. If the queries differ,
-    only `kept`, `kept_r1` and `kept_strict` are known, without intervals.
+    only `relative_auc`, `relative_r1` and `relative_auc_strict` are known,
+    without intervals.
     """
     outcomes = now.outcomes
     is_paired = len(before.outcomes) == len(outcomes)
@@ -132,8 +134,8 @@ def pose_numbers(
     Args:
         now: outcome of the method in a condition.
         before: outcome of the method in the baseline. If it is given, the
-            results include the metric `kept`: the success rate in the condition
-            divided by the success rate in the baseline.
+            results include `relative_success`: the success rate in the
+            condition divided by the success rate in the baseline.
     """
     value = now.pose.success
     if math.isnan(value):
@@ -142,7 +144,7 @@ def pose_numbers(
     yield now.number("pose_success", value, n=number)
     if before is not None:
         kept = float(kept_share(value, before.pose.success))
-        yield now.number("kept", kept, n=number)
+        yield now.number("relative_success", kept, n=number)
     known = is_accepted(now.outcomes) & ~np.isnan(now.pose_errors.translation)
     for name, median in (
         ("translation_median", now.pose.translation_median),

@@ -200,7 +200,7 @@ class PlaceOutcome:
         Geometric verification rejects places that lie too far away according to
         the method's own pose estimate.
         """
-        return self.protocol.gate
+        return self.protocol.verified
 
     @property
     def radius(self) -> float:

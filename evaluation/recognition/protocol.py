@@ -79,9 +79,9 @@ class RetrievalProtocol:
             so that the place is a match at any distance (see
             `evaluation.recognition.overlap_truth`). None if places within
             `radius` are matches.
-        gate: whether geometric verification is used, which rejects top-ranked
-            places that lie beyond the radius according to the method's own pose
-            estimate.
+        verified: whether geometric verification is used, which rejects
+            top-ranked places that lie beyond the radius according to the
+            method's own pose estimate.
         turn_queries: whether each query is rotated by a random yaw. Places stay
             as recorded.
         tilt_queries: largest random roll and pitch of the tilt of each query,
@@ -108,7 +108,7 @@ class RetrievalProtocol:
     place: PlaceScan | None = "middle"
     exclude_recent: float | None = None
     overlap: float | None = None
-    gate: bool = False
+    verified: bool = False
     turn_queries: bool = False
     tilt_queries: float = 0.0
     hide_sector: float = 0.0
@@ -210,7 +210,7 @@ class RetrievalProtocol:
 
     @property
     def name(self) -> str:
-        """Name of the protocol: `fair`, `paper`, `recorded` or `own`.
+        """Name of the protocol: `random-yaw`, `paper`, `recorded` or `own`.
 
         The name is `own` if any field that changes a number, such as the radius
         or a spacing, differs from the shipped protocol. Geometric verification
@@ -255,7 +255,7 @@ class RetrievalProtocol:
     def _counted_fields(self) -> dict[str, object]:
         """The fields that change a result: a mapping from name to value."""
         values = asdict(self)
-        del values["gate"]
+        del values["verified"]
         if not self._changes_queries:
             values["seed"] = 0  # Nothing is random.
         # Digests in published tables were made with this name.
@@ -276,7 +276,7 @@ class RetrievalProtocol:
     @property
     def gate_radius(self) -> float | None:
         """Radius of geometric verification [m]; None without it."""
-        return self.radius if self.gate else None
+        return self.radius if self.verified else None
 
     def of(self, method: Method) -> RetrievalProtocol:
         """Returns the protocol with a method's own choices filled in.
@@ -306,7 +306,7 @@ class RetrievalProtocol:
             queries: whether the drive has queries, and not only places.
         """
         values = asdict(self)
-        unused = ["radius", "exclude_recent", "overlap", "gate"]
+        unused = ["radius", "exclude_recent", "overlap", "verified"]
         if not (queries and self._changes_queries):
             unused += [*_QUERY_CHANGES, "seed"]
         for name in unused:
@@ -353,7 +353,7 @@ class RetrievalProtocol:
         if self._changes_queries:
             parts.append(f"seed {self.seed}")
         text = f"{', '.join(parts)}."
-        if self.gate:
+        if self.verified:
             text += f" {GATE_TEXT}"
         return text
 
@@ -373,10 +373,12 @@ PAPER_PROTOCOL = RetrievalProtocol(place="first")
 # The protocol of all studies. A random yaw of queries deprives methods of help
 # from crops along the sensor's axes, voxel grids and streets at right angles.
 # The random numbers must not change any more.
-FAIR_PROTOCOL = RetrievalProtocol(turn_queries=True, tilt_queries=1.5, seed=0)
+RANDOM_YAW_PROTOCOL = RetrievalProtocol(
+    turn_queries=True, tilt_queries=1.5, seed=0
+)
 
 PROTOCOLS = {
-    "fair": FAIR_PROTOCOL,
+    "random-yaw": RANDOM_YAW_PROTOCOL,
     "paper": PAPER_PROTOCOL,
     "recorded": RECORDED_PROTOCOL,
 }

@@ -22,21 +22,21 @@ _Options = Mapping[str, tuple[Any, Any]]
 class _Name(str, Enum):
     """The name of a protocol. Typer knows lists of these, not of literals."""
 
-    FAIR = "fair"
+    FAIR = "random-yaw"
     PAPER = "paper"
     RECORDED = "recorded"
 
 
 _WHAT = (
     "Protocol, which says how the scans of the query drive become queries. "
-    "fair rotates each scan by a random yaw and tilt, so that no method "
+    "random-yaw rotates each scan by a random yaw and tilt, so that no method "
     "profits from equal headings. paper follows the CNS paper. recorded leaves "
     "the scans unchanged."
 )
 _NAMED: _Options = {
     "named_protocol": (
         Annotated[_Name, typer.Option("--protocol", help=_WHAT)],
-        "fair",
+        "random-yaw",
     )
 }
 _SeveralNames = Annotated[
@@ -106,11 +106,11 @@ _FIELDS: _Options = {
     )
 }
 _GATE: _Options = {
-    "gate": (
+    "verified": (
         Annotated[
             bool,
             typer.Option(
-                "--gate",
+                "--verified",
                 help="Use geometric verification: reject a top-ranked place "
                 "if the method's own pose estimate puts the query farther "
                 "than --radius from that place. Methods without pose "

@@ -16,7 +16,7 @@ class Number(NamedTuple):
     Attributes:
         method: method, estimator or baseline; "" if there is none. For a place
             recognition method, it is the method's name with its settings.
-        gate: whether geometric verification was used.
+        verified: whether geometric verification was used.
         metric: name of the metric.
         value: its value.
         interval: its 95 % interval.
@@ -25,7 +25,7 @@ class Number(NamedTuple):
     """
 
     method: str
-    gate: bool
+    verified: bool
     metric: str
     value: float
     interval: Interval = UNKNOWN

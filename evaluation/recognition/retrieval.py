@@ -197,8 +197,8 @@ def compare_with_gates(
         method: method that described both drives.
         database: drive with described places.
         query: drive with described queries, in the same world frame.
-        protocol: protocol by which both drives were described; its field `gate`
-            does not matter.
+        protocol: protocol by which both drives were described; its field
+            `verified` does not matter.
         gate_radii: radii of geometric verification [m]; None in place of a
             radius stands for scores without geometric verification.
         overlaps: (Q, D) share of each query's scan that each place's scan

@@ -40,7 +40,7 @@ _FEW = 2
 # Greatest number of methods that a sentence names with geometric verification.
 _MOST_NAMED = 3
 # Metrics of which a page tells the cost, as a loss of AUC.
-_OF_AUC = ("auc", "kept")
+_OF_AUC = ("auc", "relative_auc")
 _VERIFIED = "with geometric verification"
 
 
@@ -82,26 +82,26 @@ class Change:
     @property
     def gates(self) -> list[bool]:
         """Whether there are rows without, and with geometric verification."""
-        return sorted({gate for _, gate, _ in self.ends})
+        return sorted({verified for _, verified, _ in self.ends})
 
-    def share(self, method: str, gate: bool) -> float:
+    def share(self, method: str, verified: bool) -> float:
         """Returns the retained share, the median of all pairs."""
-        ends = [self.ends[method, gate, pair] for pair in self.pairs]
+        ends = [self.ends[method, verified, pair] for pair in self.pairs]
         return median_kept(
             float(kept_share(after, before)) for before, after in ends
         )
 
-    def shares(self, gate: bool) -> dict[str, float]:
+    def shares(self, verified: bool) -> dict[str, float]:
         """Returns method -> its retained share, if that is known."""
-        found = {name: self.share(name, gate) for name in self.methods}
+        found = {name: self.share(name, verified) for name in self.methods}
         return {n: one for n, one in found.items() if not math.isnan(one)}
 
-    def is_at_ceiling(self, method: str, gate: bool) -> bool:
+    def is_at_ceiling(self, method: str, verified: bool) -> bool:
         """Whether all values are 1.00, the most, so that no loss is seen."""
         return metric_named(self.metric).greatest == 1.0 and all(
             end >= _CEILING
             for pair in self.pairs
-            for end in self.ends[method, gate, pair]
+            for end in self.ends[method, verified, pair]
         )
 
 
@@ -124,7 +124,7 @@ def change_of(
         (title(mean.key[0]), bool(mean.key[1]), mean.key[2:5], mean.key[5]): (
             mean.value
         )
-        for mean in means(rows, "label", "gate", *_PAIR, over)
+        for mean in means(rows, "label", "verified", *_PAIR, over)
     }
     at_start, at_end = (
         dict.fromkeys(pair for _, _, pair, v in value_at if v == value)
@@ -135,12 +135,12 @@ def change_of(
         raise InputError(f"{over}: no pair of drives has both ends")
     methods = [title(n) for n in in_table_order(row.label for row in rows)]
     ends = {
-        (name, gate, pair): (
-            value_at.get((name, gate, pair, before), math.nan),
-            value_at.get((name, gate, pair, after), math.nan),
+        (name, verified, pair): (
+            value_at.get((name, verified, pair, before), math.nan),
+            value_at.get((name, verified, pair, after), math.nan),
         )
         for name in methods
-        for gate in sorted({bool(row.gate) for row in rows})
+        for verified in sorted({bool(row.verified) for row in rows})
         for pair in pairs
     }
     return Change(over, before, after, rows[0].metric, methods, pairs, ends)
@@ -169,13 +169,13 @@ def cost_sentence(change: Change) -> str:
     return text
 
 
-def _cost_clause(change: Change, gate: bool) -> str:
+def _cost_clause(change: Change, verified: bool) -> str:
     """Returns the verb and the costs, without or with verification."""
     metric = in_words(change.metric)
-    shares = change.shares(gate)
+    shares = change.shares(verified)
     if not shares:
         return f"has an unknown cost: without it, no {metric} is above 0"
-    full = [name for name in shares if change.is_at_ceiling(name, gate)]
+    full = [name for name in shares if change.is_at_ceiling(name, verified)]
     open_ = {n: one for n, one in shares.items() if n not in full}
     has_gain = max(open_.values(), default=0.0) > 2.0 - _CEILING
     if has_gain:
@@ -223,7 +223,9 @@ def _verified_clause(change: Change, number: int) -> str:
     if not shares:
         return ""
     if all(
-        change.is_at_ceiling(n, gate) for n in shares for gate in (False, True)
+        change.is_at_ceiling(n, verified)
+        for n in shares
+        for verified in (False, True)
     ):
         return f", also {_VERIFIED}"
     if without.keys() == shares.keys() and all(
@@ -259,7 +261,7 @@ def page_answer(
     over = _asked_factor(results, chart)
     if over is None:
         return None
-    fields = {"kind", "over", "metric", "x", "y", "gate"}
+    fields = {"kind", "over", "metric", "x", "y", "verified"}
     chosen = {n: v for n, v in chart.items() if n not in fields and n != over}
     rows = results.where({"task": "place", **chosen}, metric="auc")
     rows, _ = rows.defined()
@@ -304,12 +306,12 @@ def _asked_factor(results: Results, chart: Mapping[str, Any]) -> str | None:
 def _without_baseline(rows: Iterable[Row]) -> str:
     """Returns the AUC of the methods, of a study without a baseline."""
     by_gate: dict[bool, dict[str, float]] = {}
-    for mean in means(rows, "label", "gate"):
+    for mean in means(rows, "label", "verified"):
         of_gate = by_gate.setdefault(bool(mean.key[1]), {})
         of_gate[title(mean.key[0])] = mean.value
     told = [
-        (f"{_VERIFIED}, " if gate else "") + from_least_to_greatest(found)
-        for gate, found in sorted(by_gate.items())
+        (f"{_VERIFIED}, " if verified else "") + from_least_to_greatest(found)
+        for verified, found in sorted(by_gate.items())
     ]
     text = "Without a baseline, this study cannot show what the change costs"
     return f"{text}; AUC {'; '.join(told)}"
@@ -322,10 +324,10 @@ def _evidence(change: Change, rows: Results, queries: QueryRows | None) -> str:
     if queries is None:
         return " ".join(found)
     told = []
-    for gate in change.gates:
-        apart, rest = _significant_losses(change, gate, queries)
+    for verified in change.gates:
+        apart, rest = _significant_losses(change, verified, queries)
         if apart or rest:
-            told.append((gate, apart, rest))
+            told.append((verified, apart, rest))
     if told and not any(apart for _, apart, _ in told):
         asked = _number_of_queries(change, queries)
         found.append(
@@ -334,15 +336,15 @@ def _evidence(change: Change, rows: Results, queries: QueryRows | None) -> str:
         )
     elif told:
         clauses = [
-            f"{f'{_VERIFIED}, ' if gate else ''}for {_which(apart, rest)}"
-            for gate, apart, rest in told
+            f"{f'{_VERIFIED}, ' if verified else ''}for {_which(apart, rest)}"
+            for verified, apart, rest in told
         ]
         found.append(f"The change of R@1 is significant {'; '.join(clauses)}.")
-    gate = change.gates[-1]
-    at_end = rows.where({change.over: change.after}, gate=gate)
+    verified = change.gates[-1]
+    at_end = rows.where({change.over: change.after}, verified=verified)
     lead = lead_by_right_answers(at_end.rows, queries)
     if lead:
-        where = f", {_VERIFIED}" if gate else ""
+        where = f", {_VERIFIED}" if verified else ""
         found.append(f"After it{where}, {lead}.")
     return " ".join(found)
 
@@ -359,7 +361,7 @@ def _which(apart: Sequence[str], rest: Sequence[str]) -> str:
 
 
 def _significant_losses(
-    change: Change, gate: bool, queries: QueryRows
+    change: Change, verified: bool, queries: QueryRows
 ) -> tuple[list[str], list[str]]:
     """Divides methods by whether the change makes a significant difference.
 
@@ -369,7 +371,7 @@ def _significant_losses(
     """
     ends: dict[str, dict[tuple, dict[object, Any]]] = {}
     for answers in queries.answers:
-        if answers.task == "place" and bool(answers.gate) == gate:
+        if answers.task == "place" and bool(answers.verified) == verified:
             of_method = ends.setdefault(title(answers.label), {})
             condition = of_method.setdefault(answers.without(change.over), {})
             condition[answers[change.over]] = answers

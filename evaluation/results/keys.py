@@ -20,7 +20,7 @@ from evaluation.recognition import Metric, RetrievalProtocol
 # The beginning of a factor that is a setting of a method.
 SETTINGS = "methods."
 _BEFORE_FACTORS = ("experiment", "map", "database", "query", "seed")
-_AFTER_FACTORS = ("task", "method", "gate", "protocol")
+_AFTER_FACTORS = ("task", "method", "verified", "protocol")
 # Columns of a key that every table has.
 NEEDED_KEYS = (*_BEFORE_FACTORS, *_AFTER_FACTORS)
 # Columns that a table may lack; their values are then unknown.
@@ -82,10 +82,10 @@ class Key:
             does not apply is missing or None.
         task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
         method: method, estimator or baseline; "" for the task `change`.
-        gate: whether geometric verification rejected places, by the method's
-            own pose.
-        protocol: name of the protocol: `fair`, `paper` or `recorded` for the
-            shipped protocol as it is, and `own` for any other.
+        verified: whether geometric verification rejected places, by the
+            method's own pose.
+        protocol: name of the protocol: `random-yaw`, `paper` or `recorded` for
+            the shipped protocol as it is, and `own` for any other.
         protocol_digest: hash of everything in the protocol that changes a
             number, see `RetrievalProtocol.digest`; "" if unknown.
         version: version of this program; "" if unknown.
@@ -99,7 +99,7 @@ class Key:
     factors: Mapping[str, object]
     task: str
     method: str
-    gate: bool
+    verified: bool
     protocol: str
     protocol_digest: str = field(default="", kw_only=True)
     version: str = field(default="", kw_only=True)

@@ -78,12 +78,12 @@ def table_name(path: Path, paths: Iterable[Path]) -> str:
 
 def _by_one_protocol(rows: Sequence[Row], path: Path) -> tuple[Row, ...]:
     names = list(dict.fromkeys(row.protocol for row in rows))
-    if "fair" not in names and len(names) > 1:
+    if "random-yaw" not in names and len(names) > 1:
         raise InputError(
             f"{path}: protocol: {' and '.join(names)} in one table; choose one"
             " with --protocol"
         )
-    chosen = "fair" if "fair" in names else names[0]
+    chosen = "random-yaw" if "random-yaw" in names else names[0]
     return tuple(row for row in rows if row.protocol == chosen)
 
 
@@ -159,8 +159,8 @@ def read_metric_table(
         path: the table, or the folder that contains it.
         results: all rows of the table.
         selection: name of a column -> its value in the rows to select:
-            `metric`, `task`, `gate` and, if only rows of one protocol count,
-            `protocol`.
+            `metric`, `task`, `verified` and, if only rows of one protocol
+            count, `protocol`.
         name: name of the table for the user.
         is_alone: whether the rows must be of one protocol, because they are
             ranked without rows of other tables.
@@ -195,7 +195,8 @@ def read_metric_table(
     asked = [
         answer
         for answer in answers
-        if (answer.task, answer.gate) == (selection["task"], selection["gate"])
+        if (answer.task, answer.verified)
+        == (selection["task"], selection["verified"])
     ]
     metric = metric_named(str(selection["metric"]))
     if metric.is_resampled and any(
@@ -210,7 +211,7 @@ def read_metric_table(
 
 
 def _no_row_text(results: Results, selection: Mapping[str, object]) -> str:
-    with_or = "with" if selection["gate"] else "without"
+    with_or = "with" if selection["verified"] else "without"
     chosen = f"{selection['metric']} {with_or} geometric verification"
     protocol = selection.get("protocol")
     by = f" by protocol {protocol}" if protocol else ""

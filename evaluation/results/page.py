@@ -318,7 +318,7 @@ def _summary(
     by_condition = 1 < len(cells) <= _MOST_COLUMNS
     if by_condition:
         metrics = metrics[:1]
-    shown = ("label", "gate", "metric", *(factors if by_condition else ()))
+    shown = ("label", "verified", "metric", *(factors if by_condition else ()))
     found = {mean.key: mean for mean in means(rows, *shown) if mean.number}
     # A single result has an interval of its own.
     intervals = {
@@ -335,20 +335,22 @@ def _summary(
     ]
     parts = [
         {
-            "verified": bool(gate),
+            "verified": bool(verified),
             "rows": [
                 {
                     "name": title_of(name) or "–",
                     "cells": [
                         (found.get(key), intervals.get(key))
-                        for key in ((name, gate, *column) for column in columns)
+                        for key in (
+                            (name, verified, *column) for column in columns
+                        )
                     ],
                 }
                 for name in in_table_order(row.label for row in rows)
-                if any((name, gate, *column) in found for column in columns)
+                if any((name, verified, *column) in found for column in columns)
             ],
         }
-        for gate in sorted({row.gate for row in rows})
+        for verified in sorted({row.verified for row in rows})
     ]
     heads = [metric_named(str(metric)).label for metric, *_ in columns]
     title = _TASKS.get(task, task)

@@ -69,7 +69,7 @@ def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
         from evaluation import Results, means
 
         rows = Results.read("study/results.csv").where(metric="auc").rows
-        for mean in means(rows, "method", "gate"):
+        for mean in means(rows, "method", "verified"):
             print(mean.key, mean.value)
     """
     groups: dict[tuple, list[float]] = {}
@@ -98,8 +98,8 @@ class Summary(NamedTuple):
         map: name of the map.
         task: the task from whose results the number is computed.
         method: name of the method, with its settings.
-        gate: whether geometric verification was used, which rejects places by
-            the method's own pose estimate.
+        verified: whether geometric verification was used, which rejects places
+            by the method's own pose estimate.
         value: the number.
         low, high: limits of the number's interval or range; NaN if unknown.
         n: number of conditions from which the number is computed; None if
@@ -110,7 +110,7 @@ class Summary(NamedTuple):
     map: str
     task: str
     method: str
-    gate: bool
+    verified: bool
     value: float
     low: float = math.nan
     high: float = math.nan
@@ -134,7 +134,7 @@ class Summary(NamedTuple):
             value: the number itself.
             low, high: its interval or range.
         """
-        of_method = key.map, key.task, key.label, key.gate
+        of_method = key.map, key.task, key.label, key.verified
         return cls(what, *of_method, value, low, high)
 
 
@@ -262,7 +262,7 @@ def lifetimes(
     results: Results,
     factor: str,
     shares: Iterable[float] = (0.9, 0.5),
-    metric: str = "kept",
+    metric: str = "relative_auc",
 ) -> list[Summary]:
     """Returns at which values of a factor a given share of a result is left.
 
@@ -335,19 +335,19 @@ def paired_values(results: Results, x: str, y: str) -> list[tuple[Row, float]]:
 
     `x` is a factor or another metric. The value of a metric comes from a row
     with the same condition and, in this order of preference: the same method
-    and `gate`; the same method without geometric verification; no method at
+    and `verified`; the same method without geometric verification; no method at
     all, as in a row of `tcr_sym`. Rows for which there is no value of `x` are
     left out.
     """
     wider: tuple[tuple[str, ...], ...] = (
         ("task", "protocol"),
-        ("task", "protocol", "gate"),
-        ("task", "protocol", "gate", "method"),
+        ("task", "protocol", "verified"),
+        ("task", "protocol", "verified", "method"),
     )
     values: dict[tuple, float] = {}
     for row in results.where(metric=x).rows:
         values[row.without(*wider[0])] = row.value
-        if not row.gate:
+        if not row.verified:
             values[row.without(*wider[1])] = row.value
         if not row.method:
             values[row.without(*wider[2])] = row.value
@@ -378,7 +378,7 @@ def growths(results: Results, over: str, metric: str) -> list[Summary]:
     """
     groups: dict[tuple, list[tuple[float, Row]]] = {}
     for row, at in paired_values(results, over, metric):
-        key = row.experiment, row.map, row.label, row.gate
+        key = row.experiment, row.map, row.label, row.verified
         groups.setdefault(key, []).append((at, row))
     found = []
     for curve in groups.values():
@@ -465,7 +465,7 @@ def worths(results: Results, metric: str) -> list[Summary]:
     for row in results.where(metric=metric).rows:
         factors = dict(row.factors)
         maintain = str(factors.pop(MAINTAIN, ""))
-        of_method = row.map, row.task, row.label, row.gate
+        of_method = row.map, row.task, row.label, row.verified
         condition = row.database, row.query, row.seed, *factors.items()
         group = groups.setdefault((*of_method, *condition), {})
         group[maintain] = row, row.value
@@ -480,7 +480,7 @@ def worths(results: Results, metric: str) -> list[Summary]:
                 map(math.isnan, way)
             ):
                 continue
-            name = maintain, row.map, row.task, row.label, row.gate
+            name = maintain, row.map, row.task, row.label, row.verified
             ways.setdefault(name, []).append((row, *way))
     found = []
     for (maintain, *_), measured in ways.items():
@@ -520,7 +520,7 @@ def summarised(
         over, metric = str(chart.get("over")), str(chart.get("metric"))
         if chart.get("kind") == "scatter":
             x, y = str(chart.get("x")), str(chart.get("y"))
-            found += correlations(results.where(gate=False), x, y)
+            found += correlations(results.where(verified=False), x, y)
         elif over == MAINTAIN:
             found += worths(results, metric)
         elif chart.get("kind") == "lines" and metric_named(metric).share_of:

@@ -20,7 +20,7 @@ from evaluation.results.table import Row
 
 # The metric by which a method survives a change: the share of its AUC strict
 # that it retains.
-KEPT = "kept_strict"
+RELATIVE = "relative_auc_strict"
 # Greatest mean loss with which a method survives, the margin.
 MARGIN = 0.1
 # Verdicts.
@@ -87,8 +87,9 @@ def judge_survival(rows: Iterable[Row]) -> list[Survival]:
     `city_interval` for the interval.
 
     Args:
-        rows: rows of `kept_strict`, measured with the same radius, protocol and
-            verification. Only conditions that all methods have count.
+        rows: rows of `relative_auc_strict`, measured with the same radius,
+            protocol and verification. Only conditions that all methods have
+            count.
     """
     common = common_conditions(rows)
     cities = sorted(

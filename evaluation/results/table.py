@@ -86,7 +86,7 @@ class Row(Key):
             number: the result.
             key: all other columns of the row, see `Key`.
         """
-        named = {"method": number.method, "gate": number.gate, **key}
+        named = {"method": number.method, "verified": number.verified, **key}
         return cls(
             **named,
             metric=number.metric,
@@ -336,7 +336,7 @@ def _factor_names(keys: Iterable[Key]) -> tuple[str, ...]:
 
 
 def _key_cells(key: Key, factors: Sequence[str]) -> list[str]:
-    kinds = {"gate": TRUTH, "seed": SEED, **dict.fromkeys(factors, FACTOR)}
+    kinds = {"verified": TRUTH, "seed": SEED, **dict.fromkeys(factors, FACTOR)}
     return [
         kinds.get(name, TEXT).write(key[name]) for name in key_columns(factors)
     ]

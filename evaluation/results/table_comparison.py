@@ -40,7 +40,7 @@ from evaluation.results.metric_tables import (
     table_name,
 )
 from evaluation.results.ranking import Ranked, rank_methods
-from evaluation.results.survival import KEPT, Survival, judge_survival
+from evaluation.results.survival import RELATIVE, Survival, judge_survival
 from evaluation.results.table import Answers, Results, Row
 
 # Values that differ by no more are the same result, with the digits that ship.
@@ -270,7 +270,7 @@ class Comparison:
         agreements: how similarly any two tables rank their methods, if they
             have at least two method names in common.
         survival: whether each method survives; empty unless the metric is
-            `kept_strict`.
+            `relative_auc_strict`.
         notes: what was left out.
     """
 
@@ -336,7 +336,7 @@ def compare_tables(
     metric: str = "auc",
     protocol: str | None = None,
     *,
-    gate: bool = False,
+    verified: bool = False,
     rankings: bool = False,
 ) -> Comparison:
     """Compares tables of results with each other and with the shipped tables.
@@ -348,11 +348,11 @@ def compare_tables(
             it. If several tasks have it, the results of `place` are compared.
             If the name is not known, more is taken for better, with a note.
         protocol: name of the protocol whose rows count. By default, rows of the
-            same protocol are compared. With `rankings`, the default is `fair`
-            or, in a table without this protocol, the table's only protocol.
-            Rows whose protocols differ in anything that changes a number (see
-            `RetrievalProtocol.digest`) are never compared.
-        gate: whether to compare the rows that were measured with geometric
+            same protocol are compared. With `rankings`, the default is
+            `random-yaw` or, in a table without this protocol, the table's only
+            protocol. Rows whose protocols differ in anything that changes a
+            number (see `RetrievalProtocol.digest`) are never compared.
+        verified: whether to compare the rows that were measured with geometric
             verification (true) or without (false).
         rankings: whether to compare only the order of the methods in these
             tables, without the shipped tables. The tables need no condition in
@@ -386,7 +386,7 @@ def compare_tables(
     selection: dict[str, object] = {
         "metric": metric,
         "task": task,
-        "gate": gate,
+        "verified": verified,
     }
     if protocol is not None:
         selection["protocol"] = protocol
@@ -474,7 +474,7 @@ def _compared_values(
         rank_methods(rows),
         _differences(entries, common) if metric in _OF_ANSWERS else (),
         agreements,
-        judge_survival(rows) if metric == KEPT else (),
+        judge_survival(rows) if metric == RELATIVE else (),
         notes,
     )
 

@@ -100,7 +100,7 @@ class TableLine:
         values = {name: self.value(name, TEXT) for name in (*_TEXTS, *optional)}
         self.text("seed")
         values["seed"] = self.value("seed", SEED)
-        values["gate"] = self.value("gate", TRUTH)
+        values["verified"] = self.value("verified", TRUTH)
         known = {name: self.value(name, FACTOR) for name in factors}
         values["factors"] = {n: v for n, v in known.items() if v is not None}
         if not values["method"] and values["task"] != "change":

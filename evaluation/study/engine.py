@@ -191,10 +191,10 @@ class Engine:
                 task = self.tasks[name]
                 found = self.found(one, name)
                 for number in task.numbers(found, base.get(name)):
-                    key = self._key(one, name, number.method, number.gate)
+                    key = self._key(one, name, number.method, number.verified)
                     rows.append(Row.of(number, **key))
-                for method, gate, columns in task.answers(found):
-                    key = self._key(one, name, method, gate)
+                for method, verified, columns in task.answers(found):
+                    key = self._key(one, name, method, verified)
                     answers.append(Answers(**key, columns=columns))
         return Results.of(rows), QueryRows.of(answers)
 
@@ -220,7 +220,7 @@ class Engine:
         return self.tasks[task].found(one)
 
     def _key(
-        self, one: Pair, task: str, method: str, gate: bool
+        self, one: Pair, task: str, method: str, verified: bool
     ) -> dict[str, Any]:
         factors = {name: as_factor(v) for name, v in one.factors.items()}
         settings = {**self.tasks[task].changed_settings, **one.settings}
@@ -244,7 +244,7 @@ class Engine:
             "factors": factors,
             "task": task,
             "method": method,
-            "gate": gate,
+            "verified": verified,
             **made_by(one.stated, settings),
         }
 

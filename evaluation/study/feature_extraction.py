@@ -15,7 +15,7 @@ from evaluation.drives import RecentScans, cropped, sample_frames
 from evaluation.maps import CELL_SIZE, MappedDrive, map_drive, thumbnail
 from evaluation.methods import MethodConfig
 from evaluation.recognition import (
-    FAIR_PROTOCOL,
+    RANDOM_YAW_PROTOCOL,
     DriveDescriptors,
     Request,
     RetrievalProtocol,
@@ -43,7 +43,7 @@ def extract_features(
     recording: Drive,
     roles: Set[Role],
     asked: Mapping[str, Request],
-    protocol: RetrievalProtocol = FAIR_PROTOCOL,
+    protocol: RetrievalProtocol = RANDOM_YAW_PROTOCOL,
     *,
     with_scans: bool = False,
 ) -> MappedFeatures:
@@ -126,7 +126,7 @@ def describe_recording(
     recording: Drive,
     roles: Set[Role],
     asked: Mapping[str, Request],
-    protocol: RetrievalProtocol = FAIR_PROTOCOL,
+    protocol: RetrievalProtocol = RANDOM_YAW_PROTOCOL,
 ) -> ScannedFeatures:
     """Describes the places or queries of a recording, and keeps their scans.
 

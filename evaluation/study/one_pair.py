@@ -12,7 +12,7 @@ from typing import Any
 from cns_drake.base import Reporter, one_line
 from cns_drake.drives import Drive
 from evaluation.change import DriveMap
-from evaluation.recognition import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.recognition import RANDOM_YAW_PROTOCOL, RetrievalProtocol
 from evaluation.results import check_output
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine
@@ -140,7 +140,7 @@ def pair_of(
     database: OpenSource,
     query: OpenSource,
     names: tuple[str, str],
-    protocol: RetrievalProtocol = FAIR_PROTOCOL,
+    protocol: RetrievalProtocol = RANDOM_YAW_PROTOCOL,
     settings: Mapping[str, Any] | None = None,
     **more: Any,
 ) -> Pair:

@@ -452,7 +452,9 @@ def _method_outcomes(
                     PlaceOutcome.of(
                         choice.key,
                         method,
-                        replace(protocol, gate=bool(is_gated), radius=radius),
+                        replace(
+                            protocol, verified=bool(is_gated), radius=radius
+                        ),
                         replace(found, matches=matches),
                         asked,
                         drives,

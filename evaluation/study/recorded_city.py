@@ -10,7 +10,7 @@ from pathlib import Path
 
 from cns_drake.base import Job, Reporter, doing, make_folder
 from evaluation.recognition import (
-    FAIR_PROTOCOL,
+    RANDOM_YAW_PROTOCOL,
     PlaceOutcome,
     RetrievalProtocol,
     Role,
@@ -204,7 +204,7 @@ class _ExtractionJobs(Jobs):
         files = self.files.features(drive.name)
         if name not in self.jobs:
             roles = frozenset(self._roles.get(drive.name, ()))
-            protocol = self._protocol or FAIR_PROTOCOL
+            protocol = self._protocol or RANDOM_YAW_PROTOCOL
             step = FeatureExtraction(
                 drive.source,
                 roles,

@@ -56,7 +56,7 @@ COMMANDS = {
     "compare": f"{EVAL} compare tables",
     "tcr": f"{EVAL} tcr {PAIR} --output out",
     **{
-        f"pr-{name}": f"{EVAL} pr {PAIR} --method {name} --gate --output out"
+        f"pr-{name}": f"{EVAL} pr {PAIR} --method {name} --verified --output o"
         for name in ("ring++", "btc", "learned", "solid", "scan-context++")
     },
     "pr-overlap": f"{EVAL} pr {PAIR} --method solid --truth overlap:0.5",

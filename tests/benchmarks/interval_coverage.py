@@ -151,7 +151,7 @@ def drives(
 ) -> Iterator[dict[str, object]]:
     """Metrics of one method on one drive, with and without a change."""
     names = ("auc", "auc_strict", "r1")
-    kept = ("kept", "kept_strict", "kept_r1")
+    kept = ("relative_auc", "relative_auc_strict", "relative_r1")
     for before, after in scenarios:
         rng = np.random.default_rng(0)
         control, changed = answers(rng, (before, after), MANY)
@@ -245,9 +245,9 @@ def city_row(city: int, pair: int, value: float) -> Row:
         factors={},
         task="place",
         method="solid",
-        gate=False,
+        verified=False,
         protocol="own",
-        metric="kept_strict",
+        metric="relative_auc_strict",
         value=value,
     )
 

@@ -30,7 +30,7 @@ from processes import in_process
 from cns_drake.drives import DriveNames
 from evaluation.methods import Method, make_method
 from evaluation.recognition import (
-    FAIR_PROTOCOL,
+    RANDOM_YAW_PROTOCOL,
     DescribedScans,
     DriveDescriptors,
     compare_with_gates,
@@ -153,7 +153,7 @@ def measure(
             query = DriveDescriptors("queries", none, asked.chosen(rows))
             start = time.process_time()
             for _, (found, *_) in compare_with_gates(
-                method, database, query, FAIR_PROTOCOL, radii
+                method, database, query, RANDOM_YAW_PROTOCOL, radii
             ):
                 right += int((found.best_places == found.query_frames).sum())
         times.append((time.process_time() - start) / num_queries)

@@ -46,7 +46,7 @@ def _print_correlations(path: Path) -> None:
     with path.open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
             if row["task"] == "place" and row["has_match"] == "1":
-                names = "database", "query", "both.stage", "method", "gate"
+                names = "database", "query", "both.stage", "method", "verified"
                 key = tuple(row.get(name) for name in names)
                 groups[key].append(
                     [

@@ -87,8 +87,8 @@ def test_survival_is_judged_by_the_cities_means():
         with (result_tables.BASELINES / name).open(newline="") as stream:
             for row in csv.DictReader(stream):
                 if (
-                    row["metric"] == "kept_strict"
-                    and row["gate"] == "1"
+                    row["metric"] == "relative_auc_strict"
+                    and row["verified"] == "1"
                     and row["both.stage"] == "own"
                     and row["method"] == "layered-overlap"
                 ):

@@ -64,7 +64,7 @@ def test_columns_of_the_table_of_results_are_listed():
     key = {
         **dict.fromkeys(("experiment", "map", "database", "query"), "a"),
         **{"seed": 1, "factors": {}, "task": "place", "method": "a"},
-        **{"gate": False, "protocol": "fair"},
+        **{"verified": False, "protocol": "random-yaw"},
     }
     said = first_codes("## The table of results")
     row = Row(**key, metric="auc", value=1.0)

@@ -49,7 +49,7 @@ _EXPERIMENT = {
     "database": {"stage": ["last", "first"]},
     "tasks": ["place", "pose", "change"],
     "methods": ["scan-context++", "solid", "layered-overlap", "ring++", "btc"],
-    "protocol": {"base": "fair", "query_spacing": 8.0},
+    "protocol": {"base": "random-yaw", "query_spacing": 8.0},
 }
 
 

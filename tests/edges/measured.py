@@ -213,7 +213,7 @@ def study(folder: Path) -> dict[str, str]:
 
 def pr(folder: Path) -> dict[str, str]:
     inputs.write_drives(folder)
-    words = "pr", "before", "after", "--method", "scan-context++", "--gate"
+    words = "pr", "before", "after", "--method", "scan-context++", "--verified"
     run(folder, "evaluation", *words, "--output", "out")
     return _tables(folder / "out", "pr")
 

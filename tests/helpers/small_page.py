@@ -114,7 +114,7 @@ def tables(outcomes):
                 **key,
                 task="place",
                 method=one.method,
-                gate=False,
+                verified=False,
                 columns=one.columns,
             )
         )

@@ -188,11 +188,11 @@ class Experiment(Section):
             metrics of each task. `results.csv` contains all metrics.
         seeds: seeds of all random numbers. Each condition is measured with each
             seed.
-        protocol: protocol of place recognition: `fair`, `paper` or `recorded`;
-            a list of these names, to measure by several protocols; or fields of
-            a protocol of your own. The field `base` then names a protocol,
-            which provides the fields that you leave out. Each protocol has a
-            baseline of its own.
+        protocol: protocol of place recognition: `random-yaw`, `paper` or
+            `recorded`; a list of these names, to measure by several protocols;
+            or fields of a protocol of your own. The field `base` then names a
+            protocol, which provides the fields that you leave out. Each
+            protocol has a baseline of its own.
         baseline: values of the factors in the condition with which all other
             conditions are compared. By default the first value of each factor.
         frozen: table with a fingerprint of each level's drives. The table

@@ -25,7 +25,7 @@ _ProtocolFields = create_model(  # type: ignore[call-overload]  # Fields are com
         for name, kind in get_type_hints(
             RetrievalProtocol, localns={"PlaceScan": Literal["middle", "first"]}
         ).items()
-        if name not in ("gate", "overlap", "exclude_recent")
+        if name not in ("verified", "overlap", "exclude_recent")
     },
 )
 
@@ -37,7 +37,8 @@ def protocol_from_fields(
 
     Args:
         fields: field -> value. The field `base` names a protocol; by default
-            `fair`. Fields that are not given have the values of this protocol.
+            `random-yaw`. Fields that are not given have the values of this
+            protocol.
         source: file of the experiment, for error messages.
         place: name of the section with these fields, for error messages.
 
@@ -45,7 +46,7 @@ def protocol_from_fields(
         InputError: a field is unknown or out of range.
     """
     values = dict(fields)
-    base = values.pop("base", "fair")
+    base = values.pop("base", "random-yaw")
     if not isinstance(base, str) or base not in PROTOCOLS:
         raise InputError(
             f"{source}: {place}.base: {base!r} is none of"

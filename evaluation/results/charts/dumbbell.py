@@ -43,10 +43,10 @@ def draw_dumbbell(chart: Chart) -> tuple[str, Figure]:
     except InputError as error:
         raise InputError(f"charts: dumbbell: {error}") from None
     figure, panels = _panels(chart, change)
-    for axes, gate in zip(panels, change.gates, strict=True):
-        _draw_methods(axes, chart, change, gate)
+    for axes, verified in zip(panels, change.gates, strict=True):
+        _draw_methods(axes, chart, change, verified)
         if len(panels) > 1:
-            axes.set_title(_PANELS[gate], loc="left")
+            axes.set_title(_PANELS[verified], loc="left")
         axes.grid(axis="x", alpha=0.3)
         axes.tick_params(length=0)
         start_at_zero(axes, x=chart.metric)
@@ -61,11 +61,13 @@ def _message(change: Change) -> str:
     Of other metrics, and of shares, it is what is left.
     """
     metric = metric_named(change.metric)
-    gate, *_ = change.gates
+    verified, *_ = change.gates
     if change.over.startswith(SETTINGS):
         # Each value of a setting makes a method with a row of its own.
         ends = {
-            name: np.array([change.ends[name, gate, p] for p in change.pairs])
+            name: np.array(
+                [change.ends[name, verified, p] for p in change.pairs]
+            )
             for name in change.methods
         }
         found = {
@@ -76,7 +78,7 @@ def _message(change: Change) -> str:
         return f"{in_words(change.metric)}: {from_least_to_greatest(found)}"
     if metric.better == "more" and not metric.share_of:
         return cost_sentence(change)
-    shares = {n: 100.0 * one for n, one in change.shares(gate).items()}
+    shares = {n: 100.0 * one for n, one in change.shares(verified).items()}
     number = len(change.pairs)
     pairs = f"median of {number} pairs" if number > 1 else "one pair"
     return (
@@ -99,12 +101,14 @@ def _panels(chart: Chart, change: Change) -> tuple[Figure, list[Axes]]:
     return figure, list(grid.flat)
 
 
-def _draw_methods(axes: Axes, chart: Chart, change: Change, gate: bool) -> None:
+def _draw_methods(
+    axes: Axes, chart: Chart, change: Change, verified: bool
+) -> None:
     """Draws a row for each method: the median, and a tick for each pair."""
     side = axes.get_yaxis_transform()
     for y, name in enumerate(change.methods):
         colour, _, marker = chart.styles[name]
-        ends = np.array([change.ends[name, gate, p] for p in change.pairs])
+        ends = np.array([change.ends[name, verified, p] for p in change.pairs])
         is_whole = ~np.isnan(ends).any(axis=1)
         if is_whole.any():
             ends = ends[is_whole]
@@ -115,14 +119,14 @@ def _draw_methods(axes: Axes, chart: Chart, change: Change, gate: bool) -> None:
         ):
             mark, shown = "|", at.tolist()
             if len(change.pairs) == 1:
-                mark, shown = "-", _interval(chart, name, gate, value)
+                mark, shown = "-", _interval(chart, name, verified, value)
             rows = np.full(len(shown), y + shift)
             axes.plot(shown, rows, mark, color=colour, ms=7, alpha=0.8, lw=1.2)
         before, after = np.median(ends, axis=0)
         axes.plot([before, after], [y, y], color=colour, lw=3.5, alpha=0.5)
         axes.plot(before, y, marker, color=colour, mfc="white", ms=8)
         axes.plot(after, y, marker, color=colour, ms=8)
-        share = change.share(name, gate)
+        share = change.share(name, verified)
         if not math.isnan(share):
             text = _PERCENT.format(100.0 * share)
             axes.text(
@@ -135,13 +139,13 @@ def _draw_methods(axes: Axes, chart: Chart, change: Change, gate: bool) -> None:
 
 
 def _interval(
-    chart: Chart, method: str, gate: bool, value: object
+    chart: Chart, method: str, verified: bool, value: object
 ) -> Sequence[float]:
     """Returns the 95 % interval of a single result; empty if unknown."""
     found = [
         (row.low, row.high)
         for row in chart.rows
-        if (title(row.label), row.gate) == (method, gate)
+        if (title(row.label), row.verified) == (method, verified)
         and row[chart.keys["over"]] == value
     ]
     return found[0] if len(found) == 1 and not np.isnan(found).any() else ()
@@ -157,9 +161,9 @@ def _axis_text(chart: Chart, change: Change) -> str:
             " after below the line"
         )
     elif any(
-        _interval(chart, name, gate, change.after)
+        _interval(chart, name, verified, change.after)
         for name in change.methods
-        for gate in change.gates
+        for verified in change.gates
     ):
         text += "; thin lines are 95\N{NO-BREAK SPACE}% intervals"
     return f"{text}; right: the share that is left"

@@ -110,11 +110,11 @@ def _selected_rows(
     tasks = results.where(metric=metric).distinct("task")
     task = "place" if "place" in tasks else tasks[:1]
     # A dumbbell shows results without and with geometric verification.
-    gate: object = 0
+    verified: object = 0
     if kind == "dumbbell":
         shown = results.where({"task": task, **chosen}, metric=metric)
-        gate = sorted({int(row.gate) for row in shown.rows}) or 0
-    chosen = {"task": task, "gate": gate, **chosen}
+        verified = sorted({int(row.verified) for row in shown.rows}) or 0
+    chosen = {"task": task, "verified": verified, **chosen}
     known, undefined = results.where(chosen, metric=metric).defined()
     rows = known.rows
     if not rows:

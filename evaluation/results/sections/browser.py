@@ -18,7 +18,7 @@ _POINTS_OF_A_PAGE = 5_000_000
 # Images of cameras in a page [bytes].
 _IMAGES_OF_A_PAGE = 6_000_000
 # Reasons for wrong answers in words, where these differ from the tables.
-_WORDS = {"too_far": "near miss"}
+_WORDS = {"near_miss": "near miss"}
 
 
 def browser_section(
@@ -38,7 +38,7 @@ def browser_section(
     return page_section(
         "browser",
         "Queries",
-        "queries.csv: the first protocol, with the change, gate 0",
+        "queries.csv: the first protocol, with the change, verified 0",
         is_open=True,
         data=data,
         image_step=data["imageStep"],

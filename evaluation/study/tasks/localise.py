@@ -188,7 +188,8 @@ class LocaliseTask(Task):
                     float(is_right(rows).mean()),
                     float(is_right(then[method]).mean()),
                 )
-                yield Number(method, False, "kept", float(share), n=len(rows))
+                name = "relative_success"
+                yield Number(method, False, name, float(share), n=len(rows))
 
     def answers(self, found: Any) -> Iterator[Answered]:
         for method, rows in self._named_results(found):

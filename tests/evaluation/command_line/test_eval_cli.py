@@ -24,7 +24,7 @@ def test_the_protocol_is_the_users(capsys, towns):
         "place": None,
         "exclude_recent": None,
         "overlap": None,
-        "gate": False,
+        "verified": False,
         "turn_queries": True,
         "tilt_queries": 1.5,
         "hide_sector": 0.0,
@@ -47,7 +47,7 @@ def test_the_protocol_is_the_users(capsys, towns):
         "place": "middle",
         "exclude_recent": None,
         "overlap": None,
-        "gate": False,
+        "verified": False,
         "turn_queries": False,
         "tilt_queries": 0.0,
         "hide_sector": 0.0,
@@ -66,8 +66,8 @@ def test_a_pair_writes_the_tables_of_a_study(capsys, towns, tmp_path):
     both = ["pr", towns / "town_01", towns / "town_02", "--method", "solid"]
     made = {}
     for name, *options in (
-        ("fair",),
-        ("gate", "--gate"),
+        ("random-yaw",),
+        ("verified", "--verified"),
         ("wide", "--radius", "25"),
         ("high", "--sensor-height", "1.9"),
         ("set", "--set", "ranges=20"),
@@ -77,11 +77,13 @@ def test_a_pair_writes_the_tables_of_a_study(capsys, towns, tmp_path):
             capsys, *both, *options, "--json", "--output", out
         )
         assert status == 0
-        # As in all studies, there are rows without the gate and with it.
-        gate = "--gate" in options
-        rows = Results.read(out).where(task="place", gate=gate).rows
+        # As in all studies, there are rows without the verified and with it.
+        verified = "--verified" in options
+        rows = Results.read(out).where(task="place", verified=verified).rows
         (answers,) = (
-            one for one in QueryRows.read(out).answers if one.gate == gate
+            one
+            for one in QueryRows.read(out).answers
+            if one.verified == verified
         )
         values = {row.metric: row.value for row in rows}
         assert values["auc"] == json.loads(printed)["auc"]
@@ -89,17 +91,17 @@ def test_a_pair_writes_the_tables_of_a_study(capsys, towns, tmp_path):
         assert {row.n for row in rows} == {len(answers.outcomes)}
         made[name] = rows[0]
     digests = {name: row.protocol_digest for name, row in made.items()}
-    assert digests["fair"] == digests["gate"] == digests["set"]
-    assert len({digests[name] for name in ("fair", "wide", "high")}) == 3
+    assert digests["random-yaw"] == digests["verified"] == digests["set"]
+    assert len({digests[name] for name in ("random-yaw", "wide", "high")}) == 3
     assert made["set"].label == "solid, ranges 20"
     assert [made[one].protocol for one in made] == [
-        "fair",
-        "fair",
+        "random-yaw",
+        "random-yaw",
         "own",
         "own",
-        "fair",
+        "random-yaw",
     ]
-    both = ["compare", tmp_path / "fair", tmp_path / "wide"]
+    both = ["compare", tmp_path / "random-yaw", tmp_path / "wide"]
     assert_refused(capsys, both, "no condition in common")
 
 
@@ -116,7 +118,7 @@ def test_protocols_have_names_and_single_options_replace_their_fields(
         names = ("turn_queries", "tilt_queries", "place")
         return tuple(values[name] for name in names)
 
-    assert asked() == asked("--protocol", "fair") == (True, 1.5, "middle")
+    assert asked() == asked("--protocol", "random-yaw") == (True, 1.5, "middle")
     assert asked("--protocol", "paper") == (False, 0.0, "first")
     assert asked("--protocol", "recorded") == (False, 0.0, "middle")
     assert asked("--no-turn-queries") == (False, 1.5, "middle")
@@ -185,7 +187,7 @@ def test_tcr_of_itself_by_any_path(capsys, towns):
 
 def test_tcr_table(capsys, towns):
     a, b = towns / "town_01", towns / "town_02"
-    status, out, _ = run(capsys, "tcr", a, b, "--control", a)
+    status, out, _ = run(capsys, "tcr", a, b, "--no-change", a)
     assert status == 0
     for text in (
         "town_01 <-> town_02",

@@ -30,7 +30,7 @@ def test_centroids_are_those_of_a_map(number, voxel_size):
     )
 
 
-def test_voxels_too_far_apart_to_be_numbered():
+def test_voxels_near_miss_apart_to_be_numbered():
     points = 4e8 * np.random.default_rng(3).normal(size=(300, 3))
     voxels, _ = voxelise(from_xyz(points), 0.5)
     assert len(voxels) > 200

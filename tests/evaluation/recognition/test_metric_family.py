@@ -56,8 +56,8 @@ def row(value, metric, method="m", **changes):
         "factors": {},
         "task": "map",
         "method": method,
-        "gate": False,
-        "protocol": "fair",
+        "verified": False,
+        "protocol": "random-yaw",
     }
     return Row(**{**values, **changes}, metric=metric, value=value)
 
@@ -112,7 +112,7 @@ def test_rounding_is_cut_off_and_no_more():
     for name, value in (
         ("auc", 1.0 + 2e-9),
         ("auc", -2.0),
-        ("kept", -1e-6),
+        ("relative_auc", -1e-6),
         ("auc", math.inf),
         ("with_match", 7.5),
         ("visible_change", -1.1),

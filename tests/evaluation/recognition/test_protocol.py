@@ -167,8 +167,8 @@ def test_it_is_part_of_every_number():
 
 
 def test_the_gate_is_said():
-    open_gate, shut = RetrievalProtocol(), RetrievalProtocol(gate=True)
-    assert "gate" not in open_gate.to_text()
+    open_gate, shut = RetrievalProtocol(), RetrievalProtocol(verified=True)
+    assert "verified" not in open_gate.to_text()
     assert "With geometric verification" in shut.to_text()
     assert (open_gate.gate_radius, shut.gate_radius) == (None, 7.5)
     # Descriptions of a drive do not depend on this option.

@@ -12,8 +12,8 @@ from cns_drake.base import InputError, make_pose, transform
 from evaluation.drives import QuerySensor, cloud_at, open_drive
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition import (
-    FAIR_PROTOCOL,
     PAPER_PROTOCOL,
+    RANDOM_YAW_PROTOCOL,
     RetrievalProtocol,
     describe_drive,
     retrieve,
@@ -223,8 +223,14 @@ def test_overlaps_do_not_depend_on_the_heading(drives):
 
 
 def test_protocols_have_names():
-    assert (FAIR_PROTOCOL.name, PAPER_PROTOCOL.name) == ("fair", "paper")
-    assert replace(FAIR_PROTOCOL, radius=7.5, gate=True).name == "fair"
+    assert (RANDOM_YAW_PROTOCOL.name, PAPER_PROTOCOL.name) == (
+        "random-yaw",
+        "paper",
+    )
+    assert (
+        replace(RANDOM_YAW_PROTOCOL, radius=7.5, verified=True).name
+        == "random-yaw"
+    )
     for changed in (
         {"radius": 12.0},
         {"query_spacing": 9.9},
@@ -233,11 +239,11 @@ def test_protocols_have_names():
         {"exclude_recent": 30.0},
         {"seed": 1},
     ):
-        assert replace(FAIR_PROTOCOL, **changed).name == "own", changed
+        assert replace(RANDOM_YAW_PROTOCOL, **changed).name == "own", changed
     # A method's own number of scans is no change of the protocol.
     btc = make_method("btc", {})
-    assert FAIR_PROTOCOL.of(btc).name_with(btc) == "fair"
-    fewer = replace(FAIR_PROTOCOL, scans_per_place=2)
+    assert RANDOM_YAW_PROTOCOL.of(btc).name_with(btc) == "random-yaw"
+    fewer = replace(RANDOM_YAW_PROTOCOL, scans_per_place=2)
     assert fewer.of(btc).name_with(btc) == "own"
     assert RetrievalProtocol().name == "recorded"
     assert RetrievalProtocol(hide_sector=30.0).name == "own"

@@ -5,7 +5,7 @@ import pytest
 from cns_drake.base import InputError
 from evaluation.results import RESULTS, make_output, remove_earlier
 
-TABLE = "experiment,map,task,method,gate,metric,value,low,high,n\n"
+TABLE = "experiment,map,task,method,verified,metric,value,low,high,n\n"
 OWN = {
     RESULTS: TABLE + "map-update,a,map,b,0,miou,1,,,1\n",
     "queries.csv": "experiment\n",

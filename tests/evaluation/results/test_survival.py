@@ -25,9 +25,9 @@ def rows(shares, method="solid"):
             factors={},
             task="place",
             method=method,
-            gate=False,
+            verified=False,
             protocol="own",
-            metric="kept_strict",
+            metric="relative_auc_strict",
             value=share,
         )
         for city, of_city in enumerate(shares)

@@ -18,15 +18,17 @@ from evaluation.results import (
 
 FACTOR = "query.transient.snow"
 HEADER = (
-    f"experiment,map,database,query,seed,{FACTOR},task,method,gate,protocol,"
+    f"experiment,map,database,query,seed,{FACTOR},task,method,verified,protocol,"
     "metric,value,low,high,n"
 )
-LINE = "e,town,town_01,town_02,1,0.2,place,btc,0,fair,auc,0.25,0.125,0.5,80"
+LINE = (
+    "e,town,town_01,town_02,1,0.2,place,btc,0,random-yaw,auc,0.25,0.125,0.5,80"
+)
 QUERY_HEADER = (
-    "experiment,map,database,query,seed,task,method,gate,protocol,"
+    "experiment,map,database,query,seed,task,method,verified,protocol,"
     "query_frame,correct,has_match,score,first_right_rank"
 )
-QUERY_LINE = "e,town,town_01,town_02,1,place,btc,0,fair,7,1,1,0.5,1"
+QUERY_LINE = "e,town,town_01,town_02,1,place,btc,0,random-yaw,7,1,1,0.5,1"
 
 
 def write(path, *lines):
@@ -51,8 +53,8 @@ def key(**changes):
         "factors": {FACTOR: 0.2},
         "task": "place",
         "method": "btc",
-        "gate": False,
-        "protocol": "fair",
+        "verified": False,
+        "protocol": "random-yaw",
     }
     return {**values, **changes}
 
@@ -146,9 +148,9 @@ def test_programs_with_floats_for_whole_numbers(tmp_path):
     """As pandas writes a column with an empty cell, and truth values."""
     line = replaced(LINE, HEADER, "n", "80.0")
     line = replaced(line, HEADER, "seed", "1.0")
-    line = replaced(line, HEADER, "gate", "True")
+    line = replaced(line, HEADER, "verified", "True")
     (row,) = Results.read(write(tmp_path / "r.csv", HEADER, line)).rows
-    assert (row.n, row.seed, row.gate) == (80, 1, True)
+    assert (row.n, row.seed, row.verified) == (80, 1, True)
 
 
 @pytest.mark.parametrize("seed", [2**64, 10**400])
@@ -174,13 +176,13 @@ def test_seeds_of_any_length(tmp_path, seed):
         ("n", "eighty", ["n: 'eighty'"]),
         ("seed", "1.5", ["seed: '1.5'"]),
         ("seed", "", ["seed: empty"]),
-        ("gate", "2", ["gate: '2' is neither 0 nor 1"]),
-        ("gate", "", ["gate"]),
+        ("verified", "2", ["verified: '2' is neither 0 nor 1"]),
+        ("verified", "", ["verified"]),
         ("metric", "", ["metric: empty"]),
         ("map", " ", ["map: empty"]),
         ("task", "", ["task: empty"]),
         ("method", "", ["method: empty"]),
-        ("protocol", "mine", ["protocol: 'mine'", "fair"]),
+        ("protocol", "mine", ["protocol: 'mine'", "random-yaw"]),
         ("method", "bt\x07c", ["method", "control character"]),
         ("map", '"to\nwn"', ["map", "control character"]),
         ("value", "0.2,5", ["16 cells instead of 15"]),
@@ -199,8 +201,8 @@ def test_values_that_cannot_be(tmp_path, column, cell, words):
 @pytest.mark.parametrize(
     ("metric", "value", "fits"),
     [
-        ("kept", "1.2", True),
-        ("kept", "-0.1", False),
+        ("relative_auc", "1.2", True),
+        ("relative_auc", "-0.1", False),
         ("visible_change", "-0.5", True),
         ("visible_change", "-1.5", False),
         ("tcr_sym", "1.5", False),
@@ -339,7 +341,8 @@ def test_queries_are_read_as_written(tmp_path):
 
 def test_a_few_columns_of_queries_are_enough(tmp_path):
     lines = [
-        QUERY_LINE.replace("fair,7", f"fair,{frame}") for frame in (20, 10, 0)
+        QUERY_LINE.replace("random-yaw,7", f"random-yaw,{frame}")
+        for frame in (20, 10, 0)
     ]
     # Lines of another method stand between.
     lines.insert(1, lines[0].replace("btc", "solid"))
@@ -451,7 +454,7 @@ def test_what_is_written_is_read_value_for_value(tmp_path, seed):
             query=some(WORDS),
             method=f"{some(WORDS)} {k}",
             seed=int(some((0, 1, 2**63 - 1, 2**80))),
-            gate=bool(rng.integers(2)),
+            verified=bool(rng.integers(2)),
             factors={
                 name: value
                 for name in ("query.a;b", "methods.c,d.e", "both.f")
@@ -502,7 +505,7 @@ def test_what_is_written_is_read_value_for_value(tmp_path, seed):
 
 def test_what_is_undefined_is_left_out_and_told():
     rows = [
-        Row(**key(seed=k), metric="kept", value=value)
+        Row(**key(seed=k), metric="relative_auc", value=value)
         for k, value in enumerate((0.5, math.nan, 0.7))
     ]
     known, note = Results.of(rows).defined()

@@ -47,7 +47,7 @@ def test_every_recording_is_read_once_when_it_is_made(tmp_path):
 
 def test_two_protocols_read_a_drive_once(tmp_path):
     """Places of methods that merge scans differ; so do all queries."""
-    both = {name: PROTOCOLS[name] for name in ("fair", "paper")}
+    both = {name: PROTOCOLS[name] for name in ("random-yaw", "paper")}
     jobs = studies.planned(FAMILY, tmp_path, protocols=both)
     names = [job.name for job in jobs]
     assert sum("features of" in name for name in names) == 4
@@ -131,7 +131,7 @@ def test_a_control_serves_both_ways(tmp_path):
 def test_jobs_can_go_anywhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     river = [info(f"riverside_{s}", s, s, "riverside") for s in ("01", "02")]
-    both = {name: PROTOCOLS[name] for name in ("fair", "paper")}
+    both = {name: PROTOCOLS[name] for name in ("random-yaw", "paper")}
     jobs = studies.planned(FAMILY + river, Path("out"), protocols=both)
     names = [job.name for job in jobs]
     assert len(set(names)) == len(names)

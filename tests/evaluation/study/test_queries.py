@@ -39,7 +39,7 @@ def read(path):
         return list(csv.DictReader(stream))
 
 
-KEY = ("database", "query", "method", "gate", "both.stage")
+KEY = ("database", "query", "method", "verified", "both.stage")
 
 
 def answers(folder):
@@ -112,7 +112,7 @@ def test_place_recognition(report):
             "auc": area(rows),
             "r1": recall_at(rows, 1),
             "with_match": sum(r["has_match"] == "1" for r in rows),
-            "kept": kept,
+            "relative_auc": kept,
             "recall_at_full_precision": max(
                 (
                     tp / max(tp + fn, 1)

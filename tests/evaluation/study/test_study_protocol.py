@@ -41,7 +41,7 @@ def test_another_protocol_measures_anew(tmp_path):
         path = studies.report(
             tmp_path / "in", tmp_path / "out", SOLID, {"recorded": protocol}
         )
-        results = Results.read(path.parent).where(gate=False)
+        results = Results.read(path.parent).where(verified=False)
         (places, *_), (matches, *_) = (
             results.where(metric=name).rows for name in ("places", "with_match")
         )

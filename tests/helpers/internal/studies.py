@@ -12,7 +12,7 @@ import pytest
 
 from cns_drake.base import Cluster, Reporter, nothing_left
 from cns_drake.pictures import StageScene
-from evaluation.recognition import FAIR_PROTOCOL
+from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.study import (
     choose_methods,
     chosen_methods,
@@ -60,7 +60,7 @@ def report(recordings, output, methods=None, protocols=None, **more):
             output,
             Cluster(),
             chosen,
-            protocols or {"fair": FAIR_PROTOCOL},
+            protocols or {"random-yaw": RANDOM_YAW_PROTOCOL},
             source=str(recordings),
             **more,
         )
@@ -91,7 +91,7 @@ def planned(recordings, output, methods=None, protocols=None, **more):
                 output,
                 Cluster(),
                 chosen,
-                protocols or {"fair": FAIR_PROTOCOL},
+                protocols or {"random-yaw": RANDOM_YAW_PROTOCOL},
                 source="recordings",
                 **more,
             )

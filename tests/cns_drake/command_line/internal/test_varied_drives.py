@@ -13,7 +13,7 @@ from cns_drake.studies import recording
 from evaluation.change import read_map
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
-from evaluation.recognition import FAIR_PROTOCOL
+from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.results import Results
 from evaluation.study import engine
 
@@ -70,7 +70,7 @@ def test_simulated_and_recorded_drives_agree(tmp_path, monkeypatch):
         (0.0, "town_01_missing_0p0_4"),
         (0.5, "town_01_missing_0p5_4"),
     ):
-        here = results.where(**{"database.missing": part, "gate": False})
+        here = results.where(**{"database.missing": part, "verified": False})
         change = compare_maps(
             read_map(recorded / member), read_map(recorded / "town_02")
         )
@@ -81,7 +81,7 @@ def test_simulated_and_recorded_drives_agree(tmp_path, monkeypatch):
                 open_drive(recorded / member),
                 open_drive(recorded / "town_02"),
                 make_method(method, {}),
-                protocol=FAIR_PROTOCOL,
+                protocol=RANDOM_YAW_PROTOCOL,
             )
             for metric, value in (
                 ("auc", alone.by_mode["all"].auc),

@@ -79,7 +79,7 @@ def test_formats_have_a_number_of_drives(
     [
         (("pr", "a", "b", "--method", "solid", "--scores", "s"), "--mode=all"),
         (("pr", "a", "b", "--method", "solid", "--scores", "s"), "--json"),
-        (("tcr", "a", "b", "--paths"), "--control=c"),
+        (("tcr", "a", "b", "--paths"), "--no-change=c"),
         (("localise", "a", "--estimate", "e"), "--start=1"),
         (("localise", "a", "--estimate", "e"), "--method=gicp"),
         (("localise", "a", "--estimate", "e"), "QUERY"),

@@ -29,7 +29,7 @@ def test_a_chart_is_over_a_factor_or_a_column(read, name):
     [
         "{kind: lines, over: years, metric: auc}",
         "{kind: lines, over: solid.ranges, metric: auc}",
-        "{kind: matrix, over: cause, strips: snow, metric: kept}",
+        "{kind: matrix, over: cause, strips: snow, metric: relative_auc}",
         "{kind: scatter, x: yeers, y: auc}",
         "{kind: lines, over: level, metric: auc, query.yeers: 0}",
     ],

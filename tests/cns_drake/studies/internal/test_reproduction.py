@@ -16,12 +16,12 @@ from cns_drake.studies.reproduction import (
     recording_info,
 )
 from evaluation.methods import registry
-from evaluation.recognition import FAIR_PROTOCOL
+from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.results import QueryRows, Results
 from evaluation.study import drives_by_map, engine, find_recordings
 
 pytestmark = pytest.mark.slow
-FAIR = {"fair": FAIR_PROTOCOL}
+FAIR = {"random-yaw": RANDOM_YAW_PROTOCOL}
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def planned(monkeypatch):
 
     def measure(recordings, output, cluster, methods, protocols, **more):
         assert callable(more["on_note"])
-        assert (list(protocols), more["with_costs"]) == (["fair"], False)
+        assert (list(protocols), more["with_costs"]) == (["random-yaw"], False)
         runs.append({"recordings": {one.name: one for one in recordings}})
         runs[-1]["pages"] = more["pages"]
         runs[-1]["jobs"] = {job.name: job for job in more["further_jobs"]}

@@ -11,7 +11,7 @@ import pytest
 from cns_drake.base import Cluster
 from cns_drake.base.jobs import fingerprint
 from cns_drake.studies import reproduction
-from evaluation.recognition import FAIR_PROTOCOL
+from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.study import engine
 
 pytestmark = [
@@ -71,7 +71,7 @@ def reproduce(tmp_path, monkeypatch):
             [str(town)],
             tmp_path / "out",
             Cluster(),
-            {"fair": FAIR_PROTOCOL},
+            {"random-yaw": RANDOM_YAW_PROTOCOL},
             **options,
         )
         return done[-1]

@@ -28,7 +28,7 @@ from cns_drake.studies.study import plan_study
 from evaluation.change import DriveMap
 from evaluation.maps import CELL_SIZE, VoxelAccumulator
 from evaluation.methods import make_method
-from evaluation.recognition import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.recognition import RANDOM_YAW_PROTOCOL, RetrievalProtocol
 from evaluation.results import QueryRows, Results
 from evaluation.study import engine
 
@@ -145,7 +145,7 @@ def test_the_numbers_are_those_of_the_single_commands(
             voxels.add(drive.scan(frame), drive.X_WS[frame])
         mapped[name] = DriveMap(name, voxels.to_map(), drive.X_WS[:, :3, 3])
     for stage in ("last", "own"):
-        there = {"database__stage": stage, "gate": False}
+        there = {"database__stage": stage, "verified": False}
         found = values(results, **there, task="change")
         change = compare_maps(mapped[stage], mapped["query"]).change
         assert found["tcr_sym"] == pytest.approx(change.symmetric, abs=1e-9)
@@ -165,7 +165,7 @@ def test_the_numbers_are_those_of_the_single_commands(
                 **{**with_it, "database__stage": "last"},
                 task="place",
             )
-            assert found["kept"] == pytest.approx(
+            assert found["relative_auc"] == pytest.approx(
                 found["auc"] / before["auc"], abs=1e-6
             )
     # Stage 01 lacks towers that the query sees.
@@ -298,14 +298,16 @@ def test_protocols_are_factors(town, tmp_path, jobs_done):
                 results,
                 protocol__radius=radius,
                 database__stage=stage,
-                gate=False,
+                verified=False,
             )
             for stage in ("own", "last")
         )
         assert own["auc"] == pytest.approx(alone.auc, abs=1e-9)
         assert own["with_match"] == alone.num_with_match
-        assert last["kept"] == 1.0
-        assert own["kept"] == pytest.approx(own["auc"] / last["auc"], abs=1e-6)
+        assert last["relative_auc"] == 1.0
+        assert own["relative_auc"] == pytest.approx(
+            own["auc"] / last["auc"], abs=1e-6
+        )
 
 
 @pytest.mark.slow
@@ -315,7 +317,7 @@ def test_queries_are_scored_once_for_all_radii(town, tmp_path, jobs_done):
     fields = {"tasks": ["place", "pose", "cost"], "methods": ["ring++"]}
 
     def found(radii, folder):
-        protocol = {"base": "fair", "radius": radii}
+        protocol = {"base": "random-yaw", "radius": radii}
         wanted = experiment(town, **fields, protocol=protocol)
         rows = measure(wanted, tmp_path / folder).rows
         answers = (tmp_path / folder / "queries.csv").read_text().splitlines()
@@ -325,13 +327,13 @@ def test_queries_are_scored_once_for_all_radii(town, tmp_path, jobs_done):
     assert sum(name.startswith("place ") for name in jobs_done[0]) == 1
     for radius in (2.0, 9.0):
         alone, own_answers = found(radius, f"{radius}")
-        assert {row.gate for row in alone} == {False, True}
+        assert {row.verified for row in alone} == {False, True}
         of_radius = [row for row in both if row["protocol.radius"] == radius]
         assert [
-            (row.task, row.gate, row.metric, repr(row.value), repr(row.low))
+            (row.task, row.verified, row.metric, repr(row.value), repr(row.low))
             for row in of_radius
         ] == [
-            (row.task, row.gate, row.metric, repr(row.value), repr(row.low))
+            (row.task, row.verified, row.metric, repr(row.value), repr(row.low))
             for row in alone
         ]
         assert len(answers) - 1 == 2 * (len(own_answers) - 1)
@@ -369,7 +371,7 @@ def test_a_condition_without_draws_is_measured_once(town, tmp_path, jobs_done):
         town,
         query={"transient": {"snow": [0, 0.2]}},
         seeds=[4, 5, 6],
-        protocol={"base": "fair", "query_spacing": 20},
+        protocol={"base": "random-yaw", "query_spacing": 20},
     )
     results = measure(wanted, tmp_path)
     found = {
@@ -383,12 +385,12 @@ def test_a_condition_without_draws_is_measured_once(town, tmp_path, jobs_done):
                 results,
                 query__transient__snow=snow,
                 seed=one,
-                gate=False,
+                verified=False,
             )
             for snow, one in ((0, 4), (0.2, seed))
         )
         if before["auc"]:
-            assert after["kept"] == pytest.approx(
+            assert after["relative_auc"] == pytest.approx(
                 after["auc"] / before["auc"], abs=1e-6
             )
 
@@ -570,7 +572,7 @@ def test_scans_are_localised(town, tmp_path, jobs_done):
 def test_costs_follow_the_number_of_places(town, tmp_path, jobs_done):
     results = measure(experiment(town, tasks=["cost", "place"]), tmp_path)
     cost, place = (
-        values(results, task=task, gate=False) for task in ("cost", "place")
+        values(results, task=task, verified=False) for task in ("cost", "place")
     )
     assert min(cost["query_time"], cost["build_time"]) > 0
     (number,) = {r.n for r in results.rows if r.task == "cost"}
@@ -921,4 +923,4 @@ def test_places_elsewhere_are_described_once(tmp_path):
 
 def test_fair_is_the_protocol_of_studies(town, tmp_path):
     _, (one,) = planned(experiment(town), tmp_path)
-    assert one.protocol == FAIR_PROTOCOL
+    assert one.protocol == RANDOM_YAW_PROTOCOL

@@ -68,7 +68,9 @@ def test_numbers_of_a_pair(found):
     better = [rows.copy() for rows in worse]
     for rows in better:
         rows["translation_error"] = 0.1
-    kept = [n for n in task.numbers(worse, better) if n.metric == "kept"]
+    kept = [
+        n for n in task.numbers(worse, better) if n.metric == "relative_success"
+    ]
     assert [n.value for n in kept] == [0.5] * 4
     ((_, _, columns), *_) = task.answers(worse)
     assert [*columns["correct"]] == [True] * 4 + [False] * 4

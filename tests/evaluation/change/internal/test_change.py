@@ -88,8 +88,8 @@ def test_control_is_compared_within_its_stage(drives, control, partner):
     assert report.control.symmetric == expected
     assert report.control_names == ("_".join(control), "_".join(partner))
     values = report.to_json()
-    assert values["control"]["tcr_sym"] == expected
-    assert values["control"]["between"] == list(report.control_names)
+    assert values["no_change"]["tcr_sym"] == expected
+    assert values["no_change"]["between"] == list(report.control_names)
 
 
 def test_mask_keeps_what_both_drives_passed(drives):

@@ -50,5 +50,5 @@ def test_folders(capsys, roofs, tmp_path, few_methods, monkeypatch):
     status, _, _ = run(capsys, *report, "--lidar", "roof")
     assert status == 0
     # Two drives are compared both ways.
-    rows = Results.read(output).where(metric="auc", gate=False).rows
+    rows = Results.read(output).where(metric="auc", verified=False).rows
     assert len(rows) == 2 * len(few_methods)

@@ -31,7 +31,7 @@ def test_only_its_own_protocol_is_compared():
     assert paper().is_comparable(usual)
     assert paper().printed(usual).auc == 0.0703
     for other in (
-        measured("solid", "fair"),
+        measured("solid", "random-yaw"),
         measured("solid", "own"),
         measured("solid, places 2", "paper"),
         measured("layered-overlap", "paper"),

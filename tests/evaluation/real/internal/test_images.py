@@ -73,7 +73,7 @@ def test_places_are_found_in_images(tmp_path, capsys):
     output = tmp_path / "out"
     status, out, err = ask(capsys, root, output, *methods, "--jobs", 1)
     assert (status, out) == (0, f"{output / 'results.csv'}\n"), err
-    results = Results.read(output).where(task="place", gate=False)
+    results = Results.read(output).where(task="place", verified=False)
     assert {(row.map, row.method) for row in results.rows} == {
         ("kitti_09", "scan-context++")
     }

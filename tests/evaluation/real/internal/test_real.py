@@ -86,7 +86,9 @@ def measured(tmp_path_factory):
 def values(results, **columns):
     return {
         row.metric: row.value
-        for row in results.where(experiment="real", gate=False, **columns).rows
+        for row in results.where(
+            experiment="real", verified=False, **columns
+        ).rows
     }
 
 

@@ -1,4 +1,4 @@
-"""The gate, by poses that are made by hand."""
+"""The verified, by poses that are made by hand."""
 
 import csv
 import json
@@ -167,21 +167,21 @@ def test_a_pair_of_drives(tmp_path):
     free = place_outcome(database, query, Line())
     assert free.by_mode["all"].recall_at_1 == 0.0
     shut = place_outcome(
-        database, query, Line(), protocol=RetrievalProtocol(gate=True)
+        database, query, Line(), protocol=RetrievalProtocol(verified=True)
     )
     assert shut.by_mode["all"].recall_at_1 == 1.0
     # The best place of each query is the farthest one that counts: 4 m ahead;
     # one 9 m ahead is rejected.
     np.testing.assert_allclose(shut.columns["distance"], 4.0)
     plain, gated = (
-        retrieve(database, query, Line(), RetrievalProtocol(gate=gate))
-        for gate in (False, True)
+        retrieve(database, query, Line(), RetrievalProtocol(verified=verified))
+        for verified in (False, True)
     )
     assert not np.isnan(plain.scores).any()
     far = gated.distances >= 7.5 * (1.0 + SOFTNESS)
     assert np.isnan(gated.scores[far]).all()
     # A wider radius accepts places 9 m ahead.
-    wide = RetrievalProtocol(gate=True, radius=10.5)
+    wide = RetrievalProtocol(verified=True, radius=10.5)
     outcome = place_outcome(database, query, Line(), wide)
     np.testing.assert_allclose(outcome.columns["distance"], 9.0)
 
@@ -189,13 +189,13 @@ def test_a_pair_of_drives(tmp_path):
 @pytest.mark.slow
 def test_the_option_of_pr_and_scores(capsys, towns, tmp_path):
     both = [towns / "town_01", towns / "town_02", "--method", "layered-overlap"]
-    status, out, _ = run_program(capsys, "pr", *both, "--gate", "--json")
+    status, out, _ = run_program(capsys, "pr", *both, "--verified", "--json")
     assert status == 0
-    assert json.loads(out)["protocol"]["gate"] is True
-    _, out, _ = run_program(capsys, "pr", *both, "--gate")
+    assert json.loads(out)["protocol"]["verified"] is True
+    _, out, _ = run_program(capsys, "pr", *both, "--verified")
     assert "With geometric verification" in out
     tables = []
-    for options in ((), ("--gate",), ("--gate", "--radius", "1000")):
+    for options in ((), ("--verified",), ("--verified", "--radius", "1000")):
         output = tmp_path / "scores.csv"
         status, _, _ = run_program(
             capsys,
@@ -226,6 +226,6 @@ def test_shipped_methods_take_part(name, towns):
     drive = open_drive(towns / "town_01")
     method = make_method(name, {})
     shut = place_outcome(
-        drive, drive, method, protocol=RetrievalProtocol(gate=True)
+        drive, drive, method, protocol=RetrievalProtocol(verified=True)
     )
     assert shut.by_mode["all"].recall_at_1 == 1.0

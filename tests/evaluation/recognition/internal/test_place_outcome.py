@@ -72,7 +72,7 @@ def numbers(now, before=None):
     """Metric -> value, and metric -> interval."""
     found = list(place_numbers(now, before))
     assert len({one.metric for one in found}) == len(found)
-    assert {(one.method, one.gate, one.n) for one in found} == {
+    assert {(one.method, one.verified, one.n) for one in found} == {
         ("solid", False, len(now.outcomes))
     }
     return (
@@ -86,16 +86,22 @@ def test_the_share_of_auc_that_is_kept():
     # precision.
     before, now = (answered(part(60, kept)) for kept in (54, 45))
     values, intervals = numbers(before, before)
-    assert values["kept"] == values["kept_strict"] == 1.0
-    assert 0.9 < intervals["kept"].low < 1.0 < intervals["kept"].high < 1.1
+    assert values["relative_auc"] == values["relative_auc_strict"] == 1.0
+    assert (
+        0.9
+        < intervals["relative_auc"].low
+        < 1.0
+        < intervals["relative_auc"].high
+        < 1.1
+    )
     assert (values["lost"], values["found"]) == (0.0, 0.0)
     values, intervals = numbers(now, before)
     assert values["r1"] == values["auc"] == 0.75
-    assert values["kept"] == pytest.approx(45 / 54)
+    assert values["relative_auc"] == pytest.approx(45 / 54)
     assert (values["lost"], values["found"]) == (9.0, 0.0)
     low, high = binom.ppf([0.025, 0.975], 54, 45 / 54) / 54
-    assert intervals["kept"].low == pytest.approx(low, abs=0.05)
-    assert intervals["kept"].high == pytest.approx(high, abs=0.05)
+    assert intervals["relative_auc"].low == pytest.approx(low, abs=0.05)
+    assert intervals["relative_auc"].high == pytest.approx(high, abs=0.05)
     low, high = binom.ppf([0.025, 0.975], 60, 0.75) / 60
     assert intervals["r1"].low == pytest.approx(low, abs=0.02)
     assert intervals["r1"].high == pytest.approx(high, abs=0.02)
@@ -115,7 +121,7 @@ def test_intervals_of_kept_are_of_the_blocks_of_now(blocks_before):
         answered(after, blocks=np.arange(40) // 4),
         answered(before, blocks=blocks_before),
     )
-    for name in ("kept", "kept_r1"):
+    for name in ("relative_auc", "relative_r1"):
         assert intervals[name].low == pytest.approx(expected.low)
         assert intervals[name].high == pytest.approx(expected.high)
     assert 0.0 < expected.low < share < expected.high < 1.5
@@ -128,13 +134,20 @@ def test_right_answers_with_the_best_scores():
         answered(part(10, 6), scores), answered(part(10, 10), scores)
     )
     assert values["auc_strict"] == pytest.approx(0.6)
-    assert values["kept_strict"] == pytest.approx(0.6)
-    assert intervals["kept"].low <= values["kept"] <= intervals["kept"].high
+    assert values["relative_auc_strict"] == pytest.approx(0.6)
+    assert (
+        intervals["relative_auc"].low
+        <= values["relative_auc"]
+        <= intervals["relative_auc"].high
+    )
 
 
 def test_without_a_baseline_nothing_is_kept():
     values, _ = numbers(answered(part(10, 6)))
-    assert not {"kept", "kept_strict", "lost", "found"} & values.keys()
+    assert (
+        not {"relative_auc", "relative_auc_strict", "lost", "found"}
+        & values.keys()
+    )
     assert values["with_match"] == 10.0
     assert values["places"] == 9.0
 
@@ -162,15 +175,15 @@ def test_median_errors_are_those_of_right_answers():
 def test_without_anything_to_keep():
     nothing = answered(part(9, 0))
     values, intervals = numbers(nothing, nothing)
-    assert np.isnan(values["kept"])
-    assert np.isnan(intervals["kept"].low)
+    assert np.isnan(values["relative_auc"])
+    assert np.isnan(intervals["relative_auc"].low)
 
 
 def test_other_queries_have_no_pairs():
     """The baseline asks as many queries, or no query has a partner."""
     values, intervals = numbers(answered(part(10, 6)), answered(part(9, 9)))
-    assert values["kept"] == pytest.approx(0.6)
-    assert intervals["kept"] is UNKNOWN
+    assert values["relative_auc"] == pytest.approx(0.6)
+    assert intervals["relative_auc"] is UNKNOWN
     assert not {"lost", "found"} & values.keys()
 
 
@@ -201,7 +214,7 @@ def test_what_is_wrong_with_each_answer():
         "no_place",
         "no_candidate",
         "other_city",
-        "too_far",
+        "near_miss",
         "elsewhere",
     ]
     values, _ = numbers(one, answered([1, 0, 1, 1, 0, 0, 0]))
@@ -215,11 +228,11 @@ def test_what_is_wrong_with_each_answer():
 
 
 @pytest.mark.parametrize("radius", [5.0, 7.5])
-def test_places_within_two_radii_are_too_far(radius):
+def test_places_within_two_radii_are_near_miss(radius):
     outcomes = answered([0, 0]).outcomes
     distances = 2 * radius + np.array([-1e-9, 1e-9])
     found = faults(outcomes, np.arange(2), distances, radius)
-    assert found.tolist() == ["too_far", "elsewhere"]
+    assert found.tolist() == ["near_miss", "elsewhere"]
 
 
 def test_overlaps_that_are_not_known():
@@ -248,7 +261,7 @@ def test_columns_hold_all_that_numbers_follow_from(blocks):
     one = PlaceOutcome.of(
         "solid rings=8",
         make_method("solid", {}),
-        RetrievalProtocol(gate=True),
+        RetrievalProtocol(verified=True),
         retrieval,
         QueryDrive("town_03", np.arange(8) * 50, np.arange(24.0).reshape(8, 3)),
         ["town_01"] * 6 + ["town_02"] * 3,

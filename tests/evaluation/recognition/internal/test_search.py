@@ -7,7 +7,7 @@ import pytest
 
 from evaluation.methods import make_method
 from evaluation.recognition import (
-    FAIR_PROTOCOL,
+    RANDOM_YAW_PROTOCOL,
     DescribedScans,
     DriveDescriptors,
     StoredDrives,
@@ -114,7 +114,7 @@ def test_groups_give_the_same_as_the_whole(name, settings):
     method = make_method(name, settings)
     assert method.divides
     drives, queries = drives_of(method), queries_of(method)
-    protocol = replace(FAIR_PROTOCOL, radius=25.0)
+    protocol = replace(RANDOM_YAW_PROTOCOL, radius=25.0)
     found = []
     for most_bytes in (40, 10):
         places = stored(drives, most_bytes, [])

@@ -11,7 +11,7 @@ STAGE = "both.stage"
 DUMBBELL = {"kind": "dumbbell", "over": STAGE, "metric": "auc"}
 
 
-def key(method, factors, gate=False, town="town"):
+def key(method, factors, verified=False, town="town"):
     return {
         "experiment": "e",
         "map": town,
@@ -21,16 +21,18 @@ def key(method, factors, gate=False, town="town"):
         "factors": factors,
         "task": "place",
         "method": method,
-        "gate": gate,
-        "protocol": "fair",
+        "verified": verified,
+        "protocol": "random-yaw",
     }
 
 
 def table(values, over=STAGE, ends=("last", "own")):
-    """Returns rows: (method, gate, map) -> AUC before and after."""
+    """Returns rows: (method, verified, map) -> AUC before and after."""
     return Results.of(
-        Row(**key(method, {over: at}, gate, town), metric="auc", value=value)
-        for (method, gate, town), both in values.items()
+        Row(
+            **key(method, {over: at}, verified, town), metric="auc", value=value
+        )
+        for (method, verified, town), both in values.items()
         for at, value in zip(ends, both, strict=True)
     )
 
@@ -120,7 +122,7 @@ def test_a_headline_of_an_own_experiment(values, text):
 
 def test_lines_go_from_the_least_to_the_greatest_number():
     results = table({("btc", False, "a"): (0.4, 0.8)}, "query.years", (20, 0))
-    chart = {"kind": "lines", "over": "query.years", "metric": "kept"}
+    chart = {"kind": "lines", "over": "query.years", "metric": "relative_auc"}
     assert headline(results, chart) == (
         "A query of age 20 instead of 0 years costs BTC 50 % of the AUC"
     )
@@ -140,8 +142,8 @@ def test_a_scatter_of_one_factor_tells_its_cost():
 def test_without_a_baseline_no_cost_is_told():
     results = table(
         {
-            (name, gate, "a"): (auc,)
-            for name, gate, auc in (
+            (name, verified, "a"): (auc,)
+            for name, verified, auc in (
                 ("btc", False, 0.4),
                 ("btc", True, 0.6),
                 ("solid", False, 0.2),

@@ -42,8 +42,8 @@ def row(value, factors, method="mine", metric="auc", town="town", **changes):
         "factors": factors,
         "task": "place",
         "method": method,
-        "gate": False,
-        "protocol": "fair",
+        "verified": False,
+        "protocol": "random-yaw",
     }
     return Row(**{**values, **changes}, metric=metric, value=value)
 
@@ -64,7 +64,7 @@ def caused():
             1.0 - 0.1 * level * (name == "solid") * (cause == "parked_cars"),
             {"cause": cause, "level": level},
             name,
-            "kept",
+            "relative_auc",
         )
         for name in PARTS
         for cause, levels in (("none", (0,)), ("parked_cars", (1, 2, 4)))
@@ -131,7 +131,7 @@ def test_a_matrix_has_strips_and_the_last_number():
         "kind": "matrix",
         "over": "cause",
         "strips": "level",
-        "metric": "kept",
+        "metric": "relative_auc",
     }
     drawn = draw_chart(chart, caused())
     (axes,) = drawn.figure.axes
@@ -218,12 +218,15 @@ def test_a_loss_that_is_certain_is_bold():
     rows = [
         replace(row(0.7, {"cause": c}, metric=metric), low=low, high=high)
         for c, (low, high) in ends.items()
-        for metric in ("kept", "auc")
+        for metric in ("relative_auc", "auc")
     ]
     # Of two results of one cause, neither interval is that of the mean.
     twice = {"low": 0.6, "high": 0.8}
     rows += [
-        replace(row(0.7, {"cause": "rain"}, metric="kept", seed=seed), **twice)
+        replace(
+            row(0.7, {"cause": "rain"}, metric="relative_auc", seed=seed),
+            **twice,
+        )
         for seed in (1, 2)
     ]
 
@@ -234,7 +237,7 @@ def test_a_loss_that_is_certain_is_bold():
         (axes,) = figure.axes
         return caption, [text.get_fontweight() for text in axes.texts]
 
-    caption, found = weights("kept")
+    caption, found = weights("relative_auc")
     assert found == ["bold", "normal", "normal", "normal"]
     assert caption.endswith("bold where its 95 % interval lies below 100")
     caption, found = weights("auc")
@@ -286,11 +289,11 @@ def test_a_dumbbell_joins_both_ends():
 def test_a_dumbbell_has_a_panel_with_verification():
     rows = [
         replace(
-            row(value, {"both.stage": stage}, gate=gate),
+            row(value, {"both.stage": stage}, verified=verified),
             low=value - 0.125,
             high=value + 0.125,
         )
-        for gate, after in ((False, 0.25), (True, 0.5))
+        for verified, after in ((False, 0.25), (True, 0.5))
         for stage, value in (("last", 0.75), ("own", after))
     ]
     chart = {"kind": "dumbbell", "over": "both.stage", "metric": "auc"}
@@ -304,8 +307,8 @@ def test_a_dumbbell_has_a_panel_with_verification():
                 assert ends in lines
         panels = [axes.get_title(loc="left") for axes in drawn.figure.axes]
         assert [name.split()[0] for name in panels] == ["Without", "With"]
-    assert "gate 0 or 1" in drawn.source
-    (axes,) = draw_chart({**chart, "gate": 1}, Results.of(rows)).figure.axes
+    assert "verified 0 or 1" in drawn.source
+    (axes,) = draw_chart({**chart, "verified": 1}, Results.of(rows)).figure.axes
     assert (0.75, 0.5) in {tuple(line.get_xdata()) for line in axes.get_lines()}
 
 
@@ -391,7 +394,7 @@ def test_a_scatter_says_why_its_curves_end():
 
 
 def test_other_keys_select_rows():
-    rows = [*aged().rows, row(0.01, {YEARS: 0}, "mine", gate=True)]
+    rows = [*aged().rows, row(0.01, {YEARS: 0}, "mine", verified=True)]
     chart = {"kind": "lines", "over": YEARS, "metric": "auc", "seed": 2}
     drawn = draw_chart({**chart, "method": ["mine"]}, Results.of(rows))
     (axes,) = drawn.figure.axes
@@ -429,11 +432,11 @@ def test_times_are_on_a_logarithmic_axis():
 def test_the_task_is_place_or_the_first_with_the_metric(tasks, share):
     shares = {"place": 0.9, "localise": 0.8, "pose": 0.7}
     rows = [
-        row(shares[task], {YEARS: year}, metric="kept", task=task)
+        row(shares[task], {YEARS: year}, metric="relative_auc", task=task)
         for task in tasks
         for year in (0, 5)
     ]
-    chart = {"kind": "lines", "over": YEARS, "metric": "kept"}
+    chart = {"kind": "lines", "over": YEARS, "metric": "relative_auc"}
     (axes,) = draw_chart(chart, Results.of(rows)).figure.axes
     (line,) = axes.get_lines()
     np.testing.assert_allclose(line.get_ydata(), share)
@@ -480,7 +483,10 @@ def test_faults_of_a_chart_are_named(chart, words):
     ("chart", "results"),
     [
         ({"kind": "lines", "over": YEARS, "metric": "auc"}, aged()),
-        ({"kind": "matrix", "over": "cause", "metric": "kept"}, caused()),
+        (
+            {"kind": "matrix", "over": "cause", "metric": "relative_auc"},
+            caused(),
+        ),
         ({"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered()),
         ({"kind": "dumbbell", "over": YEARS, "metric": "auc"}, aged()),
     ],
@@ -770,14 +776,14 @@ def test_counts_are_whole_on_a_page(tmp_path):
 
 
 def test_a_page_without_a_chart_or_a_value(tmp_path):
-    results = Results.of([row(math.nan, {YEARS: 0}, metric="kept")])
-    chart = {"kind": "lines", "over": YEARS, "metric": "kept"}
+    results = Results.of([row(math.nan, {YEARS: 0}, metric="relative_auc")])
+    chart = {"kind": "lines", "over": YEARS, "metric": "relative_auc"}
     path = write_page(results, None, tmp_path, title="none", charts=[chart])
     assert "<h1>none</h1>" in path.read_text()
     assert "Chart 1 is left out" in path.read_text()
     assert "as undefined: kept (1 of 1)." in path.read_text()
     header, first, _ = (tmp_path / "summaries.csv").read_text().splitlines()
-    assert header == "what,map,task,method,gate,value,low,high,n"
+    assert header == "what,map,task,method,verified,value,low,high,n"
     # A single year without a share has no lifetime.
     assert first.endswith("left (of 0),town,place,mine,0,,,,")
 
@@ -789,7 +795,7 @@ def curve_tables(levels=(0,)):
         key = {
             "experiment": "e", "map": "town", "database": "a", "query": "b",
             "seed": 1, "factors": {YEARS: level}, "task": "place",
-            "method": "solid", "gate": False, "protocol": "fair",
+            "method": "solid", "verified": False, "protocol": "random-yaw",
         }  # fmt: skip
         rows.append(Row(**key, metric="auc", value=0.5))
         columns = {
@@ -852,7 +858,10 @@ def draw_all(folder):
     for chart, results in (
         ({"kind": "lines", "over": YEARS, "metric": "auc"}, aged()),
         ({"kind": "dumbbell", "over": YEARS, "metric": "auc"}, aged()),
-        ({"kind": "matrix", "over": "cause", "metric": "kept"}, caused()),
+        (
+            {"kind": "matrix", "over": "cause", "metric": "relative_auc"},
+            caused(),
+        ),
         ({"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered()),
     ):
         drawn = draw_chart(chart, results, alone=True)

@@ -21,7 +21,9 @@ SNOW = "query.transient.snow"
 BLOCKS = np.repeat(np.arange(10), 2)
 
 
-def key(factors, method="btc", seed=1, task="place", gate=False, town="town"):
+def key(
+    factors, method="btc", seed=1, task="place", verified=False, town="town"
+):
     return {
         "experiment": "e",
         "map": town,
@@ -31,8 +33,8 @@ def key(factors, method="btc", seed=1, task="place", gate=False, town="town"):
         "factors": factors,
         "task": task,
         "method": method,
-        "gate": gate,
-        "protocol": "fair",
+        "verified": verified,
+        "protocol": "random-yaw",
     }
 
 
@@ -102,7 +104,7 @@ def test_two_causes_cost_more_than_the_product():
 def test_lifetimes_of_seeds_surround_that_of_the_mean():
     kept = {0: {0: 1.0}, 10: {1: 0.8, 2: 0.6}, 20: {1: 0.4, 2: 0.2}}
     rows = [
-        row(value, {YEARS: year}, metric="kept", seed=seed)
+        row(value, {YEARS: year}, metric="relative_auc", seed=seed)
         for year, some in kept.items()
         for seed, value in some.items()
     ]
@@ -131,7 +133,7 @@ def test_growth_of_a_power_law():
         at = {"database.distractors": number - 50}
         rows += [
             row(float(number), at, metric="places"),
-            row(float(number), at, metric="places", gate=True),
+            row(float(number), at, metric="places", verified=True),
             row(3.0 * number**1.5, at, metric="query_time", task="cost"),
         ]
     found = summaries.growths(Results.of(rows), "places", "query_time")
@@ -186,7 +188,7 @@ def test_what_is_kept_is_the_median_of_what_is_known():
 def test_summaries_of_charts():
     rows = [
         *(
-            row(value, {YEARS: year}, metric="kept")
+            row(value, {YEARS: year}, metric="relative_auc")
             for year, value in ((0, 1.0), (10, 0.6))
         ),
         *(
@@ -210,7 +212,7 @@ def test_summaries_of_charts():
         Results.of(rows),
         queries,
         [
-            {**lines, "metric": "kept"},
+            {**lines, "metric": "relative_auc"},
             {**lines, "metric": "query_time"},
             {"kind": "scatter", "x": "query.nth", "y": "auc"},
             {"kind": "matrix", "over": "method", "metric": "auc"},
@@ -302,13 +304,13 @@ def test_a_detector_is_worth_its_share_of_the_way_to_the_truth():
         *maintained({"none": 0.4, "truth": 0.8, "distance": 0.6}, seed=2),
         *maintained({"none": 0.5, "truth": 0.6, "m3c2": 0.4}, method="solid"),
         # Nothing to gain; and no exact updates, or others are unknown.
-        *maintained({"none": 0.5, "truth": 0.5, "m3c2": 0.5}, gate=True),
+        *maintained({"none": 0.5, "truth": 0.5, "m3c2": 0.5}, verified=True),
         *maintained({"none": 0.5, "distance": 0.9}, year=9),
         *maintained({"none": 0.5, "truth": 0.9, "m3c2": math.nan}, year=7),
     ]
     charts = [{"kind": "matrix", "over": MAINTAIN, "metric": "r1"}]
     found = summaries.summarised(Results.of(rows), None, charts)
-    assert [(one.method, one.gate, one.n) for one in found] == [
+    assert [(one.method, one.verified, one.n) for one in found] == [
         ("btc", False, 2),
         ("solid", False, 1),
     ]

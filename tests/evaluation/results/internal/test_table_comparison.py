@@ -14,7 +14,7 @@ from scipy.stats import kendalltau
 
 from cns_drake.base import InputError
 from evaluation.command_line import name_results
-from evaluation.recognition import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.recognition import RANDOM_YAW_PROTOCOL, RetrievalProtocol
 from evaluation.results import (
     LAST,
     OWN,
@@ -40,8 +40,8 @@ def key(method, town="town", **changes):
         "factors": {},
         "task": "place",
         "method": method,
-        "gate": False,
-        **made_by(FAIR_PROTOCOL),
+        "verified": False,
+        **made_by(RANDOM_YAW_PROTOCOL),
     }
     return {**values, **changes}
 
@@ -87,7 +87,7 @@ def shipped(**columns):
 def test_the_shipped_tables_hold_the_published_numbers():
     """Both files of the documents, read by another reader."""
     for name, source, version in (
-        ("stages.csv", "docs/notes/results_fair.csv", None),
+        ("stages.csv", "docs/notes/results_random_yaw.csv", None),
         ("fresh.csv", "docs/notes/fresh.csv", "version"),
     ):
         found = {
@@ -98,7 +98,7 @@ def test_the_shipped_tables_hold_the_published_numbers():
                 row.method,
                 row["both.redraw.frozen"],
                 row["both.stage"],
-                row.gate,
+                row.verified,
                 row.metric,
             ): row
             for row in Results.read(_BASELINES / name).rows
@@ -123,17 +123,17 @@ def test_the_shipped_tables_hold_the_published_numbers():
                 ("auc", ("own", False, "auc")),
                 ("auc_strict_unchanged", ("last", False, "auc_strict")),
                 ("auc_strict", ("own", False, "auc_strict")),
-                ("kept_strict", ("own", False, "kept_strict")),
+                ("relative_auc_strict", ("own", False, "relative_auc_strict")),
                 ("r1", ("own", False, "r1")),
-                ("kept", ("own", False, "kept")),
-                ("gate_auc", ("own", True, "auc")),
-                ("gate_unchanged_auc", ("last", True, "auc")),
+                ("relative_auc", ("own", False, "relative_auc")),
+                ("verified_auc", ("own", True, "auc")),
+                ("verified_unchanged_auc", ("last", True, "auc")),
             ):
                 if column in line:
                     row = found.pop((*drives, *place))
                     assert row.value == float(line[column])
             # The interval of the share that is kept.
-            if row := found.get((*drives, "own", False, "kept")):
+            if row := found.get((*drives, "own", False, "relative_auc")):
                 ends = float(line["kept_low"]), float(line["kept_high"])
                 assert (row.low, row.high) == ends
         # The files of the documents have few numbers with verification.
@@ -148,7 +148,12 @@ def test_the_shipped_tables_hold_the_published_numbers():
 def test_an_entrant_stands_among_the_shipped(tmp_path):
     """Each value is just above the best shipped method's, or below it."""
     best = {}
-    changed = {"map": "suburbia", STAGE: OWN, "metric": "auc", "gate": False}
+    changed = {
+        "map": "suburbia",
+        STAGE: OWN,
+        "metric": "auc",
+        "verified": False,
+    }
     for row in shipped(**changed):
         condition = row.without("method")
         if condition not in best or best[condition].value < row.value:
@@ -441,7 +446,7 @@ def test_opposite_rankings(tmp_path):
 
 def test_rankings_are_of_one_protocol(tmp_path):
     parts = {"a": {"x": 0.1, "y": 0.4}}
-    fair = write_table(tmp_path / "fair", parts)
+    fair = write_table(tmp_path / "random-yaw", parts)
     rows = [
         Row(**key(method, protocol=name), metric="auc", value=value)
         for name in ("paper", "own")
@@ -524,20 +529,22 @@ def test_queries_without_blocks_are_noted(tmp_path):
 
 def test_rows_by_another_protocol_are_left_out_and_named(tmp_path):
     """They have the name of no shipped protocol, and each digest is its own."""
-    fair = made_by(FAIR_PROTOCOL)
+    fair = made_by(RANDOM_YAW_PROTOCOL)
     wide, coarse = (
-        made_by(replace(FAIR_PROTOCOL, **one))
+        made_by(replace(RANDOM_YAW_PROTOCOL, **one))
         for one in ({"radius": 25.0}, {"place_spacing": 8})
     )
     assert [one["protocol"] for one in (fair, wide, coarse)] == [
-        "fair",
+        "random-yaw",
         "own",
         "own",
     ]
     both = {"x": 0.5, "y": 0.4}
     one = write_table(tmp_path / "one", {"a": both}, **fair)
     two = write_table(tmp_path / "two", {"a": {"z": 0.9}}, **wide)
-    with pytest.raises(InputError, match="protocol: fair in one, but own in t"):
+    with pytest.raises(
+        InputError, match="protocol: random-yaw in one, but own in t"
+    ):
         compare_tables([one, two])
     three = write_table(tmp_path / "three", {"a": {"z": 0.9}}, **coarse)
     with pytest.raises(InputError, match=f"digest: {wide['protocol_digest']}"):
@@ -552,22 +559,22 @@ def test_rows_by_another_protocol_are_left_out_and_named(tmp_path):
     ]
     assert (
         f"mixed: left out, by protocol own ({wide['protocol_digest']}), not"
-        f" fair ({fair['protocol_digest']}) in one: 1 conditions"
+        f" random-yaw ({fair['protocol_digest']}) in one: 1 conditions"
     ) in found.notes
 
 
 def test_settings_outside_of_the_protocol_count():
-    """The height of a LiDAR changes numbers; the gate has its own column."""
-    fair = made_by(FAIR_PROTOCOL)
-    assert made_by(replace(FAIR_PROTOCOL, gate=True)) == fair
-    other = made_by(FAIR_PROTOCOL, {"sensor_height": 2.0})
+    """The height of a LiDAR changes numbers; verification has a column."""
+    fair = made_by(RANDOM_YAW_PROTOCOL)
+    assert made_by(replace(RANDOM_YAW_PROTOCOL, verified=True)) == fair
+    other = made_by(RANDOM_YAW_PROTOCOL, {"sensor_height": 2.0})
     assert other["protocol"] == "own"
     assert other["protocol_digest"] != fair["protocol_digest"]
     # A whole number is the same number; a seed counts where it draws.
-    same = replace(FAIR_PROTOCOL, query_spacing=10)
+    same = replace(RANDOM_YAW_PROTOCOL, query_spacing=10)
     assert made_by(same) == fair
     assert made_by(RetrievalProtocol(seed=4))["protocol"] == "recorded"
-    assert made_by(replace(FAIR_PROTOCOL, seed=4))["protocol"] == "own"
+    assert made_by(replace(RANDOM_YAW_PROTOCOL, seed=4))["protocol"] == "own"
 
 
 @pytest.mark.parametrize("fault", ["value", "n"])
@@ -618,7 +625,7 @@ def test_what_a_table_does_not_say_is_unknown(tmp_path):
     )
     assert {row.protocol_digest for row in Results.read(file).rows} == {""}
     new = write_table(
-        tmp_path / "new", {"a": {"z": 0.3}}, **made_by(FAIR_PROTOCOL)
+        tmp_path / "new", {"a": {"z": 0.3}}, **made_by(RANDOM_YAW_PROTOCOL)
     )
     found = compare_tables([folder, new])
     assert len(found.ranked) == 3

@@ -62,12 +62,12 @@ def test_pr_has_the_rows_of_a_report(capsys, towns, report, tmp_path, method):
     for key, numbers in found.items():
         np.testing.assert_equal(numbers, expected[key])
     answers = {
-        (one.method, one.gate): one.columns
+        (one.method, one.verified): one.columns
         for one in QueryRows.read(report).answers
         if (one.database, one["both.stage"]) == ("town_01", "own")
     }
     for one in QueryRows.read(tmp_path).answers:
-        of_report = answers[one.method, one.gate]
+        of_report = answers[one.method, one.verified]
         assert one.columns.keys() == of_report.keys()
         for name, values in one.columns.items():
             np.testing.assert_array_equal(values, of_report[name])

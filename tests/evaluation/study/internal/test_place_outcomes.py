@@ -114,7 +114,7 @@ def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
             database,
             query,
             make_method(choice.name, dict(choice.settings)),
-            protocol=RetrievalProtocol(gate=one.is_gated),
+            protocol=RetrievalProtocol(verified=one.is_gated),
         )
         for name in ("best_scores", "is_right", "first_right_ranks"):
             np.testing.assert_array_equal(

@@ -246,7 +246,7 @@ def test_no_recordings_or_too_many(tmp_path):
 
 @pytest.fixture(scope="module")
 def both_protocols():
-    return {name: PROTOCOLS[name] for name in ("fair", "paper")}
+    return {name: PROTOCOLS[name] for name in ("random-yaw", "paper")}
 
 
 @pytest.fixture(scope="module")
@@ -283,7 +283,7 @@ def test_each_protocol_is_that_of_the_single_command(
     results = Results.read(report).where(
         {"both.stage": "own"},
         metric="auc",
-        gate=False,
+        verified=False,
         database="metropolis_01",
     )
     found = {(row.method, row.protocol): row for row in results.rows}
@@ -303,24 +303,24 @@ def test_each_protocol_is_that_of_the_single_command(
 
 def test_the_main_protocol_alone_has_the_control(report):
     results = Results.read(report).where(
-        task="place", gate=False, database="metropolis_01"
+        task="place", verified=False, database="metropolis_01"
     )
     further = results.where(protocol="paper")
     assert further.distinct("both.stage") == ["own"]
-    assert further.where(metric="kept").rows == ()
+    assert further.where(metric="relative_auc").rows == ()
     # Layered overlap is none of the paper's methods.
     assert further.distinct("method") == ["btc", "scan-context++", "solid"]
-    assert "is measured by the protocol fair only" in (
+    assert "is measured by the protocol random-yaw only" in (
         report / "index.html"
     ).read_text("utf-8")
-    main = results.where(protocol="fair")
+    main = results.where(protocol="random-yaw")
     for method in main.distinct("method"):
         last, own, kept = (
             main.where({"both.stage": stage}, metric=metric, method=method).rows
             for stage, metric in (
                 ("last", "auc"),
                 ("own", "auc"),
-                ("own", "kept"),
+                ("own", "relative_auc"),
             )
         )
         if last[0].value > 0.0:
@@ -337,7 +337,7 @@ def test_a_protocol_beside_another_changes_no_number(
         assert alone.factors == ("both.stage",)
         assert both.factors == ("both.stage", "protocol.base")
     alone = Results.read(tmp_path).rows
-    both = Results.read(report).where(protocol="fair").rows
+    both = Results.read(report).where(protocol="random-yaw").rows
     assert len(alone) == len(both)
     for one, other in zip(alone, both, strict=True):
         assert one.without("protocol.base") == other.without("protocol.base")
@@ -354,7 +354,7 @@ def test_change_beside_the_paper(report):
             {"both.stage": "own"},
             metric="tcr_sym",
             database="metropolis_01",
-            protocol="fair",
+            protocol="random-yaw",
         )
         .rows
     )
@@ -373,7 +373,7 @@ def test_recognition_beside_the_paper(report):
             method="scan-context++",
             database="metropolis_01",
             protocol="paper",
-            gate=False,
+            verified=False,
         )
         .rows
     )
@@ -455,8 +455,8 @@ def test_a_city_of_one_s_own_without_a_control(tmp_path, few_methods):
     )
     results = Results.read(path.parent)
     assert results.distinct("both.stage") == ["own"]
-    assert results.where(metric="kept").rows == ()
-    areas = results.where(metric="auc", gate=False).rows
+    assert results.where(metric="relative_auc").rows == ()
+    areas = results.where(metric="auc", verified=False).rows
     assert len(areas) == 2 * len(few_methods)  # Both ways.
     text = path.read_text()
     assert "KAIST" not in text

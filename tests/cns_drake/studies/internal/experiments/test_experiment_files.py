@@ -59,7 +59,7 @@ def test_settings_of_optional_methods_need_no_entry_in_the_file(read):
 def test_a_smaller_experiment(read):
     text = """
     database: {years: [0, 5, 20], rates: 2}
-    protocol: fair
+    protocol: random-yaw
     quick:
       database: {years: [0, 20]}
       protocol: {query_spacing: 30.0}
@@ -67,7 +67,7 @@ def test_a_smaller_experiment(read):
     assert read(text).database["years"] == [0, 5, 20]
     found = read(text, quick=True)
     assert found.database == {"years": [0, 20], "rates": 2}
-    assert found.protocol == {"base": "fair", "query_spacing": 30.0}
+    assert found.protocol == {"base": "random-yaw", "query_spacing": 30.0}
     with pytest.raises(InputError, match=r"mine\.yaml: quick: missing"):
         read("about: all of it\n", quick=True)
 

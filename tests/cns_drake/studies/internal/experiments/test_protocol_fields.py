@@ -10,31 +10,31 @@ from cns_drake.studies.experiments.protocol_fields import (
     protocol_from_fields,
 )
 from evaluation.recognition import (
-    FAIR_PROTOCOL,
     PAPER_PROTOCOL,
+    RANDOM_YAW_PROTOCOL,
     RetrievalProtocol,
 )
 from evaluation.results import PROTOCOL_BASE
 
 
 def test_protocols():
-    assert protocol_from_fields({}, "") == FAIR_PROTOCOL
+    assert protocol_from_fields({}, "") == RANDOM_YAW_PROTOCOL
     assert protocol_from_fields({"base": "paper"}, "") == PAPER_PROTOCOL
     found = protocol_from_fields({"base": "recorded", "radius": 5}, "")
     assert found == RetrievalProtocol(radius=5)
 
 
 def test_a_list_of_names_is_a_factor():
-    experiment = Experiment(name="e", protocol=["fair", "paper"])
+    experiment = Experiment(name="e", protocol=["random-yaw", "paper"])
     found = conditions(experiment)
     assert [one.factors for one in found] == [
-        {PROTOCOL_BASE: "fair"},
+        {PROTOCOL_BASE: "random-yaw"},
         {PROTOCOL_BASE: "paper"},
     ]
     # Each protocol has a baseline of its own.
     assert all(one.is_baseline for one in found)
     assert [condition_protocol(one, "") for one in found] == [
-        FAIR_PROTOCOL,
+        RANDOM_YAW_PROTOCOL,
         PAPER_PROTOCOL,
     ]
 

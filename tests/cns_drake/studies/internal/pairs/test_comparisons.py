@@ -690,7 +690,7 @@ FAULTS = [
     ("query: {turn_queries: 1}", "query: turn_queries: "),
     ("database: {missing: 1.1}", "database: missing: "),
     ("database: {missing: much}", "database: missing: "),
-    ("protocol: quick", "protocol.base: 'quick' is none of fair, paper"),
+    ("protocol: quick", "protocol.base: 'quick' is none of random-yaw, paper"),
     ("protocol: {radius: -1}", "protocol.radius: -1 is not positive"),
     ("protocol: {radius: true}", "protocol: radius: "),
     ("protocol: {radius: [5, far]}", "protocol: radius: "),
@@ -698,7 +698,7 @@ FAULTS = [
     ("protocol: {place_spacing: 0}", "protocol.place_spacing: 0 is not"),
     ("protocol: {scans_per_place: 2.5}", "protocol: scans_per_place: "),
     ("protocol: {raduis: 3}", "protocol: raduis: Extra .* mean radius"),
-    ("protocol: {gate: true}", "protocol: gate: Extra"),
+    ("protocol: {verified: true}", "protocol: verified: Extra"),
     ("protocol: {overlap: 0.5}", "protocol: overlap: Extra"),
 ]
 

@@ -465,7 +465,7 @@ def test_places_memory_and_answers_of_several_sessions(
 
     def of(metric, task, method="solid"):
         rows = results.where(metric=metric, task=task, method=method).rows
-        return [row.value for row in rows if not row.gate]
+        return [row.value for row in rows if not row.verified]
 
     places = of("places", "place")
     assert places[2] == places[0] + places[1]
@@ -524,7 +524,7 @@ def test_maps_are_maintained(town, tmp_path, jobs_done):
     (jobs,) = jobs_done
     upkeep = [one for one in jobs if one.startswith("upkeep ")]
     assert len(upkeep) == 2
-    rows = results.where(metric="places", task="place", gate=False).rows
+    rows = results.where(metric="places", task="place", verified=False).rows
     # No place is added or lost.
     assert len(rows) == 3
     assert len({row.value for row in rows}) == 1

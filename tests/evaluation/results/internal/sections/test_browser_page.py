@@ -281,7 +281,7 @@ def test_no_query_is_shown_if_none_fits(reader):
     parts = """["#no-query", ".views", ".steering", ".lists"].map(
       (name) => document.querySelector(name).offsetHeight > 0)"""
     assert reader.evaluate(parts) == [False, True, True, True]
-    choose(reader, "why", "too_far")
+    choose(reader, "why", "near_miss")
     assert reader.evaluate('byId("filtered").value') == "0 of 5"
     assert reader.evaluate(parts) == [True, False, False, False]
     assert status(reader) == ""

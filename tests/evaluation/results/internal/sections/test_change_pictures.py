@@ -7,7 +7,7 @@ import pytest
 
 from cns_drake.base import GONE_RGB, NEW_RGB, from_xyz
 from evaluation.maps import VoxelAccumulator
-from evaluation.recognition import FAIR_PROTOCOL
+from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.results import (
     LAST,
     OWN,
@@ -104,7 +104,7 @@ def test_a_change_stands_once_beside_that_of_its_control():
     def row(database, query, stage, metric, value):
         return Row(
             "stages", "town", database, query, 1, {STAGE: stage}, "change", "",
-            False, metric=metric, value=value, **made_by(FAIR_PROTOCOL),
+            False, metric=metric, value=value, **made_by(RANDOM_YAW_PROTOCOL),
         )  # fmt: skip
 
     results = Results.of(

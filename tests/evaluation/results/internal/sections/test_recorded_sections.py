@@ -112,7 +112,7 @@ def test_reasons_are_offered(text):
     assert re.findall(r'value="(\w*)">([\w ]+)<', choice) == [
         ("", "any reason"),
         ("no_candidate", "no candidate"),
-        ("too_far", "near miss"),
+        ("near_miss", "near miss"),
         ("elsewhere", "elsewhere"),
     ]
 
