@@ -510,5 +510,5 @@ def test_what_is_undefined_is_left_out_and_told():
     ]
     known, note = Results.of(rows).defined()
     assert [row.value for row in known.rows] == [0.5, 0.7]
-    assert "kept (1 of 3)" in note
+    assert "relative_auc (1 of 3)" in note
     assert known.defined() == (known, "")

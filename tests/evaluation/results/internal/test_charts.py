@@ -143,7 +143,7 @@ def test_a_matrix_has_strips_and_the_last_number():
         "none",
         "parked cars",
     ]
-    assert drawn.message == ("Least retained share: 0.60 (SOLiD; parked cars)")
+    assert drawn.message == ("Least relative AUC: 0.60 (SOLiD; parked cars)")
     assert not drawn.legend
 
 
@@ -781,7 +781,7 @@ def test_a_page_without_a_chart_or_a_value(tmp_path):
     path = write_page(results, None, tmp_path, title="none", charts=[chart])
     assert "<h1>none</h1>" in path.read_text()
     assert "Chart 1 is left out" in path.read_text()
-    assert "as undefined: kept (1 of 1)." in path.read_text()
+    assert "as undefined: relative_auc (1 of 1)." in path.read_text()
     header, first, _ = (tmp_path / "summaries.csv").read_text().splitlines()
     assert header == "what,map,task,method,verified,value,low,high,n"
     # A single year without a share has no lifetime.
