@@ -22,7 +22,7 @@ _Options = Mapping[str, tuple[Any, Any]]
 class _Name(str, Enum):
     """The name of a protocol. Typer knows lists of these, not of literals."""
 
-    FAIR = "random-yaw"
+    RANDOM_YAW = "random-yaw"
     PAPER = "paper"
     RECORDED = "recorded"
 

@@ -21,7 +21,7 @@ from evaluation.results import QueryRows, Results
 from evaluation.study import drives_by_map, engine, find_recordings
 
 pytestmark = pytest.mark.slow
-FAIR = {"random-yaw": RANDOM_YAW_PROTOCOL}
+RANDOM_YAW = {"random-yaw": RANDOM_YAW_PROTOCOL}
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,7 @@ def test_planned_files_are_the_written_ones(drives, tmp_path):
 def test_everything_is_planned_before_anything_runs(
     town, drives, planned, tmp_path, capsys
 ):
-    arguments = ([str(town)], tmp_path, Cluster(3), FAIR)
+    arguments = ([str(town)], tmp_path, Cluster(3), RANDOM_YAW)
     path = reproduction.reproduce_maps(*arguments)
     assert path == tmp_path / "report" / "index.html"
     (run,) = planned
@@ -127,7 +127,9 @@ def test_a_world_is_no_stage(tmp_path):
     (folder / "way.csv").write_text("x,y\n0,0\n9,0\n")
     (folder / "sequence_04.yaml").write_text(yaml.safe_dump(world))
     with pytest.raises(InputError, match=r"sequence_04.yaml: map: missing"):
-        reproduction.reproduce_maps([str(folder)], tmp_path, Cluster(), FAIR)
+        reproduction.reproduce_maps(
+            [str(folder)], tmp_path, Cluster(), RANDOM_YAW
+        )
 
 
 COUNTING = """
@@ -165,7 +167,7 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
         [str(town)],
         tmp_path / "quick",
         cluster,
-        FAIR,
+        RANDOM_YAW,
         with_recordings=False,
         methods=["standard", str(own)],
     )
@@ -174,7 +176,7 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
         [str(town)],
         tmp_path / "full",
         cluster,
-        FAIR,
+        RANDOM_YAW,
         with_pages=False,
         methods=["standard", str(own)],
     )
@@ -196,7 +198,7 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
 def test_quick_reads_existing_recordings(town, drives, planned, tmp_path):
     simulate(drives[0], tmp_path)
     reproduction.reproduce_maps(
-        [str(town)], tmp_path, Cluster(), FAIR, with_recordings=False
+        [str(town)], tmp_path, Cluster(), RANDOM_YAW, with_recordings=False
     )
     (run,) = planned
     recordings, jobs = run["recordings"], run["jobs"]

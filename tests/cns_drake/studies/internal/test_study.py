@@ -921,6 +921,6 @@ def test_places_elsewhere_are_described_once(tmp_path):
     assert set(place[-1].needs) == set(described)
 
 
-def test_fair_is_the_protocol_of_studies(town, tmp_path):
+def test_random_yaw_is_the_protocol_of_studies(town, tmp_path):
     _, (one,) = planned(experiment(town), tmp_path)
     assert one.protocol == RANDOM_YAW_PROTOCOL
