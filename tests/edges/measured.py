@@ -270,12 +270,12 @@ def shipped_cities(folder: Path) -> dict[str, str]:
 EDGES: dict[str, Callable[[Path], dict[str, str]]] = {
     "cns-drake-help": helps("cns_drake", "cns-drake"),
     "cns-eval-help": helps("evaluation", "cns-eval"),
-    "city": city,
     "recording-plain": recording("plain"),
     "pr": pr,
 }
 BY_NIGHT: dict[str, Callable[[Path], dict[str, str]]] = {
     "shipped-cities": shipped_cities,
+    "city": city,
     "recording-rain_and_traffic": recording("rain_and_traffic"),
     "recording-ride_and_camera": recording("ride_and_camera"),
     "tcr": tcr,

@@ -77,6 +77,7 @@ def grown(generated, tmp_path):
     return folder
 
 
+@pytest.mark.night
 def test_a_grown_plan_is_not_generated_with_the_old_names(grown):
     files = {path: path.read_bytes() for path in grown.glob("*.*")}
     with pytest.raises(

@@ -59,6 +59,7 @@ def test_balls_appear_where_they_are_and_in_their_colours():
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_stages_are_drawn_side_by_side(small_map, tmp_path):
     view = load_views(shipped_maps()["metropolis"] / "views.yaml")["street"]
     stages = {name: small_map / f"stage_{name}.sdf" for name in ("01", "04")}
