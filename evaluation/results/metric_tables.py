@@ -10,7 +10,7 @@ from typing import Any
 
 from cns_drake.base import InputError
 from evaluation.recognition import METRICS, PROTOCOLS, metric_named
-from evaluation.results.keys import SETTINGS
+from evaluation.results.keys import PROTOCOL_BASE, SETTINGS
 from evaluation.results.table import (
     QUERIES,
     RESULTS,
@@ -91,13 +91,15 @@ def _by_method_and_condition(keys: Iterable[Any]) -> dict[_Measured, Any]:
     """Returns rows or answers by (method with settings, condition).
 
     An unknown digest of a protocol is taken for the shipped protocol's digest.
+    Name and digest of the protocol say more than the factor of a study that
+    measures by several protocols, which does not count.
     """
     found = {}
     for key in keys:
         factors = {
             name: value
             for name, value in key.factors.items()
-            if not name.startswith(SETTINGS)
+            if not name.startswith(SETTINGS) and name != PROTOCOL_BASE
         }
         digest = key.protocol_digest
         if not digest and key.protocol in PROTOCOLS:

@@ -659,3 +659,23 @@ def test_kendall_tau_is_that_of_a_library():
                 for pair in zip(one, other, strict=True)
             ]
         np.testing.assert_array_equal(_kendall_tau(one, other), expected)
+
+
+def test_a_study_by_several_protocols_is_compared_with_the_shipped(tmp_path):
+    """The factor of its protocols, which shipped tables lack, says nothing."""
+    stages = Results.read(_BASELINES / "stages.csv")
+    mine = [
+        replace(
+            row,
+            method="mine",
+            value=0.99 * row.value,
+            factors={**row.factors, "protocol.base": "random-yaw"},
+        )
+        for row in stages.where(map="suburbia", method="btc", metric="auc").rows
+    ]
+    Results.of(mine).write_csv(tmp_path / "results.csv")
+    found = compare_tables([tmp_path])
+    assert found.conditions == 2
+    assert {one.method for one in found.ranked} > {"mine", "btc"}
+    values = {one.method: one.value for one in found.ranked}
+    assert values["mine"] == pytest.approx(0.99 * values["btc"], abs=1e-4)
