@@ -105,7 +105,7 @@ _FIELDS: _Options = {
         ),
     )
 }
-_GATE: _Options = {
+_VERIFIED: _Options = {
     "verified": (
         Annotated[
             bool,
@@ -178,7 +178,7 @@ def _named(named_protocol: str, **fields: Any) -> RetrievalProtocol:
 # Decorator: the command gets the protocol's options in place of its keyword
 # `protocol`.
 with_protocol = _with_options(
-    "protocol", {**_NAMED, **_FIELDS, **_GATE}, _named
+    "protocol", {**_NAMED, **_FIELDS, **_VERIFIED}, _named
 )
 
 

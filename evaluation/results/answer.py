@@ -305,13 +305,13 @@ def _asked_factor(results: Results, chart: Mapping[str, Any]) -> str | None:
 
 def _without_baseline(rows: Iterable[Row]) -> str:
     """Returns the AUC of the methods, of a study without a baseline."""
-    by_gate: dict[bool, dict[str, float]] = {}
+    by_verification: dict[bool, dict[str, float]] = {}
     for mean in means(rows, "label", "verified"):
-        of_gate = by_gate.setdefault(bool(mean.key[1]), {})
+        of_gate = by_verification.setdefault(bool(mean.key[1]), {})
         of_gate[title(mean.key[0])] = mean.value
     told = [
         (f"{_VERIFIED}, " if verified else "") + from_least_to_greatest(found)
-        for verified, found in sorted(by_gate.items())
+        for verified, found in sorted(by_verification.items())
     ]
     text = "Without a baseline, this study cannot show what the change costs"
     return f"{text}; AUC {'; '.join(told)}"

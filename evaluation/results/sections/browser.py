@@ -17,8 +17,6 @@ from evaluation.results.sections.routes import PageDrive
 _POINTS_OF_A_PAGE = 5_000_000
 # Images of cameras in a page [bytes].
 _IMAGES_OF_A_PAGE = 6_000_000
-# Reasons for wrong answers in words, where these differ from the tables.
-_WORDS = {"near_miss": "near miss"}
 
 
 def browser_section(
@@ -44,7 +42,7 @@ def browser_section(
         image_step=data["imageStep"],
         # Without a match in the database, no answer is wrong.
         fault_kinds={
-            kind: _WORDS.get(kind, kind.replace("_", " "))
+            kind: kind.replace("_", " ")
             for kind in FAULTS
             if kind not in ("no_place", "other_city")
         },

@@ -188,8 +188,13 @@ class LocaliseTask(Task):
                     float(is_right(rows).mean()),
                     float(is_right(then[method]).mean()),
                 )
-                name = "relative_success"
-                yield Number(method, False, name, float(share), n=len(rows))
+                yield Number(
+                    method,
+                    False,
+                    "relative_success",
+                    float(share),
+                    n=len(rows),
+                )
 
     def answers(self, found: Any) -> Iterator[Answered]:
         for method, rows in self._named_results(found):
