@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Set
-from typing import Literal, NamedTuple, TypeAlias, get_args
+from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
@@ -47,6 +47,7 @@ def describe_drive(
     protocol: RetrievalProtocol = RECORDED_PROTOCOL,
     visit: Callable[[int, np.ndarray], None] | None = None,
     further: Iterable[Request] = (),
+    make_list: Callable[[], Any] = list,
 ) -> list[DriveDescriptors]:
     """Describes the places and queries of a drive.
 
@@ -67,6 +68,8 @@ def describe_drive(
             random yaw, a tilt or an occluded sector.
         further: requests for further descriptors: each is a method, the roles
             to describe, and a protocol.
+        make_list: function that returns an empty sequence with a method
+            `append`, which holds the descriptors of one method in one role.
 
     Returns:
         One `DriveDescriptors` for each method, followed by one for each entry
@@ -77,7 +80,9 @@ def describe_drive(
             needs, or no described cloud has a point within range.
     """
     requests = [*((method, roles, protocol) for method in methods), *further]
-    describing = [_DriveDescriber(drive, *request) for request in requests]
+    describing = [
+        _DriveDescriber(drive, *request, make_list) for request in requests
+    ]
     visited = set().union(
         *(_frames_of_role(drive, role, protocol).tolist() for role in roles)
     )
@@ -176,6 +181,7 @@ class _DriveDescriber:
         method: Method,
         roles: Set[Role],
         protocol: RetrievalProtocol,
+        make_list: Callable[[], Any],
     ):
         self._cloud_kind = _CloudKind(
             protocol.scans(method),
@@ -198,6 +204,8 @@ class _DriveDescriber:
                 frames,
                 drive.stamps_ns[frames],
                 X_WS,
+                make_list(),
+                make_list(),
                 blocks=route_blocks(drive.X_WS[:, :3, 3], frames),
             )
             if role in roles:
@@ -274,10 +282,10 @@ class _DriveDescriber:
         described = {**known, **dict(zip(asked, found, strict=True))}
         drive = self._drive
         scans = drive.places if role == "places" else drive.queries
-        descriptors = scans.descriptors
-        assert isinstance(descriptors, list)
+        descriptors: Any = scans.descriptors
+        clouds: Any = scans.clouds
         for frame, cloud in chosen.items():
             descriptors.append(described[frame])
             if self._method.rerank_best:
-                scans.clouds.append(cloud)
+                clouds.append(cloud)
         return described

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -34,9 +34,14 @@ class DescribedScans:
     stamps_ns: np.ndarray
     X_WS: np.ndarray
     descriptors: Sequence[Any] = field(default_factory=list)
-    clouds: list[np.ndarray] = field(default_factory=list)
+    clouds: Sequence[np.ndarray] = field(default_factory=list)
     blocks: np.ndarray | None = None
     drive_of: np.ndarray | None = None
+
+    @property
+    def positions_only(self) -> DescribedScans:
+        """The places or queries without descriptors and clouds."""
+        return replace(self, descriptors=[], clouds=[])
 
     @property
     def p_WSs(self) -> np.ndarray:

@@ -10,7 +10,7 @@ The idea comes from OverlapNet (Chen et al., RSS 2020), which compares range
 images pixel by pixel.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import math
 from pathlib import Path
 from typing import Protocol
@@ -141,9 +141,9 @@ def compared_frames(
 
 
 def overlaps_with_best_match(
-    place_scans: list[np.ndarray],
+    place_scans: Sequence[np.ndarray],
     X_WPs: np.ndarray,
-    query_scans: list[np.ndarray],
+    query_scans: Sequence[np.ndarray],
     X_WQs: np.ndarray,
     matches: np.ndarray,
 ) -> np.ndarray:

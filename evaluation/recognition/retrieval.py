@@ -256,7 +256,7 @@ def _compare_batch(
     """
     is_known = _known_places(database, query, protocol, rows, leaves_out_itself)
     places = database.places
-    queries = query.queries.chosen(np.array(rows, np.int64))
+    queries = query.queries.positions_only.chosen(np.array(rows, np.int64))
     alone = search.scores(query, rows, is_known)
     if search.method.config.center_scores:
         alone = alone - _mean_of_known(alone)

@@ -2,14 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+import itertools
 from typing import Any
 
 import numpy as np
 
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 
-# Greatest size of the descriptors that are in memory at a time, unless a single
-# drive has more [bytes].
+# Greatest size of the descriptors that are in memory at a time [bytes].
 MOST_BYTES = 400_000_000
 
 
@@ -17,10 +17,13 @@ class StoredDrives:
     """Described drives that are read again whenever they are needed.
 
     Successive drives form a group. Only the drives of one group are in memory.
-    Each drive is read only once if you use the drives in order.
+    Each drive is read only once if you use the drives in order. A drive that is
+    too large for the memory is a group of its own, whose places are read in
+    several shares.
 
     Attributes:
         group_of: (N,) non-decreasing, the group of each drive.
+        shares: number of shares of each group.
     """
 
     def __init__(
@@ -34,7 +37,8 @@ class StoredDrives:
         Args:
             readers: a function for each of N drives, which reads it.
             sizes: (N,) size of each drive in memory [bytes].
-            most_bytes: greatest size of a group of several drives.
+            most_bytes: greatest size of a group of several drives, and of a
+                share.
         """
         self._readers = readers
         self._held: dict[int, DriveDescriptors] = {}
@@ -47,6 +51,10 @@ class StoredDrives:
             held += size
             groups.append(group)
         self.group_of = np.array(groups, np.int64)
+        held_by_group = np.bincount(self.group_of, sizes)
+        self.shares = np.maximum(np.ceil(held_by_group / most_bytes), 1).astype(
+            np.int64
+        )
 
     def drive(self, number: int) -> DriveDescriptors:
         """Returns a drive; drives of other groups leave the memory."""
@@ -93,7 +101,7 @@ class StoredDrives:
 
     def undescribed(self, number: int) -> DescribedScans:
         """Returns the places of a drive, without descriptors and clouds."""
-        return replace(self.drive(number).places, descriptors=[], clouds=[])
+        return self.drive(number).places.positions_only
 
 
 class StoredDescriptors(Sequence[Any]):
@@ -128,8 +136,12 @@ class StoredDescriptors(Sequence[Any]):
 
     @property
     def groups(self) -> list[slice]:
-        """The places of each group of drives, as a slice of the sequence."""
+        """The places of each group of drives, or of its shares, as slices."""
         group = self._drives.group_of[self._drive_of]
         starts = np.flatnonzero(np.diff(group, prepend=-1)).tolist()
-        ends = [*starts[1:], len(self)]
-        return [slice(*both) for both in zip(starts, ends, strict=True)]
+        slices = []
+        for start, end in itertools.pairwise([*starts, len(self)]):
+            shares = min(int(self._drives.shares[group[start]]), end - start)
+            limits = np.linspace(start, end, shares + 1).astype(int).tolist()
+            slices += [slice(*both) for both in itertools.pairwise(limits)]
+        return slices

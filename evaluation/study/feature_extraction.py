@@ -3,12 +3,13 @@
 from collections.abc import Callable, Mapping, Set
 import contextlib
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 
-from cns_drake.base import InputError, Reporter, Step, doing
+from cns_drake.base import InputError, Reporter, Step, doing, make_folder
 from cns_drake.drives import Drive, DriveNames
 from evaluation.change import DriveMap
 from evaluation.drives import RecentScans, cropped, sample_frames
@@ -31,7 +32,7 @@ from evaluation.study.features import (
     described_key,
     kept_points,
 )
-from evaluation.study.parts import Part
+from evaluation.study.parts import LongList, Part
 from evaluation.study.sources import DriveSource
 from evaluation.study.study_files import FeatureFiles
 
@@ -46,6 +47,7 @@ def extract_features(
     protocol: RetrievalProtocol = RANDOM_YAW_PROTOCOL,
     *,
     with_scans: bool = False,
+    folder: Path | None = None,
 ) -> MappedFeatures:
     """Maps a recording and describes its places and queries.
 
@@ -61,6 +63,8 @@ def extract_features(
             thumbnails and, if `with_scans` is set, kept.
         with_scans: whether the result contains the scans of the places and
             queries.
+        folder: existing folder for temporary files of long drives; None for the
+            system's folder.
 
     Raises:
         InputError: if the recording cannot be read, or contains no points.
@@ -68,21 +72,21 @@ def extract_features(
     frames: list[int] = []
     thumbnails = []
     mapped = MappedDrive(recording, _most_scans(asked))
-    kept: dict[int, np.ndarray] = {}
+    kept = LongList(folder)
 
     def keep(frame: int, cloud: np.ndarray) -> None:
         # Pictures show the scan as recorded, whatever its query sees.
         frames.append(frame)
         scan = mapped.scan(frame)
         if with_scans:
-            kept[frame] = kept_points(scan, protocol.half_extent)
+            kept.append(kept_points(scan, protocol.half_extent))
         height = MethodConfig().sensor_height
         shown = cropped(scan, protocol.half_extent)
         thumbnails.append(thumbnail(shown, height, seed=frame))
 
     described = {}
     if roles:
-        described = _described(mapped, roles, asked, protocol, keep)
+        described = _described(mapped, roles, asked, protocol, keep, folder)
     coarse, fine = mapped.finish()
     if len(coarse) == 0:
         raise InputError(f"{mapped.name}: no scan holds a point")
@@ -98,7 +102,13 @@ def extract_features(
     scans = None
     if with_scans:
         known = recording.instances
-        scans = KeptScans(mapped.name, mapped.X_WS, known and dict(known), kept)
+        scans = KeptScans(
+            mapped.name,
+            mapped.X_WS,
+            known and dict(known),
+            np.array(frames, np.int64),
+            kept,
+        )
     return MappedFeatures(placed, described, summary, fine, scans)
 
 
@@ -127,6 +137,8 @@ def describe_recording(
     roles: Set[Role],
     asked: Mapping[str, Request],
     protocol: RetrievalProtocol = RANDOM_YAW_PROTOCOL,
+    *,
+    folder: Path | None = None,
 ) -> ScannedFeatures:
     """Describes the places or queries of a recording, and keeps their scans.
 
@@ -134,12 +146,12 @@ def describe_recording(
     The arguments are the same as for `extract_features`.
     """
     drive = RecentScans(recording, _most_scans(asked))
-    seen: list[np.ndarray] = []
+    seen = LongList(folder)
 
     def keep(frame: int, cloud: np.ndarray) -> None:
         seen.append(cloud.astype(np.float32))
 
-    described = _described(drive, roles, asked, protocol, keep)
+    described = _described(drive, roles, asked, protocol, keep, folder)
     return ScannedFeatures(DriveNames.of(recording), described, seen)
 
 
@@ -154,8 +166,17 @@ def _described(
     asked: Mapping[str, Request],
     protocol: RetrievalProtocol,
     visit: Callable[[int, np.ndarray], None],
+    folder: Path | None,
 ) -> dict[str, DriveDescriptors]:
-    found = describe_drive(drive, (), roles, protocol, visit, asked.values())
+    found = describe_drive(
+        drive,
+        (),
+        roles,
+        protocol,
+        visit,
+        asked.values(),
+        partial(LongList, folder),
+    )
     return dict(zip(asked, found, strict=True))
 
 
@@ -225,15 +246,19 @@ class FeatureExtraction(Step):
         )
         found: MappedFeatures | ScannedFeatures
         values: dict[Part, object]
+        folder = self.files.folder
+        make_folder(folder)
         if self.with_map:
-            found = extract_features(*arguments, with_scans=self.with_scans)
+            found = extract_features(
+                *arguments, with_scans=self.with_scans, folder=folder
+            )
             values = {
                 self.files.scans: found.recorded_scans,
                 self.files.fine: found.fine,
                 self.files.drive: found.drive,
             }
         else:
-            found = describe_recording(*arguments)
+            found = describe_recording(*arguments, folder=folder)
             values = {self.files.scans: found.shown_scans}
         for key, described in found.described.items():
             values[self.files.described(key)] = found.placed, described

@@ -1,6 +1,6 @@
 """What feature extraction finds in a drive: its map, descriptors and scans."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 
@@ -65,14 +65,16 @@ class KeptScans:
         X_WS: (N, 4, 4) poses of the sensor at all frames.
         instances: instance id of a structure -> its name and class; None if
             unknown.
-        scans: frame -> structured array (M,) with coordinates and instance ids
-            of the points within range; see `kept_points`.
+        frames: (K,) frames whose scans were kept, in ascending order.
+        scans: K structured arrays (M,) with coordinates and instance ids of the
+            points within range; see `kept_points`.
     """
 
     name: str
     X_WS: np.ndarray
     instances: Mapping[int, Mapping] | None
-    scans: dict[int, np.ndarray]
+    frames: np.ndarray
+    scans: Sequence[np.ndarray]
 
     def __len__(self) -> int:
         """Returns the number of frames of the drive."""
@@ -80,7 +82,10 @@ class KeptScans:
 
     def scan(self, index: int) -> np.ndarray:
         """Returns the scan of a frame, which must have been kept."""
-        return self.scans[index]
+        row = int(np.searchsorted(self.frames, index))
+        if self.frames[row : row + 1] != index:
+            raise KeyError(index)
+        return self.scans[row]
 
 
 def kept_points(scan: np.ndarray, half_extent: float) -> np.ndarray:
@@ -143,7 +148,7 @@ class ScannedFeatures(ExtractedFeatures):
             says (rotated, tilted or without a sector) [m].
     """
 
-    shown_scans: list[np.ndarray]
+    shown_scans: Sequence[np.ndarray]
 
 
 def described_key(method: str, protocol: RetrievalProtocol) -> str:

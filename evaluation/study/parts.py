@@ -5,22 +5,32 @@ the format, and the second line contains the inputs as JSON. The result follows
 (see `encode`), compressed by zstd at its
 fastest level. Compression halves the size of maps. Spectra hardly shrink;
 compressing 50 MB of spectra takes a tenth of a second.
+
+The descriptors and scans of a long drive do not fit into memory together. They
+are kept in a `LongList`, whose blocks of items follow the result in the file.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import asdict, dataclass, fields, is_dataclass
+import functools
 import importlib
 import io
 import json
 import math
+import os
 from pathlib import Path
 import re
 import struct
 import sys
+import tempfile
 import tokenize
 from types import NoneType, UnionType
 from typing import Any, BinaryIO, Union, get_args, get_origin, get_type_hints
+import weakref
 
 import numpy as np
 import zstandard
@@ -47,11 +57,191 @@ _MOST_INPUTS = 1 << 24
 _MOST_RATIO = 200
 # This uncompressed size is always allowed [bytes].
 _ALWAYS_BYTES = 1 << 27
+# A `LongList` keeps at most this number of its last items in memory.
+_MOST_HELD = 512
+# Number of items of a `LongList` that are written and read together.
+_BLOCK = 64
+
+
+class LongList(Sequence[Any]):
+    """A list that grows, and keeps its items in a file once there are many.
+
+    At most 512 items are in memory until the list is written as part of the
+    value of a `Part`. In a list that is read from a `Part`, and of the older
+    items of a growing list, only one block of items is in memory. A slice of
+    such a list reads its items when they are used, like the list.
+    """
+
+    def __init__(self, folder: Path | None = None):
+        """Makes an empty list.
+
+        Args:
+            folder: existing folder for a temporary file, which has no name and
+                vanishes with the list; None for the system's folder.
+        """
+        self._path = folder or Path(tempfile.gettempdir())
+        self._stream: BinaryIO | None = None
+        # Ends of the blocks in the file, after the start of the first block.
+        self._ends = [0]
+        # Number of items in blocks; all blocks but the last one are full.
+        self._num_stored = 0
+        # Size of the blocks without compression [bytes].
+        self._plain_bytes = 0
+        self._recent: list[Any] = []
+        # Number and items of the block that was read last.
+        self._block: tuple[int, list[Any]] = -1, []
+
+    @classmethod
+    def of(cls, items: Iterable[Any]) -> LongList:
+        """Returns a list of items, with the system's folder if it is long."""
+        made = cls()
+        for item in items:
+            made.append(item)
+        return made
+
+    @classmethod
+    def _in_file(
+        cls, path: Path, start: int, stored: Mapping[str, Any]
+    ) -> LongList:
+        """Returns a list whose blocks are in a part.
+
+        Args:
+            path: path of the part.
+            start: offset of the first block.
+            stored: the result of `_stored`.
+        """
+        made = cls()
+        made._path = path
+        made._stream = open(path, "rb", buffering=0)  # noqa: SIM115
+        weakref.finalize(made, made._stream.close)
+        made._ends = [start, *(start + end for end in stored["ends"])]
+        made._num_stored = stored["items"]
+        made._plain_bytes = stored["plain"]
+        return made
+
+    def __len__(self) -> int:
+        return self._num_stored + len(self._recent)
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, slice):
+            if self._num_stored == 0:
+                return self._recent[index]
+            return _Stretch(self, range(len(self))[index])
+        index = range(len(self))[index]
+        if index >= self._num_stored:
+            return self._recent[index - self._num_stored]
+        number, within = divmod(index, _BLOCK)
+        if self._block[0] != number:
+            self._block = number, self._read(number)
+        return self._block[1][within]
+
+    @property
+    def is_in_file(self) -> bool:
+        """Whether some of its items are in a file."""
+        return self._num_stored > 0
+
+    def append(self, item: Any) -> None:
+        """Adds an item; the oldest items in memory are written to the file."""
+        assert self._num_stored % _BLOCK == 0, "the list was written"
+        self._recent.append(item)
+        if len(self._recent) > _MOST_HELD:
+            self._write(_BLOCK)
+
+    def _write(self, number: int) -> None:
+        """Writes the next items to the file as one block."""
+        plain = encode(self._recent[:number])
+        data, _ = _compressed(plain)
+        with user_errors(self._path):
+            if self._stream is None:
+                self._stream = tempfile.TemporaryFile(dir=self._path)  # noqa: SIM115
+                weakref.finalize(self, self._stream.close)
+            self._stream.write(data)
+            self._stream.flush()
+        del self._recent[:number]
+        self._num_stored += number
+        self._plain_bytes += len(plain)
+        self._ends.append(self._ends[-1] + len(data))
+
+    def _read(self, number: int) -> list[Any]:
+        """Returns the items of a block."""
+        data = self._bytes(number)
+        with _damage_named(self._path):
+            # Lengths at the start of stored values are far smaller.
+            if data.startswith(zstandard.FRAME_HEADER):
+                _check_size(data, len(data))
+                data = zstandard.ZstdDecompressor().decompress(data)
+            return decode(data)
+
+    def _bytes(self, number: int) -> bytes:
+        """Returns a block as it is in the file."""
+        assert self._stream is not None
+        start, end = self._ends[number : number + 2]
+        with _damage_named(self._path):
+            data = os.pread(self._stream.fileno(), end - start, start)
+            if len(data) < end - start:
+                raise ValueError("cut off")
+        return data
+
+    def _stored(self) -> dict[str, Any]:
+        """Writes all items to the file; returns what `_in_file` needs."""
+        while self._recent:
+            self._write(min(len(self._recent), _BLOCK))
+        start = self._ends[0]
+        return {
+            "items": self._num_stored,
+            "ends": [end - start for end in self._ends[1:]],
+            "plain": self._plain_bytes,
+        }
+
+    def _copy(self, stream: BinaryIO) -> None:
+        """Appends all blocks to a stream; `_stored` comes first."""
+        for number in range(len(self._ends) - 1):
+            stream.write(self._bytes(number))
+
+
+class _Stretch(Sequence[Any]):
+    """Some items of a list, which are read when they are used."""
+
+    def __init__(self, of: LongList, rows: range):
+        self._of = of
+        self._rows = rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, slice):
+            return _Stretch(self._of, self._rows[index])
+        return self._of[self._rows[index]]
 
 
 def _uncompressed_size(size: int) -> int:
     """Returns the greatest uncompressed size of some compressed bytes."""
     return max(_MOST_RATIO * size, _ALWAYS_BYTES)
+
+
+def _check_size(start: bytes, size: int) -> None:
+    """Refuses a compressed value that may be larger than the memory.
+
+    Args:
+        start: the first bytes of the value.
+        size: size of the whole value [bytes].
+
+    Raises:
+        ValueError: the uncompressed value would be too large.
+    """
+    claimed = zstandard.frame_content_size(start)
+    if not 0 <= claimed <= _uncompressed_size(size):
+        raise ValueError(f"{size} bytes stand for {claimed}")
+
+
+def _compressed(plain: bytes) -> tuple[bytes, bool]:
+    """Returns the bytes to store, and whether they are not compressed."""
+    compressor = zstandard.ZstdCompressor(level=_LEVEL, write_checksum=True)
+    data = compressor.compress(plain)
+    if len(plain) > _uncompressed_size(len(data)):
+        return plain, True
+    return data, False
 
 
 @dataclass(frozen=True)
@@ -73,22 +263,22 @@ class Part:
             InputError: if the value cannot be encoded, or the file cannot be
                 written.
         """
+        lists: list[LongList] = []
         try:
-            plain = encode(value)
+            plain = encode(value, lists)
+            stored = [one._stored() for one in lists]
         except TypeError as error:
             raise InputError(f"{self.path}: {error}") from error
-        compressor = zstandard.ZstdCompressor(level=_LEVEL, write_checksum=True)
-        data = compressor.compress(plain)
-        is_stored = len(plain) > _uncompressed_size(len(data))
-        data = plain if is_stored else data
+        data, is_stored = _compressed(plain)
         header = {
             "digest": fingerprint(inputs),
             "bytes": len(data),
             "inputs": inputs,
             **({"stored": True} if is_stored else {}),
+            **({"lists": stored} if stored else {}),
         }
         make_folder(self.path.parent)
-        self._write(header, data)
+        self._write(header, data, lists)
 
     def remove_value(self) -> None:
         """Removes the value, and keeps the record of its inputs.
@@ -102,6 +292,7 @@ class Part:
         with self._opened() as (header, _):
             if _REMOVED in header:
                 return
+        header.pop("lists", None)
         self._write({**header, "bytes": 0, _REMOVED: True}, b"")
 
     def discard_if_value_removed(self) -> None:
@@ -117,7 +308,9 @@ class Part:
             with user_errors(self.path):
                 self.path.unlink()
 
-    def _write(self, header: Mapping, data: bytes) -> None:
+    def _write(
+        self, header: Mapping, data: bytes, lists: Sequence[LongList] = ()
+    ) -> None:
         with (
             completing(self.path) as unfinished,
             open(unfinished, "wb") as stream,
@@ -125,6 +318,8 @@ class Part:
             stream.write(_MAGIC)
             stream.write(json.dumps(header, sort_keys=True).encode() + b"\n")
             stream.write(data)
+            for one in lists:
+                one._copy(stream)
 
     def is_current(self, inputs: Mapping) -> bool:
         """Returns whether the file is complete and made from `inputs`."""
@@ -151,10 +346,15 @@ class Part:
         with self._opened() as (header, stream):
             if _REMOVED in header:
                 raise InputError(f"{self.path}: its value was removed")
-            data = stream.read()
+            data = stream.read(header["bytes"])
             if "stored" not in header:
                 data = zstandard.ZstdDecompressor().decompress(data)
-            return decode(data)
+            lists = []
+            start = stream.tell()
+            for stored in header.get("lists", []):
+                lists.append(LongList._in_file(self.path, start, stored))
+                start += stored["ends"][-1]
+            return decode(data, lists)
 
     def size(self) -> int:
         """Returns the approximate size of the value in memory [bytes].
@@ -163,9 +363,10 @@ class Part:
             InputError: if there is no such file, or it is damaged.
         """
         with self._opened() as (header, stream):
+            in_lists = sum(one["plain"] for one in header.get("lists", []))
             if {"stored", _REMOVED} & header.keys():
-                return header["bytes"]
-            return zstandard.frame_content_size(stream.read(18))
+                return header["bytes"] + in_lists
+            return zstandard.frame_content_size(stream.read(18)) + in_lists
 
     def fits(self, hint: object) -> bool:
         """Returns whether the value in the file can be of a given type.
@@ -191,30 +392,32 @@ class Part:
     def _opened(self) -> Iterator[tuple[dict, BinaryIO]]:
         """Yields the header, and the value after checking its length."""
         check_regular(self.path)
-        try:
-            with open(self.path, "rb") as stream:
-                if stream.readline(len(_MAGIC)) != _MAGIC:
-                    raise ValueError("no part of a study")
-                header = json.loads(stream.readline(_MOST_INPUTS))
-                start = stream.tell()
-                size = stream.seek(0, 2) - start
-                if size != header["bytes"]:
-                    raise ValueError("cut off")
+        with _damage_named(self.path), open(self.path, "rb") as stream:
+            if stream.readline(len(_MAGIC)) != _MAGIC:
+                raise ValueError("no part of a study")
+            header = json.loads(stream.readline(_MOST_INPUTS))
+            start = stream.tell()
+            size = header["bytes"]
+            lists = header.get("lists", [])
+            in_lists = sum(one["ends"][-1] for one in lists)
+            if stream.seek(0, 2) - start != size + in_lists:
+                raise ValueError("cut off")
+            stream.seek(start)
+            if not {"stored", _REMOVED} & header.keys():
+                _check_size(stream.read(18), size)
                 stream.seek(start)
-                if not {"stored", _REMOVED} & header.keys():
-                    claimed = zstandard.frame_content_size(stream.read(18))
-                    if not 0 <= claimed <= _uncompressed_size(size):
-                        raise ValueError(f"{size} bytes stand for {claimed}")
-                    stream.seek(start)
-                yield header, stream
-        except OSError as error:
-            raise InputError(
-                f"{self.path}: {error.strerror or error}"
-            ) from error
-        except (zstandard.ZstdError, ValueError, *_DECODING_ERRORS) as error:
-            raise InputError(
-                f"{self.path}: damaged ({error}); delete it"
-            ) from error
+            yield header, stream
+
+
+@contextlib.contextmanager
+def _damage_named(path: Path) -> Iterator[None]:
+    """Turns errors of a file that cannot be decoded into an `InputError`."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+    except (zstandard.ZstdError, ValueError, *_DECODING_ERRORS) as error:
+        raise InputError(f"{path}: damaged ({error}); delete it") from error
 
 
 @dataclass(frozen=True)
@@ -295,6 +498,8 @@ def _identity(argument: Any) -> object:
 
 
 _LENGTH = struct.Struct("<Q")
+# Greatest length of the header of an array, as in NumPy.
+_MOST_HEADER = 10_000
 # Types in these modules belong to methods and are not checked.
 _METHODS = "evaluation.methods"
 _OWN_MODULE = re.compile(r"evaluation(\.[a-z]\w*)+")
@@ -314,6 +519,7 @@ _DECODING_ERRORS = (
 )
 # The form of a tree -> the type of its value; see `_Encoder`.
 _FORMS: dict[str, type] = {
+    "long": list,
     "tuple": tuple,
     "dict": dict,
     "array": np.ndarray,
@@ -321,16 +527,21 @@ _FORMS: dict[str, type] = {
 }
 
 
-def encode(value: object) -> bytes:
+def encode(value: object, lists: list[LongList] | None = None) -> bytes:
     """Returns a value as bytes; equal values give equal bytes.
 
     A value is None, a number, text, bytes, an array without Python objects, or
     a list, tuple, dict, named tuple or dataclass of such values.
 
+    Args:
+        value: the value.
+        lists: the lists among the values whose items are in a file are added
+            here instead of their items; None if there are none.
+
     Raises:
         TypeError: if the value contains anything else.
     """
-    encoder = _Encoder()
+    encoder = _Encoder(lists)
     tree = json.dumps(encoder.encode(value), separators=(",", ":")).encode()
     stream = io.BytesIO()
     stream.write(_LENGTH.pack(len(tree)))
@@ -340,11 +551,15 @@ def encode(value: object) -> bytes:
     return stream.getvalue()
 
 
-def decode(data: bytes) -> Any:
+def decode(data: bytes, lists: Sequence[LongList] = ()) -> Any:
     """Returns the value that `encode` turned into bytes.
 
     Dataclasses must belong to this package, or to modules that have been
     imported.
+
+    Args:
+        data: the bytes.
+        lists: the lists among the values whose items are in a file.
 
     Raises:
         ValueError: if the bytes are not from `encode`, or a type is unknown.
@@ -353,7 +568,7 @@ def decode(data: bytes) -> Any:
         (length,) = _LENGTH.unpack_from(data)
         start = _LENGTH.size + length
         tree = json.loads(data[_LENGTH.size : start])
-        return _decode_tree(tree, _read_arrays(data, start))
+        return _decode_tree(tree, _read_arrays(data, start), lists)
     except _DECODING_ERRORS as error:
         raise ValueError(f"{type(error).__name__}: {error}") from error
 
@@ -361,7 +576,8 @@ def decode(data: bytes) -> Any:
 class _Encoder:
     """Turns a value into a tree; arrays that occur twice are stored once."""
 
-    def __init__(self) -> None:
+    def __init__(self, lists: list[LongList] | None) -> None:
+        self._lists = lists
         self.arrays: list[np.ndarray] = []
         # The identity of an array -> its number.
         self._numbers: dict[int, int] = {}
@@ -371,7 +587,10 @@ class _Encoder:
         kind = type(value)
         if value is None or kind in (bool, int, float, str):
             return value
-        if kind is list:
+        if kind is LongList and value.is_in_file and self._lists is not None:
+            self._lists.append(value)
+            return {"long": len(self._lists) - 1}
+        if kind in (list, LongList):
             return [self.encode(one) for one in value]
         if kind is tuple:
             return {"tuple": [self.encode(one) for one in value]}
@@ -413,32 +632,66 @@ def _read_arrays(data: bytes, start: int) -> list[np.ndarray]:
     stream = io.BytesIO(data)
     stream.seek(start)
     arrays = []
-    while (place := stream.tell()) < len(data):
+    while stream.tell() < len(data):
+        version = np.lib.format.read_magic(stream)
+        width = 2 if version == (1, 0) else 4
+        length = int.from_bytes(stream.read(width), "little")
+        begin = stream.tell() + length
+        text = stream.read(length)
+        shape, is_fortran, dtype = _array_header(text, version == (3, 0))
+        size = math.prod(shape) * dtype.itemsize
         # NumPy would first reserve all that a header names.
-        is_first = np.lib.format.read_magic(stream) == (1, 0)
-        form = "1_0" if is_first else "2_0"
-        read = getattr(np.lib.format, f"read_array_header_{form}")
-        shape, _, dtype = read(stream)
-        if math.prod(shape) * dtype.itemsize > len(data) - stream.tell():
+        if size > len(data) - begin:
             raise ValueError("an array is cut off")
-        stream.seek(place)
-        arrays.append(np.lib.format.read_array(stream, allow_pickle=False))
+        array = np.empty(shape, dtype, "F" if is_fortran else "C")
+        if size:
+            flat = array.T if is_fortran else array
+            stream.readinto(flat.reshape(-1).view(np.uint8).data)
+        arrays.append(array)
     return arrays
 
 
-def _decode_tree(tree: Any, arrays: list[np.ndarray]) -> Any:
+# Most arrays of a result have equal headers.
+@functools.lru_cache(4096)
+def _array_header(
+    text: bytes, is_utf_8: bool
+) -> tuple[tuple[int, ...], bool, np.dtype]:
+    """Returns an array's shape, whether its order is Fortran's, and its type.
+
+    Args:
+        text: the header, a Python expression.
+        is_utf_8: whether names in the header are in UTF-8 instead of Latin-1.
+
+    Raises:
+        ValueError: the header is too long, or of an array of objects.
+    """
+    if len(text) > _MOST_HEADER:
+        raise ValueError("a header is too long")
+    header = ast.literal_eval(text.decode("utf-8" if is_utf_8 else "latin-1"))
+    dtype = np.lib.format.descr_to_dtype(header["descr"])
+    if dtype.hasobject:
+        raise ValueError("an array of objects")
+    return header["shape"], header["fortran_order"], dtype
+
+
+def _decode_tree(
+    tree: Any, arrays: Sequence[np.ndarray], lists: Sequence[LongList]
+) -> Any:
     """Returns the value of a tree; see `_Encoder`."""
+
+    def decoded(inner: Any) -> Any:
+        return _decode_tree(inner, arrays, lists)
+
     if isinstance(tree, list):
-        return [_decode_tree(one, arrays) for one in tree]
+        return [decoded(one) for one in tree]
     if not isinstance(tree, dict):
         return tree
     if "tuple" in tree:
-        return tuple(_decode_tree(one, arrays) for one in tree["tuple"])
+        return tuple(map(decoded, tree["tuple"]))
     if "dict" in tree:
-        return {
-            _decode_tree(key, arrays): _decode_tree(value, arrays)
-            for key, value in tree["dict"]
-        }
+        return {decoded(key): decoded(value) for key, value in tree["dict"]}
+    if "long" in tree:
+        return lists[tree["long"]]
     if "array" in tree:
         return arrays[tree["array"]]
     if "bytes" in tree:
@@ -446,7 +699,7 @@ def _decode_tree(tree: Any, arrays: list[np.ndarray]) -> Any:
     if "scalar" in tree:
         return arrays[tree["scalar"]][()]
     if "named" in tree:
-        values = [_decode_tree(one, arrays) for one in tree["values"]]
+        values = [decoded(one) for one in tree["values"]]
         kind = _find_type(*tree["named"])
         if not issubclass(kind, tuple) or len(kind._fields) != len(values):
             raise TypeError(f"{kind.__name__} is no such tuple")
@@ -457,7 +710,7 @@ def _decode_tree(tree: Any, arrays: list[np.ndarray]) -> Any:
         raise TypeError(f"{kind.__name__} has other fields")
     made = object.__new__(kind)
     for name, value in tree["fields"].items():
-        object.__setattr__(made, name, _decode_tree(value, arrays))
+        object.__setattr__(made, name, decoded(value))
     return made
 
 
@@ -514,7 +767,8 @@ def _fits_type(tree: Any, hint: Any) -> bool:
             _fits_type(tree["fields"][one.name], hints.get(one.name, Any))
             for one in fields(found)
         )
-    if found not in (list, tuple, dict) or not inner:
+    is_long = isinstance(tree, dict) and "long" in tree
+    if found not in (list, tuple, dict) or not inner or is_long:
         return True
     items = tree if found is list else tree[found.__name__]
     if found is dict:

@@ -32,7 +32,8 @@ from evaluation.recognition import (
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import describe_recording
-from evaluation.study.parts import Part
+from evaluation.study.features import KeptScans
+from evaluation.study.parts import LongList, Part
 from evaluation.study.sources import DriveSource
 
 # The source of a drive, or the parts of its scans and of its descriptors by
@@ -238,36 +239,37 @@ def shown_overlaps(
     (scans, described), (asked_scans, described_query) = compared.stored
     protocol, radii = compared.protocol, compared.radii
     _, query = described_query.read()
+    queries = query.queries
     asked = asked_scans.read()
-    if not isinstance(asked, list):
-        asked = [
+    are_whole = isinstance(asked, KeptScans)
+    if are_whole:
+        asked = LongList.of(
             protocol.query_scan(asked, frame).astype(np.float32)
-            for frame in query.queries.frames.tolist()
-        ]
+            for frame in queries.frames.tolist()
+        )
     here = compared._replace(distractors=(), num_distractors=0)
     searched = here.searched(0, described, method)
     database = searched.described
-    found = {radius: np.full(len(asked), math.nan) for radius in radii}
+    found = {radius: np.full(len(queries.frames), math.nan) for radius in radii}
     drive_of = database.places.drive_of
     if drive_of is None:
         drive_of = np.zeros(len(searched.rows), np.int64)
-    # The scans of one drive are in memory at a time.
     first = 0
     for number, part in enumerate(
         [scans, *(parts[0] for parts in compared.beside)]
     ):
         of = drive_of == number
         kept = part.read()
-        if isinstance(kept, list):
-            chosen = [kept[row] for row in searched.rows[of] - first]
-            first += len(kept)
-        else:
-            chosen = [
+        if are_whole:
+            chosen = LongList.of(
                 cloud_at(kept, frame, 1, protocol.half_extent).astype(
                     np.float32
                 )
                 for frame in database.places.frames[of].tolist()
-            ]
+            )
+        else:
+            chosen = LongList.of(kept[row] for row in searched.rows[of] - first)
+            first += len(kept)
         for radius, rows in itertools.product(
             radii, query_batches(len(asked), len(of))
         ):
@@ -283,7 +285,7 @@ def shown_overlaps(
                 chosen,
                 database.places.X_WS[of],
                 asked[batch],
-                query.queries.X_WS[batch],
+                queries.X_WS[batch],
                 matches[:, of],
             )
             found[radius][batch] = np.fmax(found[radius][batch], shown)
@@ -482,7 +484,7 @@ class _DescribedDrive(Protocol):
     """
 
     @property
-    def scans(self) -> list[np.ndarray]: ...
+    def scans(self) -> Sequence[np.ndarray]: ...
 
     def take(self, number: int) -> DriveDescriptors | Part:
         """Returns the descriptors by one method, and keeps no copy of them.
@@ -511,7 +513,7 @@ class _StoredDrive:
         self._described = described
 
     @cached_property
-    def scans(self) -> list[np.ndarray]:
+    def scans(self) -> Sequence[np.ndarray]:
         return self._scans.read()
 
     def take(self, number: int) -> Part:
@@ -538,7 +540,7 @@ class _ReadDrive:
         """
         asked = {one.key: (one.make(), {role}, protocol) for one in methods}
         found = describe_recording(source(), {role}, asked, protocol)
-        self.scans: list[np.ndarray] = found.shown_scans
+        self.scans: Sequence[np.ndarray] = found.shown_scans
         self._described = found.described
         self._methods = methods
 

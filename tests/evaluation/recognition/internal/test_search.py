@@ -116,7 +116,8 @@ def test_groups_give_the_same_as_the_whole(name, settings):
     drives, queries = drives_of(method), queries_of(method)
     protocol = replace(RANDOM_YAW_PROTOCOL, radius=25.0)
     found = []
-    for most_bytes in (40, 10):
+    # All drives in memory, one drive, or a third of a drive.
+    for most_bytes in (40, 10, 4):
         places = stored(drives, most_bytes, [])
         assert len(places.descriptors) == NUM_DRIVES * NUM_PLACES
         database = DriveDescriptors("places", places, places)
@@ -124,9 +125,10 @@ def test_groups_give_the_same_as_the_whole(name, settings):
             method, database, queries, protocol, [None, 25.0]
         )
         found.append(batch)
-    whole, one = found
+    whole, *others = found
     assert not np.isnan(whole[0].scores).all()
-    for expected, got in zip(whole, one, strict=True):
+    pairs = [both for one in others for both in zip(whole, one, strict=True)]
+    for expected, got in pairs:
         if name == "learned":
             # A product of matrices rounds by their size.
             np.testing.assert_allclose(got.scores, expected.scores, rtol=1e-5)
@@ -167,6 +169,12 @@ def test_one_group_is_in_memory_at_a_time():
     # The last group is still there.
     search.poses(queries, range(5), [np.array([0, 23])] * 5)
     assert reads == [0, 1, 2, 3, 0, 1, 2, 3, 0, 1]
+
+
+def test_a_large_drive_is_searched_in_shares():
+    places = stored(drives_of(make_method("solid", {})), 4, [])
+    shares = [(one.start, one.stop) for one in places.descriptors.groups]
+    assert shares == [(k, k + 2) for k in range(0, 24, 2)]
 
 
 def test_a_small_database_is_read_once():

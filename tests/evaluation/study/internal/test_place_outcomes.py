@@ -16,10 +16,15 @@ from evaluation.study import (
     MethodChoice,
     Part,
     RecordingSource,
+    parts,
     place_measurements,
 )
 from evaluation.study.feature_extraction import FeatureExtraction
-from evaluation.study.place_measurements import PlaceComparison, measure_places
+from evaluation.study.place_measurements import (
+    PlaceComparison,
+    measure_places,
+    shown_overlaps,
+)
 from evaluation.study.study_files import FeatureFiles
 
 METHODS = (
@@ -142,6 +147,42 @@ def test_the_best_match_agrees_with_the_matrix_of_overlaps(folder, tmp_path):
     expected = np.where(apart <= PROTOCOL.radius, matrix, 0.0).max(axis=1)
     for one in _done(pair(folder, tmp_path / "pair.data")):
         np.testing.assert_allclose(one.columns["overlap"], expected, atol=1e-4)
+
+
+@pytest.mark.slow
+def test_drives_that_are_longer_than_the_memory_give_the_same(
+    folder, tmp_path, monkeypatch
+):
+    stored = tmp_path / "stored"
+    stored.mkdir()
+    for name in ("metropolis_01", "metropolis_04"):
+        (stored / name).symlink_to(folder / name)
+
+    def compared(root):
+        query = described(root, "metropolis_04", "queries")
+        return pair(root, tmp_path / "pair.data", query=query).arguments[0]
+
+    def measured(compared):
+        shown = shown_overlaps(Reporter(), compared.by_method(0))
+        return measure_places(Reporter(), compared), shown
+
+    expected, expected_shown = measured(compared(folder))
+    # Two items a block, and a group of places for every few.
+    monkeypatch.setattr(parts, "_MOST_HELD", 3)
+    monkeypatch.setattr(parts, "_BLOCK", 2)
+    monkeypatch.setattr(place_measurements, "MOST_BYTES", 100_000)
+    places, asked = (one[1].read()[1] for one in compared(stored).stored)
+    assert places.places.descriptors.is_in_file
+    assert asked.queries.descriptors.is_in_file
+    found, shown = measured(compared(stored))
+    np.testing.assert_array_equal(
+        shown[PROTOCOL.radius], expected_shown[PROTOCOL.radius]
+    )
+    assert len(found) == len(expected) > 0
+    for one, other in zip(found, expected, strict=True):
+        assert one.columns.keys() == other.columns.keys()
+        for name, column in one.columns.items():
+            np.testing.assert_array_equal(column, other.columns[name])
 
 
 @pytest.mark.slow

@@ -58,6 +58,14 @@ def test_arrays_come_back_after_others_of_their_type(turned):
             assert old.flags.f_contiguous == new.flags.f_contiguous
 
 
+@pytest.mark.filterwarnings("ignore:Stored array in format 3.0")
+def test_names_of_fields_are_any_text():
+    old = np.ones(4, dtype=[("h\u00f6he", "<f4"), ("\u540d", ">u2")])
+    (new,) = decode(encode([old]))
+    assert new.dtype == old.dtype
+    assert new.tobytes() == old.tobytes()
+
+
 def test_what_is_read_shares_no_memory():
     first, second = decode(encode([np.zeros(3), np.zeros(3)]))
     first[:] = 1.0
