@@ -26,9 +26,9 @@ def is_pose(X: np.ndarray) -> bool:
         return False
     R = X[:3, :3]
     return bool(
-        np.allclose(R @ R.T, np.eye(3), atol=1e-3)
+        (np.abs(R @ R.T - np.eye(3)) < 1e-3).all()
         and np.linalg.det(R) > 0.0
-        and np.allclose(X[3], [0.0, 0.0, 0.0, 1.0], atol=1e-6)
+        and (np.abs(X[3] - [0.0, 0.0, 0.0, 1.0]) < 1e-6).all()
     )
 
 

@@ -185,10 +185,12 @@ def is_in_sight(points: np.ndarray, other: DrivenMap) -> np.ndarray:
     _, chosen = np.unique(along, return_index=True)
     for place in other.positions[chosen]:
         rows = np.flatnonzero(~found)
+        rows = rows[_is_near(points[rows], place)]
         ranges, asked = _directions(points[rows] - place)
         near = ranges < _SIGHT_RANGE
         rows, ranges, asked = rows[near], ranges[near], asked[near]
-        depths, angles = _directions(other.cloud - place)
+        hidden_by = other.cloud[_is_near(other.cloud, place)]
+        depths, angles = _directions(hidden_by - place)
         is_free = np.ones(len(rows), dtype=bool)
         for (low, degrees), (high, _) in itertools.pairwise(_SIGHT_DEG):
             here = (depths >= low) & (depths < min(high, _SIGHT_RANGE))
@@ -201,6 +203,12 @@ def is_in_sight(points: np.ndarray, other: DrivenMap) -> np.ndarray:
             )
         found[rows] = is_free
     return found
+
+
+def _is_near(points: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Returns whether points can be within the range of sight, (N,) bool."""
+    x, y = np.abs(points[:, :2] - place[:2]).T
+    return (x < _SIGHT_RANGE) & (y < _SIGHT_RANGE)
 
 
 def _directions(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
