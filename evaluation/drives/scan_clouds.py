@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.base import InputError, compiled, poses
+from cns_drake.base import InputError, poses
 from cns_drake.base import points as clouds
 from cns_drake.drives import Drive
 from evaluation.drives.query_sensor import QuerySensor
@@ -160,24 +160,9 @@ def _coordinates(scan: np.ndarray, X_FS: np.ndarray | None) -> np.ndarray:
     p_S = clouds.xyz(scan)
     if X_FS is None:
         return p_S
-    return _moved(p_S, np.ascontiguousarray(X_FS, np.float64))
-
-
-@compiled
-def _moved(p_S: np.ndarray, X_FS: np.ndarray) -> np.ndarray:
-    """Returns points (N, 3) in the frame F.
-
-    Unlike a matrix product, products and sums that are computed one by one are
-    rounded in the same way on every processor.
-    """
-    p_F = np.empty_like(p_S)
-    for k in range(len(p_S)):
-        x, y, z = p_S[k]
-        for row in range(3):
-            p_F[k, row] = (
-                X_FS[row, 0] * x
-                + X_FS[row, 1] * y
-                + X_FS[row, 2] * z
-                + X_FS[row, 3]
-            )
-    return p_F
+    x, y, z = p_S.T
+    # Unlike a matrix product, products and sums that are computed one by one
+    # are rounded in the same way on every processor.
+    with np.errstate(invalid="ignore"):
+        rows = [r[0] * x + r[1] * y + r[2] * z + r[3] for r in X_FS[:3]]
+    return np.stack(rows, axis=1)
