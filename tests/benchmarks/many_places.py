@@ -10,16 +10,20 @@ on the number of points. A query is a scene seen from elsewhere. With
 its drives together, and the queries are those of its last drive: FOLDER is
 `report/parts/features` of `cns-drake reproduce`, before the study is finished
 and removes its descriptors. Each method
-and number of places has a process of its own, of which the CPU time of the
-description, the database, a query without and with geometric verification and
-the peak of memory are printed. With `--all-queries`, there are as many queries
-as places. Exponents are slopes of straight lines through logarithms; the last
-column is the time for as many queries as places, on one core.
+and number of places has a process of its own, which keeps its descriptors in a
+file as a study does. The CPU time of the description, of reading the places and
+building the database, of a query without and with geometric verification, and
+the peak of memory are printed. Places are read once for each batch of queries;
+the time of a query does not include it, the last column does: it is the time
+for as many queries as places, on one core. With `--all-queries`, there are as
+many queries as places. Exponents are slopes of straight lines through
+logarithms.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 import tempfile
 import time
@@ -30,18 +34,24 @@ from processes import in_process
 from cns_drake.drives import DriveNames
 from evaluation.methods import Method, make_method
 from evaluation.recognition import (
+    MOST_BYTES,
     RANDOM_YAW_PROTOCOL,
     DescribedScans,
     DriveDescriptors,
+    StoredDrives,
     compare_with_gates,
+    query_batches,
 )
+from evaluation.recognition.search import Search
 from evaluation.study import Part
+from evaluation.study.parts import LongList
 
 METHODS = ("scan-context++", "solid", "ring++", "btc", "layered-overlap")
 PLACES = (300, 3000)
 QUERIES = 20
 # Distance between two places [m].
 APART = 10.0
+_NO_ROWS = np.arange(0)
 
 
 def scene(seed: int) -> np.ndarray:
@@ -73,7 +83,7 @@ def seen_again(points: np.ndarray, seed: int) -> np.ndarray:
     return shifted @ R + rng.normal(0.0, 0.01, points.shape)
 
 
-def described(frames: np.ndarray, descriptors: list) -> DescribedScans:
+def described(frames: np.ndarray, descriptors: Sequence) -> DescribedScans:
     """Returns places or queries, each at a distance from all others."""
     X_WS = np.tile(np.eye(4), (len(frames), 1, 1))
     X_WS[:, 0, 3] = APART * frames
@@ -81,16 +91,27 @@ def described(frames: np.ndarray, descriptors: list) -> DescribedScans:
 
 
 def drawn(
-    method: Method, num_places: int, num_queries: int
+    method: Method, num_places: int, num_queries: int, folder: Path
 ) -> tuple[DescribedScans, DescribedScans]:
     """Returns places and queries of scenes that are drawn at random."""
-    of_places = [method.describe_place(scene(k)) for k in range(num_places)]
+    of_places = LongList(folder)
+    for k in range(num_places):
+        of_places.append(method.describe_place(scene(k)))
     chosen = np.linspace(0, num_places - 1, num_queries).astype(int)
-    of_queries = [
-        method.describe(seen_again(scene(k), k)) for k in chosen.tolist()
-    ]
+    of_queries = LongList(folder)
+    for k in chosen.tolist():
+        of_queries.append(method.describe(seen_again(scene(k), k)))
     places = described(np.arange(num_places), of_places)
     return places, described(chosen, of_queries)
+
+
+def in_file(places: DescribedScans, file: Path) -> DescribedScans:
+    """Returns places whose descriptors are read from a file, as in a study."""
+    part = Part(file)
+    part.write({}, DriveDescriptors("places", places, places.chosen(_NO_ROWS)))
+    store = StoredDrives([part.read], [part.size()], MOST_BYTES)
+    rows = np.arange(len(places.frames))
+    return store.described(store.undescribed(0), np.zeros_like(rows), rows)
 
 
 def recorded(
@@ -128,36 +149,50 @@ def measure(
     # The first call of a function loads and compiles.
     method.describe(scene(0))
     start = time.process_time()
+    folder = file.parent
     if features is None:
-        places, asked = drawn(method, num_places, num_queries)
+        places, asked = drawn(method, num_places, num_queries, folder)
     else:
         places, asked = recorded(name, num_places, num_queries, features)
     describing = (time.process_time() - start) / num_places
-    of_places = list(places.descriptors)
-    none = described(np.arange(0), [])
+    places = in_file(places, folder / "places.data")
+    none = described(_NO_ROWS, [])
     database = DriveDescriptors("places", places, none)
-    method.build_database(of_places[:2])
-    start = time.process_time()
-    built = method.build_database(of_places)
-    building = time.process_time() - start
-    # A method may build small databases of its own, of candidates.
-    build = method.build_database
-    method.build_database = lambda some: (
-        built if len(some) == num_places else build(some)
-    )
+    loading = _timed_loading()
     times, right = [], 0
     for radii in ([None], [None, 7.5]):
         # The first query does not count: it compiles.
         for part in (slice(0, 1), slice(0, None)):
             rows = np.arange(len(asked.frames))[part]
             query = DriveDescriptors("queries", none, asked.chosen(rows))
+            loading.clear()
             start = time.process_time()
             for _, (found, *_) in compare_with_gates(
                 method, database, query, RANDOM_YAW_PROTOCOL, radii
             ):
                 right += int((found.best_places == found.query_frames).sum())
-        times.append((time.process_time() - start) / num_queries)
-    np.savetxt(file, [describing, building, *times, right, _peak()])
+        spent = time.process_time() - start - sum(loading)
+        times.append(spent / num_queries)
+    batches = len(list(query_batches(num_queries, num_places)))
+    once = sum(loading) / batches
+    np.savetxt(file, [describing, once, *times, right, _peak()])
+
+
+def _timed_loading() -> list[float]:
+    """Returns a list that gets the CPU time of each loading of places [s].
+
+    The places are read, and a database is built of them.
+    """
+    spent: list[float] = []
+    build = Search._build
+
+    def timed(search: Search, number: int) -> None:
+        start = time.process_time()
+        build(search, number)
+        spent.append(time.process_time() - start)
+
+    Search._build = timed
+    return spent
 
 
 def _peak() -> float:
@@ -181,13 +216,15 @@ def report(
             file = Path(folder) / "times"
             asked = number if num_queries is None else min(num_queries, number)
             in_process(measure, name, number, asked, features, file)
-            describing, building, alone, gated, _, peak = np.loadtxt(file)
+            describing, loading, alone, gated, _, peak = np.loadtxt(file)
         spent.append(gated)
+        batches = len(list(query_batches(number, number)))
+        whole = number * gated + batches * loading
         print(
             f"{name:16} {number:6} places: describe {1e3 * describing:.1f} ms,"
-            f" build {building:.3f} s, query {1e3 * alone:.2f} ms,"
+            f" load {loading:.3f} s, query {1e3 * alone:.2f} ms,"
             f" verified {1e3 * gated:.2f} ms, peak {peak:.0f} MB;"
-            f" {number} queries {number * gated / 3600.0:.2g} h",
+            f" {number} queries {whole / 3600.0:.2g} h",
             flush=True,
         )
     if len(numbers) > 1:
