@@ -43,7 +43,7 @@ class FrozenRedraw:
         turn_deg: angle by which the city is rotated about the world's origin
             [deg].
         stages: name of the shipped map whose stages the redraw has, with the
-            same streets and structures. The redraws of Metropolis are older
+            same streets and structures. Five redraws of Metropolis are older
             than its present stages, and keep those of Metropolis cleared.
     """
 
@@ -97,7 +97,11 @@ def redraw_frozen(
     redraws = frozen_redraws()
     for what, given, known in (
         ("map", maps, [one.map_name for one in redraws]),
-        (FROZEN_REDRAW, numbers, [one.number for one in redraws]),
+        (
+            FROZEN_REDRAW,
+            numbers,
+            [one.number for one in redraws if one.map_name in maps or not maps],
+        ),
     ):
         for one in given:
             if one not in known:

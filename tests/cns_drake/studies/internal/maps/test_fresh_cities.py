@@ -1,6 +1,7 @@
 """Fresh versions of cities: frozen, turned as a whole, with their stages."""
 
 from collections import Counter
+from dataclasses import replace
 
 from helpers.small_city import write_small_city
 import numpy as np
@@ -23,6 +24,12 @@ from cns_drake.studies.maps.turned_inputs import turned_content
 
 def test_five_versions_of_each_map_of_which_two_are_off_the_axes():
     versions = frozen_redraws()
+    # The city of Metropolis's version 1, with the map's present stages.
+    *_, last = [one for one in versions if one.map_name == "metropolis"]
+    first = next(one for one in versions if one.map_name == "metropolis")
+    assert first.stages == "metropolis_cleared"
+    assert last == replace(first, number=6, stages="metropolis")
+    versions.remove(last)
     assert Counter(one.map_name for one in versions) == dict.fromkeys(
         shipped_cities(), 5
     )
@@ -132,7 +139,8 @@ def test_a_version_of_a_small_city(tmp_path, turn_deg):
 def test_versions_that_are_none(tmp_path):
     for maps, numbers, fault in (
         (("atlantis",), (), "map: no frozen redraw 'atlantis'"),
-        ((), (6,), "mine: both.redraw.frozen: no frozen redraw 6"),
+        ((), (7,), "mine: both.redraw.frozen: no frozen redraw 7"),
+        (("suburbia",), (6,), "both.redraw.frozen: no frozen redraw 6"),
     ):
         with pytest.raises(InputError, match=fault):
             redraw_frozen(maps, numbers, tmp_path / "out", Cluster(), "mine")
