@@ -1293,6 +1293,14 @@ def _claims_on_reality() -> list[Claim]:
         row["scans"]: float(row["all"])
         for row in csv_rows("notes/judge_scans.csv")
     }
+    plain, green = (
+        np.mean(
+            _values(
+                "notes/judge_images.csv", "auc", roadsides=n, features="all"
+            )
+        )
+        for n in "03"
+    )
     nclt, ours = (
         {
             row["days"]: float(row["r1"])
@@ -1391,6 +1399,21 @@ def _claims_on_reality() -> list[Claim]:
             declared="the values of the sensor model, by commits before each"
             " measurement",
             **real | {"seen_before": "the first of the three places"},
+        ),
+        Claim(
+            name="images-told-apart",
+            claim="A classifier tells images of these scans from above from"
+            f" simulated ones with an AUC of {plain:.2f}, or {green:.2f} with"
+            " `roadsides: 3`.",
+            estimate=float(green),
+            unit="real scans of three places of KITTI 00",
+            n=15,
+            test="cross-validated by place; the mean of two LiDARs",
+            source="docs/notes/judge_images.csv",
+            overturned_by="a greater AUC with scans of other streets",
+            declared="both values, before the images were made, as 0.88 and"
+            " 0.86",
+            **real | {"seen_before": "the AUC of an earlier version, 0.88"},
         ),
         Claim(
             name="easier",
