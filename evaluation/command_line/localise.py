@@ -188,7 +188,8 @@ def localise(
         values |= tracking_summary(rows)
     values |= localisation_summary(rows)
     if output is not None:
-        _write_results(engine, rows, output, track=track)
+        title = f"{drive.name}, tracked by {name} in the map of {source.name}"
+        _write_results(engine, rows, output, title if track else None)
     terminal.show(values, _rows(values), json=json)
 
 
@@ -225,19 +226,26 @@ def _localised(
 
 
 def _write_results(
-    engine: Engine, rows: np.ndarray, output: Path, *, track: bool
+    engine: Engine, rows: np.ndarray, output: Path, title: str | None
 ) -> None:
-    """Writes the tables and, of a tracked drive, the picture."""
+    """Writes the tables and, of a tracked drive, the picture.
+
+    Args:
+        engine: has the tables.
+        rows: (K,) results, one per query.
+        output: folder of the files.
+        title: title of the picture; None if no drive is tracked.
+    """
     from evaluation.localisation import write_rows
 
     options.write_tables(engine)
     write_rows(rows, output / "localisation.csv")
     terminal.note(f"wrote {output / 'localisation.csv'}")
     # A picture that fails takes no number along.
-    if track:
+    if title:
         from evaluation.results import draw_track
 
-        draw_track(rows, output / "track")
+        draw_track(rows, output / "track", title)
 
 
 def _check_together(

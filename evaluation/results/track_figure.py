@@ -12,7 +12,7 @@ from evaluation.results.styles import INK, PALE
 
 
 @figure_style()
-def draw_track(rows: np.ndarray, stem: Path) -> None:
+def draw_track(rows: np.ndarray, stem: Path, title: str) -> None:
     """Draws the results of a tracked drive over its length, and saves them.
 
     The figure shows the position error, and the share of each scan's points
@@ -22,6 +22,7 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
     Args:
         rows: records of `evaluation.localisation.tracking.TRACKED`.
         stem: path of the files without the ending.
+        title: title of the figure.
     """
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
@@ -43,6 +44,7 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
             textcoords="offset points",
             va="center",
         )
+    top.set_title(title, loc="left", wrap=True)
     top.set(yscale="log", ylabel="position error [m]")
     bottom.set(
         xlabel="distance driven [m]",

@@ -854,7 +854,7 @@ def draw_all(folder):
         ],
     )
     rows["way"] = np.arange(9.0)
-    draw_track(rows, folder / "track")
+    draw_track(rows, folder / "track", "town_02, tracked")
     for chart, results in (
         ({"kind": "lines", "over": YEARS, "metric": "auc"}, aged()),
         ({"kind": "dumbbell", "over": YEARS, "metric": "auc"}, aged()),
