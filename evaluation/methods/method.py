@@ -139,7 +139,11 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
     @abc.abstractmethod
     def describe(self, points: np.ndarray) -> Descriptor:
-        """Returns the descriptor of a query's cloud."""
+        """Returns the descriptor of a query's cloud.
+
+        Do not change a descriptor later: of a long drive, descriptors are read
+        again from a file.
+        """
 
     def describe_place(self, points: np.ndarray) -> Descriptor:
         """Returns a place's descriptor; by default the same as for a query."""
@@ -228,7 +232,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
         Args:
             queries: descriptors of a drive's queries, from the first to the
-                present one.
+                present one; a list, or a sequence that reads them from a file.
             database: see `score`.
             exhaustive: see `score`.
 

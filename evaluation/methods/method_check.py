@@ -41,8 +41,9 @@ def check_method(method: Method) -> None:
     The check describes made-up clouds, also empty ones, and compares them: all
     results must have the right type, shape and number, be finite, be the same
     for the same input, and survive pickling, which worker processes need. The
-    input must not be changed, scores must tell places apart, and a cloud must
-    not fit another cloud better than itself.
+    input must not be changed, and no descriptor once it has been described;
+    scores must tell places apart, and a cloud must not fit another cloud better
+    than itself.
 
     Args:
         method: the method, with the settings to check.
@@ -73,6 +74,7 @@ class _Check:
         self._check_attributes()
         self._clouds = [self._cloud(seed) for seed in range(_NUM_PLACES)]
         places, queries = self._described()
+        as_described = _copied((places, queries))
         database = self._call("build_database", places)
         self._check_differences(queries, database)
         places_again, queries_again = self._described()
@@ -90,6 +92,11 @@ class _Check:
                 )
             self._check_own_score(scores, number)
             self._check_poses(query, database)
+        if not _is_equal(_copied((places, queries)), as_described):
+            raise self._fault(
+                "a descriptor was changed after it was described; of a long"
+                " drive, it is read again from a file"
+            )
         self._check_pickles(queries[0], places)
         self._check_batches(queries, database)
         self._check_parts(queries[0], database, places)
@@ -334,3 +341,34 @@ def _not_plain(value: Any) -> str:
     else:
         return f"an object of the type {type(value).__name__}"
     return next(filter(None, map(_not_plain, parts)), "")
+
+
+def _copied(value: Any) -> Any:
+    """Returns a copy of a plain value; see `_not_plain`."""
+    if isinstance(value, np.ndarray):
+        return value.copy()
+    if dataclasses.is_dataclass(value):
+        names = [one.name for one in dataclasses.fields(value)]
+        return {name: _copied(getattr(value, name)) for name in names}
+    if isinstance(value, Mapping):
+        return {key: _copied(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_copied(one) for one in value]
+    return value
+
+
+def _is_equal(one: Any, other: Any) -> bool:
+    """Returns whether two results of `_copied` are equal, bit for bit."""
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray):
+        kinds = [(array.dtype, array.shape) for array in (one, other)]
+        return kinds[0] == kinds[1] and one.tobytes() == other.tobytes()
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(
+            _is_equal(value, other[key]) for key, value in one.items()
+        )
+    if isinstance(one, list):
+        return len(one) == len(other) and all(map(_is_equal, one, other))
+    # A NaN does not equal itself.
+    return one is other or bool(one == other)

@@ -66,10 +66,13 @@ _BLOCK = 64
 class LongList(Sequence[Any]):
     """A list that grows, and keeps its items in a file once there are many.
 
-    At most 512 items are in memory until the list is written as part of the
-    value of a `Part`. In a list that is read from a `Part`, and of the older
-    items of a growing list, only one block of items is in memory. A slice of
-    such a list reads its items when they are used, like the list.
+    The last items, at most 512, are in memory until the list is written as part
+    of the value of a `Part`. Of the items in a file, the blocks that were used
+    last are in memory, with 512 items. An item that is read again is another
+    object, so do not change it. A short slice is a list; a long one reads its
+    items when they are used, like the `LongList`.
+
+    Items that cannot be stored (see `encode`) all stay in memory.
     """
 
     def __init__(self, folder: Path | None = None):
@@ -79,7 +82,7 @@ class LongList(Sequence[Any]):
             folder: existing folder for a temporary file, which has no name and
                 vanishes with the list; None for the system's folder.
         """
-        self._path = folder or Path(tempfile.gettempdir())
+        self._path = folder
         self._stream: BinaryIO | None = None
         # Ends of the blocks in the file, after the start of the first block.
         self._ends = [0]
@@ -88,8 +91,9 @@ class LongList(Sequence[Any]):
         # Size of the blocks without compression [bytes].
         self._plain_bytes = 0
         self._recent: list[Any] = []
-        # Number and items of the block that was read last.
-        self._block: tuple[int, list[Any]] = -1, []
+        # Blocks in memory, from the least to the most recently used one.
+        self._blocks: dict[int, list[Any]] = {}
+        self._is_storable = True
 
     @classmethod
     def of(cls, items: Iterable[Any]) -> LongList:
@@ -101,18 +105,23 @@ class LongList(Sequence[Any]):
 
     @classmethod
     def _in_file(
-        cls, path: Path, start: int, stored: Mapping[str, Any]
+        cls,
+        path: Path,
+        stream: BinaryIO,
+        start: int,
+        stored: Mapping[str, Any],
     ) -> LongList:
         """Returns a list whose blocks are in a part.
 
         Args:
-            path: path of the part.
+            path: path of the part, for error messages.
+            stream: the part, which is open: the file may be replaced by then.
             start: offset of the first block.
             stored: the result of `_stored`.
         """
         made = cls()
         made._path = path
-        made._stream = open(path, "rb", buffering=0)  # noqa: SIM115
+        made._stream = os.fdopen(os.dup(stream.fileno()), "rb")
         weakref.finalize(made, made._stream.close)
         made._ends = [start, *(start + end for end in stored["ends"])]
         made._num_stored = stored["items"]
@@ -126,14 +135,33 @@ class LongList(Sequence[Any]):
         if isinstance(index, slice):
             if self._num_stored == 0:
                 return self._recent[index]
-            return _Stretch(self, range(len(self))[index])
+            return _stretch(self, range(len(self))[index])
         index = range(len(self))[index]
         if index >= self._num_stored:
             return self._recent[index - self._num_stored]
         number, within = divmod(index, _BLOCK)
-        if self._block[0] != number:
-            self._block = number, self._read(number)
-        return self._block[1][within]
+        block = self._blocks.pop(number, None)
+        if block is None:
+            block = self._read(number)
+            if len(self._blocks) >= max(2, _MOST_HELD // _BLOCK):
+                del self._blocks[next(iter(self._blocks))]
+        self._blocks[number] = block
+        return block[within]
+
+    def __add__(self, other: list[Any]) -> list[Any]:
+        return [*self, *other]
+
+    def __radd__(self, other: list[Any]) -> list[Any]:
+        return [*other, *self]
+
+    @property
+    def _where(self) -> Path:
+        return self._path or Path("temporary file")
+
+    @property
+    def num_bytes(self) -> int:
+        """Size of the items in the file if they were in memory [bytes]."""
+        return self._plain_bytes
 
     @property
     def is_in_file(self) -> bool:
@@ -144,14 +172,17 @@ class LongList(Sequence[Any]):
         """Adds an item; the oldest items in memory are written to the file."""
         assert self._num_stored % _BLOCK == 0, "the list was written"
         self._recent.append(item)
-        if len(self._recent) > _MOST_HELD:
-            self._write(_BLOCK)
+        if self._is_storable and len(self._recent) > _MOST_HELD:
+            try:
+                self._write(_BLOCK)
+            except TypeError:
+                self._is_storable = False
 
     def _write(self, number: int) -> None:
         """Writes the next items to the file as one block."""
         plain = encode(self._recent[:number])
         data, _ = _compressed(plain)
-        with user_errors(self._path):
+        with user_errors(self._where):
             if self._stream is None:
                 self._stream = tempfile.TemporaryFile(dir=self._path)  # noqa: SIM115
                 weakref.finalize(self, self._stream.close)
@@ -165,7 +196,7 @@ class LongList(Sequence[Any]):
     def _read(self, number: int) -> list[Any]:
         """Returns the items of a block."""
         data = self._bytes(number)
-        with _damage_named(self._path):
+        with _damage_named(self._where):
             # Lengths at the start of stored values are far smaller.
             if data.startswith(zstandard.FRAME_HEADER):
                 _check_size(data, len(data))
@@ -176,7 +207,7 @@ class LongList(Sequence[Any]):
         """Returns a block as it is in the file."""
         assert self._stream is not None
         start, end = self._ends[number : number + 2]
-        with _damage_named(self._path):
+        with _damage_named(self._where):
             data = os.pread(self._stream.fileno(), end - start, start)
             if len(data) < end - start:
                 raise ValueError("cut off")
@@ -199,6 +230,13 @@ class LongList(Sequence[Any]):
             stream.write(self._bytes(number))
 
 
+def _stretch(of: LongList, rows: range) -> Sequence[Any]:
+    """Returns some items, as a list if there are few."""
+    if len(rows) <= _MOST_HELD:
+        return [of[row] for row in rows]
+    return _Stretch(of, rows)
+
+
 class _Stretch(Sequence[Any]):
     """Some items of a list, which are read when they are used."""
 
@@ -211,8 +249,14 @@ class _Stretch(Sequence[Any]):
 
     def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
-            return _Stretch(self._of, self._rows[index])
+            return _stretch(self._of, self._rows[index])
         return self._of[self._rows[index]]
+
+    def __add__(self, other: list[Any]) -> list[Any]:
+        return [*self, *other]
+
+    def __radd__(self, other: list[Any]) -> list[Any]:
+        return [*other, *self]
 
 
 def _uncompressed_size(size: int) -> int:
@@ -233,6 +277,25 @@ def _check_size(start: bytes, size: int) -> None:
     claimed = zstandard.frame_content_size(start)
     if not 0 <= claimed <= _uncompressed_size(size):
         raise ValueError(f"{size} bytes stand for {claimed}")
+
+
+def _check_lists(lists: Sequence[Mapping[str, Any]]) -> None:
+    """Refuses damaged results of `LongList._stored` in a header.
+
+    Raises:
+        ValueError: if numbers do not fit each other.
+    """
+    for one in lists:
+        ends, items = one["ends"], one["items"]
+        sizes = np.diff([0, *ends])
+        is_whole = all(type(n) is int for n in (*ends, items, one["plain"]))
+        full = _BLOCK * (len(ends) - 1)
+        if (
+            not is_whole
+            or (sizes <= 0).any()
+            or not full < items <= full + _BLOCK
+        ):
+            raise ValueError("a list has another length")
 
 
 def _compressed(plain: bytes) -> tuple[bytes, bool]:
@@ -352,7 +415,9 @@ class Part:
             lists = []
             start = stream.tell()
             for stored in header.get("lists", []):
-                lists.append(LongList._in_file(self.path, start, stored))
+                lists.append(
+                    LongList._in_file(self.path, stream, start, stored)
+                )
                 start += stored["ends"][-1]
             return decode(data, lists)
 
@@ -399,6 +464,7 @@ class Part:
             start = stream.tell()
             size = header["bytes"]
             lists = header.get("lists", [])
+            _check_lists(lists)
             in_lists = sum(one["ends"][-1] for one in lists)
             if stream.seek(0, 2) - start != size + in_lists:
                 raise ValueError("cut off")
@@ -510,6 +576,7 @@ _DECODING_ERRORS = (
     ImportError,
     IndexError,
     KeyError,
+    MemoryError,
     OverflowError,
     RecursionError,
     SyntaxError,
@@ -638,7 +705,10 @@ def _read_arrays(data: bytes, start: int) -> list[np.ndarray]:
         length = int.from_bytes(stream.read(width), "little")
         begin = stream.tell() + length
         text = stream.read(length)
-        shape, is_fortran, dtype = _array_header(text, version == (3, 0))
+        shape, is_fortran, kind = _array_header(text, version == (3, 0))
+        dtype = np.lib.format.descr_to_dtype(kind)
+        if dtype.hasobject:
+            raise ValueError("an array of objects")
         size = math.prod(shape) * dtype.itemsize
         # NumPy would first reserve all that a header names.
         if size > len(data) - begin:
@@ -655,23 +725,23 @@ def _read_arrays(data: bytes, start: int) -> list[np.ndarray]:
 @functools.lru_cache(4096)
 def _array_header(
     text: bytes, is_utf_8: bool
-) -> tuple[tuple[int, ...], bool, np.dtype]:
-    """Returns an array's shape, whether its order is Fortran's, and its type.
+) -> tuple[tuple[int, ...], bool, Any]:
+    """Returns an array's shape, whether its order is Fortran's, and its kind.
+
+    The kind describes a type, of which each array gets one of its own: names of
+    fields can be changed.
 
     Args:
         text: the header, a Python expression.
         is_utf_8: whether names in the header are in UTF-8 instead of Latin-1.
 
     Raises:
-        ValueError: the header is too long, or of an array of objects.
+        ValueError: the header is too long.
     """
     if len(text) > _MOST_HEADER:
         raise ValueError("a header is too long")
     header = ast.literal_eval(text.decode("utf-8" if is_utf_8 else "latin-1"))
-    dtype = np.lib.format.descr_to_dtype(header["descr"])
-    if dtype.hasobject:
-        raise ValueError("an array of objects")
-    return header["shape"], header["fortran_order"], dtype
+    return header["shape"], header["fortran_order"], header["descr"]
 
 
 def _decode_tree(

@@ -97,7 +97,7 @@ def _searched_database(
     parts = [database, *beside, *distractors]
     store = StoredDrives(
         [partial(_descriptors_of, one) for one in parts],
-        [one.size() if isinstance(one, Part) else 0 for one in parts],
+        [_size_of(one) for one in parts],
         MOST_BYTES if divides else math.inf,
     )
     num_near = 1 + len(beside)
@@ -129,6 +129,14 @@ def _searched_database(
         len(rows),
         rows,
     )
+
+
+def _size_of(source: DriveDescriptors | Part) -> int:
+    """Returns the size of descriptors that are in a file [bytes]."""
+    if isinstance(source, Part):
+        return source.size()
+    kept = source.places.descriptors
+    return kept.num_bytes if isinstance(kept, LongList) else 0
 
 
 def _descriptors_of(source: DriveDescriptors | Part) -> DriveDescriptors:

@@ -95,20 +95,19 @@ def redraw_frozen(
         InputError: a redraw is unknown or could not be generated.
     """
     redraws = frozen_redraws()
-    for what, given, known in (
-        ("map", maps, [one.map_name for one in redraws]),
-        (
-            FROZEN_REDRAW,
-            numbers,
-            [one.number for one in redraws if one.map_name in maps or not maps],
-        ),
-    ):
+    all_maps = dict.fromkeys(one.map_name for one in redraws)
+    checks: list[tuple[str, Sequence[object], list[object]]] = [
+        ("map", maps, list(all_maps))
+    ]
+    for name in maps or all_maps:
+        known = [one.number for one in redraws if one.map_name == name]
+        checks.append((f"{FROZEN_REDRAW} of {name}", numbers, [*known]))
+    for what, given, there in checks:
         for one in given:
-            if one not in known:
-                there = ", ".join(map(str, dict.fromkeys(known)))
+            if one not in there:
                 raise InputError(
                     f"{source}: {what}: no frozen redraw {one!r} (there are:"
-                    f" {there})"
+                    f" {', '.join(map(str, there))})"
                 )
     steps = [
         RedrawFrozen(

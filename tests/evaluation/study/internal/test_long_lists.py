@@ -60,6 +60,18 @@ def test_a_slice_reads_what_the_list_reads(tmp_path):
         assert_equal(found[:650][600:][-1], item(649))
 
 
+def test_slices_join_lists(tmp_path):
+    part = Part(tmp_path / "list.data")
+    part.write({}, some(1100))
+    for found in (some(1100), part.read()):
+        assert isinstance(found[-5:], list)
+        for whole in (found, found[: HELD + 1]):
+            first, *_, last = [whole[0]] * 5 + whole + [7]
+            assert_equal(first, item(0))
+            assert last == 7
+        assert len(found[10:20] + list("ab")) == 12
+
+
 def test_few_items_are_in_memory(tmp_path, monkeypatch):
     decoded = []
     decode = parts.decode
@@ -74,9 +86,44 @@ def test_few_items_are_in_memory(tmp_path, monkeypatch):
     monkeypatch.setattr(parts, "decode", counting)
     (found,) = part.read()
     assert decoded == [1]
-    for number in (0, 63, 1, 64, 127, 999):
+    for number in (0, 63, 1, 64, 127, 999, 0):
         assert_equal(found[number], item(number))
     assert decoded == [1, BLOCK, BLOCK, 1000 % BLOCK]
+    # Eight blocks stay, of which the first was used last but six.
+    for number in range(128, 128 + 6 * BLOCK, BLOCK):
+        assert_equal(found[number], item(number))
+    assert len(decoded) == 4 + 6
+    assert_equal(found[0], item(0))
+    assert len(decoded) == 4 + 6
+    assert_equal(found[64], item(64))
+    assert len(decoded) == 4 + 7
+
+
+def test_a_part_that_is_replaced_while_it_is_read(tmp_path):
+    part = Part(tmp_path / "list.data")
+    part.write({}, some(600))
+    found = part.read()
+    part.write({}, LongList.of([7] * 700))
+    assert len(found) == 600
+    assert_equal(found[0], item(0))
+    part.remove_value()
+    assert_equal(found[599], item(599))
+
+
+def test_items_that_cannot_be_stored_stay_in_memory(tmp_path):
+    things = [object() for _ in range(HELD + 200)]
+    kept = LongList.of(things)
+    assert not kept.is_in_file
+    assert list(kept) == things
+    with pytest.raises(InputError, match="cannot be kept"):
+        Part(tmp_path / "list.data").write({}, kept)
+
+
+def test_a_short_list_needs_no_folder(monkeypatch):
+    monkeypatch.setattr(parts.tempfile, "tempdir", "/nowhere")
+    assert len(some(HELD)) == HELD
+    with pytest.raises(InputError, match="temporary file: No such file"):
+        some(HELD + 1)
 
 
 def test_several_lists_and_other_values_share_a_file(tmp_path):
@@ -121,6 +168,22 @@ def test_a_damaged_list_is_named(tmp_path):
     # The last block is cut off in a file that is already open.
     with pytest.raises(InputError, match=r"list\.data: damaged \(cut off\)"):
         found[599]
+    magic, header, data = whole.split(b"\n", 2)
+    for name, value in (
+        ("items", 500),
+        ("items", 5000),
+        ("items", -3),
+        ("items", "x"),
+        ("plain", 1.5),
+        ("ends", []),
+        ("ends", [10**12]),
+    ):
+        changed = json.loads(header)
+        changed["lists"][0][name] = value
+        line = json.dumps(changed).encode()
+        part.path.write_bytes(b"\n".join((magic, line, data)))
+        with pytest.raises(InputError, match=r"list\.data: damaged"):
+            part.read()
     part.path.write_bytes(whole[:-40] + bytes(40))
     with pytest.raises(InputError, match=r"list\.data: damaged"):
         part.read()[599]

@@ -66,6 +66,14 @@ def test_names_of_fields_are_any_text():
     assert new.tobytes() == old.tobytes()
 
 
+def test_names_of_fields_belong_to_one_array():
+    old = np.ones(4, dtype=[("a", "<f4"), ("b", "<f4")])
+    first, second = decode(encode([old, old.copy()]))
+    first.dtype.names = ("p", "q")
+    (third,) = decode(encode([old]))
+    assert second.dtype.names == third.dtype.names == ("a", "b")
+
+
 def test_what_is_read_shares_no_memory():
     first, second = decode(encode([np.zeros(3), np.zeros(3)]))
     first[:] = 1.0

@@ -139,8 +139,8 @@ def test_a_version_of_a_small_city(tmp_path, turn_deg):
 def test_versions_that_are_none(tmp_path):
     for maps, numbers, fault in (
         (("atlantis",), (), "map: no frozen redraw 'atlantis'"),
-        ((), (7,), "mine: both.redraw.frozen: no frozen redraw 7"),
-        (("suburbia",), (6,), "both.redraw.frozen: no frozen redraw 6"),
+        ((), (7,), "mine: both.redraw.frozen of downtown: no frozen redraw 7"),
+        (("metropolis", "suburbia"), (6,), "of suburbia: no frozen redraw 6"),
     ):
         with pytest.raises(InputError, match=fault):
             redraw_frozen(maps, numbers, tmp_path / "out", Cluster(), "mine")
