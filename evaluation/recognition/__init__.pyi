@@ -99,6 +99,7 @@ from evaluation.recognition.retrieval import query_batches as query_batches
 from evaluation.recognition.retrieval import retrieve as retrieve
 from evaluation.recognition.scan_folders import write_scores as write_scores
 from evaluation.recognition.scoring import score_places as score_places
+from evaluation.recognition.search import Search as Search
 from evaluation.recognition.seen_surfaces import TOLERANCE as TOLERANCE
 from evaluation.recognition.seen_surfaces import SeenSurfaces as SeenSurfaces
 from evaluation.recognition.sign_flips import LEAST_BLOCKS as LEAST_BLOCKS

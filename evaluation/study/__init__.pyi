@@ -13,6 +13,7 @@ from evaluation.study.one_pair import measure_pairs as measure_pairs
 from evaluation.study.one_pair import pair_of as pair_of
 from evaluation.study.one_pair import pair_of_drive_maps as pair_of_drive_maps
 from evaluation.study.one_pair import pair_of_maps as pair_of_maps
+from evaluation.study.parts import LongList as LongList
 from evaluation.study.parts import MakePart as MakePart
 from evaluation.study.parts import Part as Part
 from evaluation.study.place_measurements import (

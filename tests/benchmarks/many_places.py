@@ -38,19 +38,19 @@ from evaluation.recognition import (
     RANDOM_YAW_PROTOCOL,
     DescribedScans,
     DriveDescriptors,
+    Search,
     StoredDrives,
     compare_with_gates,
     query_batches,
 )
-from evaluation.recognition.search import Search
-from evaluation.study import Part
-from evaluation.study.parts import LongList
+from evaluation.study import LongList, Part
 
 METHODS = ("scan-context++", "solid", "ring++", "btc", "layered-overlap")
 PLACES = (300, 3000)
 QUERIES = 20
 # Distance between two places [m].
 APART = 10.0
+# Rows of no place.
 _NO_ROWS = np.arange(0)
 
 

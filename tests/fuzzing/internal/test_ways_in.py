@@ -1285,10 +1285,7 @@ OPENERS = {
     "lzma.open": (),
     # Only its header is read.
     "np.load": ("evaluation.clouds.npy_files",),
-    "np.lib.format.read_array": (
-        "cns_drake.base.npz_files",
-        "evaluation.study.parts",
-    ),
+    "np.lib.format.read_array": ("cns_drake.base.npz_files",),
     # Films are made of the program's own pictures.
     "Image.open": ("cns_drake.base.images", "cns_drake.simulation.film"),
     "yaml.load": (),

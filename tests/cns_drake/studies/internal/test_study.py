@@ -770,7 +770,7 @@ def test_faults_before_any_work(town, tmp_path, fields, fault):
         ),
         (
             {"maps": ["suburbia"], "both": {"redraw": {"frozen": [1, 6]}}},
-            "mine: both.redraw.frozen: no frozen redraw 6",
+            "mine: both.redraw.frozen of suburbia: no frozen redraw 6",
         ),
         (
             {"database": {"stage": "earlier 1"}},

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.study import Part, parts
-from evaluation.study.parts import LongList
+from evaluation.study import LongList, Part, parts
 
-BLOCK, HELD = 64, 512
+# Number of items that are written together.
+BLOCK = 64
+# Number of items that are in memory.
+HELD = 512
 
 
 def item(number):
