@@ -83,7 +83,7 @@ class KeptScans:
     def scan(self, index: int) -> np.ndarray:
         """Returns the scan of a frame, which must have been kept."""
         row = int(np.searchsorted(self.frames, index))
-        if self.frames[row : row + 1] != index:
+        if row == len(self.frames) or self.frames[row] != index:
             raise KeyError(index)
         return self.scans[row]
 

@@ -249,8 +249,8 @@ def shown_overlaps(
     _, query = described_query.read()
     queries = query.queries
     asked = asked_scans.read()
-    are_whole = isinstance(asked, KeptScans)
-    if are_whole:
+    are_recorded = isinstance(asked, KeptScans)
+    if are_recorded:
         asked = LongList.of(
             protocol.query_scan(asked, frame).astype(np.float32)
             for frame in queries.frames.tolist()
@@ -268,7 +268,8 @@ def shown_overlaps(
     ):
         of = drive_of == number
         kept = part.read()
-        if are_whole:
+        are_recorded = isinstance(kept, KeptScans)
+        if are_recorded:
             chosen = LongList.of(
                 cloud_at(kept, frame, 1, protocol.half_extent).astype(
                     np.float32

@@ -7,6 +7,7 @@ import pytest
 
 from cns_drake.base import InputError
 from evaluation.study import LongList, Part, parts
+from evaluation.study.features import KeptScans
 
 # Number of items that are written together.
 BLOCK = 64
@@ -214,3 +215,12 @@ def test_nothing_is_left_of_a_temporary_file(tmp_path):
         lost.append(item(number))
     with pytest.raises(InputError, match="nowhere: No such file"):
         lost.append(item(HELD))
+
+
+def test_scans_that_were_not_kept():
+    frames = np.array([2, 5])
+    kept = KeptScans("a", np.eye(4)[None], None, frames, [np.zeros(1)] * 2)
+    assert kept.scan(5).shape == (1,)
+    for missing in (0, 3, 6):
+        with pytest.raises(KeyError):
+            kept.scan(missing)
