@@ -63,7 +63,17 @@ _MOST_HELD = 512
 _BLOCK = 64
 
 
-class LongList(Sequence[Any]):
+class _Joined(Sequence[Any]):
+    """A sequence to which lists can be added, as to a list."""
+
+    def __add__(self, other: list[Any]) -> list[Any]:
+        return [*self, *other]
+
+    def __radd__(self, other: list[Any]) -> list[Any]:
+        return [*other, *self]
+
+
+class LongList(_Joined):
     """A list that grows, and keeps its items in a file once there are many.
 
     The last items, at most 512, are in memory until the list is written as part
@@ -148,12 +158,6 @@ class LongList(Sequence[Any]):
         self._blocks[number] = block
         return block[within]
 
-    def __add__(self, other: list[Any]) -> list[Any]:
-        return [*self, *other]
-
-    def __radd__(self, other: list[Any]) -> list[Any]:
-        return [*other, *self]
-
     @property
     def _where(self) -> Path:
         return self._path or Path("temporary file")
@@ -232,12 +236,12 @@ class LongList(Sequence[Any]):
 
 def _stretch(of: LongList, rows: range) -> Sequence[Any]:
     """Returns some items, as a list if there are few."""
-    if len(rows) <= _MOST_HELD:
+    if len(rows) <= _BLOCK:
         return [of[row] for row in rows]
     return _Stretch(of, rows)
 
 
-class _Stretch(Sequence[Any]):
+class _Stretch(_Joined):
     """Some items of a list, which are read when they are used."""
 
     def __init__(self, of: LongList, rows: range):
@@ -251,12 +255,6 @@ class _Stretch(Sequence[Any]):
         if isinstance(index, slice):
             return _stretch(self._of, self._rows[index])
         return self._of[self._rows[index]]
-
-    def __add__(self, other: list[Any]) -> list[Any]:
-        return [*self, *other]
-
-    def __radd__(self, other: list[Any]) -> list[Any]:
-        return [*other, *self]
 
 
 def _uncompressed_size(size: int) -> int:
