@@ -198,10 +198,7 @@ def radius() -> str:
         for wanted in _RADII:
             word = ", verified" if verified else ""
             found = losses_at(wanted, verified)
-            cells = [
-                f"{np.mean(v):.2f} ({min(v):.2f}–{max(v):.2f})"
-                for v in (found[method] for method in METHODS)
-            ]
+            cells = [_mean_and_range(found[method]) for method in METHODS]
             lines.append((f"{wanted:g} m{word}", *cells))
     return _table(("radius of a match", *map(title, METHODS)), lines)
 
@@ -217,7 +214,7 @@ def changes() -> str:
     }
     for (cause, name), verified in itertools.product(causes.items(), "01"):
         some = [found[verified][cause, method] for method in METHODS]
-        cells = [f"{np.mean(v):.2f} ({min(v):.2f}–{max(v):.2f})" for v in some]
+        cells = [_mean_and_range(values) for values in some]
         lines.append((name, "yes" if verified == "1" else "no", *cells))
     head = "what the database lacks", "verified", *map(title, METHODS)
     return _table(head, lines)
@@ -1680,11 +1677,15 @@ def _verb(some: Sequence[str]) -> str:
     return "survives" if len(some) == 1 else "survive"
 
 
-def _loss(one: Survival, *, bold: bool = False) -> str:
+def _mean_and_range(values: Sequence[float]) -> str:
+    return f"{np.mean(values):.2f} ({min(values):.2f}–{max(values):.2f})"
+
+
+def _loss(one: Survival) -> str:
     text = f"{one.loss:.2f}"
     if not np.isnan(one.interval.low):
         text += f" ({one.interval.low:.2f}–{one.interval.high:.2f})"
-    return f"**{text}**" if bold and one.verdict == SURVIVES else text
+    return text
 
 
 def random_yaw_table() -> str:

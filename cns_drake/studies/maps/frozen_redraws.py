@@ -8,7 +8,7 @@ so that their streets are not parallel to the axes of the world.
 random before any method ran.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -96,12 +96,12 @@ def redraw_frozen(
     """
     redraws = frozen_redraws()
     all_maps = dict.fromkeys(one.map_name for one in redraws)
-    checks: list[tuple[str, Sequence[object], list[object]]] = [
-        ("map", maps, list(all_maps))
+    checks: list[tuple[str, Sequence[object], Collection[object]]] = [
+        ("map", maps, all_maps)
     ]
     for name in maps or all_maps:
         known = [one.number for one in redraws if one.map_name == name]
-        checks.append((f"{FROZEN_REDRAW} of {name}", numbers, [*known]))
+        checks.append((f"{FROZEN_REDRAW} of {name}", numbers, known))
     for what, given, there in checks:
         for one in given:
             if one not in there:
