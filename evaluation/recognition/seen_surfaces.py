@@ -125,7 +125,7 @@ class SeenSurfaces:
         """
         if len(points) == 0:
             return Shares(math.nan, math.nan)
-        kinds, _ = self._kinds_and_clearances(points)
+        kinds = self._kinds(points)
         return Shares(
             float(np.mean(kinds == _SHOWN)), float(np.mean(kinds == _BEHIND))
         )
@@ -149,17 +149,22 @@ class SeenSurfaces:
         Args:
             points: (N, 3) points in the sensor's frame [m].
         """
-        return self._kinds_and_clearances(points)[1]
+        return _measure_clearances(
+            _contiguous(points), self.points, self.angles_deg, self.starts
+        )
 
     def hides(self, points: np.ndarray) -> np.ndarray:
         """Returns which points (N, 3) are behind a seen surface, (N,) bool."""
-        return self._kinds_and_clearances(points)[0] == _BEHIND
+        return self._kinds(points) == _BEHIND
 
-    def _kinds_and_clearances(
-        self, points: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        points = np.ascontiguousarray(points, dtype=np.float64)
-        return _look_at(points, self.points, self.angles_deg, self.starts)
+    def _kinds(self, points: np.ndarray) -> np.ndarray:
+        return _classify(
+            _contiguous(points), self.points, self.angles_deg, self.starts
+        )
+
+
+def _contiguous(points: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(points, dtype=np.float64)
 
 
 @compiled
@@ -195,7 +200,9 @@ def _find_nearest_by_quadrant(
         max(row - _REACH_UP, 0), min(row + _REACH_UP, _ROWS - 1) + 1
     ):
         for c in range(column - _REACH_ASIDE, column + _REACH_ASIDE + 1):
-            cell = r * _COLUMNS + c % _COLUMNS
+            # This equals `% _COLUMNS`, which is slow.
+            turn = _COLUMNS if c < 0 else -_COLUMNS if c >= _COLUMNS else 0
+            cell = r * _COLUMNS + c + turn
             for k in range(starts[cell], starts[cell + 1]):
                 up = angles[k, 0] - elevation
                 # This equals `% 360.0`, which is slow.
@@ -351,75 +358,70 @@ def _is_beside_return(
 
 @compiled
 def _classify(
-    distance: float, around: _Returns, side: _PlaneSide, is_beside: bool
-) -> int:
-    """Returns whether a point is shown, hidden or neither.
-
-    Args:
-        distance: range of the point [m].
-        around: the returns around its direction.
-        side: where the point lies relative to the plane through these returns.
-        is_beside: whether a return near its direction has the same range.
-    """
-    nearest, farthest = around.nearest, around.farthest
-    is_between = nearest - TOLERANCE <= distance <= farthest + TOLERANCE
-    # The plane meets the ray at h / along times the point.
-    is_on_plane = (
-        side.along != 0.0
-        and abs(side.h / side.along - 1.0) * distance <= TOLERANCE
-    )
-    if is_beside or is_on_plane or (is_between and around.is_one_surface):
-        return _SHOWN
-    if around.number > 0 and distance > farthest + TOLERANCE:
-        return _BEHIND
-    return _UNKNOWN
-
-
-@compiled
-def _measure_clearance(
-    distance: float, around: _Returns, side: _PlaneSide
-) -> float:
-    """Returns the distance of a point in front of the surface [m].
-
-    See `SeenSurfaces.clearances`; for the arguments, see `_classify`.
-    """
-    if around.number == 0:
-        return math.inf
-    if around.is_one_surface:
-        if side.along == 0.0 or side.size == 0.0:
-            return math.nan
-        towards = math.copysign(1.0, side.along)
-        return towards * (side.h - side.along) / side.size
-    if distance < around.nearest:
-        return around.nearest - distance
-    if distance > around.farthest:
-        return around.farthest - distance
-    return math.nan
-
-
-@compiled
-def _look_at(
     others: np.ndarray, seen: np.ndarray, angles: np.ndarray, starts: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns whether M points are shown, hidden or neither; and clearances.
-
-    A clearance is the distance of a point in front of the surface [m], see
-    `SeenSurfaces.clearances`.
+) -> np.ndarray:
+    """Returns whether M points are shown, hidden or neither, (M,) int8.
 
     Args:
         others: (M, 3) the points, in the frame of the scan's sensor [m].
         seen, angles, starts: see `SeenSurfaces`.
     """
-    kinds = np.empty(len(others), np.int8)
-    clearances = np.empty(len(others))
+    kinds = np.full(len(others), _UNKNOWN, np.int8)
+    corners = np.empty(4, np.int64)
+    away = np.empty(4)
+    for i in range(len(others)):
+        p = others[i]
+        _find_nearest_by_quadrant(p, angles, starts, corners, away)
+        # Most points of similar scans lie beside a return.
+        if _is_beside_return(p, seen, corners, away):
+            kinds[i] = _SHOWN
+            continue
+        around = _measure_returns(seen, corners)
+        distance = _length(p)
+        if around.is_one_surface and (
+            around.nearest - TOLERANCE
+            <= distance
+            <= around.farthest + TOLERANCE
+        ):
+            kinds[i] = _SHOWN
+            continue
+        side = _compare_to_plane(p, seen, corners, away, around)
+        # The plane meets the ray at h / along times the point.
+        if (
+            side.along != 0.0
+            and abs(side.h / side.along - 1.0) * distance <= TOLERANCE
+        ):
+            kinds[i] = _SHOWN
+        elif around.number > 0 and distance > around.farthest + TOLERANCE:
+            kinds[i] = _BEHIND
+    return kinds
+
+
+@compiled
+def _measure_clearances(
+    others: np.ndarray, seen: np.ndarray, angles: np.ndarray, starts: np.ndarray
+) -> np.ndarray:
+    """Returns how far M points are in front of the surface, (M,) [m].
+
+    See `SeenSurfaces.clearances`; for the arguments, see `_classify`.
+    """
+    clearances = np.full(len(others), math.nan)
     corners = np.empty(4, np.int64)
     away = np.empty(4)
     for i in range(len(others)):
         p = others[i]
         _find_nearest_by_quadrant(p, angles, starts, corners, away)
         around = _measure_returns(seen, corners)
-        side = _compare_to_plane(p, seen, corners, away, around)
-        is_beside = _is_beside_return(p, seen, corners, away)
-        kinds[i] = _classify(_length(p), around, side, is_beside)
-        clearances[i] = _measure_clearance(_length(p), around, side)
-    return kinds, clearances
+        distance = _length(p)
+        if around.number == 0:
+            clearances[i] = math.inf
+        elif around.is_one_surface:
+            side = _compare_to_plane(p, seen, corners, away, around)
+            if side.along != 0.0 and side.size != 0.0:
+                towards = math.copysign(1.0, side.along)
+                clearances[i] = towards * (side.h - side.along) / side.size
+        elif distance < around.nearest:
+            clearances[i] = around.nearest - distance
+        elif distance > around.farthest:
+            clearances[i] = around.farthest - distance
+    return clearances
