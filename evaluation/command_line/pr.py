@@ -259,7 +259,7 @@ def _measured(
     (outcome,) = (
         replace(outcome, method=method[0].name)
         for outcome in engine.found(pair, PlaceTask.name)
-        if outcome.is_gated == protocol.verified
+        if outcome.is_verified == protocol.verified
     )
     check_has_match(outcome)
     return engine, outcome
@@ -356,7 +356,7 @@ def _write_scores(
         database,
         query,
         output,
-        gate_radius=protocol.gate_radius,
+        verification_radius=protocol.verification_radius,
         columns=columns,
         on_note=terminal.note,
     )

@@ -90,7 +90,7 @@ from evaluation.recognition.query_outcomes import judge as judge
 from evaluation.recognition.result_number import Number as Number
 from evaluation.recognition.retrieval import Retrieval as Retrieval
 from evaluation.recognition.retrieval import (
-    compare_with_gates as compare_with_gates,
+    compare_at_radii as compare_at_radii,
 )
 from evaluation.recognition.retrieval import (
     matches_within_radius as matches_within_radius,

@@ -10,12 +10,12 @@ from evaluation.recognition.ranking import ranked_places
 
 # Number of places with the best scores that are tested. This value and the next
 # were chosen on development worlds, see docs/notes/fitting.md.
-NUM_GATED = 30
+NUM_VERIFIED = 30
 # Half the width of the transition of a weight, as a share of the radius.
 SOFTNESS = 0.05
 
 
-def gate_weight(
+def verification_weight(
     distance: np.ndarray | float, radius: float, softness: float = SOFTNESS
 ) -> np.ndarray:
     """Returns the factor by which geometric verification scales a score.
@@ -32,7 +32,7 @@ def gate_weight(
     return np.clip((1.0 + softness - far) / (2.0 * softness), 0.0, 1.0)
 
 
-def gated(
+def verified_scores(
     method: Method,
     query: Any,
     database: Any,
@@ -41,13 +41,13 @@ def gated(
 ) -> list[np.ndarray]:
     """Returns scores after geometric verification: (D,) for each radius.
 
-    Geometric verification tests the `NUM_GATED` places with the best scores.
+    Geometric verification tests the `NUM_VERIFIED` places with the best scores.
     The method estimates the distance of each of these places from the query,
-    and `gate_weight` returns a weight w from 1 (near) to 0 (far). If w is 0,
-    the place is rejected: its score becomes NaN. Otherwise the score s becomes
-    s - (1 - w) |s|; a positive score is thus multiplied by w. A place for which
-    the method estimates no pose keeps its score. Scores of places that are not
-    tested become NaN.
+    and `verification_weight` returns a weight w from 1 (near) to 0 (far). If w
+    is 0, the place is rejected: its score becomes NaN. Otherwise the score s
+    becomes s - (1 - w) |s|; a positive score is thus multiplied by w. A place
+    for which the method estimates no pose keeps its score. Scores of places
+    that are not tested become NaN.
 
     If the method estimates no pose at all, all scores stay the same.
 
@@ -65,7 +65,7 @@ def gated(
     if len(best) == 0 or not radii:
         return [scores for _ in radii]
     poses = estimated_poses(method, query, database, best.tolist())
-    return gated_by_poses(
+    return verified_by_poses(
         scores, dict(zip(best.tolist(), poses, strict=True)), radii
     )
 
@@ -98,15 +98,15 @@ def tested_places(scores: np.ndarray) -> np.ndarray:
         scores: (D,) scores; NaN for a place that is no candidate.
     """
     num_candidates = int((~np.isnan(scores)).sum())
-    return ranked_places(scores)[: min(NUM_GATED, num_candidates)]
+    return ranked_places(scores)[: min(NUM_VERIFIED, num_candidates)]
 
 
-def gated_by_poses(
+def verified_by_poses(
     scores: np.ndarray,
     poses: Mapping[int, np.ndarray | None],
     radii: Sequence[float],
 ) -> list[np.ndarray]:
-    """Returns scores after geometric verification, see `gated`.
+    """Returns scores after geometric verification, see `verified_scores`.
 
     Args:
         scores: (D,) scores; NaN for a place that is no candidate.
@@ -122,7 +122,7 @@ def gated_by_poses(
     )
     results = []
     for radius in radii:
-        weight = gate_weight(distance, radius)
+        weight = verification_weight(distance, radius)
         values = scores[best] - (1.0 - weight) * np.abs(scores[best])
         result = np.full(len(scores), np.nan)
         result[best] = np.where(weight > 0.0, values, np.nan)

@@ -194,7 +194,7 @@ class PlaceOutcome:
         )
 
     @property
-    def is_gated(self) -> bool:
+    def is_verified(self) -> bool:
         """Whether geometric verification was used.
 
         Geometric verification rejects places that lie too far away according to
@@ -306,7 +306,7 @@ class PlaceOutcome:
         """
         count = len(self.outcomes) if n is None else n
         return Number(
-            self.method, self.is_gated, metric, value, interval, count
+            self.method, self.is_verified, metric, value, interval, count
         )
 
 

@@ -274,7 +274,7 @@ class RetrievalProtocol:
         return any(getattr(self, name) for name in _QUERY_CHANGES)
 
     @property
-    def gate_radius(self) -> float | None:
+    def verification_radius(self) -> float | None:
         """Radius of geometric verification [m]; None without it."""
         return self.radius if self.verified else None
 
@@ -354,12 +354,12 @@ class RetrievalProtocol:
             parts.append(f"seed {self.seed}")
         text = f"{', '.join(parts)}."
         if self.verified:
-            text += f" {GATE_TEXT}"
+            text += f" {VERIFICATION_TEXT}"
         return text
 
 
 # Geometric verification in words, for readers of a table.
-GATE_TEXT = (
+VERIFICATION_TEXT = (
     "With geometric verification: each method's own pose says how far a place"
     " is from the query, and places beyond the radius are rejected."
 )

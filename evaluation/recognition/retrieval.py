@@ -15,8 +15,8 @@ from evaluation.methods import Method
 from evaluation.recognition.describing import describe_drive
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 from evaluation.recognition.geometric_verification import (
-    gated_by_poses,
     tested_places,
+    verified_by_poses,
 )
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.pose_errors import PoseErrors, pose_error
@@ -130,8 +130,13 @@ def retrieve(
         overlaps = overlap_matrix(database, query, protocol)
     (places,) = describe_drive(database, [method], {"places"}, protocol)
     (queries,) = describe_drive(query, [method], {"queries"}, protocol)
-    batches = compare_with_gates(
-        method, places, queries, protocol, [protocol.gate_radius], overlaps
+    batches = compare_at_radii(
+        method,
+        places,
+        queries,
+        protocol,
+        [protocol.verification_radius],
+        overlaps,
     )
     return _joined([found for _, (found,) in batches])
 
@@ -174,12 +179,12 @@ def query_batches(
         yield range(start, min(start + most, num_queries))
 
 
-def compare_with_gates(
+def compare_at_radii(
     method: Method,
     database: DriveDescriptors,
     query: DriveDescriptors,
     protocol: RetrievalProtocol,
-    gate_radii: Collection[float | None],
+    verification_radii: Collection[float | None],
     overlaps: np.ndarray | None = None,
     *,
     leaves_out_itself: bool = False,
@@ -199,8 +204,8 @@ def compare_with_gates(
         query: drive with described queries, in the same world frame.
         protocol: protocol by which both drives were described; its field
             `verified` does not matter.
-        gate_radii: radii of geometric verification [m]; None in place of a
-            radius stands for scores without geometric verification.
+        verification_radii: radii of geometric verification [m]; None in place
+            of a radius stands for scores without geometric verification.
         overlaps: (Q, D) share of each query's scan that each place's scan
             shows; needed for matches by overlap.
         leaves_out_itself: whether query and place of the same number are the
@@ -209,7 +214,7 @@ def compare_with_gates(
 
     Yields:
         The numbers of the queries of a batch, and their retrieval for each of
-        `gate_radii`.
+        `verification_radii`.
 
     Raises:
         InputError: if the method returns an invalid result.
@@ -228,7 +233,7 @@ def compare_with_gates(
                 database,
                 query,
                 protocol,
-                gate_radii,
+                verification_radii,
                 overlaps,
                 leaves_out_itself,
                 rows,
@@ -241,17 +246,17 @@ def _compare_batch(
     database: DriveDescriptors,
     query: DriveDescriptors,
     protocol: RetrievalProtocol,
-    gate_radii: Collection[float | None],
+    verification_radii: Collection[float | None],
     overlaps: np.ndarray | None,
     leaves_out_itself: bool,
     rows: range,
 ) -> list[Retrieval]:
-    """Returns the retrievals of one batch, see `compare_with_gates`.
+    """Returns the retrievals of one batch, see `compare_at_radii`.
 
     Args:
         search: search in the database.
-        database, query, protocol, gate_radii, overlaps, leaves_out_itself: see
-            `compare_with_gates`.
+        database, query, protocol, verification_radii, overlaps,
+            leaves_out_itself: see `compare_at_radii`.
         rows: numbers of the queries of the batch.
     """
     is_known = _known_places(database, query, protocol, rows, leaves_out_itself)
@@ -271,9 +276,9 @@ def _compare_batch(
         )
     # Without geometric verification, only the pose at the top-ranked place is
     # needed, for its error.
-    is_gated = any(radius is not None for radius in gate_radii)
+    is_verified = any(radius is not None for radius in verification_radii)
     tested = [
-        tested_places(scores_of_query)[: None if is_gated else 1]
+        tested_places(scores_of_query)[: None if is_verified else 1]
         for scores_of_query in alone
     ]
     poses = search.poses(query, rows, tested)
@@ -292,29 +297,29 @@ def _compare_batch(
             overlaps=shown,
             query_blocks=queries.blocks,
         )
-        for kept in _gated_scores(alone, poses, gate_radii)
+        for kept in _verified_scores(alone, poses, verification_radii)
     ]
 
 
-def _gated_scores(
+def _verified_scores(
     scores: np.ndarray,
     poses: Sequence[Mapping[int, np.ndarray | None]],
-    gate_radii: Collection[float | None],
+    verification_radii: Collection[float | None],
 ) -> list[np.ndarray]:
     """Returns the scores (Q, D) after geometric verification by each radius.
 
     Args:
         scores: (Q, D) scores; NaN for a place that is no candidate.
         poses: for each query, place -> estimated pose X_PQ (4, 4), or None.
-        gate_radii: radii of geometric verification [m]; None in place of a
-            radius stands for scores without geometric verification.
+        verification_radii: radii of geometric verification [m]; None in place
+            of a radius stands for scores without geometric verification.
     """
-    radii = [radius for radius in gate_radii if radius is not None]
-    found = [np.empty(scores.shape) for _ in gate_radii]
-    for row, ungated in enumerate(scores):
-        by_gate = iter(gated_by_poses(ungated, poses[row], radii))
-        for radius, kept in zip(gate_radii, found, strict=True):
-            kept[row] = ungated if radius is None else next(by_gate)
+    radii = [radius for radius in verification_radii if radius is not None]
+    found = [np.empty(scores.shape) for _ in verification_radii]
+    for row, unverified in enumerate(scores):
+        by_radius = iter(verified_by_poses(unverified, poses[row], radii))
+        for radius, kept in zip(verification_radii, found, strict=True):
+            kept[row] = unverified if radius is None else next(by_radius)
     return found
 
 
@@ -361,7 +366,7 @@ def matches_within_radius(
         query: drive of the queries.
         protocol: protocol of the comparison.
         rows: numbers of R queries.
-        leaves_out_itself: see `compare_with_gates`.
+        leaves_out_itself: see `compare_at_radii`.
     """
     is_near = _distances(database, query, rows) <= protocol.radius
     return is_near & _known_places(

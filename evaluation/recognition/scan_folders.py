@@ -20,7 +20,7 @@ def write_scores(
     query: Path,
     output: Path,
     *,
-    gate_radius: float | None = None,
+    verification_radius: float | None = None,
     columns: int | None = None,
     on_note: OnNote = no_note,
 ) -> int:
@@ -37,7 +37,7 @@ def write_scores(
         database: folder of the scans of places, one file each.
         query: folder of the scans of queries, one file each.
         output: the file to write.
-        gate_radius: radius of geometric verification [m] (see
+        verification_radius: radius of geometric verification [m] (see
             `evaluation.recognition.geometric_verification`); None for scores
             without this verification.
         columns: number of columns of `.bin` files; by default guessed for each
@@ -96,7 +96,7 @@ def write_scores(
                 places,
                 clouds,
                 is_known,
-                gate_radius=gate_radius,
+                verification_radius=verification_radius,
                 exhaustive=True,
                 where=str(path),
             )

@@ -7,7 +7,7 @@ import numpy as np
 
 from cns_drake.base import InputError, read_only
 from evaluation.methods import Method, checked_scores
-from evaluation.recognition.geometric_verification import gated
+from evaluation.recognition.geometric_verification import verified_scores
 from evaluation.recognition.ranking import ranked_places
 
 
@@ -19,7 +19,7 @@ def score_places(
     place_clouds: Sequence[np.ndarray],
     is_known: np.ndarray,
     *,
-    gate_radius: float | None = None,
+    verification_radius: float | None = None,
     exhaustive: bool = False,
     where: str = "",
 ) -> np.ndarray:
@@ -37,8 +37,8 @@ def score_places(
         is_known: (D,) bool, which places may be candidates. If a place is
             excluded, the query is compared with every place, because a search
             for a few top-ranked places might return only excluded places.
-        gate_radius: radius of geometric verification [m] (see `gated`); None
-            for scores without this verification.
+        verification_radius: radius of geometric verification [m] (see
+            `verified_scores`); None for scores without this verification.
         exhaustive: whether to also compare places that a search would skip only
             to save time.
         where: the name of the current query, for errors.
@@ -64,9 +64,11 @@ def score_places(
     if method.rerank_best:
         assert query_cloud is not None
         scores = _reranked(method, scores, query_cloud, place_clouds)
-    if gate_radius is None:
+    if verification_radius is None:
         return scores
-    return gated(method, queries[-1], database, scores, [gate_radius])[0]
+    return verified_scores(
+        method, queries[-1], database, scores, [verification_radius]
+    )[0]
 
 
 def _reranked(

@@ -80,7 +80,7 @@ class Change:
     ends: Mapping[tuple[str, bool, DrivePair], tuple[float, float]]
 
     @property
-    def gates(self) -> list[bool]:
+    def verifications(self) -> list[bool]:
         """Whether there are rows without, and with geometric verification."""
         return sorted({verified for _, verified, _ in self.ends})
 
@@ -156,7 +156,7 @@ def cost_sentence(change: Change) -> str:
     """
     subject = change_words(change.over, change.before, change.after)
     subject = subject[:1].upper() + subject[1:]
-    first, *others = change.gates
+    first, *others = change.verifications
     start = f"{subject} {_cost_clause(change, first)}"
     if first:
         start = f"{_VERIFIED.capitalize()}, {start[:1].lower()}{start[1:]}"
@@ -307,8 +307,8 @@ def _without_baseline(rows: Iterable[Row]) -> str:
     """Returns the AUC of the methods, of a study without a baseline."""
     by_verification: dict[bool, dict[str, float]] = {}
     for mean in means(rows, "label", "verified"):
-        of_gate = by_verification.setdefault(bool(mean.key[1]), {})
-        of_gate[title(mean.key[0])] = mean.value
+        of_verification = by_verification.setdefault(bool(mean.key[1]), {})
+        of_verification[title(mean.key[0])] = mean.value
     told = [
         (f"{_VERIFIED}, " if verified else "") + from_least_to_greatest(found)
         for verified, found in sorted(by_verification.items())
@@ -324,7 +324,7 @@ def _evidence(change: Change, rows: Results, queries: QueryRows | None) -> str:
     if queries is None:
         return " ".join(found)
     told = []
-    for verified in change.gates:
+    for verified in change.verifications:
         apart, rest = _significant_losses(change, verified, queries)
         if apart or rest:
             told.append((verified, apart, rest))
@@ -340,7 +340,7 @@ def _evidence(change: Change, rows: Results, queries: QueryRows | None) -> str:
             for verified, apart, rest in told
         ]
         found.append(f"The change of R@1 is significant {'; '.join(clauses)}.")
-    verified = change.gates[-1]
+    verified = change.verifications[-1]
     at_end = rows.where({change.over: change.after}, verified=verified)
     lead = lead_by_right_answers(at_end.rows, queries)
     if lead:

@@ -22,7 +22,7 @@ from evaluation.recognition import (
     RetrievalProtocol,
     Role,
     StoredDrives,
-    compare_with_gates,
+    compare_at_radii,
     joined_scans,
     kept_places,
     matches_within_radius,
@@ -438,7 +438,7 @@ def _method_outcomes(
     # For each radius, without and with geometric verification: the outcomes of
     # each batch of queries.
     outcomes: list[list[PlaceOutcome]] = [[] for _ in range(2 * len(radii))]
-    for rows, (plain, *by_gate) in compare_with_gates(
+    for rows, (plain, *by_radius) in compare_at_radii(
         method,
         searched,
         query,
@@ -453,18 +453,20 @@ def _method_outcomes(
             query.queries.stamps_ns[batch],
             query.queries.p_WSs[batch],
         )
-        for k, (radius, gated) in enumerate(zip(radii, by_gate, strict=True)):
+        for k, (radius, verified) in enumerate(
+            zip(radii, by_radius, strict=True)
+        ):
             matches = plain.matches
             if truth is None:
                 matches = (plain.distances <= radius) & plain.is_known
             overlaps = shown(radius, rows, matches)
-            for is_gated, found in enumerate((plain, gated)):
-                outcomes[2 * k + is_gated].append(
+            for is_verified, found in enumerate((plain, verified)):
+                outcomes[2 * k + is_verified].append(
                     PlaceOutcome.of(
                         choice.key,
                         method,
                         replace(
-                            protocol, verified=bool(is_gated), radius=radius
+                            protocol, verified=bool(is_verified), radius=radius
                         ),
                         replace(found, matches=matches),
                         asked,

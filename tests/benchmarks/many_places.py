@@ -40,7 +40,7 @@ from evaluation.recognition import (
     DriveDescriptors,
     Search,
     StoredDrives,
-    compare_with_gates,
+    compare_at_radii,
     query_batches,
 )
 from evaluation.study import LongList, Part
@@ -167,7 +167,7 @@ def measure(
             query = DriveDescriptors("queries", none, asked.chosen(rows))
             loading.clear()
             start = time.process_time()
-            for _, (found, *_) in compare_with_gates(
+            for _, (found, *_) in compare_at_radii(
                 method, database, query, RANDOM_YAW_PROTOCOL, radii
             ):
                 right += int((found.best_places == found.query_frames).sum())
@@ -216,14 +216,14 @@ def report(
             file = Path(folder) / "times"
             asked = number if num_queries is None else min(num_queries, number)
             in_process(measure, name, number, asked, features, file)
-            describing, loading, alone, gated, _, peak = np.loadtxt(file)
-        spent.append(gated)
+            describing, loading, alone, verified, _, peak = np.loadtxt(file)
+        spent.append(verified)
         batches = len(list(query_batches(number, number)))
-        whole = number * gated + batches * loading
+        whole = number * verified + batches * loading
         print(
             f"{name:16} {number:6} places: describe {1e3 * describing:.1f} ms,"
             f" load {loading:.3f} s, query {1e3 * alone:.2f} ms,"
-            f" verified {1e3 * gated:.2f} ms, peak {peak:.0f} MB;"
+            f" verified {1e3 * verified:.2f} ms, peak {peak:.0f} MB;"
             f" {number} queries {whole / 3600.0:.2g} h",
             flush=True,
         )

@@ -43,7 +43,7 @@ def draw_dumbbell(chart: Chart) -> tuple[str, Figure]:
     except InputError as error:
         raise InputError(f"charts: dumbbell: {error}") from None
     figure, panels = _panels(chart, change)
-    for axes, verified in zip(panels, change.gates, strict=True):
+    for axes, verified in zip(panels, change.verifications, strict=True):
         _draw_methods(axes, chart, change, verified)
         if len(panels) > 1:
             axes.set_title(_PANELS[verified], loc="left")
@@ -61,7 +61,7 @@ def _message(change: Change) -> str:
     Of other metrics, and of shares, it is what is left.
     """
     metric = metric_named(change.metric)
-    verified, *_ = change.gates
+    verified, *_ = change.verifications
     if change.over.startswith(SETTINGS):
         # Each value of a setting makes a method with a row of its own.
         ends = {
@@ -92,7 +92,7 @@ def _panels(chart: Chart, change: Change) -> tuple[Figure, list[Axes]]:
 
     On a phone, one is below the other.
     """
-    number = len(change.gates)
+    number = len(change.verifications)
     height = (1.6 * len(change.methods) + 2) * ROW
     is_wide = chart.width >= WIDE
     figure = chart.figure((1 if is_wide else number) * height + 2 * ROW)
@@ -163,7 +163,7 @@ def _axis_text(chart: Chart, change: Change) -> str:
     elif any(
         _interval(chart, name, verified, change.after)
         for name in change.methods
-        for verified in change.gates
+        for verified in change.verifications
     ):
         text += "; thin lines are 95\N{NO-BREAK SPACE}% intervals"
     return f"{text}; right: the share that is left"

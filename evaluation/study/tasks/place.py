@@ -104,7 +104,7 @@ class PlaceTask(PoseTask):
 
     def answers(self, found: Outcomes) -> Iterator[Answered]:
         for now in found:
-            yield now.method, now.is_gated, now.columns
+            yield now.method, now.is_verified, now.columns
 
 
 class CostTask(Task):
@@ -219,6 +219,6 @@ def _same_settings_outcome(
 ) -> PlaceOutcome | None:
     """Returns the baseline's outcome with `now`'s method and verification."""
     for one in before or ():
-        if (one.method, one.is_gated) == (now.method, now.is_gated):
+        if (one.method, one.is_verified) == (now.method, now.is_verified):
             return one
     return None

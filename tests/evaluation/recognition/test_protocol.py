@@ -170,6 +170,9 @@ def test_the_gate_is_said():
     open_gate, shut = RetrievalProtocol(), RetrievalProtocol(verified=True)
     assert "verified" not in open_gate.to_text()
     assert "With geometric verification" in shut.to_text()
-    assert (open_gate.gate_radius, shut.gate_radius) == (None, 7.5)
+    assert (open_gate.verification_radius, shut.verification_radius) == (
+        None,
+        7.5,
+    )
     # Descriptions of a drive do not depend on this option.
     assert shut.descriptor_options() == open_gate.descriptor_options()

@@ -90,7 +90,7 @@ def test_the_numbers_are_those_of_the_single_commands(folder, tmp_path):
 @pytest.mark.slow
 @pytest.mark.night
 def test_a_report_writes_the_tables_of_the_stages(folder, tmp_path):
-    """Rows and answers, with and without the verified, of both ways."""
+    """Rows and answers of both ways, with and without verification."""
     for names in (["btc", "solid"], ["solid"]):
         output = tmp_path / str(len(names))
         fields = {"tasks": ["place", "pose", "change"], "methods": names}

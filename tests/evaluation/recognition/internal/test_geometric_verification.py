@@ -1,4 +1,4 @@
-"""The verified, by poses that are made by hand."""
+"""Geometric verification, by poses that are made by hand."""
 
 import csv
 import json
@@ -14,10 +14,10 @@ from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition import RetrievalProtocol, retrieve
 from evaluation.recognition.geometric_verification import (
-    NUM_GATED,
+    NUM_VERIFIED,
     SOFTNESS,
-    gate_weight,
-    gated,
+    verification_weight,
+    verified_scores,
 )
 
 RADIUS = 8.0
@@ -51,25 +51,29 @@ class Far(Method):
 
 
 def after(scores, distances):
-    return gated(Far(), None, distances, np.array(scores, float), [RADIUS])[0]
+    return verified_scores(
+        Far(), None, distances, np.array(scores, float), [RADIUS]
+    )[0]
 
 
 def test_the_ramp():
     eps = 1e-9
     distances = [0.0, FULL - eps, FULL + eps, RADIUS, NONE - eps, NONE, 99.0]
-    weight = gate_weight(np.array(distances), RADIUS)
+    weight = verification_weight(np.array(distances), RADIUS)
     assert weight[:2].tolist() == [1.0, 1.0]
     assert 1.0 - 1e-8 < weight[2] < 1.0
     assert weight[3] == pytest.approx(0.5)
     assert 0.0 < weight[4] < 1e-8
     assert weight[5:].tolist() == [0.0, 0.0]
     # The weight falls linearly: a quarter of the way takes a quarter.
-    assert gate_weight(FULL + 0.25 * (NONE - FULL), RADIUS) == pytest.approx(
-        0.75
-    )
+    assert verification_weight(
+        FULL + 0.25 * (NONE - FULL), RADIUS
+    ) == pytest.approx(0.75)
     # Other units of length change nothing.
     np.testing.assert_allclose(
-        gate_weight(1e3 * np.array(distances), 1e3 * RADIUS), weight, atol=1e-9
+        verification_weight(1e3 * np.array(distances), 1e3 * RADIUS),
+        weight,
+        atol=1e-9,
     )
 
 
@@ -89,7 +93,7 @@ def test_negative_scores_fall_too(scale):
 
 
 def test_without_poses_nothing_changes():
-    scores = np.random.default_rng(0).normal(size=NUM_GATED + 20)
+    scores = np.random.default_rng(0).normal(size=NUM_VERIFIED + 20)
     scores[3] = np.nan
     found = after(scores, [None] * len(scores))
     np.testing.assert_array_equal(found, scores)
@@ -102,17 +106,17 @@ def test_a_place_without_a_pose_keeps_its_score():
 
 
 def test_only_the_best_are_looked_at():
-    number = NUM_GATED + 3
+    number = NUM_VERIFIED + 3
     scores = np.random.default_rng(1).permutation(number) / number
     found = after(scores, [0.0] * number)
-    best = np.argsort(-scores)[:NUM_GATED]
+    best = np.argsort(-scores)[:NUM_VERIFIED]
     assert np.flatnonzero(~np.isnan(found)).tolist() == sorted(best)
     np.testing.assert_array_equal(found[best], scores[best])
 
 
 def test_of_equal_scores_the_first():
-    found = after([0.5] * (NUM_GATED + 1), [0.0] * (NUM_GATED + 1))
-    assert np.flatnonzero(np.isnan(found)).tolist() == [NUM_GATED]
+    found = after([0.5] * (NUM_VERIFIED + 1), [0.0] * (NUM_VERIFIED + 1))
+    assert np.flatnonzero(np.isnan(found)).tolist() == [NUM_VERIFIED]
 
 
 @pytest.mark.parametrize("pose", [np.eye(3), np.full((4, 4), np.nan), "x"])
@@ -122,7 +126,7 @@ def test_what_is_no_pose_is_refused(pose):
             return pose
 
     with pytest.raises(InputError, match="far: relative_pose returned"):
-        gated(Wrong(), None, [1.0], np.array([0.5]), [RADIUS])
+        verified_scores(Wrong(), None, [1.0], np.array([0.5]), [RADIUS])
 
 
 def test_too_few_poses_are_refused():
@@ -133,7 +137,7 @@ def test_too_few_poses_are_refused():
     with pytest.raises(
         InputError, match="returned list of length 1 instead of 2"
     ):
-        gated(Few(), None, [1.0, 1.0], np.array([0.5, 0.5]), [RADIUS])
+        verified_scores(Few(), None, [1.0, 1.0], np.array([0.5, 0.5]), [RADIUS])
 
 
 class Line(Method):
@@ -173,13 +177,13 @@ def test_a_pair_of_drives(tmp_path):
     # The best place of each query is the farthest one that counts: 4 m ahead;
     # one 9 m ahead is rejected.
     np.testing.assert_allclose(shut.columns["distance"], 4.0)
-    plain, gated = (
+    plain, verified = (
         retrieve(database, query, Line(), RetrievalProtocol(verified=verified))
         for verified in (False, True)
     )
     assert not np.isnan(plain.scores).any()
-    far = gated.distances >= 7.5 * (1.0 + SOFTNESS)
-    assert np.isnan(gated.scores[far]).all()
+    far = verified.distances >= 7.5 * (1.0 + SOFTNESS)
+    assert np.isnan(verified.scores[far]).all()
     # A wider radius accepts places 9 m ahead.
     wide = RetrievalProtocol(verified=True, radius=10.5)
     outcome = place_outcome(database, query, Line(), wide)

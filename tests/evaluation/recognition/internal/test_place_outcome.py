@@ -280,7 +280,7 @@ def test_columns_hold_all_that_numbers_follow_from(blocks):
     )
     np.testing.assert_allclose(found["overlap"] + found["visible_change"], 1.0)
     assert (one.method, one.database) == ("solid rings=8", "town_01")
-    assert (one.query, one.is_gated, one.radius) == ("town_03", True, 7.5)
+    assert (one.query, one.is_verified, one.radius) == ("town_03", True, 7.5)
     assert one.protocol.scans_per_place == 1
     # Each query has one candidate.
     assert one.best_places.tolist() == [[k, -1, -1, -1, -1] for k in range(8)]

@@ -15,7 +15,7 @@ from evaluation.recognition import (
     QueryDrive,
     Retrieval,
     RetrievalProtocol,
-    compare_with_gates,
+    compare_at_radii,
     describe_drive,
     joined_scans,
     retrieve,
@@ -284,7 +284,7 @@ def test_batches_of_queries_give_the_same_as_all_at_once(
         (num_places - 1, [1] * num_queries),
     ):
         outcomes, retrievals = [], []
-        batches = compare_with_gates(
+        batches = compare_at_radii(
             method,
             places,
             queries,

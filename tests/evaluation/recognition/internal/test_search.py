@@ -11,7 +11,7 @@ from evaluation.recognition import (
     DescribedScans,
     DriveDescriptors,
     StoredDrives,
-    compare_with_gates,
+    compare_at_radii,
 )
 from evaluation.recognition.search import Search
 
@@ -121,7 +121,7 @@ def test_groups_give_the_same_as_the_whole(name, settings):
         places = stored(drives, most_bytes, [])
         assert len(places.descriptors) == NUM_DRIVES * NUM_PLACES
         database = DriveDescriptors("places", places, places)
-        ((_, batch),) = compare_with_gates(
+        ((_, batch),) = compare_at_radii(
             method, database, queries, protocol, [None, 25.0]
         )
         found.append(batch)

@@ -107,8 +107,10 @@ def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
     step = pair(folder, tmp_path / "pair.data")
     found = _done(step)
     assert step.is_done()
-    assert [(one.method, one.is_gated) for one in found] == [
-        (choice.key, gated) for choice in METHODS for gated in (False, True)
+    assert [(one.method, one.is_verified) for one in found] == [
+        (choice.key, verified)
+        for choice in METHODS
+        for verified in (False, True)
     ]
     database, query = (
         open_drive(folder / name) for name in ("metropolis_01", "metropolis_04")
@@ -119,7 +121,7 @@ def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
             database,
             query,
             make_method(choice.name, dict(choice.settings)),
-            protocol=RetrievalProtocol(verified=one.is_gated),
+            protocol=RetrievalProtocol(verified=one.is_verified),
         )
         for name in ("best_scores", "is_right", "first_right_ranks"):
             np.testing.assert_array_equal(
