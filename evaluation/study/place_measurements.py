@@ -277,8 +277,11 @@ def shown_overlaps(
                 for frame in database.places.frames[of].tolist()
             )
         else:
-            chosen = LongList.of(kept[row] for row in searched.rows[of] - first)
+            rows_here = searched.rows[of] - first
             first += len(kept)
+            chosen = kept
+            if len(rows_here) < len(kept):
+                chosen = LongList.of(kept[row] for row in rows_here)
         for radius, rows in itertools.product(
             radii, query_batches(len(asked), len(of))
         ):
