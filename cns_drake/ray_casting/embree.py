@@ -38,6 +38,9 @@ FLOAT4 = 0x9004
 FLOAT3X4_ROW_MAJOR = 0x9134
 # Flag of a scene (`RTC_SCENE_FLAG_ROBUST`).
 ROBUST_SCENE = 1 << 2
+# Quality of a scene's hierarchy (`RTC_BUILD_QUALITY_LOW`): quick to build, slow
+# to traverse.
+LOW_QUALITY = 0
 # Error of a device (`RTC_ERROR_OUT_OF_MEMORY`).
 OUT_OF_MEMORY = 4
 # Flag of a query (`RTC_RAY_QUERY_FLAG_COHERENT`).
@@ -95,6 +98,7 @@ def load() -> ctypes.CDLL:
         ("rtcGetDeviceProperty", ctypes.c_ssize_t, [pointer, integer]),
         ("rtcNewScene", pointer, [pointer]),
         ("rtcSetSceneFlags", None, [pointer, integer]),
+        ("rtcSetSceneBuildQuality", None, [pointer, integer]),
         ("rtcJoinCommitScene", None, [pointer]),
         ("rtcRetainScene", None, [pointer]),
         ("rtcReleaseScene", None, [pointer]),

@@ -479,6 +479,8 @@ class EmbreeHierarchy:
         lib.rtcSetGeometryMask(handle, ALL)
         lib.rtcCommitGeometry(handle)
         scene = self._new_scene()
+        # A scan casts a few rays on the boxes.
+        lib.rtcSetSceneBuildQuality(scene, embree.LOW_QUALITY)
         lib.rtcAttachGeometry(scene, handle)
         lib.rtcReleaseGeometry(handle)
         lib.rtcJoinCommitScene(scene)
