@@ -261,7 +261,11 @@ class McapDrive(Drive):
             return from_layout(
                 points,
                 self._labels(index, message),
-                lambda: self.lidar_section.get("returns") == "calibrated",
+                # Other programs have other units.
+                lambda: (
+                    self._file.library.startswith("cns-drake ")
+                    and self.lidar_section.get("returns") != "calibrated"
+                ),
             )
 
     def _labels(self, index: int, cloud: Any) -> np.ndarray | None:

@@ -36,6 +36,7 @@ from mcap.records import (
     AttachmentIndex,
     Channel,
     Chunk,
+    Header,
     McapRecord,
     Message,
     Metadata,
@@ -255,6 +256,20 @@ class McapFile:
                     content = Metadata.read(_RecordContent(body))
                     found.append(content.metadata)
         return found
+
+    @functools.cached_property
+    def library(self) -> str:
+        """Name and version of the program that wrote the file.
+
+        Raises:
+            InputError: the header cannot be read.
+        """
+        start = len(_MAGIC)
+        with self._reading() as stream, _place_named(start):
+            _, body = _read_record(
+                stream, start, _ATTACHMENT_LIMIT_BYTES, "the header"
+            )
+            return Header.read(_RecordContent(body)).library
 
     def _kind(self, channel: Channel) -> str:
         schema = self._contents.schemas.get(channel.schema_id)

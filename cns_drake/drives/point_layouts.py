@@ -127,7 +127,7 @@ def to_labels(points: np.ndarray) -> np.ndarray:
 def from_layout(
     points: np.ndarray,
     labels: np.ndarray | None = None,
-    is_calibrated: Callable[[], bool] = lambda: False,
+    is_ideal: Callable[[], bool] = lambda: False,
 ) -> np.ndarray:
     """Converts points of any layout to the fields of the layout `cns`.
 
@@ -135,17 +135,17 @@ def from_layout(
         points: (N,) in any layout.
         labels: (N,) records with further fields of the same points, such as
             `label`; by default none.
-        is_calibrated: function that returns whether intensities of the
-            `autoware` layout are calibrated. Calibrated intensities keep their
-            range of 0 to 255.
+        is_ideal: function that returns whether intensities of the `autoware`
+            layout are 255 times ideal ones, as cns-drake records them. All
+            others stay as they are.
 
     Returns:
         (N,) points; `points` itself if nothing changes. Fields that `cns` does
         not have are kept. In `velodyne`, `time` [s] becomes `t` [ns]. In
-        `autoware`, `time_stamp` and `channel` become `t` and `ring`, and
-        intensities are scaled to 0 to 1 unless they are calibrated. A
-        floating-point `t` in seconds or nanoseconds becomes whole nanoseconds;
-        a `t` whose values fit neither unit stays unchanged.
+        `autoware`, `time_stamp` and `channel` become `t` and `ring`, and ideal
+        intensities are scaled to 0 to 1. A floating-point `t` in seconds or
+        nanoseconds becomes whole nanoseconds; a `t` whose values fit neither
+        unit stays unchanged.
 
     Raises:
         ValueError: the numbers of labels and points differ.
@@ -155,8 +155,10 @@ def from_layout(
     if {"time_stamp", "channel", "intensity"} <= set(names):
         columns["t"] = columns.pop("time_stamp")
         columns["ring"] = columns.pop("channel")
-        full = np.float32(1.0 if is_calibrated() else _FULL)
+        full = np.float32(_FULL if is_ideal() else 1.0)
         columns["intensity"] = points["intensity"] / full
+    elif "time_stamp" in names and "t" not in names:
+        columns["t"] = columns.pop("time_stamp")
     else:
         timed = next((name for name in ("t", "time") if name in names), "t")
         t_ns = _nanoseconds(columns.get(timed))

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 import yaml
 
-from cns_drake.base import encode_pcd
+from cns_drake.base import InputError, encode_pcd
 from cns_drake.drives import McapDrive
 from cns_drake.export.layout import (
     Layout,
@@ -30,6 +30,13 @@ def _drive_folder(drive: McapDrive) -> PurePosixPath:
 
 
 def _outer_files(drive: McapDrive) -> dict[str, str]:
+    height = drive.X_BS[2, 3]
+    if height < 0.0:
+        # Readers would take the mounting pose for its inverse.
+        raise InputError(
+            f"{drive.name}: the LiDAR is mounted at z = {height:g} m, below the"
+            " vehicle, which this format does not have; use another one"
+        )
     files = {"transformation_lidar.yaml": _mount_yaml(drive.X_BS)}
     if drive.X_BI is not None:
         files["transformation_imu.yaml"] = _mount_yaml(drive.X_BI)

@@ -7,6 +7,7 @@ final name when it is complete.
 """
 
 from collections.abc import Callable, Iterator, Mapping
+import contextlib
 import importlib
 import os
 from pathlib import Path
@@ -112,19 +113,38 @@ def export_drive(
     if layout.shared_outer_files:
         _check_shared_files(outer)
     part = part_path(folder)
-    with sole_writer(folder):
-        try:
-            for note in _notes(drive, layout):
-                on_note(note)
-            _write_drive(drive, layout, part)
-            for path, text in outer.items():
-                make_folder(path.parent)
-                write_text(path, text)
-            with user_errors(folder):
-                os.replace(part, folder)
-        finally:
-            shutil.rmtree(part, ignore_errors=True)
+    try:
+        with sole_writer(folder):
+            try:
+                for note in _notes(drive, layout):
+                    on_note(note)
+                _write_drive(drive, layout, part)
+                for path, text in outer.items():
+                    make_folder(path.parent)
+                    write_text(path, text)
+                with user_errors(folder):
+                    os.replace(part, folder)
+            finally:
+                shutil.rmtree(part, ignore_errors=True)
+    finally:
+        _remove_empty(folder.parent, output)
     return folder
+
+
+def _remove_empty(folder: Path, output: Path) -> None:
+    """Removes the folders of an export that has written nothing.
+
+    Args:
+        folder: the folder of the drive's folder, in `output` or equal to it.
+        output: the folder of drives. Only its marker is no drive.
+    """
+    with contextlib.suppress(OSError):
+        while folder != output:
+            folder.rmdir()
+            folder = folder.parent
+        if [path.name for path in output.iterdir()] == [_MARKER]:
+            (output / _MARKER).unlink()
+            output.rmdir()
 
 
 def _open_recording(

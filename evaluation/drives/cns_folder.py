@@ -181,10 +181,10 @@ def _read_mount(path: Path | None) -> np.ndarray:
             f"{path}: no transformation (a matrix of 4 x 4 or 3 x 4 numbers,"
             " or translation and rotation)"
         )
-    if X_BS[2, 3] <= 0.0:
+    if X_BS[2, 3] < 0.0:
         raise InputError(
             f"{path}: translation: puts the LiDAR at z = {X_BS[2, 3]:g} m,"
-            " not above the vehicle (the inverse transformation?)"
+            " below the vehicle (the inverse transformation?)"
         )
     return X_BS
 

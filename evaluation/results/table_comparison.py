@@ -725,6 +725,9 @@ def _without_controls(
 
 def _why_nothing_is_common(table: MetricTable, other: MetricTable) -> str:
     """Returns as text why two tables have no condition in common."""
+    if not other.rows:
+        tasks = {str(row["task"]) for row in table.rows.values()}
+        return f"task: {', '.join(sorted(tasks))}: not in {other.name}"
     rows = [list(compared.rows.values()) for compared in (table, other)]
     factors = {
         name: None

@@ -66,6 +66,7 @@ def write_recording(
     compression: CompressionType = CompressionType.ZSTD,
     without_pose: list[int] | None = None,
     later_poses: dict[int, np.ndarray] | None = None,
+    library: str = "test",
     **writing,
 ) -> Path:
     """Writes a rosbag2 folder; rotations of X_WBs are about z only.
@@ -87,6 +88,7 @@ def write_recording(
         compression: of the chunks.
         without_pose: frames without a message of odometry.
         later_poses: stamp [ns] -> pose of the vehicle (4, 4), on /tf.
+        library: name of the program that wrote the file.
         writing: further options of the writer.
 
     Returns:
@@ -100,7 +102,7 @@ def write_recording(
         writer = Writer(
             stream, chunk_size=chunk_size, compression=compression, **writing
         )
-        writer.start(profile="ros2", library="test")
+        writer.start(profile="ros2", library=library)
         for name, value in (attachments or {}).items():
             writer.add_attachment(
                 T0_NS,

@@ -7,6 +7,7 @@ import shutil
 
 from helpers.bent_drive import NUM_SCANS, P_BS, QUAT_BS, write_drive
 from helpers.contradictions import read_messages, write_messages
+from helpers.drive_files import write_recording
 from helpers.internal.eval_program import run_program
 from mcap.reader import make_reader
 from mcap.writer import Writer
@@ -177,6 +178,27 @@ def test_cns_reads_back(drive, cns):
     read = open_drive(cns / "Town/07")
     assert_same_drive(read, recorded, XYZI)
     np.testing.assert_array_equal(read.stamps_ns, recorded.stamps_ns)
+
+
+def test_cns_has_lidars_at_the_vehicle_and_none_below(tmp_path):
+    """A mounting pose below the vehicle reads like the inverse of one above."""
+    recording = write_drive(tmp_path / "town_01", p_BS=(0.2, 0.0, 0.0))
+    read = open_drive(export_drive(recording, "cns", tmp_path / "cns"))
+    assert_same_drive(read, open_drive(recording), XYZI)
+    recording = write_drive(tmp_path / "town_02", p_BS=(0.2, 0.0, -1e-3))
+    with pytest.raises(InputError, match=r"town_02: .* z = -0\.001 m"):
+        export_drive(recording, "cns", tmp_path / "below")
+    assert not (tmp_path / "below").exists()
+
+
+def test_a_failed_export_leaves_earlier_drives(drive, tmp_path):
+    first = export_drive(drive, "kitti", tmp_path / "out")
+    bare = np.zeros(3, [(axis, "<f4") for axis in "xyz"])
+    recording = write_recording(tmp_path / "n_08", [bare] * 2, [np.eye(4)] * 2)
+    with pytest.raises(InputError, match="no field intensity"):
+        export_drive(recording, "kitti", tmp_path / "out")
+    assert [path.name for path in first.parent.iterdir()] == ["07"]
+    assert (tmp_path / "out/export.yaml").is_file()
 
 
 def test_cns_by_plain_means(drive, cns):
@@ -352,15 +374,13 @@ def test_an_interrupted_export_has_no_final_name(drive, tmp_path, format_name):
 
     with pytest.raises(StopError), heard_by(Stopper()):
         export_drive(drive, format_name, tmp_path / "out")
-    left = [p.name for p in (tmp_path / "out").rglob("*") if p.is_file()]
-    assert left == ["export.yaml"]
+    assert not (tmp_path / "out").exists()
     # A killed export leaves its part file, which no other export uses.
-    final = tmp_path / "out" / ("Town" if format_name == "cns" else "sequences")
-    part = final / "07.part"
-    part.mkdir(parents=True)
-    (part / "scrap").write_text("")
     drive_folder = export_drive(drive, format_name, tmp_path / "out")
-    assert drive_folder.parent == final
+    part = drive_folder.with_name("07.part")
+    drive_folder.rename(part)
+    (part / "scrap").write_text("")
+    assert export_drive(drive, format_name, tmp_path / "out") == drive_folder
     assert not part.exists()
     assert not (drive_folder / "scrap").exists()
 
@@ -382,8 +402,7 @@ def test_a_full_disk_leaves_nothing_half(
     monkeypatch.setattr(type(tmp_path), "write_bytes", write_bytes)
     with pytest.raises(InputError, match=r"07\.part: No space left"):
         export_drive(drive, format_name, tmp_path / "out")
-    left = [p.name for p in (tmp_path / "out").rglob("*") if p.is_file()]
-    assert left == ["export.yaml"]
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,12 @@
 """Layouts of points against the documents of drivers, and back."""
 
+from helpers.drive_files import write_recording
 import numpy as np
 import pytest
 
 from cns_drake.drives import (
     POINT_CLOUD,
+    McapDrive,
     deserialize,
     from_layout,
     to_labels,
@@ -87,7 +89,11 @@ def test_fields_lie_where_readers_look(points, layout):
 @pytest.mark.parametrize("layout", ["cns", *FIELDS])
 def test_points_come_back(points, layout):
     labels = None if layout == "cns" else to_records(sent(to_labels(points)))
-    read = from_layout(to_points(sent(to_layout(points, layout))), labels)
+    read = from_layout(
+        to_points(sent(to_layout(points, layout))),
+        labels,
+        is_ideal=lambda: True,
+    )
     for name in ("x", "y", "z", "ring", "label", "instance"):
         np.testing.assert_array_equal(read[name], points[name])
     # A float32 of a tenth of a second resolves 7 ns, a byte 1/255.
@@ -107,8 +113,7 @@ def test_points_come_back(points, layout):
 def test_calibrated_intensities_come_back(points, layout, most):
     points["intensity"] = np.arange(500) % most
     read = from_layout(
-        to_points(sent(to_layout(points, layout, is_calibrated=True))),
-        is_calibrated=lambda: True,
+        to_points(sent(to_layout(points, layout, is_calibrated=True)))
     )
     np.testing.assert_array_equal(read["intensity"], points["intensity"])
     if layout == "ouster":
@@ -155,6 +160,38 @@ def test_points_of_others_stay_as_they_are():
         points = np.zeros(3, [("x", "f4"), ("time", "f8"), ("ring", "u2")])
         points["time"] = time
         assert from_layout(points) is points
+
+
+@pytest.mark.parametrize("kind", ["f4", "u1", "u2"])
+@pytest.mark.parametrize(
+    ("library", "unit"), [("cns-drake 4.0.0", 1 / 255), ("nebula", 1.0)]
+)
+def test_only_own_files_have_a_unit_of_intensity(tmp_path, kind, library, unit):
+    """Autoware's fields in files of this program, and of another one."""
+    scan = np.zeros(
+        4,
+        [(axis, "<f4") for axis in "xyz"]
+        + [("intensity", kind), ("channel", "<u2"), ("time_stamp", "<u4")],
+    )
+    scan["x"] = 5.0
+    scan["intensity"] = [0, 1, 60, 255]
+    scan["channel"] = [3, 2, 1, 0]
+    scan["time_stamp"] = [0, 7, 8, 99_000_000]
+    path = write_recording(
+        tmp_path / "drive", [scan] * 2, [np.eye(4)] * 2, library=library
+    )
+    read = McapDrive(path).scan(1)
+    np.testing.assert_allclose(
+        read["intensity"], scan["intensity"] * unit, rtol=1e-6
+    )
+    np.testing.assert_array_equal(read["ring"], scan["channel"])
+    np.testing.assert_array_equal(read["t"], scan["time_stamp"])
+
+
+def test_a_time_stamp_needs_no_channel():
+    points = np.zeros(2, [("x", "f4"), ("time_stamp", "u4")])
+    points["time_stamp"] = [5, 9]
+    np.testing.assert_array_equal(from_layout(points)["t"], [5, 9])
 
 
 def test_labels_of_another_scan(points):
