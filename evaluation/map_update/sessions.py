@@ -175,7 +175,7 @@ def read_labels(path: Path, session: Session, *, truth: bool) -> np.ndarray:
     """
     labels = _read_any_labels(path)
     count = len(session.points)
-    if labels.ndim != 1 or labels.dtype.kind not in "iub":
+    if labels.ndim != 1 or labels.dtype.kind not in "iu":
         raise InputError(f"{path}: not one whole number for each point")
     if len(labels) != count:
         raise InputError(

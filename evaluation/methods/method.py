@@ -407,9 +407,9 @@ def checked_scores(
     """Returns the scores of a method as a float64 array of shape (number,).
 
     Raises:
-        InputError: the scores have another shape or are no numbers, or they are
-            complex or masked: a conversion would drop the imaginary part or the
-            mask.
+        InputError: the scores have another shape, are no numbers or infinite,
+            or are complex or masked: a conversion would drop the imaginary part
+            or the mask.
     """
     fault = ""
     try:
@@ -422,7 +422,10 @@ def checked_scores(
         fault = f" and type {values.dtype}"
     elif values.shape == (number,):
         with contextlib.suppress(TypeError, ValueError):
-            return values.astype(np.float64)
+            found = values.astype(np.float64)
+            if not np.isinf(found).any():
+                return found
+            fault = " with inf (NaN says that a place is no candidate)"
     raise InputError(
         f"{method.name}: {function} returned {type(scores).__name__} of shape"
         f" {values.shape}{fault} instead of {number} numbers"
