@@ -79,6 +79,8 @@ def maps_in_one_world(
     }
     if when == "always" and len(drives) < len(opened):
         raise InputError("--align always: a map file cannot be aligned")
+    if lidar is not None and not drives:
+        raise InputError(f"--lidar {lidar}: a map file has no LiDARs")
     reports = []
     if len(drives) > 1:
         # Imported here: it is slow to load, and not needed for map files.

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import KDTree
 
-from cns_drake.base import FARTHEST, InputError, poses
+from cns_drake.base import FARTHEST, InputError, poses, yaw_pose
 from cns_drake.drives import Drive
 from cns_drake.units import check_preset
 from evaluation.drives.opening import open_drive
@@ -27,9 +27,11 @@ _GROUND = (3.0, 30.0)
 _LAYER = 0.25
 # The ground lies at most this far above a LiDAR [m].
 _HIGHEST_GROUND = 1.0
-# Two scans are compared if the LiDAR moved or turned by this much [m], [rad].
-_LEAST_MOVE = 1.0
-_LEAST_TURN = np.radians(5.0)
+# Two scans are compared if the LiDAR moved or turned by this much [m], [rad]:
+# near scans have most points in common, far ones show a fault more clearly.
+_LEAST_MOVES = ((1.0, np.radians(5.0)), (10.0, np.radians(30.0)))
+# Scans that are farther apart have too few points in common [m].
+_FARTHEST_MOVE = 25.0
 # Number of points that are compared, at most and at least.
 _COMPARED = 1500
 _FEWEST = 100
@@ -39,6 +41,8 @@ _GROUND_MARGIN = 0.5
 _METRES_PER_FOOT = 0.3048
 # Other poses are right if points then lie nearer by this factor.
 _NEARER = 0.5
+_AS_GIVEN = "nothing is wrong"
+_MIRROR_Y = np.diag([1.0, -1.0, 1.0, 1.0])
 
 
 def check_data_set(path: Path | str) -> None:
@@ -48,7 +52,8 @@ def check_data_set(path: Path | str) -> None:
     poses must be rigid, scans must have points, and a scan must be the same
     each time it is read. The check also looks for what readers often confuse:
     units other than metres and nanoseconds, a LiDAR frame whose z axis points
-    down, poses that are inverted, and points that are not in the LiDAR's frame.
+    down or which is left-handed, poses that are inverted or turned by a quarter
+    or half against the points, and points that are not in the LiDAR's frame.
     Points whose coordinates are not finite are beams without a return: they are
     allowed, and left out, as in all programs.
 
@@ -216,49 +221,87 @@ def _above_ground(points: np.ndarray) -> np.ndarray:
 def _faults_of_frames(
     drive: Drive, clouds: dict[int, np.ndarray]
 ) -> Iterator[str]:
-    """Compares each scan with its neighbour, as the poses place both."""
-    gaps: dict[str, list[float]] = {}
-    rng = np.random.default_rng(0)
-    for frame, cloud in clouds.items():
-        other = _moved_frame(drive.X_WS, frame)
-        if other is None:
-            continue
-        scan = drive.scan(other)
-        beside = _above_ground(_returns(scan))
-        cloud = _above_ground(cloud)
-        if min(len(beside), len(cloud)) < _FEWEST:
-            continue
-        some = beside[rng.permutation(len(beside))[:_COMPARED]]
-        tree = KDTree(cloud)
-        X = poses.inverse(drive.X_WS[frame]) @ drive.X_WS[other]
-        inverted = drive.X_WS[frame] @ poses.inverse(drive.X_WS[other])
-        in_feet = X.copy()
-        in_feet[:3, 3] /= _METRES_PER_FOOT
-        for name, X_there in (
-            ("as given", X),
-            ("inverted: X_SW instead of X_WS?", inverted),
-            ("of scans whose points are in one frame already", np.eye(4)),
-            ("in metres, and the points in feet", in_feet),
-        ):
-            moved = some @ X_there[:3, :3].T + X_there[:3, 3]
-            distance, _ = tree.query(moved)
-            gaps.setdefault(name, []).append(float(np.median(distance)))
-    means = {name: float(np.mean(some)) for name, some in gaps.items()}
-    given = means.pop("as given", 0.0)
-    for name, gap in means.items():
-        if gap < _NEARER * given:
+    """Compares each scan with later ones, as the poses place both."""
+    for least_move in _LEAST_MOVES:
+        gaps: dict[str, list[float]] = {}
+        rng = np.random.default_rng(0)
+        for frame, scan in clouds.items():
+            other = _moved_frame(drive.X_WS, frame, *least_move)
+            if other is None:
+                continue
+            cloud = _above_ground(scan)
+            beside = _above_ground(_returns(drive.scan(other)))
+            if min(len(beside), len(cloud)) < _FEWEST:
+                continue
+            some = beside[rng.permutation(len(beside))[:_COMPARED]]
+            tree = KDTree(cloud)
+            placed = _placements(drive.X_WS[frame], drive.X_WS[other])
+            for name, X_there in placed.items():
+                moved = some @ X_there[:3, :3].T + X_there[:3, 3]
+                distance, _ = tree.query(moved)
+                gaps.setdefault(name, []).append(float(np.median(distance)))
+        means = {name: float(np.mean(found)) for name, found in gaps.items()}
+        given = means.pop(_AS_GIVEN, 0.0)
+        best = min(means, key=lambda name: means[name], default=_AS_GIVEN)
+        if best in means and means[best] < _NEARER * given:
             yield (
-                f"poses: neighbouring scans fit better ({gap:.2f} m instead of"
-                f" {given:.2f} m) if the poses are {name}"
+                "poses: neighbouring scans fit better"
+                f" ({means[best]:.2f} m instead of {given:.2f} m) if {best}"
             )
 
 
-def _moved_frame(X_WS: np.ndarray, frame: int) -> int | None:
-    """Returns the next scan from a pose that differs enough, or None."""
+def _placements(X_WA: np.ndarray, X_WB: np.ndarray) -> dict[str, np.ndarray]:
+    """Returns where a scan B lies beside a scan A, by what may be wrong.
+
+    Args:
+        X_WA, X_WB: (4, 4) poses of the LiDAR, as given.
+
+    Returns:
+        What is wrong -> the map (4, 4) from points of B to points of A.
+    """
+    X_AB = poses.inverse(X_WA) @ X_WB
+    in_feet = X_AB.copy()
+    in_feet[:3, 3] /= _METRES_PER_FOOT
+    transposed = [X_WA.copy(), X_WB.copy()]
+    for X in transposed:
+        X[:3, :3] = X[:3, :3].T
+    found = {
+        _AS_GIVEN: X_AB,
+        "the poses are inverted: X_SW instead of X_WS?": (
+            X_WA @ poses.inverse(X_WB)
+        ),
+        "their rotations are transposed": (
+            poses.inverse(transposed[0]) @ transposed[1]
+        ),
+        "the points of all scans are in one frame already": np.eye(4),
+        "the points are in feet, and the poses in metres": in_feet,
+        "y is mirrored: a left-handed frame?": _MIRROR_Y @ X_AB @ _MIRROR_Y,
+    }
+    for axis, yaw_deg in (("left", 90), ("right", -90), ("back", 180)):
+        # X_SC, where C is the frame of the points.
+        X_SC = yaw_pose(np.radians(yaw_deg), 0.0, 0.0)
+        found[f"the points' x axis points to the {axis}"] = (
+            poses.inverse(X_SC) @ X_AB @ X_SC
+        )
+    return found
+
+
+def _moved_frame(
+    X_WS: np.ndarray, frame: int, least_move: float, least_turn: float
+) -> int | None:
+    """Returns the next scan from a pose that differs enough, or None.
+
+    Args:
+        X_WS: (N, 4, 4) poses of the LiDAR.
+        frame: number of a scan.
+        least_move, least_turn: one of both is enough [m], [rad].
+    """
     X = poses.inverse(X_WS[frame]) @ X_WS[frame + 1 :]
     moves = np.linalg.norm(X[:, :3, 3], axis=1)
     turns = np.arccos(
         np.clip((np.trace(X[:, :3, :3], axis1=1, axis2=2) - 1) / 2, -1.0, 1.0)
     )
-    far = np.flatnonzero((moves >= _LEAST_MOVE) | (turns >= _LEAST_TURN))
-    return frame + 1 + int(far[0]) if len(far) else None
+    far = np.flatnonzero((moves >= least_move) | (turns >= least_turn))
+    if not len(far) or moves[far[0]] > _FARTHEST_MOVE:
+        return None
+    return frame + 1 + int(far[0])

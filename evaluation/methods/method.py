@@ -425,7 +425,7 @@ def checked_scores(
             found = values.astype(np.float64)
             if not np.isinf(found).any():
                 return found
-            fault = " with inf (NaN says that a place is no candidate)"
+            fault = " with an infinite score (NaN: the place is no candidate)"
     raise InputError(
         f"{method.name}: {function} returned {type(scores).__name__} of shape"
         f" {values.shape}{fault} instead of {number} numbers"

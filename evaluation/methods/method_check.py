@@ -211,8 +211,6 @@ class _Check:
             raise self._fault(
                 "score: two calls with the same input return different scores"
             )
-        if np.isinf(first).any():
-            raise self._fault("score returned an infinite score")
         if np.isnan(first).any() and not self._method.skips_places:
             raise self._fault("score returned NaN, but skips_places is not set")
         found = self._call("score_in_drive", [query], database, exhaustive=True)

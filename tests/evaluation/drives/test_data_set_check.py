@@ -135,6 +135,11 @@ def test_a_correct_drive_passes(tmp_path, name):
 
 
 SCANS = scans_in(X_WB)
+# A rotation by 90 deg about z.
+TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+TRANSPOSED = np.block(
+    [[X_WB[:, :3, :3].transpose(0, 2, 1), X_WB[:, :3, 3:]], [X_WB[:, 3:]]]
+)
 
 
 @pytest.mark.parametrize(
@@ -146,7 +151,12 @@ SCANS = scans_in(X_WB)
         ("without points", [one[:0] for one in SCANS], {}),
         ("inverted", SCANS, {"X_WS": poses.inverse(X_WB)}),
         ("in one frame already", [SCANS[0]] * NUM_SCANS, {}),
-        ("points in feet", [one / 0.3048 for one in SCANS], {}),
+        ("points are in feet", [one / 0.3048 for one in SCANS], {}),
+        ("points to the left", [one @ TURN for one in SCANS], {}),
+        ("points to the right", [one @ TURN.T for one in SCANS], {}),
+        ("points to the back", [one * [-1, -1, 1] for one in SCANS], {}),
+        ("y is mirrored", [one * [1, -1, 1] for one in SCANS], {}),
+        ("rotations are transposed", SCANS, {"X_WS": TRANSPOSED}),
         ("without points", [one * np.nan for one in SCANS], {}),
         ("every 1e-07 s", SCANS, {"times": 1e-7 * np.arange(NUM_SCANS)}),
         (

@@ -282,6 +282,8 @@ def test_map_files_are_taken_as_they_are(recordings, drives, tmp_path):
     assert maps[1].name == "map.npy"
     with pytest.raises(InputError, match="--align always: a map file"):
         maps_in_one_world(paths, "always")
+    with pytest.raises(InputError, match="--lidar roof: a map file has no"):
+        maps_in_one_world(paths[1:] * 2, "auto", "roof")
 
 
 @pytest.mark.night
