@@ -97,8 +97,8 @@ def tested_places(scores: np.ndarray) -> np.ndarray:
     Args:
         scores: (D,) scores; NaN for a place that is no candidate.
     """
-    num_candidates = int((~np.isnan(scores)).sum())
-    return ranked_places(scores)[: min(NUM_VERIFIED, num_candidates)]
+    best = ranked_places(scores, NUM_VERIFIED)
+    return best[~np.isnan(scores[best])]
 
 
 def verified_by_poses(

@@ -130,7 +130,7 @@ class PlaceOutcome:
                 Distances to all other places are unknown.
         """
         scores = retrieval.scores
-        order = ranked_places(scores)[:, :NUM_BEST].astype(np.int32)
+        order = ranked_places(scores, NUM_BEST).astype(np.int32)
         best_scores = np.take_along_axis(scores, order, axis=1)
         best_places = np.where(np.isnan(best_scores), -1, order)
         outcomes = judge(scores, retrieval.matches, retrieval.query_blocks)

@@ -74,7 +74,7 @@ class Retrieval:
         Of several places with the best score, the first one counts.
         """
         candidate = ~np.isnan(self.scores)
-        best = ranked_places(self.scores)[:, 0] if self.scores.size else -1
+        best = ranked_places(self.scores, 1)[:, 0] if self.scores.size else -1
         return np.where(candidate.any(axis=1), best, -1)
 
     @property
@@ -341,7 +341,7 @@ def _errors_at_best(
     for row, found in enumerate(scores):
         if np.isnan(found).all():
             continue
-        best = int(ranked_places(found)[0])
+        best = int(ranked_places(found, 1)[0])
         if (X_PQ := poses[row][best]) is not None:
             errors.translation[row], errors.rotation_deg[row] = pose_error(
                 X_PQ, places.X_WS[best], queries.X_WS[row]

@@ -86,9 +86,8 @@ def _reranked(
         query: cloud of the query.
         places: clouds of the D places.
     """
-    order = ranked_places(scores)
-    num_candidates = int((~np.isnan(scores)).sum())
-    best = order[: min(method.rerank_best, num_candidates)]
+    best = ranked_places(scores, method.rerank_best)
+    best = best[~np.isnan(scores[best])]
     result = np.full(len(scores), np.nan)
     if len(best):
         # Later queries are compared with the same clouds.

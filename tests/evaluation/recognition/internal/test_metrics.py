@@ -151,7 +151,22 @@ def test_the_worst_candidate_is_before_what_is_none(right):
     assert outcomes.best_scores.tolist() == [-math.inf]
     expected = {2: 1.0, 3: 2.0}.get(right, math.inf)
     assert outcomes.first_right_ranks.tolist() == [expected]
-    assert ranked_places(scores).tolist() == [[2, 3, 0, 1]]
+    assert ranked_places(scores, 9).tolist() == [[2, 3, 0, 1]]
+
+
+@pytest.mark.parametrize("number", [5, 1999, 2000, 5000])
+@pytest.mark.parametrize("most", [1, 30])
+def test_the_best_places_are_those_of_a_full_sort(number, most):
+    """With equal scores, with few candidates, and with none."""
+    rng = np.random.default_rng(number)
+    scores = rng.integers(0, 40, (4, number)).astype(float)
+    scores[1, rng.random(number) < 0.5] = NAN
+    scores[2, 3:] = NAN
+    scores[3] = NAN
+    full = np.argsort(-scores, axis=1, kind="stable")[:, :most]
+    found = ranked_places(scores, most)
+    np.testing.assert_array_equal(found, full)
+    np.testing.assert_array_equal(ranked_places(scores[0], most), full[0])
 
 
 def test_no_candidate_is_never_accepted_and_a_miss():
@@ -338,7 +353,7 @@ def test_long_drives_need_no_array_more_of_all_pairs():
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 0.1 * scores.nbytes
-    order = ranked_places(scores)
+    order = ranked_places(scores, scores.shape[1])
     right = np.take_along_axis(matches, order, axis=1)
     np.testing.assert_array_equal(
         found.first_right_ranks, 1 + right.argmax(axis=1)
