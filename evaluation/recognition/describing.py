@@ -53,7 +53,7 @@ def describe_drive(
 
     Each cloud is made only once for all methods. A frame that is both a place
     and a query is described only once by a method that describes both in the
-    same way.
+    same way, also if they are of different protocols.
 
     Args:
         drive: the drive.
@@ -80,9 +80,11 @@ def describe_drive(
             needs, or no described cloud has a point within range.
     """
     requests = [*((method, roles, protocol) for method in methods), *further]
-    describing = [
-        _DriveDescriber(drive, *request, make_list) for request in requests
-    ]
+    describing: list[_DriveDescriber] = []
+    for request in requests:
+        describing.append(
+            _DriveDescriber(drive, *request, make_list, describing)
+        )
     visited = set().union(
         *(_frames_of_role(drive, role, protocol).tolist() for role in roles)
     )
@@ -182,7 +184,15 @@ class _DriveDescriber:
         roles: Set[Role],
         protocol: RetrievalProtocol,
         make_list: Callable[[], Any],
+        others: Iterable[_DriveDescriber] = (),
     ):
+        """Describes nothing yet.
+
+        Args:
+            drive, method, roles, protocol, make_list: see `describe_drive`.
+            others: describers of the same drive, to which each frame is added
+                before it is added to this one.
+        """
         self._cloud_kind = _CloudKind(
             protocol.scans(method),
             protocol.scans_before(method),
@@ -211,6 +221,25 @@ class _DriveDescriber:
             if role in roles:
                 self._members[role] = set(frames.tolist())
         self._drive = DriveDescriptors(drive.name, **scans)
+        # A describer whose places are described as these queries would be.
+        self._alike = next(filter(self._has_such_places, others), None)
+
+    def _has_such_places(self, other: _DriveDescriber) -> bool:
+        """Returns whether this method describes queries as the other places.
+
+        Queries with another sensor than the recorded one do not count. Of a
+        method with batches, the bits may depend on the other clouds of a batch.
+        """
+        one, same = self._method, other._method
+        return (
+            one.describes_alike
+            and one.batch_size == 1
+            and type(one) is type(same)
+            and one.config == same.config
+            and self._cloud_kind == other._cloud_kind
+            and self._protocol.half_extent == other._protocol.half_extent
+            and "places" in other._members
+        )
 
     @property
     def frames(self) -> set[int]:
@@ -256,8 +285,25 @@ class _DriveDescriber:
                 for frame, clouds in self._waiting
                 if frame in places and clouds.get("queries") is clouds["places"]
             }
+            shared |= self._described_by_another()
         self._describe("queries", shared)
         self._waiting = []
+
+    def _described_by_another(self) -> dict[int, object]:
+        """Returns frame -> descriptor of waiting queries, as far as known."""
+        other = self._alike
+        if other is None:
+            return {}
+        places = other._drive.places
+        return {
+            frame: places.descriptors[
+                int(np.searchsorted(places.frames, frame))
+            ]
+            for frame, clouds in self._waiting
+            if "queries" in clouds
+            and frame in other._members["places"]
+            and self._protocol.query_sensor(frame) is None
+        }
 
     def _describe(
         self, role: Role, known: Mapping[int, object]

@@ -107,6 +107,64 @@ def test_a_turned_cloud_is_the_same_in_the_world(drives, number):
     )
 
 
+class Cropping(MethodConfig):
+    reach: float = 50.0
+
+
+class Counting(Corresponding):
+    """Keeps what it was asked to describe; another reach is another method."""
+
+    name = "counting"
+    Config = Cropping
+
+    def __init__(self, *arguments, asked):
+        super().__init__(*arguments)
+        self.asked = asked
+
+    def describe(self, points):
+        self.asked.append(points)
+        return points[np.linalg.norm(points, axis=1) < self.config.reach]
+
+
+@pytest.mark.parametrize(
+    ("reach", "protocol", "number"),
+    [
+        (50.0, RetrievalProtocol(), 0),
+        (20.0, RetrievalProtocol(), 4),
+        (50.0, RetrievalProtocol(half_extent=40.0), 4),
+        (50.0, RetrievalProtocol(scans_per_place=2), 4),
+        (50.0, replace(TURNED, seed=3), 4),
+        # Frames that are no places.
+        (50.0, RetrievalProtocol(query_spacing=5.0), 3),
+    ],
+)
+def test_queries_of_a_second_protocol_are_places_of_the_first(
+    drives, reach, protocol, number
+):
+    """A method describes a cloud once, whatever it is described for."""
+    asked: list = []
+    first = replace(TURNED, place_spacing=10.0, query_spacing=10.0)
+    protocol = replace(protocol, place_spacing=10.0)
+    methods = [
+        Counting(Cropping(reach=one), asked=asked) for one in (50.0, reach)
+    ]
+    both = frozenset({"places", "queries"})
+    further = [
+        (methods[0], both, first),
+        (methods[1], frozenset({"queries"}), protocol),
+    ]
+    one, two = describe_drive(drives[0], [], both, first, further=further)
+    assert len(one.places.frames) == len(one.queries.frames) == 4
+    assert len(asked) == 8 + number
+    (alone,) = describe_drive(drives[0], [methods[1]], {"queries"}, protocol)
+    assert two.queries.frames.tolist() == alone.queries.frames.tolist()
+    for mine, other in zip(
+        two.queries.descriptors, alone.queries.descriptors, strict=True
+    ):
+        np.testing.assert_array_equal(mine, other)
+    assert list(two.places.descriptors) == []
+
+
 def test_places_are_described_as_ever(drives):
     for protocol in (RetrievalProtocol(), replace(TURNED, hide_sector=90.0)):
         (one,) = describe_drive(
