@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.base import InputError, poses
+from cns_drake.base import InputError, compiled, poses
 from cns_drake.base import points as clouds
 from cns_drake.drives import Drive
 from evaluation.drives.query_sensor import QuerySensor
@@ -100,8 +100,7 @@ def cropped(
     Returns:
         (K, 3) float64 in F [m].
     """
-    p_F = _coordinates(scan, X_FS)
-    return p_F.compress(within_cube(p_F, half_extent), axis=0)
+    return _within_range(scan, half_extent, X_FS)[0]
 
 
 def cropped_with_fields(
@@ -135,9 +134,7 @@ def cropped_with_fields(
                 f"{source}: its points have no field {name!r} (they have"
                 f" {', '.join(known)})"
             )
-    p_F = _coordinates(scan, X_FS)
-    kept = within_cube(p_F, half_extent)
-    p_F = p_F.compress(kept, axis=0)
+    p_F, rows = _within_range(scan, half_extent, X_FS)
     cloud = np.empty(
         len(p_F),
         [(axis, np.float64) for axis in "xyz"]
@@ -146,23 +143,52 @@ def cropped_with_fields(
     for axis, coordinates in zip("xyz", p_F.T, strict=True):
         cloud[axis] = coordinates
     for name in fields:
-        cloud[name] = scan[name].compress(kept, axis=0)
+        cloud[name] = scan[name].take(rows, axis=0)
     return cloud
 
 
-def _coordinates(scan: np.ndarray, X_FS: np.ndarray | None) -> np.ndarray:
-    """Returns the points (N, 3) of a scan in the frame F [m].
+def _within_range(
+    scan: np.ndarray, half_extent: float, X_FS: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the points (K, 3) of `cropped`, and their rows (K,) in the scan.
 
-    Args:
-        scan: structured array (N,) in the frame S of a sensor.
-        X_FS: (4, 4) pose of the sensor in F; None if F is S.
+    For the arguments, see `cropped`.
     """
-    p_S = clouds.xyz(scan)
-    if X_FS is None:
-        return p_S
-    x, y, z = p_S.T
-    # Unlike a matrix product, products and sums that are computed one by one
-    # are rounded in the same way on every processor.
+    p_S = np.empty((3, len(scan)))
+    # NumPy warns when it converts some NaN.
     with np.errstate(invalid="ignore"):
-        rows = [r[0] * x + r[1] * y + r[2] * z + r[3] for r in X_FS[:3]]
-    return np.stack(rows, axis=1)
+        for coordinates, axis in zip(p_S, "xyz", strict=True):
+            coordinates[:] = scan[axis]
+    X = np.eye(4) if X_FS is None else np.array(X_FS, np.float64, order="C")
+    return _move_and_crop(p_S, X, X_FS is not None, float(half_extent))
+
+
+@compiled
+def _move_and_crop(
+    p_S: np.ndarray, X_FS: np.ndarray, is_moved: bool, half_extent: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Moves points (3, N) to F; returns those within range, and their rows."""
+    p_F = np.empty((p_S.shape[1], 3))
+    rows = np.empty(p_S.shape[1], np.int64)
+    number = 0
+    for row in range(p_S.shape[1]):
+        x, y, z = p_S[0, row], p_S[1, row], p_S[2, row]
+        if is_moved:
+            # Unlike a matrix product, products and sums that are computed one
+            # by one are rounded in the same way on every processor.
+            a, b, c = x, y, z
+            x = X_FS[0, 0] * a + X_FS[0, 1] * b + X_FS[0, 2] * c + X_FS[0, 3]
+            y = X_FS[1, 0] * a + X_FS[1, 1] * b + X_FS[1, 2] * c + X_FS[1, 3]
+            z = X_FS[2, 0] * a + X_FS[2, 1] * b + X_FS[2, 2] * c + X_FS[2, 3]
+        # A comparison with NaN is false, so NaN is out of range.
+        if (
+            abs(x) <= half_extent
+            and abs(y) <= half_extent
+            and abs(z) <= half_extent
+        ):
+            p_F[number, 0] = x
+            p_F[number, 1] = y
+            p_F[number, 2] = z
+            rows[number] = row
+            number += 1
+    return p_F[:number].copy(), rows[:number].copy()
