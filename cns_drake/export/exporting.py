@@ -113,21 +113,18 @@ def export_drive(
     if layout.shared_outer_files:
         _check_shared_files(outer)
     part = part_path(folder)
-    try:
-        with sole_writer(folder):
-            try:
-                for note in _notes(drive, layout):
-                    on_note(note)
-                _write_drive(drive, layout, part)
-                for path, text in outer.items():
-                    make_folder(path.parent)
-                    write_text(path, text)
-                with user_errors(folder):
-                    os.replace(part, folder)
-            finally:
-                shutil.rmtree(part, ignore_errors=True)
-    finally:
-        _remove_empty(folder.parent, output)
+    with contextlib.ExitStack() as stack:
+        stack.callback(_remove_empty, folder.parent, output)
+        stack.enter_context(sole_writer(folder))
+        stack.callback(shutil.rmtree, part, ignore_errors=True)
+        for note in _notes(drive, layout):
+            on_note(note)
+        _write_drive(drive, layout, part)
+        for path, text in outer.items():
+            make_folder(path.parent)
+            write_text(path, text)
+        with user_errors(folder):
+            os.replace(part, folder)
     return folder
 
 

@@ -222,32 +222,51 @@ def _faults_of_frames(
     drive: Drive, clouds: dict[int, np.ndarray]
 ) -> Iterator[str]:
     """Compares each scan with later ones, as the poses place both."""
+    trees = {
+        frame: KDTree(above)
+        for frame, cloud in clouds.items()
+        if len(above := _above_ground(cloud)) >= _FEWEST
+    }
     for least_move in _LEAST_MOVES:
-        gaps: dict[str, list[float]] = {}
-        rng = np.random.default_rng(0)
-        for frame, scan in clouds.items():
-            other = _moved_frame(drive.X_WS, frame, *least_move)
-            if other is None:
-                continue
-            cloud = _above_ground(scan)
-            beside = _above_ground(_returns(drive.scan(other)))
-            if min(len(beside), len(cloud)) < _FEWEST:
-                continue
-            some = beside[rng.permutation(len(beside))[:_COMPARED]]
-            tree = KDTree(cloud)
-            placed = _placements(drive.X_WS[frame], drive.X_WS[other])
-            for name, X_there in placed.items():
-                moved = some @ X_there[:3, :3].T + X_there[:3, 3]
-                distance, _ = tree.query(moved)
-                gaps.setdefault(name, []).append(float(np.median(distance)))
-        means = {name: float(np.mean(found)) for name, found in gaps.items()}
-        given = means.pop(_AS_GIVEN, 0.0)
-        best = min(means, key=lambda name: means[name], default=_AS_GIVEN)
-        if best in means and means[best] < _NEARER * given:
+        gaps = _gaps(drive, trees, *least_move)
+        given = gaps.pop(_AS_GIVEN, 0.0)
+        best = min(gaps, key=lambda name: gaps[name], default=_AS_GIVEN)
+        if best in gaps and gaps[best] < _NEARER * given:
             yield (
                 "poses: neighbouring scans fit better"
-                f" ({means[best]:.2f} m instead of {given:.2f} m) if {best}"
+                f" ({gaps[best]:.2f} m instead of {given:.2f} m) if {best}"
             )
+
+
+def _gaps(
+    drive: Drive,
+    trees: Mapping[int, KDTree],
+    least_move: float,
+    least_turn: float,
+) -> dict[str, float]:
+    """Returns how far scans lie from later ones, by what may be wrong [m].
+
+    Args:
+        drive: the drive.
+        trees: frame -> the points of its scan above the ground.
+        least_move, least_turn: see `_moved_frame`.
+    """
+    found: dict[str, list[float]] = {}
+    rng = np.random.default_rng(0)
+    for frame, tree in trees.items():
+        other = _moved_frame(drive.X_WS, frame, least_move, least_turn)
+        if other is None:
+            continue
+        beside = _above_ground(_returns(drive.scan(other)))
+        if len(beside) < _FEWEST:
+            continue
+        some = beside[rng.permutation(len(beside))[:_COMPARED]]
+        placed = _placements(drive.X_WS[frame], drive.X_WS[other])
+        for name, X_there in placed.items():
+            moved = some @ X_there[:3, :3].T + X_there[:3, 3]
+            distance, _ = tree.query(moved)
+            found.setdefault(name, []).append(float(np.median(distance)))
+    return {name: float(np.mean(some)) for name, some in found.items()}
 
 
 def _placements(X_WA: np.ndarray, X_WB: np.ndarray) -> dict[str, np.ndarray]:
