@@ -182,6 +182,14 @@ def test_an_entrant_stands_among_the_shipped(tmp_path):
     assert found.agreements == []
 
 
+def test_a_task_that_is_not_shipped_is_named(tmp_path):
+    rows = [replace(row, task="plac") for row in shipped(metric="auc")]
+    path = tmp_path / "misspelt.csv"
+    Results.of(rows).write_csv(path)
+    with pytest.raises(InputError, match="task: plac: not in shipped"):
+        compare_tables([path])
+
+
 @pytest.mark.parametrize(
     ("change", "may_be_rounding"), [(0.0069, True), (0.011, False)]
 )
