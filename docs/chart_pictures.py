@@ -26,7 +26,7 @@ from docs.picture_parts import (
     add_heading,
     make_plain,
 )
-from docs.result_tables import csv_rows, kept_in_cities
+from docs.result_tables import aged, csv_rows, kept_in_cities
 from evaluation.methods import method_facts, shipped_methods
 from evaluation.results import (
     INK,
@@ -144,23 +144,20 @@ def assumptions(path: Path) -> None:
         "0.2 m": "displaced by up to 0.2 m",
         "2 m": "displaced by up to 2 m, as shipped",
     }
-    rows = [
-        row
-        for row in csv_rows("notes/ageing_means.csv")
-        if (row["method"], row["metric"]) == ("btc", "auc")
-        and (row["season"], row["random_yaw"]) == ("same", "1")
-    ]
     colour, _, marker = METHOD_STYLES["btc"]
     figure = Figure(figsize=(WIDTH, 6.8), layout="constrained")
     axes = figure.subplots()
     ticks: dict[float, str] = {}
     y = 0.0
     for place, text in places.items():
-        some = [row for row in rows if row["furniture"] == place]
+        young, old = (
+            aged("relative_auc", "btc", years, furniture=place)
+            for years in (20, 40)
+        )
         lost = [
-            row["map"].capitalize()
-            for row in some
-            if row["years"] == "20" and float(row["retained"]) < 0.9
+            city.capitalize()
+            for city, (mean, _, _) in young.items()
+            if mean < 0.9
         ]
         note = "no tenth lost\nin 20 years"
         if lost:
@@ -168,16 +165,12 @@ def assumptions(path: Path) -> None:
             note += f":\n{listed(lost)}" * (len(lost) < 4)
         axes.text(1.0, y, text, va="center", fontweight="bold")
         axes.text(1.0, y + 1.6, note, va="top")
-        for row in some:
-            if row["years"] == "40":
-                y += 1.0
-                mean, *ends = (
-                    100.0 * float(row[name])
-                    for name in ("retained", "low", "high")
-                )
-                axes.plot(ends, [y, y], color=colour, lw=3, alpha=0.4)
-                axes.plot(mean, y, marker, color=colour, ms=8)
-                ticks[y] = row["map"].capitalize()
+        for city, shares in old.items():
+            y += 1.0
+            mean, *ends = (100.0 * share for share in shares)
+            axes.plot(ends, [y, y], color=colour, lw=3, alpha=0.4)
+            axes.plot(mean, y, marker, color=colour, ms=8)
+            ticks[y] = city.capitalize()
         y += 1.4
     axes.set_yticks(list(ticks), ticks.values())
     axes.set(xlim=(0.0, 122.0), ylim=(y - 0.7, -0.7))
@@ -265,7 +258,8 @@ def years(path: Path) -> None:
     rows = csv_rows("notes/years.csv")
     cities = list(dict.fromkeys(row["map"].capitalize() for row in rows))
     columns = (
-        "years", "btc", "btc_low", "btc_high", "solid", "ring++", "others_best"
+        "years", "btc", "btc_least", "btc_most", "solid", "ring++",
+        "others_best",
     )  # fmt: skip
     shown = np.array([[float(row[name]) for name in columns] for row in rows])
     shown[:, 1:] *= 100.0
@@ -274,9 +268,9 @@ def years(path: Path) -> None:
     for axes, city, some in zip(
         grid.flat, cities, np.split(shown, len(cities)), strict=True
     ):
-        x, mean, low, high, solid, ringpp, others = some.T
+        x, mean, least, most, solid, ringpp, others = some.T
         bars = METHOD_STYLES["btc"][0]
-        axes.fill_between(x, low, high, color=bars, alpha=0.15, lw=0)
+        axes.fill_between(x, least, most, color=bars, alpha=0.15, lw=0)
         for y, name, text in (
             (others, None, "the other three"),
             (ringpp, "ring++", "RING++"),

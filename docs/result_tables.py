@@ -30,7 +30,6 @@ ROOT = Path(__file__).resolve().parents[1]
 # As a program, this file is not in the package `docs`.
 sys.path.insert(0, str(ROOT))
 
-from evaluation.recognition import sign_flip_test  # noqa: E402
 from evaluation.results import (  # noqa: E402
     CANNOT_SHOW,
     LAST,
@@ -131,21 +130,27 @@ def shipped() -> Results:
     return Results.read(BASELINES / "stages.csv")
 
 
+@functools.cache
+def _fresh() -> Results:
+    return Results.read(BASELINES / "fresh.csv")
+
+
 def kept_in_cities(verified: bool) -> list[Row]:
     """Returns retained shares of AUC strict in the shipped and fresh cities.
 
     A fresh city counts as a city of its own: it has the streets of a shipped
     city, but no building of it.
     """
-    fresh = Results.read(BASELINES / "fresh.csv")
     rows = list(
         shipped()
         .where({STAGE: OWN}, metric="relative_auc_strict", verified=verified)
         .rows
     )
-    for row in fresh.where(
-        {STAGE: OWN}, metric="relative_auc_strict", verified=verified
-    ).rows:
+    for row in (
+        _fresh()
+        .where({STAGE: OWN}, metric="relative_auc_strict", verified=verified)
+        .rows
+    ):
         number = row["both.redraw.frozen"]
         rows.append(replace(row, map=f"{row.map}, fresh {number}"))
     return [row for row in rows if row.method in METHODS]
@@ -211,6 +216,20 @@ def radius() -> str:
             ]
             lines.append((f"{wanted:g} m{word}", *cells))
     return _table(("radius of a match", *map(title, METHODS)), lines)
+
+
+def poses() -> str:
+    """Returns the table of right poses, and of answers without an error."""
+    lines = []
+    for method in METHODS:
+        some = shipped().where({STAGE: OWN}, method=method, verified=False)
+        values = (
+            [row.value for row in some.where(metric=metric).rows]
+            for metric in ("pose_success", "recall_at_full_precision")
+        )
+        lines.append((title(method), *map(_median_and_range, values)))
+    head = "method", "within 2 m and 5 deg", "recall at full precision"
+    return _table(head, lines)
 
 
 def changes() -> str:
@@ -327,7 +346,8 @@ def _claims_on_rebuilt_cities() -> list[Claim]:
         " them",
         "seen_before": "layered overlap was developed on versions of the"
         " shipped cities; the fresh ones with other early stages",
-        "test": "sign flips over cities; non-inferiority, margin 10 %",
+        "test": "sign flips over cities, three on each of four road networks;"
+        " non-inferiority, margin 10 %",
     }
     made = {
         (row["database"], row["method"], row["protocol"]): (
@@ -356,7 +376,10 @@ def _claims_on_rebuilt_cities() -> list[Claim]:
         for one in survival_at(radius_m, True, draw)
         if one.method == "layered-overlap"
     }
-    means = [at_radii[radius_m, None] for radius_m in _RADII]
+    worst = max(
+        (at_radii[radius_m, None] for radius_m in _RADII),
+        key=lambda one: one.loss,
+    )
     # The claim `any-radius` says so.
     assert {one.verdict for one in at_radii.values()} == {SURVIVES}
     four_fresh: dict[str, Any] = {
@@ -372,7 +395,7 @@ def _claims_on_rebuilt_cities() -> list[Claim]:
             name="survives-verified",
             claim="With geometric verification, layered overlap loses"
             f" {_percent(ours.loss)} of its AUC strict in"
-            f" {_NUMBERS[ours.cities]} rebuilt cities"
+            f" {_NUMBERS[ours.cities]} rebuilt cities on four road networks"
             f" (95 % interval {_percent(ours.interval.low)} to"
             f" {_percent(ours.interval.high)}), and {_survives(ours)}.",
             page="../README.md",
@@ -449,13 +472,13 @@ def _claims_on_rebuilt_cities() -> list[Claim]:
         Claim(
             name="any-radius",
             claim="With geometric verification, layered overlap loses"
-            f" at most {_percent(max(one.loss for one in means))} of its AUC"
+            f" at most {_at_most(worst.loss)} of its AUC"
             " strict in twelve cities at each radius of a match from 5 to 15 m,"
             " and survives in each of five draws of the random yaw.",
             page="results.md",
-            estimate=max(one.loss for one in means),
-            low=min(one.interval.low for one in means),
-            high=max(one.interval.high for one in means),
+            estimate=worst.loss,
+            low=worst.interval.low,
+            high=worst.interval.high,
             **over_cities
             | {
                 "source": "docs/notes/yaw_draws.csv",
@@ -597,10 +620,10 @@ def _claims_on_causes() -> list[Claim]:
         ),
         Claim(
             name="roofs",
-            claim="Higher roofs alone cost little: a city cut"
-            f" off at 5 m leaves every method {_percent(min(lower))} of its AUC"
-            " or more, and all but SOLiD and Scan Context++ at least"
-            f" {_percent(min(safe))}.",
+            claim="Higher roofs alone cost little: a city cut off at 5 m"
+            f" leaves every method {_at_least(min(lower))} of its AUC or more,"
+            " and all but SOLiD and Scan Context++ at least"
+            f" {_at_least(min(safe))}.",
             estimate=min(lower),
             overturned_by="a city of high roofs close to the street in which"
             " methods lose more",
@@ -659,34 +682,69 @@ def _claims_on_levels() -> list[Claim]:
     ]
 
 
-def _aged(
+def aged(
     metric: str, method: str, years: int, *, furniture: str = "2 m",
     season: str = "same",
-) -> list[float]:  # fmt: skip
-    """Returns what a method retains in each city: means of 3 realisations."""
-    found: dict[str, list[float]] = {}
+) -> dict[str, tuple[float, float, float]]:  # fmt: skip
+    """Returns what a method retains in a map that is years old.
+
+    Args:
+        metric: `relative_auc` or `relative_auc_strict`.
+        method: name of the method.
+        years: age of the map.
+        furniture: where new street furniture stands: `2 m` or `0.2 m` from the
+            old, `in place`, or `none` if it is never replaced.
+        season: season of the query drive: that of the map, `same`, or `other`.
+
+    Returns:
+        city -> mean over three realisations of the retained share, and of both
+        limits of its 95 % interval; NaN if the method has no intervals there.
+    """
+    found: dict[str, list[list[float]]] = {}
     for row in _find(
         "notes/ageing.csv", method=method, years=str(years),
         furniture=furniture, season=season, turned="1",
     ):  # fmt: skip
-        found.setdefault(row["map"], []).append(float(row[metric]))
-    return [float(np.mean(some)) for some in found.values()]
+        cells = (row.get(f"{metric}{end}") for end in ("", "_low", "_high"))
+        found.setdefault(row["map"], []).append(
+            [float(cell or "nan") for cell in cells]
+        )
+    return {
+        city: tuple(np.mean(some, axis=0).tolist())
+        for city, some in found.items()
+    }
+
+
+def ageing() -> str:
+    """Returns the table of what BTC retains at the shipped rates."""
+    found = [aged("relative_auc", "btc", years) for years in (5, 20, 40)]
+    lines = [
+        (city.capitalize(), *(_with_limits(*some[city]) for some in found))
+        for city in sorted(found[0], key=lambda city: found[0][city])
+    ]
+    return _table(("city", "5 years", "20 years", "40 years"), lines)
+
+
+def _aged_means(*args: Any, **where: str) -> list[float]:
+    return [mean for mean, _, _ in aged(*args, **where).values()]
 
 
 def _claims_on_ageing() -> list[Claim]:
     last = ("ring++", "scan-context++", "layered-overlap", "learned")
-    early, late = (_aged("relative_auc", "btc", years) for years in (5, 20))
+    early, late = (
+        _aged_means("relative_auc", "btc", years) for years in (5, 20)
+    )
     # The claim `btc-ages` says so.
     assert min(early) > 0.9 > max(late)
-    in_place = _aged("relative_auc", "btc", 40, furniture="in place")
-    lasting = [min(_aged("relative_auc", method, 40)) for method in last]
+    in_place = _aged_means("relative_auc", "btc", 40, furniture="in place")
+    lasting = [min(_aged_means("relative_auc", method, 40)) for method in last]
     lasting_strict = [
-        min(_aged("relative_auc_strict", method, 40)) for method in last
+        min(_aged_means("relative_auc_strict", method, 40)) for method in last
     ]
-    solid = _aged("relative_auc", "solid", 40)
-    solid_strict = _aged("relative_auc_strict", "solid", 40)
+    solid = _aged_means("relative_auc", "solid", 40)
+    solid_strict = _aged_means("relative_auc_strict", "solid", 40)
     both = {
-        m: _aged("relative_auc", m, 40, season="other")
+        m: _aged_means("relative_auc", m, 40, season="other")
         for m in ("ring++", "solid")
     }
     young = _values("notes/years.csv", "tcr_sym", years="5")
@@ -794,7 +852,7 @@ def _change(
     """Returns the change of a metric from one condition to another.
 
     Returns:
-        The mean over realisations, and its 95 % interval.
+        Its mean, least and greatest value over the realisations.
     """
     by_condition = {
         one: {
@@ -805,7 +863,7 @@ def _change(
         }
         for one in (new, old)
     }
-    return _with_interval(
+    return _with_range(
         [by_condition[new][key] - by_condition[old][key]
          for key in by_condition[old]]
     )  # fmt: skip
@@ -823,7 +881,7 @@ def _right_answers(cars: int, method: str) -> tuple[float, float, float]:
             found[key] = found.get(key, 1.0) * share
         elif row["metric"] == "r1" and row["verified"] == "1":
             found[key] = found.get(key, 1.0) * float(row["value"])
-    return _with_interval(list(found.values()))
+    return _with_range(list(found.values()))
 
 
 def _claims_on_upkeep() -> list[Claim]:
@@ -867,15 +925,15 @@ def _claims_on_upkeep() -> list[Claim]:
         "unit": "realisations, three of each of two cities",
         "n": 6,
         "source": "docs/notes/upkeep.csv",
-        "test": "sign flips over realisations, not corrected; two cities say"
-        " nothing about others",
+        "test": "none: the range over realisations; two cities give no"
+        " interval",
     }
     return [
         Claim(
             name="old-drive",
             claim="For queries in summer, a database drive of 20 years changes"
             f" the AUC strict of BTC by {_signed(old)} against one of 1 year.",
-            **_measured(old),
+            estimate=old[0],
             overturned_by="other rates of ageing, or furniture replaced in"
             " place",
             **over_realisations,
@@ -888,7 +946,7 @@ def _claims_on_upkeep() -> list[Claim]:
             f" {_signed(winter['ring++'])}, and of BTC by"
             f" {_signed(winter['btc'])}; a drive in winter alone was not"
             " measured.",
-            **_measured(winter["solid"]),
+            estimate=winter["solid"][0],
             overturned_by="a single drive in winter that is as good; then the"
             " season counts, and not the number of drives",
             **over_realisations,
@@ -907,7 +965,7 @@ def _claims_on_upkeep() -> list[Claim]:
             claim="Three drives of 20, 10 and 1 years, merged into one map,"
             f" change the AUC strict of BTC by {_signed(merged)} against the"
             " newest alone, in maintenance.yaml.",
-            **_measured(merged),
+            estimate=merged[0],
             overturned_by="the same gain from a denser map of the newest drive",
             **over_realisations,
         ),
@@ -915,7 +973,7 @@ def _claims_on_upkeep() -> list[Claim]:
             name="updating",
             claim="Removing what is gone from the merged map by exact labels"
             f" changes the AUC strict of BTC by {_signed(exact)}.",
-            **_measured(exact),
+            estimate=exact[0],
             overturned_by="longer routes than 400 m, a rebuilt city, or many"
             " more drives than three",
             **over_realisations,
@@ -923,9 +981,9 @@ def _claims_on_upkeep() -> list[Claim]:
         Claim(
             name="fleet",
             claim="Within three years, four cars a year let verified RING++"
-            f" answer {_share(four)} of the queries of a route of 500 m, one"
-            f" car {_share(one)}.",
-            **_measured(four),
+            f" answer {_share(four, 'range ')} of the queries of a route of"
+            f" 500 m, one car {_share(one, 'range ')}.",
+            estimate=four[0],
             overturned_by="a larger area, or cars on fixed routes",
             **over_realisations,
         ),
@@ -1267,7 +1325,8 @@ def _claims_on_methods() -> list[Claim]:
             name="graded",
             claim="Weights that were trained on other streets and without the"
             " radius of the test have a mean AUC strict of"
-            f" {graded['graded']:.2f} on ten shipped pairs, the first weights"
+            f" {graded['graded']:.2f} on ten pairs of the shipped cities, with"
+            " Metropolis cleared, the first weights"
             f" {graded['radius']:.2f}.",
             page="notes/learned.md",
             estimate=float(graded["graded"]),
@@ -1564,9 +1623,9 @@ def _claims_on_reality() -> list[Claim]:
         ),
         Claim(
             name="drivers",
-            claim="Simulated drivers differ from Boreas by at most 0.04, and"
-            " from KAIST by at most 0.16, in the distribution of lateral"
-            " offsets between two drives.",
+            claim="Simulated drivers, fitted to a pair of drives of Boreas and"
+            " one of KAIST, still differ from these by 0.04 and 0.16 in the"
+            " distribution of lateral offsets.",
             estimate=0.16,
             unit="real routes",
             n=2,
@@ -1574,7 +1633,7 @@ def _claims_on_reality() -> list[Claim]:
             " --paths",
             overturned_by="streets with one lane: there, 0.18 and 0.25 in a"
             " second set of pairs",
-            **copied,
+            **copied | {"seen_before": "both, since the driver was fitted"},
         ),
         Claim(
             name="plants",
@@ -1657,11 +1716,9 @@ def _hits(predicted: Mapping[tuple[str, str, str], tuple[float, float]]) -> int:
     )
 
 
-def _with_interval(values: Sequence[float]) -> tuple[float, float, float]:
-    """Returns the mean, and the limits of its 95 % interval by sign flips."""
-    array = np.array(values)
-    interval, _ = sign_flip_test(array, np.ones(len(array)))
-    return float(array.mean()), interval.low, interval.high
+def _with_range(values: Sequence[float]) -> tuple[float, float, float]:
+    """Returns the mean, the least and the greatest value."""
+    return float(np.mean(values)), min(values), max(values)
 
 
 def _measured(interval: tuple[float, float, float]) -> dict[str, float]:
@@ -1693,17 +1750,17 @@ def _pair(values: Iterable[float]) -> str:
     return f"{min(some):.2f} to {max(some):.2f}"
 
 
-def _share(interval: tuple[float, float, float]) -> str:
-    """Returns a share with its interval, cut off at 0 and 1."""
+def _share(interval: tuple[float, float, float], word: str = "") -> str:
+    """Returns a share with its interval, or its range, cut off at 0 and 1."""
     middle, low, high = np.clip(interval, 0.0, 1.0)
-    return f"{_percent(middle)} ({_percent(low)} to {_percent(high)})"
+    return f"{_percent(middle)} ({word}{_percent(low)} to {_percent(high)})"
 
 
 def _signed(interval: tuple[float, float, float]) -> str:
-    """Returns a difference with its interval."""
+    """Returns a difference with its range."""
     # Adding 0 turns -0.00 into 0.00.
     middle, low, high = (round(one, 2) + 0.0 for one in interval)
-    return f"{middle:+.2f} ({low:+.2f} to {high:+.2f})"
+    return f"{middle:+.2f} (range {low:+.2f} to {high:+.2f})"
 
 
 def _times(number: float) -> str:
@@ -1719,19 +1776,24 @@ def _verb(some: Sequence[str]) -> str:
     return "survives" if len(some) == 1 else "survive"
 
 
+def _median_and_range(values: Sequence[float]) -> str:
+    return f"{np.median(values):.2f} ({min(values):.2f}–{max(values):.2f})"
+
+
 def _mean_and_range(values: Sequence[float]) -> str:
     return f"{np.mean(values):.2f} ({min(values):.2f}–{max(values):.2f})"
 
 
 def _loss(one: Survival) -> str:
-    text = f"{one.loss:.2f}"
-    if not np.isnan(one.interval.low):
-        text += f" ({one.interval.low:.2f}–{one.interval.high:.2f})"
-    return text
+    return _with_limits(one.loss, one.interval.low, one.interval.high)
 
 
-def random_yaw_table() -> str:
-    """Returns `results_random_yaw.csv`: each pair and method."""
+def _with_limits(value: float, low: float, high: float) -> str:
+    return f"{value:.2f}" + f" ({low:.2f}–{high:.2f})" * (not np.isnan(low))
+
+
+def pairs_csv(results: Results) -> str:
+    """Returns a CSV file: each pair and method of `stages` or `fresh`."""
     columns = {
         "auc_unchanged": (LAST, False, "auc"),
         "auc": (OWN, False, "auc"),
@@ -1749,6 +1811,7 @@ def random_yaw_table() -> str:
     }
     rows = {
         (
+            r["both.redraw.frozen"],
             r.map,
             r.database,
             r.query,
@@ -1757,22 +1820,24 @@ def random_yaw_table() -> str:
             r.verified,
             r.metric,
         ): r
-        for r in shipped().rows
+        for r in results.rows
     }
+    places = sorted({key[:5] for key in rows if key[4]})
+    is_fresh = places[0][0] is not None
     stream = io.StringIO()
     table = csv.writer(stream, lineterminator="\n")
-    table.writerow(["map", "db", "query", "method", *columns])
-    for city, database, query, method in sorted(
-        {key[:4] for key in rows if key[3]}
-    ):
+    head = ["map", "db", "query", "method", *columns]
+    table.writerow(["version"] * is_fresh + head)
+    for place in places:
+        version, city, database, query, method = place
         cells = []
         for name, (stage, verified, metric) in columns.items():
-            row = rows[city, database, query, method, stage, verified, metric]
+            row = rows[(*place, stage, verified, metric)]
             end = name.rpartition("_")[2]
             value = getattr(row, end if end in ("low", "high") else "value")
             cells.append("" if np.isnan(value) else f"{value:.4f}")
         numbers = [n.rpartition("_")[2] for n in (database, query)]
-        table.writerow([city, *numbers, method, *cells])
+        table.writerow([version] * is_fresh + [city, *numbers, method, *cells])
     return stream.getvalue()
 
 
@@ -1826,7 +1891,8 @@ def _page_of(claim: Claim) -> str:
 
 def _evidence(claim: Claim) -> str:
     # Counts have no decimals.
-    form = ".0f" if claim.estimate == round(claim.estimate) else ".2f"
+    is_count = claim.estimate == round(claim.estimate) and np.isnan(claim.low)
+    form = ".0f" if is_count else ".2f"
     text = f"{claim.estimate:{form}}"
     if not np.isnan(claim.low):
         text += f" ({claim.low:{form}} to {claim.high:{form}})"
@@ -1857,6 +1923,8 @@ TABLES: dict[str, Callable[[], str]] = {
     "survival": survival,
     "radius": radius,
     "changes": changes,
+    "poses": poses,
+    "ageing": ageing,
 }
 TABLES_OF_CLAIMS: dict[str, Callable[[Sequence[Claim]], str]] = {
     "limits": limits,
@@ -1898,7 +1966,8 @@ def files() -> dict[Path, str]:
         if _BLOCK.search(text := path.read_text("utf-8"))
     }
     return pages | {
-        DOCS / "notes/results_random_yaw.csv": random_yaw_table(),
+        DOCS / "notes/results_random_yaw.csv": pairs_csv(shipped()),
+        DOCS / "notes/fresh.csv": pairs_csv(_fresh()),
         DOCS / "claims.csv": claims_table(found),
     }
 
