@@ -96,7 +96,7 @@ def compare(
         rows.append(
             (
                 f"Kendall's tau, {alike.first} and {alike.second}",
-                f"{number_text(alike.tau)}{_spaced_interval(alike.interval)}",
+                number_text(alike.tau),
             )
         )
         families = number_text(alike.tau_of_families)

@@ -8,27 +8,19 @@ import math
 from pathlib import Path
 import re
 from typing import Any, NamedTuple
-import zlib
 
 import numpy as np
 
 from cns_drake.base import InputError, doing, json_values
 from evaluation.recognition import (
-    LEAST_CITIES,
     METRICS,
     PROTOCOL_NAMES,
-    UNKNOWN,
     Difference,
-    Interval,
     Metric,
-    common_blocks,
     load_metrics,
-    metric_named,
 )
 from evaluation.results.compared_answers import (
-    check_same_queries,
     compared_answers,
-    drive_number,
 )
 from evaluation.results.keys import KEYS, LAST, STAGE
 from evaluation.results.metric_tables import (
@@ -47,8 +39,6 @@ from evaluation.results.table import Answers, Results, Row
 _ALIKE = 1e-4
 # Metrics whose ranking is followed by the differences of right answers.
 _OF_ANSWERS = ("auc", "auc_strict", "r1")
-# Number of bootstrap samples of a ranking.
-_SAMPLES = 1000
 # Up to this number of families, all orders are counted.
 _MOST_ENUMERATED = 7
 # Number of random orders of more families.
@@ -83,8 +73,6 @@ class _Agreement(NamedTuple):
         tau: Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if the two tables
             rank the methods in the same order, -1 if they rank them in opposite
             orders; NaN if all values of a table are equal.
-        interval: 95 % interval of `tau`; unknown if a table has fewer than
-            eight maps.
         families: names of the methods without their settings.
         tau_of_families: Kendall's tau-b over families. The value of a family is
             the mean over its methods: variants of a method are ranked alike, so
@@ -97,15 +85,12 @@ class _Agreement(NamedTuple):
     second: str
     methods: tuple[str, ...]
     tau: float
-    interval: Interval
     families: tuple[str, ...]
     tau_of_families: float
     p_value: float
 
 
-def _rank_agreement(
-    first: MetricTable, second: MetricTable, metric: str
-) -> _Agreement:
+def _rank_agreement(first: MetricTable, second: MetricTable) -> _Agreement:
     """Compares the rankings of two tables, each over its own conditions.
 
     Raises:
@@ -130,16 +115,6 @@ def _rank_agreement(
             f" conditions of both ({', '.join(methods) or 'none'})"
         )
     means = np.array([_means(table, methods) for table in (first, second)])
-    interval = UNKNOWN
-    if all(
-        len({row.map for row in table.rows.values()}) >= LEAST_CITIES
-        for table in (first, second)
-    ):
-        taus = _kendall_tau(
-            *(_samples(table, methods, metric) for table in (first, second))
-        )
-        low, high = np.nanquantile(taus, [0.025, 0.975]).tolist()
-        interval = Interval(low, high)
     # Settings follow the name of a method.
     names = np.array([re.split("[ ,]", name)[0] for name in methods])
     families = tuple(dict.fromkeys(names.tolist()))
@@ -151,7 +126,6 @@ def _rank_agreement(
         second.name,
         methods,
         float(_kendall_tau(*means)),
-        interval,
         families,
         float(_kendall_tau(*values)),
         _order_p_value(*values),
@@ -184,53 +158,6 @@ def _means(table: MetricTable, methods: Sequence[str]) -> list[float]:
     rows = [row for (method, _), row in table.rows.items() if method in methods]
     mean = {one.method: one.value for one in rank_methods(rows)}
     return [mean.get(name, math.nan) for name in methods]
-
-
-def _samples(
-    table: MetricTable, methods: Sequence[str], metric: str
-) -> np.ndarray:
-    """Returns means (B, M) of methods in bootstrap samples.
-
-    Maps are sampled, because a ranking should hold on other maps, too. If the
-    answers to all queries are known, blocks of street are sampled within the
-    maps as well. Tables of the same maps, or conditions of the same drive, get
-    the same samples.
-    """
-    conditions = table.conditions
-    towns = [table.rows[methods[0], one].map for one in conditions]
-    known, of_town = np.unique(towns, return_inverse=True)
-    rng = np.random.default_rng(zlib.crc32(" ".join(known).encode()))
-    size = _SAMPLES, len(known)
-    draws = rng.integers(len(known), size=size)
-    weights = np.stack([np.bincount(d, minlength=len(known)) for d in draws])
-    weights = weights[:, of_town].astype(float)
-    values = np.empty((len(conditions), len(methods), _SAMPLES))
-    is_drawn = metric_named(metric).is_resampled
-    for k, condition in enumerate(conditions):
-        keys = [(method, condition) for method in methods]
-        if is_drawn and all(key in table.answers for key in keys):
-            asked = [table.answers[key] for key in keys]
-            for pair in itertools.combinations(asked, 2):
-                check_same_queries(*pair)
-            of_query = _drawn_queries(asked)
-            values[k] = [
-                metric_named(metric).weighted(one.outcomes, of_query)
-                for one in asked
-            ]
-        else:
-            values[k] = [[table.rows[key].value] for key in keys]
-    total = weights.sum(axis=1, keepdims=True)
-    return np.einsum("bk,kmb->bm", weights, values) / total
-
-
-def _drawn_queries(asked: Sequence[Answers]) -> np.ndarray:
-    """Returns how often each query is in each sample of blocks, (B, Q)."""
-    blocks = common_blocks([answers.outcomes for answers in asked])
-    known, of_query = np.unique(blocks, return_inverse=True)
-    rng = np.random.default_rng(drive_number(asked[0]))
-    draws = rng.integers(len(known), size=(_SAMPLES, len(known)))
-    counts = [np.bincount(draw, minlength=len(known)) for draw in draws]
-    return np.stack(counts)[:, of_query].astype(float)
 
 
 def _kendall_tau(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -317,7 +244,6 @@ class Comparison:
                     "second": agreement.second,
                     "methods": list(agreement.methods),
                     "kendall_tau": json_values(agreement.tau),
-                    "interval_95": agreement.interval.to_json(),
                     "families": list(agreement.families),
                     "kendall_tau_families": json_values(
                         agreement.tau_of_families
@@ -434,8 +360,7 @@ def _compared_rankings(own: Sequence[MetricTable], metric: str) -> Comparison:
         tables.append(_reduced_to(table, changed))
         notes += [f"{table.name}: {note}" for note in left_out]
     agreements = [
-        _rank_agreement(*pair, metric)
-        for pair in itertools.combinations(tables, 2)
+        _rank_agreement(*pair) for pair in itertools.combinations(tables, 2)
     ]
     ranked = [
         mean._replace(method=f"{mean.method} ({table.name})")
@@ -463,7 +388,7 @@ def _compared_values(
         for condition in common
     ]
     agreements = [
-        _rank_agreement(*pair, metric)
+        _rank_agreement(*pair)
         for pair in itertools.combinations(tables, 2)
         if len({*pair[0].methods} & {*pair[1].methods}) > 1
     ]

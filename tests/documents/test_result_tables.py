@@ -99,3 +99,21 @@ def test_survival_is_judged_by_the_cities_means():
     assert len(cities) == CLAIMS["survives-verified"].n == 12
     mean = sum(cities) / 12
     assert mean == pytest.approx(CLAIMS["survives-verified"].estimate)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        *sorted(result_tables.DOCS.glob("notes/*.csv")),
+        *sorted(result_tables.BASELINES.glob("*.csv")),
+    ],
+    ids=lambda path: path.name,
+)
+def test_no_published_interval_is_without_width(path):
+    """A result without an error is not known to be perfect."""
+    with path.open(newline="", encoding="utf-8") as stream:
+        for row in csv.DictReader(stream):
+            for name in row:
+                other = name.replace("low", "high")
+                if other != name and row.get(other):
+                    assert float(row[name]) < float(row[other]), row

@@ -11,7 +11,7 @@
   value of a second factor. A retained share is bold if its 95 % interval lies
   below 1.
 - `scatter` (`x`, `y`): a metric over a metric or a numeric factor, with a
-  smooth curve and its 95 % band where there are enough points.
+  smooth curve where there are enough points.
 
 The names in brackets are keys of the mapping; `kind` names the kind of chart.
 All other keys select rows: the key is a column of the table, and its value

@@ -54,9 +54,6 @@ def draw_scatter(chart: Chart) -> tuple[str, Figure]:
             any(curve.x[0] <= at <= curve.x[-1] for curve in drawn) for at in x
         )
         for curve in drawn:
-            axes.fill_between(
-                curve.x, curve.low, curve.high, color=colour, alpha=0.18, lw=0
-            )
             axes.plot(curve.x, curve.y, style, color=colour)
     axes.set(
         xlabel=escape_dollars(in_words(x_name)),
@@ -97,35 +94,30 @@ _BANDWIDTH = 0.15
 # Widest gap that a curve crosses: two widths, so that no part of it is farther
 # than one width from a point.
 _WIDEST_GAP = 2.0
-# Number of bootstrap samples of a curve.
-_RESAMPLES = 1000
 # Number of points of a curve over the whole range of x.
 _GRID = 60
 
 
 class _Curve(NamedTuple):
-    """A smooth curve through a run of points without gaps, and its 95 % band.
+    """A smooth curve through a run of points without gaps.
 
     Attributes:
         x: (M,) coordinates of the curve.
         y: (M,) the curve.
-        low, high: (M,) limits of its band.
     """
 
     x: np.ndarray
     y: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
 
 
 def curves(x: np.ndarray, y: np.ndarray) -> Iterator[_Curve]:
     """Yields curves through points, one for each run of points without a gap.
 
     Runs of fewer than five points, or with a single x, have no curve. A curve
-    is a local linear regression, and its band is by bootstrap over the points
-    of the run. Curve and band are limited to the range from the least to the
-    greatest y of the run, because values outside of this range were not
-    measured, and may be impossible.
+    is a local linear regression. It is limited to the range from the least to
+    the greatest y of the run, because values outside of this range were not
+    measured, and may be impossible. It has no band: conditions of one map share
+    its streets, so points are not independent.
 
     Args:
         x, y: (N,) coordinates of the points.
@@ -140,15 +132,8 @@ def curves(x: np.ndarray, y: np.ndarray) -> Iterator[_Curve]:
             continue
         number = max(2, round(_GRID * float(np.ptp(at)) / span))
         grid = np.linspace(at[0], at[-1], number)
-        draws = np.random.default_rng(0).integers(
-            len(at), size=(_RESAMPLES, len(at))
-        )
-        counts = np.stack([np.bincount(d, minlength=len(at)) for d in draws])
-        samples = smooth(at, values, grid, width, counts)
-        low, high = np.percentile(samples, [2.5, 97.5], axis=0)
-        shown = smooth(at, values, grid, width), low, high
-        limits = values.min(), values.max()
-        yield _Curve(grid, *(np.clip(one, *limits) for one in shown))
+        shown = smooth(at, values, grid, width)
+        yield _Curve(grid, np.clip(shown, values.min(), values.max()))
 
 
 def smooth(
@@ -156,7 +141,6 @@ def smooth(
     y: np.ndarray,
     grid: np.ndarray,
     width: float,
-    counts: np.ndarray | None = None,
 ) -> np.ndarray:
     """Returns the local linear regression of y over x, with Gaussian weights.
 
@@ -167,17 +151,14 @@ def smooth(
         x, y: (N,) coordinates of the points.
         grid: (M,) values of x at which the regression is computed.
         width: standard deviation of the weights, in units of x.
-        counts: (B, N) how often each point counts in each of B samples; None if
-            each point counts once.
 
     Returns:
-        (M,) values of the regression; with `counts`, (B, M).
+        (M,) values of the regression.
     """
-    counts = np.ones(len(x)) if counts is None else counts
     offset = x[:, None] - grid[None, :]
     weight = np.exp(-0.5 * (offset / width) ** 2)
-    s0, s1, s2 = (counts @ (weight * offset**power) for power in (0, 1, 2))
-    t0, t1 = ((counts * y) @ (weight * offset**power) for power in (0, 1))
+    s0, s1, s2 = ((weight * offset**power).sum(axis=0) for power in (0, 1, 2))
+    t0, t1 = (y @ (weight * offset**power) for power in (0, 1))
     determinant = s0 * s2 - s1**2
     # One distinct value of x has no slope, only a mean.
     flat = determinant <= 1e-12 * s0 * width**2 * s0

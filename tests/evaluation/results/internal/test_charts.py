@@ -358,9 +358,8 @@ def test_a_scatter_of_points_on_a_line(number):
         np.testing.assert_allclose(
             line.get_ydata(), 0.9 - np.asarray(line.get_xdata())
         )
-    # Of two methods: points, and a curve with its band.
+    # Of two methods: points, and a curve.
     assert len(axes.get_lines()) == 4
-    assert len(axes.collections) == 2
     assert drawn.message == "Rank correlation of AUC with TCR_sym: -1.00"
     # A line in the legend stands for a curve.
     assert all(style for _, style, _ in drawn.legend.values())
