@@ -29,7 +29,16 @@ from evaluation.recognition import (
     compared_by_right_answers,
     place_numbers,
 )
-from evaluation.results import SURVIVES, Row, judge_survival, rank_methods
+from evaluation.results import (
+    SURVIVES,
+    QueryRows,
+    Row,
+    judge_survival,
+    rank_methods,
+    summaries,
+)
+from evaluation.results.summaries import Summary
+from evaluation.results.table import Answers
 
 COLUMNS = (
     "part", "units", "conditions", "scenario", "quantity", "runs", "shown",
@@ -37,6 +46,13 @@ COLUMNS = (
 )  # fmt: skip
 # Shares of right answers before and after a change.
 CHANGES = ((0.9, 0.5), (1.0, 1.0), (1.0, 0.97), (0.5, 0.0))
+# Shares of right answers without a cause, with each of two, and with both.
+CAUSES = (
+    (1.0, 1.0, 1.0, 1.0),
+    (0.95, 0.8, 0.8, 0.65),
+    (0.95, 0.7, 0.9, 0.3),
+    (0.6, 0.5, 0.3, 0.3),
+)
 # Shares of right answers of methods.
 METHODS = (
     (0.7, 0.7),
@@ -177,6 +193,62 @@ def drives(
                     "quantity": name,
                     **count.columns(),
                 }
+
+
+def excesses(
+    runs: int, scenarios: Sequence[Sequence[float]] = CAUSES
+) -> Iterator[dict[str, object]]:
+    """How much more two causes cost together than each by itself."""
+    for shares in scenarios:
+        whole, *kept = (
+            METRICS["auc"].of(one)
+            for one in answers(np.random.default_rng(0), shares, MANY)
+        )
+        first, second, both = np.array(kept) / whole
+        truth = first * second - both
+        for num_blocks in (4, 10, 24):
+            rng = np.random.default_rng(num_blocks)
+            count = Count(truth)
+            for _ in range(runs):
+                found = _excess(answers(rng, shares, num_blocks))
+                count.add(Interval(found.low, found.high))
+            yield {
+                "part": "excesses",
+                "units": num_blocks,
+                "conditions": 4,
+                "scenario": " and ".join(f"{s:g}" for s in shares) + " right",
+                "quantity": "excess of two causes",
+                **count.columns(),
+            }
+
+
+def _excess(some: Sequence[QueryOutcomes]) -> Summary:
+    """Returns the excess of answers without, with either and with both."""
+    rows = [
+        Answers(
+            experiment="e",
+            map="city",
+            database="a",
+            query="b",
+            seed=1,
+            factors={"cause": cause, "level": int(cause != "none")},
+            task="place",
+            method="solid",
+            verified=False,
+            protocol="own",
+            columns={
+                "correct": outcomes.is_right,
+                "score": outcomes.best_scores,
+                "has_match": outcomes.has_match,
+                "block": outcomes.blocks,
+            },
+        )
+        for cause, outcomes in zip(
+            ("none", "snow", "leaves", "snow+leaves"), some, strict=True
+        )
+    ]
+    (found,) = summaries.excesses(QueryRows.of(rows))
+    return found
 
 
 def differences(
@@ -328,6 +400,7 @@ def _cities(
 
 PARTS = {
     "drives": drives,
+    "excesses": excesses,
     "differences": differences,
     "cities": cities,
     "networks": networks,
