@@ -145,7 +145,7 @@ def assumptions(path: Path) -> None:
         "2 m": "displaced by up to 2 m, as shipped",
     }
     colour, _, marker = METHOD_STYLES["btc"]
-    figure = Figure(figsize=(WIDTH, 6.8), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 7.6), layout="constrained")
     axes = figure.subplots()
     ticks: dict[float, str] = {}
     y = 0.0
@@ -159,12 +159,13 @@ def assumptions(path: Path) -> None:
             for city, (mean, _, _) in young.items()
             if mean < 0.9
         ]
-        note = "no tenth lost\nin 20 years"
+        note = "BTC loses no tenth in 20 years"
         if lost:
-            note = "a tenth lost between\n5 and 20 years"
-            note += f":\n{listed(lost)}" * (len(lost) < 4)
+            where = "each city" if len(lost) == len(young) else listed(lost)
+            note = f"in {where}, BTC loses a tenth between 5 and 20 years"
         axes.text(1.0, y, text, va="center", fontweight="bold")
-        axes.text(1.0, y + 1.6, note, va="top")
+        y += 0.8
+        axes.text(1.0, y, note, va="center")
         for city, shares in old.items():
             y += 1.0
             mean, *ends = (100.0 * share for share in shares)
@@ -173,9 +174,12 @@ def assumptions(path: Path) -> None:
             ticks[y] = city.capitalize()
         y += 1.4
     axes.set_yticks(list(ticks), ticks.values())
-    axes.set(xlim=(0.0, 122.0), ylim=(y - 0.7, -0.7))
+    axes.set(xlim=(0.0, 142.0), ylim=(y - 0.7, -0.7))
     axes.axvline(100.0, color=PALE, zorder=0)
-    axes.set_xlabel("retained AUC of BTC in a map 40 years old [%]")
+    axes.set_xlabel(
+        "retained AUC of BTC in a map 40 years old [%]\n"
+        "line: 95 % interval over the streets of the city"
+    )
     axes.set_title("new lamps, signs, signals and benches:", loc="left")
     make_plain(axes)
     add_heading(
