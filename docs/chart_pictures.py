@@ -141,8 +141,8 @@ def assumptions(path: Path) -> None:
     places = {
         "none": "none",
         "in place": "where the old ones stood",
-        "0.2 m": "displaced by up to 0.2 m",
-        "2 m": "displaced by up to 2 m, as shipped",
+        "0.2 m": "displaced by 0.2 m",
+        "2 m": "displaced by 0.2 m to 2 m, as shipped",
     }
     colour, _, marker = METHOD_STYLES["btc"]
     figure = Figure(figsize=(WIDTH, 7.6), layout="constrained")

@@ -164,7 +164,7 @@ _FILLED_IN = {
     (Experiment, "name"): "the file's name",
     (Experiment, "maps"): "all shipped maps",
     (Experiment, "tasks"): "`place`",
-    (Experiment, "methods"): "all that ship",
+    (Experiment, "methods"): "the standard methods",
     (Experiment, "protocol"): "`random-yaw`",
     (Experiment, "baseline"): "the first values",
     (Fleet, "seed"): "the condition's seed",

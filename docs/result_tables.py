@@ -1440,7 +1440,7 @@ def _claims_on_reality() -> list[Claim]:
         )
     order = stats.kendalltau(right[True], right[False], method="exact")
     radar = {
-        row["folder"]: float(row["r1"])
+        row["folder"]: float(row["hits"]) / float(row["revisits"])
         for row in _find(
             "notes/radar_sessions.csv", method="scan-context", radius="10"
         )

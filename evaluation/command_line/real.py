@@ -35,7 +35,8 @@ def real(
         method: Method of place recognition or of registration to run: the name
             of a shipped method, a Python file with your own method or your own
             function `localise`, or the word standard, which means all standard
-            methods of place recognition. By default all shipped methods run.
+            methods of place recognition. By default all standard methods run,
+            and the shipped methods of registration.
             May be repeated.
         simulated: Folder with simulated recordings. The scans of a recording
             are added as distractors to the database of each data set that was

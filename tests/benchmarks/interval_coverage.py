@@ -31,14 +31,13 @@ from evaluation.recognition import (
 )
 from evaluation.results import (
     SURVIVES,
+    Answers,
     QueryRows,
     Row,
     judge_survival,
     rank_methods,
     summaries,
 )
-from evaluation.results.summaries import Summary
-from evaluation.results.table import Answers
 
 COLUMNS = (
     "part", "units", "conditions", "scenario", "quantity", "runs", "shown",
@@ -222,7 +221,7 @@ def excesses(
             }
 
 
-def _excess(some: Sequence[QueryOutcomes]) -> Summary:
+def _excess(some: Sequence[QueryOutcomes]) -> summaries.Summary:
     """Returns the excess of answers without, with either and with both."""
     rows = [
         Answers(

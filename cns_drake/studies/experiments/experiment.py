@@ -182,7 +182,7 @@ class Experiment(Section):
             mapping from each name to its settings.
         methods: methods to run, as a list of names or Python files; to change
             settings, a mapping from each name to its settings. A setting with a
-            list of values is a factor. By default all shipped methods.
+            list of values is a factor. By default the standard methods.
         metrics: metrics that the page shows, the most important first: names,
             or Python files with metrics of your own. By default the main
             metrics of each task. `results.csv` contains all metrics.
