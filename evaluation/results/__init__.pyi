@@ -55,6 +55,7 @@ from evaluation.results.styles import method_style as method_style
 from evaluation.results.styles import method_styles as method_styles
 from evaluation.results.styles import unit_rgb as unit_rgb
 from evaluation.results.summaries import LEAST_POINTS as LEAST_POINTS
+from evaluation.results.summaries import excesses as excesses
 from evaluation.results.summaries import means as means
 from evaluation.results.survival import CANNOT_SHOW as CANNOT_SHOW
 from evaluation.results.survival import MARGIN as MARGIN

@@ -34,9 +34,9 @@ from evaluation.results import (
     Answers,
     QueryRows,
     Row,
+    excesses,
     judge_survival,
     rank_methods,
-    summaries,
 )
 
 COLUMNS = (
@@ -194,7 +194,7 @@ def drives(
                 }
 
 
-def excesses(
+def two_causes(
     runs: int, scenarios: Sequence[Sequence[float]] = CAUSES
 ) -> Iterator[dict[str, object]]:
     """How much more two causes cost together than each by itself."""
@@ -209,8 +209,7 @@ def excesses(
             rng = np.random.default_rng(num_blocks)
             count = Count(truth)
             for _ in range(runs):
-                found = _excess(answers(rng, shares, num_blocks))
-                count.add(Interval(found.low, found.high))
+                count.add(_interval(answers(rng, shares, num_blocks)))
             yield {
                 "part": "excesses",
                 "units": num_blocks,
@@ -221,8 +220,8 @@ def excesses(
             }
 
 
-def _excess(some: Sequence[QueryOutcomes]) -> summaries.Summary:
-    """Returns the excess of answers without, with either and with both."""
+def _interval(some: Sequence[QueryOutcomes]) -> Interval:
+    """Returns that of answers without, with either and with both causes."""
     rows = [
         Answers(
             experiment="e",
@@ -246,8 +245,8 @@ def _excess(some: Sequence[QueryOutcomes]) -> summaries.Summary:
             ("none", "snow", "leaves", "snow+leaves"), some, strict=True
         )
     ]
-    (found,) = summaries.excesses(QueryRows.of(rows))
-    return found
+    (found,) = excesses(QueryRows.of(rows))
+    return Interval(found.low, found.high)
 
 
 def differences(
@@ -399,7 +398,7 @@ def _cities(
 
 PARTS = {
     "drives": drives,
-    "excesses": excesses,
+    "excesses": two_causes,
     "differences": differences,
     "cities": cities,
     "networks": networks,
