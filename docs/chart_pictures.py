@@ -409,7 +409,8 @@ def sessions(path: Path) -> None:
         found: dict[float, list[list[float]]] = {}
         for row in rows:
             if row["where"].startswith(where):
-                numbers = [float(row[key]) for key in ("r1", "low", "high")]
+                cells = (row[key] or "nan" for key in ("r1", "low", "high"))
+                numbers = [float(cell) for cell in cells]
                 found.setdefault(float(row["days"]), []).append(numbers)
         days = list(found)
         middle, low, high = np.transpose(
