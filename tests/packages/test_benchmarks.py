@@ -55,6 +55,7 @@ BY_HAND = {
     "lidar_odometry.py",
     "memory.py",
     "peers.py",
+    "predicts_failure.py",
     "real_or_simulated.py",
     "real_scans.py",
     "repeats.py",
