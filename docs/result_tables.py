@@ -826,8 +826,8 @@ def _claims_on_ageing() -> list[Claim]:
             name="btc-ages",
             claim="At the shipped rates of ageing, BTC retains"
             f" {_range(early)} of its AUC in a map of 5 years, and"
-            f" {_range(late)} in one of 20 years: in all four cities it loses a"
-            " tenth between these ages.",
+            f" {_range(late)} in one of 20 years: the mean of each of four"
+            " cities loses a tenth between these ages.",
             estimate=float(np.mean(late)),
             overturned_by="new street furniture that stands where the old"
             " stood, or other rates; with a query every 30 m and a place every"
