@@ -99,7 +99,10 @@ def compare(
                 number_text(alike.tau),
             )
         )
-        families = number_text(alike.tau_of_families)
+        families = (
+            f"{number_text(alike.tau_of_families)}"
+            f"{_spaced_interval(alike.interval)}"
+        )
         rows.append(
             (
                 f"the same over {len(alike.families)} families of methods",

@@ -13,15 +13,18 @@ import numpy as np
 
 from cns_drake.base import InputError, doing, json_values
 from evaluation.recognition import (
+    LEAST_CITIES,
     METRICS,
     PROTOCOL_NAMES,
+    SIGNIFICANT,
+    UNKNOWN,
     Difference,
+    Interval,
     Metric,
     load_metrics,
+    sign_flip_test,
 )
-from evaluation.results.compared_answers import (
-    compared_answers,
-)
+from evaluation.results.compared_answers import compared_answers
 from evaluation.results.keys import KEYS, LAST, STAGE
 from evaluation.results.metric_tables import (
     SHIPPED,
@@ -77,6 +80,7 @@ class _Agreement(NamedTuple):
         tau_of_families: Kendall's tau-b over families. The value of a family is
             the mean over its methods: variants of a method are ranked alike, so
             they are no independent evidence.
+        interval: 95 % interval of `tau_of_families`, see `_tau_interval`.
         p_value: probability that a random order of the families has a tau of
             this magnitude or a greater one.
     """
@@ -87,6 +91,7 @@ class _Agreement(NamedTuple):
     tau: float
     families: tuple[str, ...]
     tau_of_families: float
+    interval: Interval
     p_value: float
 
 
@@ -118,9 +123,8 @@ def _rank_agreement(first: MetricTable, second: MetricTable) -> _Agreement:
     # Settings follow the name of a method.
     names = np.array([re.split("[ ,]", name)[0] for name in methods])
     families = tuple(dict.fromkeys(names.tolist()))
-    values = np.stack(
-        [means[:, names == family].mean(axis=1) for family in families], axis=1
-    )
+    members = [np.flatnonzero(names == family) for family in families]
+    values = np.stack([means[:, some].mean(axis=1) for some in members], axis=1)
     return _Agreement(
         first.name,
         second.name,
@@ -128,7 +132,58 @@ def _rank_agreement(first: MetricTable, second: MetricTable) -> _Agreement:
         float(_kendall_tau(*means)),
         families,
         float(_kendall_tau(*values)),
+        _tau_interval(
+            (first, second), [[methods[k] for k in some] for some in members]
+        ),
         _order_p_value(*values),
+    )
+
+
+def _tau_interval(
+    tables: Sequence[MetricTable], families: Sequence[Sequence[str]]
+) -> Interval:
+    """Returns the 95 % interval of Kendall's tau between families of methods.
+
+    Which of two families is better in a table is known if `sign_flip_test` over
+    the maps says so, corrected (Bonferroni) for all pairs of families in both
+    tables. Maps are the units, because a ranking should hold on other maps; how
+    the queries of a map scatter is part of how maps differ. The interval
+    contains each tau that agrees with what is known: it is -1 to 1 if nothing
+    is. It is unknown if a table has fewer than eight maps.
+
+    Args:
+        tables: the two tables.
+        families: names of the methods of each family.
+    """
+    pairs = list(itertools.combinations(range(len(families)), 2))
+    if not pairs:
+        return UNKNOWN
+    known = np.ones(len(pairs))
+    for table in tables:
+        conditions = table.conditions
+        maps = [table.rows[families[0][0], one].map for one in conditions]
+        names, of_map = np.unique(maps, return_inverse=True)
+        if len(names) < LEAST_CITIES:
+            return UNKNOWN
+        values = np.array(
+            [
+                [
+                    np.mean([table.rows[name, one].value for name in family])
+                    for one in conditions
+                ]
+                for family in families
+            ]
+        )
+        for k, (i, j) in enumerate(pairs):
+            sums = np.bincount(of_map, values[i] - values[j])
+            weights = np.bincount(of_map).astype(float)
+            _, p_value = sign_flip_test(sums, weights, 2 * len(pairs))
+            is_known = p_value < SIGNIFICANT and not np.isnan(sums).any()
+            known[k] *= np.sign(sums.sum()) if is_known else 0.0
+    unknown = np.count_nonzero(known == 0.0)
+    return Interval(
+        float(known.sum() - unknown) / len(pairs),
+        float(known.sum() + unknown) / len(pairs),
     )
 
 
@@ -248,6 +303,7 @@ class Comparison:
                     "kendall_tau_families": json_values(
                         agreement.tau_of_families
                     ),
+                    "interval_95_families": agreement.interval.to_json(),
                     "p_families": json_values(agreement.p_value),
                 }
                 for agreement in self.agreements

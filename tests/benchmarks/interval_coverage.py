@@ -14,8 +14,11 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 import csv
+from dataclasses import replace
 import itertools
+from pathlib import Path
 import sys
+import tempfile
 
 import numpy as np
 
@@ -33,7 +36,9 @@ from evaluation.results import (
     SURVIVES,
     Answers,
     QueryRows,
+    Results,
     Row,
+    compare_tables,
     excesses,
     judge_survival,
     rank_methods,
@@ -74,6 +79,8 @@ CITIES = (
 )
 # Intraclass correlations of the results on one road network.
 ALIKE = (0.13, 0.5, 0.75)
+# Steps between the mean results of methods.
+STEPS = (0.01, 0.05, 0.15)
 # Queries of a block: from 1 to twice the mean less 1.
 MEAN_QUERIES = 5
 # Correlation of the answers in a block.
@@ -396,12 +403,59 @@ def _cities(
                 }
 
 
+def rankings(
+    runs: int, steps: Sequence[float] = STEPS
+) -> Iterator[dict[str, object]]:
+    """Kendall's tau between the rankings of four methods in two tables."""
+    orders = {1.0: (0, 1, 2, 3), 2.0 / 3.0: (0, 2, 1, 3)}
+    for tau, step, number in itertools.product(orders, steps, (12, 20)):
+        rng = np.random.default_rng(number)
+        count = Count(tau)
+        for _ in range(runs):
+            with tempfile.TemporaryDirectory() as folder:
+                paths = [Path(folder, name) for name in ("a.csv", "b.csv")]
+                for path, order in zip(
+                    paths, (orders[1.0], orders[tau]), strict=True
+                ):
+                    means = 0.3 + step * np.array(order)
+                    rows = _scattered(rng, means, number)
+                    Results.of(rows).write_csv(path)
+                found = compare_tables(paths, rankings=True)
+            count.add(found.agreements[0].interval)
+        yield {
+            "part": "rankings",
+            "units": number,
+            "conditions": 1,
+            "scenario": f"true tau {tau:.2g}, steps of {step:g}",
+            "quantity": "Kendall's tau",
+            **count.columns(),
+        }
+
+
+def _scattered(
+    rng: np.random.Generator, means: np.ndarray, number: int
+) -> list[Row]:
+    """Returns results of methods in cities, of which some are hard for all."""
+    hard = rng.normal(0.0, 0.05, (number, 1))
+    results = means + hard + rng.normal(0.0, 0.08, (number, len(means)))
+    return [
+        replace(
+            city_row(city, 0, float(np.clip(value, 0.0, 1.0))),
+            method=f"method_{k}",
+            metric="auc",
+        )
+        for city, values in enumerate(results)
+        for k, value in enumerate(values)
+    ]
+
+
 PARTS = {
     "drives": drives,
     "excesses": two_causes,
     "differences": differences,
     "cities": cities,
     "networks": networks,
+    "rankings": rankings,
 }
 
 

@@ -390,6 +390,41 @@ def test_variants_are_one_family_in_the_published_ranking(tmp_path):
     assert found.tau_of_families == pytest.approx(1.0)
     # Two of the 24 orders of four families: the same, and the opposite.
     assert found.p_value == pytest.approx(2 / 24)
+    # Four sequences and four cities cannot show more.
+    assert math.isnan(found.interval.low)
+
+
+def ranked_on(folder, values, number=12, scatter=0.0):
+    """Writes a table of methods on maps; all methods suffer from a hard map."""
+    rng = np.random.default_rng(len(folder.name))
+    towns = {}
+    for k in range(number):
+        hard = 0.2 * rng.random()
+        towns[f"town {k}"] = {
+            name: float(np.clip(value - hard + scatter * rng.normal(), 0, 1))
+            for name, value in values.items()
+        }
+    return write_table(folder, towns)
+
+
+def test_the_interval_of_tau_is_what_the_maps_leave_open(tmp_path):
+    up = {"x": 0.3, "y": 0.5, "z": 0.7, "w": 0.9}
+    down = {name: 1.2 - value for name, value in up.items()}
+    paths = [ranked_on(tmp_path / "up", up), ranked_on(tmp_path / "down", down)]
+    (one,) = compare_tables(paths, rankings=True).agreements
+    assert (one.interval.low, one.interval.high) == (-1.0, -1.0)
+    # Where results scatter as much as neighbours differ, their order is open.
+    rough = ranked_on(tmp_path / "rough", up, scatter=0.15)
+    (one,) = compare_tables([paths[0], rough], rankings=True).agreements
+    assert one.interval.low < one.tau_of_families <= one.interval.high == 1.0
+    # Seven maps say nothing.
+    few = ranked_on(tmp_path / "few", up, 7)
+    (one,) = compare_tables([paths[0], few], rankings=True).agreements
+    assert math.isnan(one.interval.low)
+    # Eight cannot show any of six differences in two tables.
+    eight = ranked_on(tmp_path / "eight", up, 8)
+    (one,) = compare_tables([paths[0], eight], rankings=True).agreements
+    assert (one.interval.low, one.interval.high) == (-1.0, 1.0)
 
 
 def test_the_order_of_families_by_hand():
