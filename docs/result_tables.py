@@ -219,6 +219,27 @@ def radius() -> str:
     return _table(("radius of a match", *map(title, METHODS)), lines)
 
 
+def levels() -> str:
+    """Returns the table of AUC at each level, without and with verification."""
+    found = {
+        (row["map"], row["method"], row["level"], row["verified"]): row["value"]
+        for row in _find("notes/levels.csv", metric="auc")
+    }
+    lines = []
+    for city in dict.fromkeys(key[0] for key in found):
+        for method in METHODS:
+            cells = []
+            for level in "1234":
+                alone, verified = (
+                    f"{float(found[city, method, level, one]):.2f}"
+                    for one in "01"
+                )
+                changes = f"→{verified}" * (alone != verified)
+                cells.append(f"{alone}{changes}")
+            lines.append((city, title(method), *cells))
+    return _table(("map", "method", *"1234"), lines)
+
+
 def poses() -> str:
     """Returns the table of right poses, and of answers without an error."""
     lines = []
@@ -1983,6 +2004,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "survival": survival,
     "radius": radius,
     "changes": changes,
+    "levels": levels,
     "poses": poses,
     "change seen": change_seen,
     "wrong places": wrong_places,
