@@ -1858,11 +1858,11 @@ def _verb(some: Sequence[str]) -> str:
 
 
 def _median_and_range(values: Sequence[float]) -> str:
-    return f"{np.median(values):.2f} ({min(values):.2f}–{max(values):.2f})"
+    return _with_limits(float(np.median(values)), min(values), max(values))
 
 
 def _mean_and_range(values: Sequence[float]) -> str:
-    return f"{np.mean(values):.2f} ({min(values):.2f}–{max(values):.2f})"
+    return _with_limits(*_with_range(values))
 
 
 def _loss(one: Survival) -> str:

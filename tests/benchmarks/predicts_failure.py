@@ -15,7 +15,8 @@ from pathlib import Path
 import sys
 
 import numpy as np
-from scipy.stats import rankdata
+
+from evaluation.recognition import auroc
 
 COLUMNS = (
     "map", "db", "query", "method", "wrong", "predicted_by", "mean", "queries",
@@ -97,23 +98,11 @@ def _rows(
             f"{np.nanmean(values):.4f}",
             len(is_wrong),
             int(is_wrong.sum()),
-            _auroc(values[counts], is_wrong),
+            "" if np.isnan(area) else f"{area:.4f}",
         ]
         for name, values in measures.items()
+        for area in [auroc(values[counts], is_wrong)]
     ]
-
-
-def _auroc(values: np.ndarray, is_wrong: np.ndarray) -> str:
-    """Returns the probability that a wrong one has the greater value.
-
-    Ties count half (Mann and Whitney, 1947). Empty if all are right, or wrong.
-    """
-    number = int(is_wrong.sum())
-    rest = len(is_wrong) - number
-    if not number or not rest:
-        return ""
-    ranks = rankdata(values)[is_wrong].sum()
-    return f"{(ranks - number * (number + 1) / 2.0) / (number * rest):.4f}"
 
 
 if __name__ == "__main__":

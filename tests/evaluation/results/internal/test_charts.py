@@ -358,8 +358,9 @@ def test_a_scatter_of_points_on_a_line(number):
         np.testing.assert_allclose(
             line.get_ydata(), 0.9 - np.asarray(line.get_xdata())
         )
-    # Of two methods: points, and a curve.
+    # Of two methods: points, and a curve without a band.
     assert len(axes.get_lines()) == 4
+    assert len(axes.collections) == 0
     assert drawn.message == "Rank correlation of AUC with TCR_sym: -1.00"
     # A line in the legend stands for a curve.
     assert all(style for _, style, _ in drawn.legend.values())

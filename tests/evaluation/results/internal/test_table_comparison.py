@@ -458,6 +458,7 @@ def test_opposite_rankings(tmp_path):
     assert one.tau_of_families == one.tau
     # One of six orders, and the opposite.
     assert one.p_value == pytest.approx(2 / 6)
+    assert math.isnan(one.interval.low)
 
 
 def test_rankings_are_of_one_protocol(tmp_path):
