@@ -5,7 +5,7 @@ Their results stay in memory, and may be written as the two tables of a study.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -180,14 +180,18 @@ def pair_of_drive_maps(
 ) -> Pair:
     """Returns a pair of drives or map files whose voxel maps are known.
 
-    The other arguments are the same as for `pair_of`.
+    The drives keep the names of their maps, which name the files of results: a
+    control has the `names` of its pair in tables, and other drives. The other
+    arguments are the same as for `pair_of`.
     """
     database, query = (
         OpenSource(Path(one.name), drive_map=one) for one in both
     )
     drive = both[1].drive
     map_name = drive if isinstance(drive, Drive) else query.opened
-    return pair_of(database, query, names, map_name=_map_of(map_name), **more)
+    own = both[0].name, both[1].name
+    pair = pair_of(database, query, own, map_name=_map_of(map_name), **more)
+    return replace(pair, names=names)
 
 
 def pair_of_maps(older: Path, newer: Path, map_name: str) -> Pair:
