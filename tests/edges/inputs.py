@@ -6,6 +6,13 @@ of these files.
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.layered_scans import seen_from, town
+from helpers.mesh_texts import (
+    collada_text,
+    gltf_text,
+    obj_text,
+    ply_text,
+    stl_text,
+)
 from helpers.small_city import write_small_city
 from helpers.small_cityjson import write_blocks
 from helpers.small_opendrive import (
@@ -73,30 +80,135 @@ def write_experiment(folder):
 
 
 def write_drives(folder):
-    """Writes recordings `before` and `after`, 23 scans along 110 m each.
+    """Writes recordings `before`, `after` and `control`."""
+    for name, scans, X_WBs in _drives():
+        write_recording(folder / name, list(map(make_scan, scans)), X_WBs)
 
-    Of four towns along the way, the second is another one afterwards.
+
+def write_kitti_drives(folder):
+    """Writes the drives `before` and `after` as sequences 00 and 01 of KITTI.
+
+    The poses are of a camera 0.3 m ahead of the LiDAR, and 0.1 m below it.
+    """
+    X_CS = np.array(
+        [[0, -1, 0, 0], [0, 0, -1, -0.1], [1, 0, 0, -0.3], [0, 0, 0, 1.0]]
+    )
+    (folder / "poses").mkdir()
+    for number, (_, scans, X_WBs) in enumerate(list(_drives())[:2]):
+        sequence = folder / "sequences" / f"{number:02d}"
+        (sequence / "velodyne").mkdir(parents=True)
+        for i, scan in enumerate(scans):
+            intensity = np.random.default_rng(i).uniform(size=len(scan))
+            rows = np.c_[scan, intensity].astype("<f4")
+            rows.tofile(sequence / "velodyne" / f"{i:06d}.bin")
+        X_WCs = np.array(X_WBs) @ np.linalg.inv(X_CS)
+        X_C0Cs = np.linalg.inv(X_WCs[0]) @ X_WCs
+        for path, rows in (
+            (folder / "poses" / f"{number:02d}.txt", X_C0Cs[:, :3]),
+            (sequence / "times.txt", 0.1 * np.arange(len(scans))),
+        ):
+            np.savetxt(path, rows.reshape(len(scans), -1))
+        row = " ".join(map(str, X_CS[:3].ravel()))
+        (sequence / "calib.txt").write_text(f"Tr: {row}\n")
+
+
+def write_streets(folder):
+    """Writes recordings `old` and `new`, 500 m and 600 m of a street.
+
+    Of every three towns along the way, the second is another one in `new`.
+    """
+    for name, side, number in (("old", 0.0, 26), ("new", 2.0, 31)):
+        seeds = [k + 50 * (k % 3 == 1 and name == "new") for k in range(15)]
+        scans, X_WBs = _drive(seeds, side, 20.0 * np.arange(number), number)
+        write_recording(folder / name, list(map(make_scan, scans)), X_WBs)
+
+
+def _drives():
+    """Yields name, scans and poses of three drives, 23 scans along 110 m each.
+
+    Of four towns along the way, the second is another one in `after`, and the
+    fourth in `control`, so that no two pairs give the same numbers.
     """
     for name, side, seeds in (
         ("before", 0.0, (1, 2, 3, 4)),
         ("after", 1.0, (1, 5, 3, 4)),
+        ("control", 1.0, (1, 2, 3, 6)),
     ):
-        parts = [
-            town(seed, number=25) + np.array([45.0 * k - 10.0, 0.0, 0.0])
-            for k, seed in enumerate(seeds)
-        ]
-        points = np.concatenate(parts)
-        scans, X_WBs = [], []
-        for i in range(23):
-            x, yaw = 5.0 * i, 0.02 * i
-            rng = np.random.default_rng([i, len(name)])
-            near = points[np.hypot(points[:, 0] - x, points[:, 1]) < 50.0]
-            chosen = rng.permutation(len(near))[:6000]
-            scan = seen_from(near[chosen], yaw, x, side)
-            scan += rng.normal(scale=0.01, size=scan.shape)
-            scans.append(make_scan(scan))
-            X_WBs.append(yaw_pose(x, side, 0.0, yaw))
-        write_recording(folder / name, scans, X_WBs)
+        yield name, *_drive(seeds, side, 5.0 * np.arange(23), len(name))
+
+
+def _drive(seeds, side, xs, seed):
+    """Returns scans and poses of a drive along the x axis.
+
+    Args:
+        seeds: of the towns along the way, every 45 m.
+        side: y of the drive [m].
+        xs: of the scans [m].
+        seed: selects the points of the scans.
+    """
+    parts = [
+        town(one, number=25) + np.array([45.0 * k - 10.0, 0.0, 0.0])
+        for k, one in enumerate(seeds)
+    ]
+    points = np.concatenate(parts)
+    scans, X_WBs = [], []
+    for i, x in enumerate(xs.tolist()):
+        yaw = 0.02 * i
+        rng = np.random.default_rng([i, seed])
+        near = points[np.hypot(points[:, 0] - x, points[:, 1]) < 50.0]
+        chosen = rng.permutation(len(near))[:6000]
+        scan = seen_from(near[chosen], yaw, x, side)
+        scans.append(scan + rng.normal(scale=0.01, size=scan.shape))
+        X_WBs.append(yaw_pose(x, side, 0.0, yaw))
+    return scans, X_WBs
+
+
+def write_worlds(folder):
+    """Writes worlds of SDF and of URDF; returns the names of their files.
+
+    Both have a ground, a box and a prism; in SDF the prism stands there once
+    in each format of meshes.
+    """
+    meshes = {
+        "prism.obj": obj_text(),
+        "prism.gltf": gltf_text()[0],
+        "prism.stl": stl_text(),
+        "prism.ply": ply_text(),
+        "prism.dae": collada_text(),
+    }
+    for name, text in meshes.items():
+        (folder / name).write_text(text)
+    models = "".join(
+        f'<model name="{name[6:]}"><static>true</static><pose>{6 * np.cos(k)}'
+        f" {6 * np.sin(k)} 0 0 0 0.3</pose><link name='link'>"
+        f"<visual name='mesh'><geometry><mesh><uri>{name}</uri></mesh>"
+        "</geometry></visual></link></model>"
+        for k, name in enumerate(meshes)
+    )
+    (folder / "meshes.sdf").write_text(
+        '<sdf version="1.9"><world name="meshes"><model name="ground">'
+        "<static>true</static><link name='link'><visual name='plane'><geometry>"
+        "<plane><normal>0 0 1</normal></plane></geometry></visual>"
+        "<visual name='box'><pose>-5 0 1 0 0 0</pose><geometry><box>"
+        "<size>1 3 2</size></box></geometry></visual></link></model>"
+        f"{models}</world></sdf>"
+    )
+    visuals = "".join(
+        f"<visual name='{name}'><origin xyz='{xyz}' rpy='0 0 0.3'/><geometry>"
+        f"{shape}</geometry></visual>"
+        for name, xyz, shape in (
+            ("ground", "0 0 -0.5", "<box size='100 100 1'/>"),
+            ("box", "-5 0 1", "<box size='1 3 2'/>"),
+            ("pole", "0 -4 2", "<cylinder radius='0.2' length='4'/>"),
+            ("mesh", "6 0 0", "<mesh filename='prism.obj'/>"),
+        )
+    )
+    (folder / "yard.urdf").write_text(
+        f"<robot name='yard'><link name='world'/><link name='yard'>{visuals}"
+        "</link><joint name='fixed' type='fixed'><parent link='world'/>"
+        "<child link='yard'/></joint></robot>"
+    )
+    return "meshes.sdf", "yard.urdf"
 
 
 def write_revisits(folder):

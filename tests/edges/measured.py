@@ -9,6 +9,7 @@ import csv
 from functools import cache
 import hashlib
 import io
+import json
 import math
 import os
 from pathlib import Path
@@ -18,6 +19,7 @@ import sys
 import tempfile
 
 from mcap.reader import make_reader
+import numpy as np
 
 from edges import inputs
 
@@ -212,16 +214,61 @@ def study(folder: Path) -> dict[str, str]:
 
 
 def pr(folder: Path) -> dict[str, str]:
+    """Recognises places, and prints the numbers of a street in both ways."""
     inputs.write_drives(folder)
     words = "pr", "before", "after", "--method", "scan-context++", "--verified"
     run(folder, "evaluation", *words, "--output", "out")
-    return _tables(folder / "out", "pr")
+    inputs.write_streets(folder)
+    words = "pr", "old", "new", "--method", "scan-context++"
+    tables = _tables(folder / "out", "pr")
+    return tables | _printed(folder, "pr", *words, "--tilt-queries", 8)
 
 
 def tcr(folder: Path) -> dict[str, str]:
+    """Measures change, beside a control."""
     inputs.write_drives(folder)
-    run(folder, "evaluation", "tcr", "before", "after", "--output", "out")
-    return _tables(folder / "out", "tcr")
+    words = "tcr", "before", "after", "--no-change", "control"
+    run(folder, "evaluation", *words, "--output", "out")
+    return _tables(folder / "out", "tcr") | _printed(folder, "tcr", *words)
+
+
+def kitti(folder: Path) -> dict[str, str]:
+    """Recognises places between drives in KITTI's layout, aligned first."""
+    inputs.write_kitti_drives(folder)
+    drives = "sequences/00", "sequences/01"
+    words = "--method", "solid", "--output", "out"
+    run(folder, "evaluation", "pr", *drives, *words)
+    return _tables(folder / "out", "kitti")
+
+
+def _printed(folder: Path, name: str, *words: object) -> dict[str, str]:
+    """Returns what `cns-eval` prints, as text and as JSON."""
+    text = run(folder, "evaluation", *words)
+    found = json.loads(run(folder, "evaluation", *words, "--json"))
+    rows = [{"name": n, "value": v} for n, v in _leaves(found)]
+    return {f"{name}.txt": text, f"{name}.json.csv": _csv(rows)}
+
+
+def _leaves(value: object, name: str = "") -> Iterator[tuple[str, object]]:
+    """Yields names and values of what a JSON value consists of."""
+    if isinstance(value, dict | list):
+        items = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, one in items:
+            yield from _leaves(one, f"{name}.{key}".lstrip("."))
+    else:
+        yield name, value
+
+
+def scan(folder: Path) -> dict[str, str]:
+    """Scans a world of each kind, with a mesh of each format."""
+    rows = []
+    for world in inputs.write_worlds(folder):
+        words = world, "--pose", 0, 0, 1.6, 0, 0, 0.1, "--output", "scan.npy"
+        run(folder, "cns_drake", "scan", *words)
+        points = np.load(folder / "scan.npy")
+        digest = _short(hashlib.sha256(points.tobytes()))
+        rows.append({"world": world, "points": len(points), "sha256": digest})
+    return {"scan.csv": _csv(rows)}
 
 
 def localise(folder: Path) -> dict[str, str]:
@@ -272,6 +319,7 @@ EDGES: dict[str, Callable[[Path], dict[str, str]]] = {
     "cns-eval-help": helps("evaluation", "cns-eval"),
     "recording-plain": recording("plain"),
     "pr": pr,
+    "scan": scan,
 }
 BY_NIGHT: dict[str, Callable[[Path], dict[str, str]]] = {
     "shipped-cities": shipped_cities,
@@ -279,6 +327,7 @@ BY_NIGHT: dict[str, Callable[[Path], dict[str, str]]] = {
     "recording-rain_and_traffic": recording("rain_and_traffic"),
     "recording-ride_and_camera": recording("ride_and_camera"),
     "tcr": tcr,
+    "kitti": kitti,
     "localise": localise,
     "map-update": map_update,
     "study": study,

@@ -27,6 +27,52 @@ def obj_text():
     return "\n".join(lines) + "\n"
 
 
+def stl_text():
+    """The prism."""
+    lines = ["solid prism"]
+    for triangle in L_VERTICES[L_TRIANGLES]:
+        normal = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
+        lines.append("facet normal {} {} {}".format(*normal))
+        lines.append("outer loop")
+        lines += ["vertex {} {} {}".format(*p) for p in triangle]
+        lines += ["endloop", "endfacet"]
+    return "\n".join([*lines, "endsolid prism"]) + "\n"
+
+
+def ply_text():
+    """The prism."""
+    rows = ["{} {} {}".format(*p) for p in L_VERTICES]
+    rows += ["3 {} {} {}".format(*t) for t in L_TRIANGLES]
+    return (
+        f"ply\nformat ascii 1.0\nelement vertex {len(L_VERTICES)}\n"
+        "property float x\nproperty float y\nproperty float z\n"
+        f"element face {len(L_TRIANGLES)}\n"
+        "property list uchar int vertex_indices\nend_header\n"
+    ) + "".join(f"{row}\n" for row in rows)
+
+
+def collada_text():
+    """The prism, its z up."""
+    numbers = " ".join(map(str, L_VERTICES.ravel()))
+    corners = " ".join(map(str, L_TRIANGLES.ravel()))
+    return f"""<COLLADA version="1.4.1"
+xmlns="http://www.collada.org/2005/11/COLLADASchema">
+<asset><unit meter="1"/><up_axis>Z_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh><source id="p">
+<float_array id="a" count="{L_VERTICES.size}">{numbers}</float_array>
+<technique_common><accessor source="#a" count="{len(L_VERTICES)}" stride="3">
+<param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="{len(L_TRIANGLES)}">
+<input semantic="VERTEX" source="#v" offset="0"/><p>{corners}</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/>
+</node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>
+"""
+
+
 def gltf_text(nodes=({"mesh": 0},), uri=None):
     """The prism, its y up, flat shaded."""
     vertices = L_VERTICES[L_TRIANGLES].reshape(-1, 3)
