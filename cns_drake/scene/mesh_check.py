@@ -21,10 +21,6 @@ from cns_drake.scene.ply_check import check_ply
 GLTF = (".gltf", ".glb")
 _STL_HEADER_BYTES = 84
 _STL_FACET_BYTES = 50
-# Counts that a VTK file declares, for which memory is reserved.
-_VTK_COUNTS = re.compile(
-    rb"^[ \t]*(POINTS|CELLS|CELL_TYPES)[ \t]+(\d{1,18})\b", re.M | re.I
-)
 _STL_WORDS = re.compile(rb"^[ \t]*(vertex|endfacet|endsolid)\b", re.M | re.I)
 
 
@@ -81,21 +77,6 @@ def _check_stl(content: bytes) -> tuple[()]:
     return ()
 
 
-def _check_vtk(content: bytes) -> tuple[()]:
-    """Checks that a VTK file can hold what it declares; there are no notes.
-
-    Raises:
-        ValueError: a count is larger than the number of bytes.
-    """
-    for what, count in _VTK_COUNTS.findall(content):
-        if int(count) > len(content):
-            raise ValueError(
-                f"declares {int(count)} {what.decode()} of VTK in"
-                f" {len(content)} bytes"
-            )
-    return ()
-
-
 # File name extension -> function that reads and checks a file.
 _CHECKS_OF_FILES: dict[str, Callable[[Path], tuple[str, ...]]] = {
     ".dae": check_collada,
@@ -106,5 +87,4 @@ _CHECKS = {
     **dict.fromkeys(GLTF, check_gltf),
     ".ply": check_ply,
     ".stl": _check_stl,
-    ".vtk": _check_vtk,
 }

@@ -1,6 +1,5 @@
 """Reads the surfaces of meshes, from files or from memory."""
 
-from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 import tempfile
@@ -11,7 +10,6 @@ from pydrake.geometry import (
     Mesh,
     MeshSource,
     ReadObjToTriangleSurfaceMesh,
-    RefineVolumeMeshIntoVtkFileContents,
 )
 
 from cns_drake.base import InputError, read_bytes
@@ -23,9 +21,6 @@ from cns_drake.scene.mesh_check import GLTF, check_mesh_file
 from cns_drake.scene.obj_check import LARGEST_FILE, check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 
-# The faces of a tetrahedron, counter-clockwise seen from outside. This holds if
-# its first three vertices are counter-clockwise, seen from the fourth.
-_FACES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
 # Formats whose y axis points up. Drake rotates them so that z does.
 _Y_UP = (*GLTF, ".dae")
 # Greatest number of triangles in all copies of meshes at further scales, of
@@ -105,8 +100,8 @@ class MeshFiles:
             raise ValueError("no such mesh file")
         ending = path.suffix.lower()
         check_mesh_file(path)
-        if ending in _READERS:
-            p_GVset, triangles = _READERS[ending](path)
+        if ending == ".obj":
+            p_GVset, triangles = _read_obj(path)
         elif ending in GLTF:
             p_GVset, triangles = self._read_gltf(path)
         else:
@@ -233,39 +228,3 @@ def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
     for array in (p_GVset, triangles):
         array.setflags(write=False)
     return p_GVset, triangles
-
-
-def _read_vtk(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the boundary surface of a volume mesh in a VTK file.
-
-    Returns:
-        Vertices (N, 3), float64 [m], including inner vertices, and triangles
-        (M, 3), int32.
-
-    Raises:
-        RuntimeError: Drake cannot read the file.
-    """
-    # Drake's reader converts all dialects of VTK to the one that Drake writes.
-    words = RefineVolumeMeshIntoVtkFileContents(MeshSource(path)).split()
-    vertices = _rows_of_numbers(words, "POINTS", 3, 3).astype(float)
-    cells = _rows_of_numbers(words, "CELLS", 3, 5).astype(np.int32)[:, 1:]
-    faces = cells[:, _FACES].reshape(-1, 3)
-    # A face between two tetrahedra occurs twice.
-    _, first, count = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    return vertices, faces[np.sort(first[count == 1])]
-
-
-def _rows_of_numbers(
-    words: Sequence[str], keyword: str, header: int, columns: int
-) -> np.ndarray:
-    """Returns the rows of numbers behind a keyword and its header."""
-    at = words.index(keyword)
-    rows = int(words[at + 1])
-    begin = at + header
-    block = np.array(words[begin : begin + rows * columns])
-    return block.reshape(rows, columns)
-
-
-_READERS = {".obj": _read_obj, ".vtk": _read_vtk}

@@ -30,7 +30,6 @@ from cns_drake.base import (
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.mesh_check import check_mesh_file
-from cns_drake.scene.mjcf_worlds import read_mjcf_world
 from cns_drake.scene.model_check import check_model
 from cns_drake.scene.model_finder import ModelFinder
 from cns_drake.scene.perception_geometry import anchored_frames, check_shape
@@ -83,11 +82,11 @@ def load_world(
     """Reads a world and, if given, a vehicle.
 
     From an SDF world, only the visuals are kept, at their initial places, and
-    nothing moves; the notes list what is left out. The visuals of URDF and MJCF
-    are read by Drake, with all joints at zero.
+    nothing moves; the notes list what is left out. The visuals of URDF are read
+    by Drake, with all joints at zero.
 
     Args:
-        sdf: SDF, URDF (`.urdf`) or MJCF (`.xml`) file of the world or model.
+        sdf: SDF or URDF (`.urdf`) file of the world or model.
         vehicle: file of the vehicle's model; None for no vehicle.
         structures: structure table; by default `structures.csv` in the world's
             folder, if it exists.
@@ -162,7 +161,7 @@ def _read_world(
 
 
 # File name ending -> reader; all others are read as SDF.
-_READERS = {".urdf": read_urdf_world, ".xml": read_mjcf_world}
+_READERS = {".urdf": read_urdf_world}
 
 
 def _parse_models(
@@ -198,6 +197,11 @@ def _drake_errors(path: Path) -> Iterator[None]:
 def _check_text(path: Path) -> None:
     if not path.is_file():
         raise InputError(f"{path}: no such file")
+    if path.suffix.lower() == ".xml":
+        raise InputError(
+            f"{path}: MJCF is not read; Drake's Parser reads it in a Diagram,"
+            " to which add_lidar adds a LiDAR (docs/drake.md)"
+        )
     # Drake would fail when it quotes other text.
     content = read_bytes(path)
     try:

@@ -1,4 +1,4 @@
-"""Small meshes in every format that Drake reads."""
+"""Small meshes in OBJ and glTF."""
 
 import base64
 import json
@@ -107,23 +107,3 @@ def gltf_text(nodes=({"mesh": 0},), uri=None):
         "buffers": [{"byteLength": len(data), "uri": uri or inline}],
     }
     return json.dumps(gltf), data
-
-
-def vtk_text():
-    """Six tetrahedra that fill a box of 1 x 2 x 3 m with a corner at zero."""
-    corners = [(x, y, z) for z in (0, 3) for y in (0, 2) for x in (0, 1)]
-    tetrahedra = []
-    # Along each way from one corner to the opposite one.
-    for steps in ((1, 2), (1, 4), (2, 1), (2, 4), (4, 1), (4, 2)):
-        cell = [0, steps[0], sum(steps), 7]
-        p = np.array([corners[k] for k in cell], dtype=float)
-        if np.linalg.det(p[1:] - p[0]) < 0.0:
-            cell[1], cell[2] = cell[2], cell[1]
-        tetrahedra.append(cell)
-    lines = ["# vtk DataFile Version 3.0", "box", "ASCII"]
-    lines += ["DATASET UNSTRUCTURED_GRID", "POINTS 8 double"]
-    lines += ["{} {} {}".format(*p) for p in corners]
-    lines += ["CELLS 6 30"]
-    lines += ["4 {} {} {} {}".format(*cell) for cell in tetrahedra]
-    lines += ["CELL_TYPES 6", *["10"] * 6]
-    return "\n".join(lines) + "\n"

@@ -5,20 +5,17 @@ from pathlib import Path
 import re
 from xml.etree.ElementTree import Comment, Element, fromstring, tostring
 
-# Root tag -> attribute of the root with a model's name.
-_NAMES = {"robot": "name", "mujoco": "model"}
-
 
 def same_worlds(path: Path) -> dict[str, str]:
-    """Returns texts that mean what an SDF, URDF or MJCF file means, by change.
+    """Returns texts that mean what an SDF or URDF file means, by change.
 
     Poses of the file must not refer to models.
     """
     text = path.read_text("utf-8")
     changes = dict(_SPELLINGS)
     tag = fromstring(text).tag
-    if tag in _NAMES:
-        changes["another name"] = lambda root: root.set(_NAMES[tag], "other")
+    if tag == "robot":
+        changes["another name"] = lambda root: root.set("name", "other")
     changes |= _ADDITIONS.get(tag, _ADDITIONS["sdf"])
     body = re.sub(r"\A<\?xml.*?\?>\s*", "", text)
     found = {
@@ -98,10 +95,5 @@ _ADDITIONS: dict[str, dict[str, Callable[[Element], object]]] = {
             "<gazebo><plugin name='zz' filename='zz.so'/></gazebo>",
         ),
         "a transmission": _adding(("robot",), "<transmission name='zz'/>"),
-    },
-    "mujoco": {
-        "a light": _adding(("worldbody",), "<light pos='0 0 1'/>"),
-        "a sensor": _adding(("mujoco",), "<sensor/>"),
-        "a site": _adding(("body",), "<site name='zz'/>"),
     },
 }

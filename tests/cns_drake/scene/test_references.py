@@ -143,23 +143,3 @@ def test_vertices_of_obj_have_a_weight_of_one_or_a_colour(
     else:
         with pytest.raises(InputError, match=r"a\.obj: line 1: a vertex that"):
             load_world(path)
-
-
-@pytest.mark.parametrize("folder", ["my meshes", "my%20meshes"])
-@pytest.mark.parametrize("name", ["a b.obj", "a%20b.obj"])
-def test_meshdir_of_mjcf_is_a_part_of_the_reference(tmp_path, folder, name):
-    (tmp_path / "my meshes").mkdir()
-    (tmp_path / "my meshes" / "a b.obj").write_text(obj_text())
-    path = tmp_path / "w.xml"
-
-    def write(place, file):
-        path.write_text(
-            f"<mujoco><compiler assetdir='none' meshdir='{place}'/><asset>"
-            f"<mesh name='m' file='{file}'/></asset><worldbody>"
-            "<geom type='mesh' mesh='m'/></worldbody></mujoco>"
-        )
-        return load_world(path).notes
-
-    if ("%" in folder) == ("%" in name):
-        assert write(folder, name) == ()
-    assert write("none", tmp_path / "my meshes" / "a b.obj") == ()

@@ -232,14 +232,13 @@ def test_meshes_of_urdf_are_searched_as_those_of_sdf(tmp_path, uri):
     assert f"1 meshes not found, and left out: {uri}" in note
 
 
-def test_mjcf_is_read_or_refused(tmp_path):
-    geom = '<geom type="box" size=".5 .5 .5"/>'
+def test_mjcf_is_drakes_alone(tmp_path):
     path = tmp_path / "w.xml"
-    text = "<mujoco model='m'><worldbody>{}</worldbody></mujoco>"
-    path.write_text(text.format(geom))
-    world = load_world(path)
-    assert len(read_perception_geometry(world.scene_graph.model_inspector()))
-    more = f"<replicate count='3' offset='1 0 0'>{geom}</replicate>"
-    path.write_text(text.format(geom + more))
-    with pytest.raises(InputError, match="<replicate> in <worldbody> of MJCF"):
+    path.write_text("<mujoco model='m'><worldbody/></mujoco>")
+    box = tmp_path / "w.urdf"
+    box.write_text(ROBOT.format(uri="gone.obj"))
+    fault = r"w\.xml: MJCF is not read; Drake's Parser reads it in a Diagram"
+    with pytest.raises(InputError, match=fault):
         load_world(path)
+    with pytest.raises(InputError, match=fault):
+        load_world(box, vehicle=path)

@@ -138,27 +138,9 @@ def urdf_with(tag):
 BOX_URDF = "<geometry><box size='1 1 1'/></geometry>"
 
 
-def mjcf_with(tag):
-    geom = "<geom type='box' size='.5 .5 .5'/>"
-    model = "<mujoco>{}<worldbody>{}<body>{}</body></worldbody></mujoco>"
-    if tag in ("frame", "replicate", "attach", "composite", "flexcomp", "site",
-               "camera", "light"):  # fmt: skip
-        return model.format("", geom + f"<{tag}/>", geom)
-    if tag in ("hfield", "skin", "texture"):
-        return model.format(f"<asset><{tag}/></asset>", geom, geom)
-    if tag == "inertial":
-        more = "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>"
-        return model.format("", geom, more + geom)
-    if tag in ("mujoco", "compiler", "default", "asset", "mesh", "material",
-               "worldbody", "body", "geom", "joint", "freejoint"):  # fmt: skip
-        return None
-    return model.format(f"<{tag}/>", geom, geom)
-
-
 FORMATS = {
     "SDF": ("w.sdf", sdf_with),
     "URDF": ("w.urdf", urdf_with),
-    "MJCF": ("w.xml", mjcf_with),
 }
 
 
@@ -171,7 +153,7 @@ def rows():
         for row in table.splitlines()[1:]:
             _, treated, what, _ = row.split("|")
             for tag in re.findall(r"`([\w:]+)`", what.partition(";")[0]):
-                if tag not in ("mj_saveLastXML", "xacro", "drake:"):
+                if tag not in ("xacro", "drake:"):
                     yield name, treated.strip(), tag
 
 

@@ -9,7 +9,7 @@ from helpers.lidar_stage import (
     beam_index,
     positions,
 )
-from helpers.mesh_texts import gltf_text, obj_text, vtk_text
+from helpers.mesh_texts import gltf_text, obj_text
 import numpy as np
 from pydrake.common import MemoryFile
 from pydrake.geometry import (
@@ -59,9 +59,8 @@ NODES = (
 def meshes(tmp_path):
     """Files of meshes by ending."""
     (tmp_path / "mesh.obj").write_text(obj_text())
-    (tmp_path / "mesh.vtk").write_text(vtk_text())
     (tmp_path / "mesh.gltf").write_text(gltf_text(NODES)[0])
-    return {e: tmp_path / f"mesh.{e}" for e in ("obj", "vtk", "gltf")}
+    return {e: tmp_path / f"mesh.{e}" for e in ("obj", "gltf")}
 
 
 def points(count=20):
@@ -79,12 +78,9 @@ SHAPES = {
     "convex of points": lambda meshes: Convex(points(), "points", 0.7),
     "convex OBJ": lambda meshes: Convex(meshes["obj"], [1.0, 0.6, 1.7]),
     "convex glTF": lambda meshes: Convex(meshes["gltf"], [1.0, 0.6, -1.7]),
-    "convex VTK": lambda meshes: Convex(meshes["vtk"], 0.8),
     "OBJ": lambda meshes: Mesh(meshes["obj"]),
     "OBJ, scaled": lambda meshes: Mesh(meshes["obj"], [0.5, 2.0, 1.3]),
     "OBJ, mirrored": lambda meshes: Mesh(meshes["obj"], [-0.5, 2.0, 1.3]),
-    "VTK": lambda meshes: Mesh(meshes["vtk"]),
-    "VTK, scaled": lambda meshes: Mesh(meshes["vtk"], [2.0, 0.5, 0.4]),
 }
 
 
@@ -200,7 +196,7 @@ def look_at(d_W):
 
 @pytest.mark.sampled(1)
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["obj", "gltf", "vtk"])
+@pytest.mark.parametrize("kind", ["obj", "gltf"])
 def test_a_mesh_in_memory_is_that_of_the_file(kind, meshes, tmp_path):
     if kind == "gltf":
         text, data = gltf_text(NODES, uri="parts/mesh.bin")

@@ -758,17 +758,6 @@ def _(folder):
     (folder / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
 
 
-for _name, _text in {
-    "replicate": '<replicate count="100000000"><geom size="1"/></replicate>',
-    "nested": "<body>" * 90 + '<geom size="1"/>' + "</body>" * 90,
-}.items():
-
-    @way(f"mjcf: {_name}", "w.xml", *WORLDS, "world .xml", use=world("w.xml"))
-    def _(folder, text=_text):
-        text = f"<mujoco><worldbody>{text}</worldbody></mujoco>"
-        (folder / "w.xml").write_text(text)
-
-
 def mesh(file):
     def use(folder):
         uri = f"<uri>{file}</uri>"
@@ -860,15 +849,6 @@ def _(folder):
 def _(folder):
     data = bytes(80) + struct.pack("<I", 2**32 - 1) + bytes(50)
     (folder / "m.stl").write_bytes(data)
-
-
-@way("vtk: points", "m.vtk", *WORLDS, "mesh .vtk", use=mesh("m.vtk"))
-def _(folder):
-    (folder / "m.vtk").write_text(
-        "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\n"
-        "POINTS 400000000 float\n0 0 0 1 0 0 0 1 0 0 0 1\n"
-        "CELLS 400000000 2000000000\n4 0 1 2 3\nCELL_TYPES 400000000\n10\n"
-    )
 
 
 @way("dae: nodes of nodes", "m.dae", *WORLDS, "mesh .dae", use=mesh("m.dae"))
@@ -1312,7 +1292,7 @@ OPENERS = {
 def offered_readers():
     """All readers that doors offer, and members of families of readers."""
     from cns_drake.imports import map_sources
-    from cns_drake.scene import mesh_check, mesh_files
+    from cns_drake.scene import mesh_check
     from cns_drake.scene import world as worlds
     from evaluation.clouds import cloud_files
     from evaluation.drives import data_sets
@@ -1328,7 +1308,6 @@ def offered_readers():
     meshes = {
         *mesh_check._CHECKS,
         *mesh_check._CHECKS_OF_FILES,
-        *mesh_files._READERS,
     }
     found |= {f"mesh {ending}" for ending in meshes}
     return found | {f"world {one}" for one in {".sdf", *worlds._READERS}}
