@@ -24,6 +24,7 @@ from cns_drake.sensors import ImuConfig as ImuConfig
 from cns_drake.sensors import ImuNoise as ImuNoise
 from cns_drake.sensors import Lidar as Lidar
 from cns_drake.sensors import LidarConfig as LidarConfig
+from cns_drake.sensors import LidarOptions as LidarOptions
 from cns_drake.sensors import MeasurementModel as MeasurementModel
 from cns_drake.sensors import NoddingPattern as NoddingPattern
 from cns_drake.sensors import Odometry as Odometry

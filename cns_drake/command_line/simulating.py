@@ -257,12 +257,7 @@ def scan(
 
         from cns_drake.base import check_writable
         from cns_drake.scene import LARGEST_SIZE, load_world
-        from cns_drake.sensors import (
-            WeatherConfig,
-            make_lidar_config,
-            make_pattern,
-            make_returns,
-        )
+        from cns_drake.sensors import make_lidar_config, make_lidar_model
         from cns_drake.simulation import check_ending, save_scan, scan_world
 
     if not np.isfinite(pose).all():
@@ -273,7 +268,6 @@ def scan(
     check_writable(output)
     with errors_at_option("--lidar", "unit"):
         config = make_lidar_config(lidar)
-    pattern = make_pattern(config)
     X_WS = RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
     doing(f"reading {world.name}")
     loaded = load_world(world, model_paths=model_path or ())
@@ -281,9 +275,9 @@ def scan(
         note(text)
     chosen, weather = choose_returns(returns, fog, rain, snowfall)
     config = config.replaced(returns=chosen or "ideal")
-    model = make_returns(config, weather or WeatherConfig(), "lidar", seed)
+    model = make_lidar_model(config, "lidar", seed, weather)
     doing("casting rays")
-    points = scan_world(loaded, X_WS, pattern, model)
+    points = scan_world(loaded, X_WS, model.pattern, model.returns)
     save_scan(points, output)
     show(
         {"output": str(output), "points": len(points)},

@@ -4,9 +4,6 @@ from cns_drake.sensors.camera.camera_scene import CameraScene as CameraScene
 from cns_drake.sensors.camera.config import CameraSection as CameraSection
 from cns_drake.sensors.camera.renderer import check_renderer as check_renderer
 from cns_drake.sensors.carriers import sensor_pose as sensor_pose
-from cns_drake.sensors.described_lidar import (
-    add_described_lidar as add_described_lidar,
-)
 from cns_drake.sensors.drake_configs import ApplyImuConfig as ApplyImuConfig
 from cns_drake.sensors.drake_configs import ApplyLidarConfig as ApplyLidarConfig
 from cns_drake.sensors.drake_configs import (
@@ -26,8 +23,10 @@ from cns_drake.sensors.imu.vehicle_imu import (
     add_described_imu as add_described_imu,
 )
 from cns_drake.sensors.lidar.beam_coverage import BeamCoverage as BeamCoverage
+from cns_drake.sensors.lidar.beams import HIGHEST_RATE as HIGHEST_RATE
 from cns_drake.sensors.lidar.beams import BeamPattern as BeamPattern
 from cns_drake.sensors.lidar.lidar import Lidar as Lidar
+from cns_drake.sensors.lidar.lidar import LidarOptions as LidarOptions
 from cns_drake.sensors.lidar.measurement import Echoes as Echoes
 from cns_drake.sensors.lidar.measurement import (
     MeasurementModel as MeasurementModel,
@@ -52,8 +51,8 @@ from cns_drake.sensors.lidar_config import describe_unit as describe_unit
 from cns_drake.sensors.lidar_config import (
     make_lidar_config as make_lidar_config,
 )
+from cns_drake.sensors.lidar_config import make_lidar_model as make_lidar_model
 from cns_drake.sensors.lidar_config import make_pattern as make_pattern
-from cns_drake.sensors.lidar_config import make_returns as make_returns
 from cns_drake.sensors.noise_draws import noise_generator as noise_generator
 from cns_drake.sensors.odometry import Odometry as Odometry
 from cns_drake.sensors.odometry import OdometrySensor as OdometrySensor
@@ -69,7 +68,6 @@ from cns_drake.sensors.returns.link_budget import (
     fit_link_budget as fit_link_budget,
 )
 from cns_drake.sensors.returns.weather import Weather as Weather
-from cns_drake.sensors.sensor_config import HIGHEST_RATE as HIGHEST_RATE
 from cns_drake.sensors.sensor_config import Mount as Mount
 from cns_drake.sensors.sensor_config import Section as Section
 from cns_drake.sensors.sensor_config import SensorConfig as SensorConfig

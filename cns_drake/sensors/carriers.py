@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.tree import Frame, RigidBody
-from pydrake.systems.framework import DiagramBuilder, InputPort, System
+from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 
 if TYPE_CHECKING:
     from cns_drake.sensors.sensor_config import Mount
@@ -53,22 +53,45 @@ def body_and_pose(
     return place, X_PS
 
 
-def connect_motion(
+def find_motion(
     builder: DiagramBuilder,
     motion: System | None,
     body: RigidBody,
-    inputs: dict[str, InputPort],
-) -> None:
-    """Connects a system's inputs to the motion of the bodies of a plant.
+    *names: str,
+) -> list[OutputPort]:
+    """Returns output ports with the motion of the bodies of a plant.
 
     Args:
-        builder: builder of a diagram with all these systems.
+        builder: builder of a diagram with the plant, or with `motion`.
         motion: system with the kinematic output ports of a MultibodyPlant, such
             as `body_poses`; None for the plant itself.
         body: any body of the plant; not used if `motion` is given.
-        inputs: name of an output port of `motion` -> the input port to connect
-            to this output port.
+        names: names of the ports.
+
+    Raises:
+        RuntimeError: the diagram has no such system, or the system no such
+            port.
     """
     source = body.GetParentPlant() if motion is None else motion
-    for name, port in inputs.items():
-        builder.Connect(source.GetOutputPort(name), port)
+    check_in_diagram(builder, source, "motion" if motion else "body: its plant")
+    return [source.GetOutputPort(name) for name in names]
+
+
+def check_in_diagram(
+    builder: DiagramBuilder, system: System, argument: str
+) -> None:
+    """Checks that a system has been added to a diagram.
+
+    Args:
+        builder: builder of the diagram.
+        system: the system.
+        argument: text with which an error message begins.
+
+    Raises:
+        RuntimeError: the builder has no such system.
+    """
+    if not any(system is one for one in builder.GetSystems()):
+        raise RuntimeError(
+            f"{argument}: {type(system).__name__} '{system.get_name()}' is not "
+            "in this builder's diagram"
+        )

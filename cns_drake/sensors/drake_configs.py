@@ -6,13 +6,13 @@ publishes its measurements on LCM. The sections of scenarios define which values
 the fields can have.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 import copy
 from dataclasses import dataclass, field
 import math
 import numbers
 import os
-import sys
 import types
 import typing
 from typing import Any, TypeAlias, TypeVar
@@ -38,19 +38,22 @@ from pydrake.systems.primitives import ZeroOrderHold
 from cns_drake.base import describe_validation_error, one_line
 from cns_drake.scene import find_bus
 from cns_drake.sensors import odometry
-from cns_drake.sensors.described_lidar import add_described_lidar
 from cns_drake.sensors.imu.config import ImuDescription, ImuSection
 from cns_drake.sensors.imu.imu import Imu, add_imu
-from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.lidar_config import LidarDescription, LidarSection
-from cns_drake.sensors.odometry_config import OdometrySection
-from cns_drake.sensors.sensor_config import HIGHEST_RATE, Section
+from cns_drake.sensors.lidar.lidar import Lidar, period_of_rate
+from cns_drake.sensors.lidar_adding import add_lidar
+from cns_drake.sensors.lidar_config import (
+    LidarDescription,
+    LidarSection,
+    make_lidar_model,
+)
+from cns_drake.sensors.sensor_config import Section
 from cns_drake.sensors.system_names import check_unused_names
 from cns_drake.units import DEFAULT_PRESET, LONGEST_PERIOD
 
-# Fields of a section that no config has: `X_PB` replaces the mount, and only
-# recordings have a layout.
-_LEFT_OUT = ("xyz", "rpy_deg", "layout")
+# Fields of a section that a config does not have, as `X_PB` replaces the mount
+# and only recordings have a layout, or that differ from the config's.
+_LEFT_OUT = ("xyz", "rpy_deg", "layout", "rate")
 # Messages per second of an IMU or odometry that names no rate.
 _RATE = 20
 _ROLES = {
@@ -75,7 +78,9 @@ def _names_of_fields_in_errors(struct: type[_Struct]) -> type[_Struct]:
     dataclass refuses the value, also in Python.
     """
     fields: dict[str, Any] = struct.__dataclass_fields__  # type: ignore[attr-defined]  # A dataclass.
-    hints = {name: one.type for name, one in fields.items()}
+    # Without the limits, which a section of a scenario checks.
+    types = typing.get_type_hints(struct)
+    hints = {name: types[name] for name in fields}
     for name, hint in hints.items():
         # A copy: base classes share the field.
         fields[name] = copy.copy(fields[name])
@@ -249,6 +254,12 @@ class OdometryConfig(PublishedSensor):
 
 Config: TypeAlias = LidarConfig | ImuConfig | OdometryConfig
 
+# The kind of sensor in the name of a channel.
+_CHANNELS = {
+    LidarConfig: "POINT_CLOUD",
+    ImuConfig: "IMU",
+    OdometryConfig: "ODOMETRY",
+}
 
 # An interface on which messages are published.
 _Interface: TypeAlias = DrakeLcmInterface | LcmInterfaceSystem
@@ -256,58 +267,52 @@ _Interface: TypeAlias = DrakeLcmInterface | LcmInterfaceSystem
 _PARTS = ("to_lcm", "publisher", "delay")
 
 
-def _check_publisher_names(builder: DiagramBuilder, name: str) -> None:
-    """Checks that a diagram has no systems that publish a sensor's messages.
-
-    Args:
-        builder: builder of the diagram.
-        name: name of the sensor.
-
-    Raises:
-        ValueError: the diagram already has a system with one of the names that
-            these systems have.
-    """
-    check_unused_names(builder, *(f"{name}_{part}" for part in _PARTS))
+@contextmanager
+def _errors_of(config: Config) -> Iterator[None]:
+    """Names a configured sensor in the errors of its values."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{_caller(config)}: {error}") from None
 
 
-def find_interface(
+def _find_interface(
+    config: Config,
     builder: DiagramBuilder,
-    bus: str,
     lcm_buses: LcmBuses | None,
     lcm: _Interface | None,
-    caller: str,
-) -> _Interface:
-    """Returns the interface on which a sensor publishes.
+) -> _Interface | None:
+    """Returns the interface on which a configured sensor publishes.
 
-    Args:
-        builder: builder of a diagram. If both `lcm_buses` and `lcm` are None,
-            an interface to the default URL is added to the diagram.
-        bus: name of the sensor's bus.
-        lcm_buses: the available buses.
-        lcm: the interface, instead of a bus.
-        caller: text with which an error message begins.
+    Returns:
+        The interface; None for one to the default URL, which is still to be
+        added to the diagram.
 
     Raises:
         RuntimeError: there is no such bus.
+        ValueError: the diagram already has a system with the name of one that
+            publishes the sensor's messages.
     """
+    name = config.name
+    check_unused_names(builder, *(f"{name}_{part}" for part in _PARTS))
     if lcm is not None:
         return lcm
     if lcm_buses is not None:
-        return find_bus(builder, lcm_buses, caller, bus)
-    if bus != "default":
+        return find_bus(builder, lcm_buses, _caller(config), config.lcm_bus)
+    if config.lcm_bus != "default":
         raise RuntimeError(
-            f"{caller}: lcm_bus: there is no bus '{bus}' without lcm_buses"
+            f"{_caller(config)}: lcm_bus: there is no bus '{config.lcm_bus}' "
+            "without lcm_buses"
         )
-    return builder.AddSystem(LcmInterfaceSystem(lcm=DrakeLcm()))
+    return None
 
 
 def _publish_measurements(
+    config: Config,
     builder: DiagramBuilder,
-    name: str,
-    channel: str,
+    lcm: _Interface | None,
     ports: list[OutputPort],
     to_lcm: framework.System,
-    lcm: _Interface,
     *,
     period: float,
     offset: float = 0.0,
@@ -319,22 +324,23 @@ def _publish_measurements(
     {default: null}`. Drake's cameras behave in the same way.
 
     Args:
+        config: description of the sensor.
         builder: builder of a diagram with the sensor.
-        name: name of the sensor.
-        channel: name of the LCM channel.
+        lcm: what `_find_interface` returned.
         ports: output ports of the sensor.
         to_lcm: system that converts the ports' values to a message: a
             `PointCloudToLcm` or a `_SignalToLcm`.
-        lcm: interface on which the messages are published.
         period: time between two messages [s].
         offset: time of the first conversion [s].
         delay: time from a conversion to the publication [s].
     """
+    if lcm is None:
+        lcm = builder.AddSystem(LcmInterfaceSystem(lcm=DrakeLcm()))
     if lcm.get_lcm_url() == LcmBuses.kLcmUrlMemqNull:
         return
     is_cloud = isinstance(to_lcm, PointCloudToLcm)
     publisher = drake_lcm.LcmPublisherSystem.Make(
-        channel,
+        f"DRAKE_{_CHANNELS[type(config)]}_{config.name}",
         lcmt_point_cloud if is_cloud else lcmt_drake_signal,
         lcm,
         publish_period=period,
@@ -342,7 +348,7 @@ def _publish_measurements(
         use_cpp_serializer=is_cloud,
     )
     converter_name, publisher_name, delay_name = (
-        f"{name}_{part}" for part in _PARTS
+        f"{config.name}_{part}" for part in _PARTS
     )
     builder.AddNamedSystem(converter_name, to_lcm)
     for index, port in enumerate(ports):
@@ -440,48 +446,44 @@ def ApplyLidarConfig(
 
         ApplyLidarConfig(LidarConfig(name="roof", rate=10), builder)
     """
-    section = _checked_section(config, LidarSection, ("rate",))
-    period = section.sheet.period
-    if config.rate is not None:
-        period = 1.0 / config.rate
-    _check_timing(config, period)
-    _check_publisher_names(builder, config.name)
-    if config.role not in _ROLES:
-        raise ValueError(
-            f"{_caller(config)}: role: {config.role!r} is not one of"
-            f" {', '.join(_ROLES)}"
-        )
-    if config.num_threads < 1:
-        raise ValueError(
-            f"{_caller(config)}: num_threads: {config.num_threads} is not at"
-            " least 1"
-        )
+    section = _checked_section(config, LidarSection)
+    with _errors_of(config):
+        period = section.sheet.period
+        if config.rate is not None:
+            period = period_of_rate(config.rate, LONGEST_PERIOD)
+        _check_time(config.capture_offset, math.inf, "capture_offset")
+        _check_time(config.output_delay, period, "output_delay")
+        if config.role not in _ROLES:
+            raise ValueError(
+                f"role: {config.role!r} is not one of {', '.join(_ROLES)}"
+            )
+    interface = _find_interface(config, builder, lcm_buses, lcm)
     scene_graph = scene_graph or builder.GetSubsystemByName("scene_graph")
     plant = plant or builder.GetSubsystemByName("plant")
-    lidar = add_described_lidar(
-        section,
-        builder,
-        scene_graph,
-        *_carrier_frame(config, builder, plant),
-        name=config.name,
-        seed=config.seed,
-        period=period,
-        motion_distortion=section.motion_distortion,
-        causal=config.causal,
-        rate=config.rate,
-        # Without a rate, it concerns the messages only.
-        capture_offset=config.capture_offset if config.rate else 0.0,
-        role=_ROLES[config.role],
-        unseen=_unseen(config, plant, scene_graph),
-        num_threads=config.num_threads,
-    )
+    with _errors_of(config):
+        lidar = add_lidar(
+            builder,
+            scene_graph,
+            *_carrier_frame(config, builder, plant),
+            name=config.name,
+            **make_lidar_model(
+                section, config.name, config.seed, period=period
+            )._asdict(),
+            motion_distortion=section.motion_distortion,
+            causal=config.causal,
+            rate=config.rate,
+            # Without a rate, it concerns the messages only.
+            capture_offset=config.capture_offset if config.rate else 0.0,
+            role=_ROLES[config.role],
+            unseen=_unseen(config, plant, scene_graph),
+            num_threads=config.num_threads,
+        )
     _publish_measurements(
+        config,
         builder,
-        config.name,
-        f"DRAKE_POINT_CLOUD_{config.name}",
+        interface,
         [lidar.GetOutputPort("point_cloud_W")],
         PointCloudToLcm("world"),
-        _find_interface(config, builder, lcm_buses, lcm),
         period=period,
         offset=config.capture_offset,
         delay=config.output_delay,
@@ -521,26 +523,28 @@ def ApplyImuConfig(
 
         ApplyImuConfig(ImuConfig(rate=200), builder)
     """
-    section = _checked_section(config, ImuSection, ("rate",))
-    rate = config.rate or section.sample_rate(_RATE)
-    _check_publisher_names(builder, config.name)
-    imu = add_imu(
-        builder,
-        *_carrier_frame(config, builder, plant),
-        rate=rate,
-        noise=None if section.is_ideal else section.noise(config.seed),
-        name=config.name,
-    )
+    section = _checked_section(config, ImuSection)
+    rate = config.rate
+    if rate is None:
+        rate = section.sample_rate(_RATE)
+    interface = _find_interface(config, builder, lcm_buses, lcm)
+    with _errors_of(config):
+        imu = add_imu(
+            builder,
+            *_carrier_frame(config, builder, plant),
+            rate=rate,
+            noise=None if section.is_ideal else section.noise(config.seed),
+            name=config.name,
+        )
     measured = imu.ports()
     ports = list(measured.values())
     axes = [f"{name}_{axis}" for name in measured for axis in "xyz"]
     _publish_measurements(
+        config,
         builder,
-        config.name,
-        f"DRAKE_IMU_{config.name}",
+        interface,
         ports,
         _SignalToLcm(ports, axes, lambda *values: np.hstack(values)),
-        _find_interface(config, builder, lcm_buses, lcm),
         period=1.0 / rate,
     )
     return imu
@@ -579,51 +583,43 @@ def ApplyOdometryConfig(
 
         ApplyOdometryConfig(OdometryConfig(rate=100), builder)
     """
-    section = _checked_section(config, OdometrySection)
-    _check_publisher_names(builder, config.name)
-    frame, X_PB = _carrier_frame(config, builder, plant)
-    sensor = odometry.add_odometry(builder, frame, X_PB=X_PB, name=config.name)
+    interface = _find_interface(config, builder, lcm_buses, lcm)
+    with _errors_of(config):
+        rate = _RATE if config.rate is None else config.rate
+        period = period_of_rate(rate)
+        frame, X_PB = _carrier_frame(config, builder, plant)
+        sensor = odometry.add_odometry(
+            builder, frame, X_PB=X_PB, name=config.name
+        )
     axes = ["qw", "qx", "qy", "qz", "x", "y", "z"]
     axes += ["wx", "wy", "wz", "vx", "vy", "vz"]
     ports = [sensor.GetOutputPort("odometry")]
     _publish_measurements(
+        config,
         builder,
-        config.name,
-        f"DRAKE_ODOMETRY_{config.name}",
+        interface,
         ports,
         _SignalToLcm(ports, axes, _odometry_numbers),
-        _find_interface(config, builder, lcm_buses, lcm),
-        period=1.0 / (section.rate or _RATE),
+        period=period,
     )
     return sensor
 
 
-def _checked_section(
-    config: Config, kind: type[Section], left_out: tuple[str, ...] = ()
-) -> Any:
+def _checked_section(config: Config, kind: type[Section]) -> Any:
     """Returns the section of a scenario with the fields of a config.
 
     Args:
         config: the config.
         kind: class of the section.
-        left_out: fields of the section that keep their defaults.
 
     Raises:
         ValueError: a field is out of range.
     """
     source = _caller(config)
-    rate = config.rate
-    highest = sys.float_info.max if kind is ImuSection else HIGHEST_RATE
-    lowest = 1.0 / LONGEST_PERIOD if kind is LidarSection else 0.0
-    if rate is not None and not (0.0 < rate <= highest and rate >= lowest):
-        limit = f"at least {lowest:g}" if lowest else "above 0"
-        raise ValueError(
-            f"{source}: rate: {rate:g} is not {limit} and up to {highest:g}"
-        )
     given = {
         name: getattr(config, name)
         for name in kind.model_fields
-        if name not in (*_LEFT_OUT, *left_out)
+        if name not in _LEFT_OUT
     }
     if given.get("unit") is not None and given["preset"] == DEFAULT_PRESET:
         given["preset"] = None  # Nobody has given it.
@@ -658,42 +654,26 @@ def _unseen(
         except RuntimeError as error:
             if not found:
                 raise ValueError(
-                    f"{_caller(config)}: unseen: no body, frame or geometry"
-                    f" {name!r}: {one_line(error)}"
+                    f"unseen: no body, frame or geometry {name!r}: "
+                    f"{one_line(error)}"
                 ) from None
         unseen += found
     return unseen
 
 
-def _check_timing(config: LidarConfig, period: float) -> None:
-    """Checks the offset and the delay of scans, as Drake does for cameras.
+def _check_time(time: float, end: float, name: str) -> None:
+    """Checks the offset or the delay of scans, as Drake does for cameras.
+
+    Args:
+        time: the offset or delay [s].
+        end: what it must be below [s].
+        name: the field, with which an error message begins.
 
     Raises:
-        ValueError: the offset or the delay is out of range.
+        ValueError: the time is out of range.
     """
-    for name, most in (("capture_offset", math.inf), ("output_delay", period)):
-        value = getattr(config, name)
-        if not 0.0 <= value < most:
-            raise ValueError(
-                f"{_caller(config)}: {name}: {value:g} is not from 0 to below "
-                f"{most:g} s"
-            )
-
-
-def _find_interface(
-    config: Config,
-    builder: DiagramBuilder,
-    lcm_buses: LcmBuses | None,
-    lcm: _Interface | None,
-) -> _Interface:
-    """Returns the interface on which a configured sensor publishes.
-
-    Raises:
-        RuntimeError: there is no such bus.
-    """
-    return find_interface(
-        builder, config.lcm_bus, lcm_buses, lcm, _caller(config)
-    )
+    if not 0.0 <= time < end:
+        raise ValueError(f"{name}: {time:g} is not from 0 to below {end:g} s")
 
 
 def _carrier_frame(
@@ -710,7 +690,7 @@ def _carrier_frame(
         frame = GetScopedFrameByName(plant, config.X_PB.base_frame)
     X_PB = config.X_PB.GetDeterministicValue()
     if not np.isfinite(X_PB.GetAsMatrix34()).all():
-        raise ValueError(f"{_caller(config)}: X_PB: a number is not finite")
+        raise ValueError("X_PB: a number is not finite")
     return frame, X_PB
 
 

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 import warnings
 
 import numpy as np
 from pydrake import geometry
-from pydrake.geometry import FrameId, GeometryId, Rgba, Role, SceneGraph
+from pydrake.geometry import FrameId, Rgba, Role, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
-from pydrake.systems.framework import DiagramBuilder, System
+from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import LinearSystem
 
 from cns_drake.scene import anchored_frames as find_anchored_frames
 from cns_drake.scene import geometry_port
-from cns_drake.sensors.carriers import body_and_pose, connect_motion
+from cns_drake.sensors.carriers import (
+    body_and_pose,
+    check_in_diagram,
+    find_motion,
+)
 from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.lidar import Lidar, period_of_rate
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
-from cns_drake.sensors.lidar.seen_geometry import Structures
 from cns_drake.sensors.system_names import check_new_sensor, check_unused_names
 
 if TYPE_CHECKING:
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
 _VIEW_COLOR = Rgba(0.9, 0.2, 0.1, 1.0)
 # Ending of the name of the system that chooses a LiDAR's random numbers.
 _DRAW = "noise_draw"
+# The port of a plant and a LiDAR with the velocities of bodies.
+_VELOCITIES = "body_spatial_velocities"
 # Period of a system that never changes its state [s].
 _NEVER = 1e9
 
@@ -45,24 +49,17 @@ def add_lidar(
     pattern: BeamPattern | str | Path,
     *,
     name: str = "lidar",
-    unseen: Collection[RigidBody | Frame | FrameId | GeometryId] | None = None,
     motion_distortion: bool = False,
     motion: System | None = None,
     range_noise: float = 0.0,
     dropout: float = 0.0,
     seed: int = 0,
-    measurement: MeasurementModel | None = None,
-    returns: CalibratedReturns | str = "ideal",
-    role: Role = Role.kPerception,
-    structures: Structures | None = None,
-    anchored_frames: Collection[FrameId] | None = None,
-    moving_bodies: Mapping[FrameId, int] | None = None,
-    num_threads: int = 1,
-    causal: bool = False,
-    rate: float | None = None,
-    capture_offset: float = 0.0,
+    returns: CalibratedReturns | str | None = "ideal",
+    **options: Any,
 ) -> Lidar:
     """Adds a LiDAR to a diagram and connects it to the SceneGraph.
+
+    If this function fails, nothing was added.
 
     Args:
         builder: builder of a diagram with `scene_graph`.
@@ -80,11 +77,6 @@ def add_lidar(
             are not rounded.
         name: name of the system, and of the LiDAR's frame and topics in a
             recording.
-        unseen: bodies, frames and geometries that the LiDAR does not see; by
-            default the LiDAR's body and all bodies that are welded to this
-            body, except the world. A frame on a body stands for the whole body.
-            A FrameId stands for its own geometry only, because a SceneGraph
-            does not contain welds.
         motion_distortion: whether the LiDAR and all other bodies of its plant
             keep moving during a revolution (see `Lidar`). Bodies of other
             plants and frames of other sources stay where they are at the time
@@ -99,27 +91,16 @@ def add_lidar(
             and differ after each `SetRandomContext` of the Diagram. A
             model of noise or returns with a `sensor_name` uses the
             `sensor_name` instead of the name.
-        measurement: model of the noise, instead of `range_noise`, `dropout` and
-            `seed`.
-        returns: `ideal`, `calibrated` by the data sheet of a preset, or a
-            `CalibratedReturns`.
-        role: role of the geometry that the LiDAR sees.
-        structures: table of the structures' labels and instance ids; by default
-            structures have no class.
-        anchored_frames: frames that never move; by default the frames of the
-            plant's bodies that are welded to the world.
-        moving_bodies: frame -> index of its body in the LiDAR's port
-            `body_spatial_velocities`. Give this argument only if you connect
-            this port yourself. With `motion_distortion`, the port is connected
-            by this function, for all bodies of the plant.
-        num_threads: number of threads that share the LiDAR's rays.
-        causal: whether a scan is the revolution that ends at the time of the
-            output.
-        rate: scans per second of a discrete LiDAR, which computes a scan once
-            per period and holds it (see `Lidar`). By default the LiDAR is
-            continuous: its ports have a scan for each time at which they are
-            evaluated.
-        capture_offset: time of a discrete LiDAR's first scan [s].
+        returns: `ideal` (or None), `calibrated` by the data sheet of a preset,
+            or a `CalibratedReturns`.
+        options: further fields of `LidarOptions`, such as `rate`, `role` and
+            `unseen`. A `measurement` takes the place of `range_noise`,
+            `dropout` and `seed`. By default, the LiDAR does not see its body
+            and all bodies that are welded to this body, except the world; and
+            `anchored_frames` are those of the plant's bodies that are welded to
+            the world. Give `moving_bodies` only if you connect the port
+            `body_spatial_velocities` yourself; with `motion_distortion`, this
+            function connects the port, for all bodies of the plant.
 
     Returns:
         The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W`,
@@ -128,13 +109,14 @@ def add_lidar(
 
     Raises:
         RuntimeError: the plant is not finalized, or not registered with the
-            SceneGraph.
-        TypeError: an argument is of the wrong type.
+            SceneGraph; or the SceneGraph, or the source of the motion, is not
+            in the diagram.
+        TypeError: an argument is of the wrong type, or unknown.
         ValueError: there is no preset of that name, the name of the LiDAR is
             taken, reserved or cannot be a part of a ROS 2 topic, the noise is
             out of range or given twice, motion distortion needs a body,
-            calibrated returns need a preset or a data sheet, or the rate is not
-            positive or higher than that of the revolutions.
+            calibrated returns need a preset or a data sheet, or an option is
+            out of range (see `LidarOptions`).
         InputError: the file cannot be read, or is no data sheet.
 
     Warns:
@@ -143,7 +125,7 @@ def add_lidar(
     Example:
         from cns_drake import add_lidar
 
-        lidar = add_lidar(builder, scene_graph, body, X_PB, "os1-64")
+        lidar = add_lidar(builder, scene_graph, body, X_PB, "os1-64", rate=10)
         builder.ExportOutput(lidar.GetOutputPort("scan"), "scan")
     """
     if not isinstance(scene_graph, SceneGraph):
@@ -151,6 +133,7 @@ def add_lidar(
             f"scene_graph: {type(scene_graph).__name__} is not a SceneGraph; "
             "AddMultibodyPlantSceneGraph returns one beside the plant"
         )
+    check_in_diagram(builder, scene_graph, "scene_graph")
     if not isinstance(X_PB, RigidTransform):
         raise TypeError(f"X_PB: {X_PB!r} is not a RigidTransform")
     check_new_sensor(builder, name, parts=(_DRAW,))
@@ -160,8 +143,13 @@ def add_lidar(
     if unit is not None:
         # Imported here: patterns of the caller's own need no data sheets.
         from cns_drake.sensors.sheet_patterns import make_beam_pattern
+        from cns_drake.units import LONGEST_PERIOD
 
-        pattern = make_beam_pattern(unit, period_of_rate(rate))
+        rate = options.get("rate")
+        pattern = make_beam_pattern(
+            unit,
+            None if rate is None else period_of_rate(rate, LONGEST_PERIOD),
+        )
     if not isinstance(pattern, BeamPattern):
         raise TypeError(
             f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "
@@ -172,21 +160,22 @@ def add_lidar(
         from cns_drake.sensors.sheet_patterns import aimed
 
         pattern = aimed(pattern, model.sheet)
+    measurement = options.get("measurement")
     if model is not None:
         _check_no_noise(measurement, range_noise, dropout)
     else:
         measurement = _noise_model(measurement, range_noise, dropout, seed)
-    measurement = _with_name(measurement or IDEAL, name)
+    velocities: list[OutputPort] = []
+    defaults: dict[str, Any] = {}
     if isinstance(body, RigidBody):
         plant = body.GetParentPlant()
         _check_registered(plant, scene_graph)
         frame_id = plant.GetBodyFrameIdOrThrow(body.index())
-        if unseen is None:
-            unseen = _welded_to(body)
-        if anchored_frames is None:
-            anchored_frames = find_anchored_frames(plant)
+        defaults["unseen"] = _welded_to(body)
+        defaults["anchored_frames"] = find_anchored_frames(plant)
         if motion_distortion:
-            moving_bodies = _body_frames(plant)
+            options["moving_bodies"] = _body_frames(plant)
+            velocities = find_motion(builder, motion, body, _VELOCITIES)
     else:
         frame_id = body
         if motion_distortion:
@@ -194,35 +183,21 @@ def add_lidar(
                 "motion distortion needs a body of a plant, which has its "
                 "velocity; a frame of another source does not"
             )
-    lidar = builder.AddNamedSystem(
-        name,
-        Lidar(
-            frame_id,
-            X_PB,
-            pattern,
-            measurement=measurement,
-            returns=model,
-            moving_bodies=moving_bodies,
-            role=role,
-            unseen=None if unseen is None else [*map(_unseen_id, unseen)],
-            structures=structures,
-            anchored_frames=anchored_frames or (),
-            num_threads=num_threads,
-            causal=causal,
-            rate=rate,
-            capture_offset=capture_offset,
-        ),
-    )
-    _warn_of_no_geometry(scene_graph, role)
+    given = {k: value for k, value in options.items() if value is not None}
+    given |= {"measurement": _with_name(measurement or IDEAL, name)}
+    lidar = Lidar(frame_id, X_PB, pattern, returns=model, **(defaults | given))
+    # Adds a port to a SceneGraph, or fails.
+    geometry_port(scene_graph, lidar.role)
+    _warn_of_no_geometry(scene_graph, lidar.role)
+    builder.AddNamedSystem(name, lidar)
     connect_lidar(builder, scene_graph, lidar)
     if lidar.is_random:
         draw = builder.AddNamedSystem(f"{name}_{_DRAW}", _make_noise_draw())
         builder.Connect(
             draw.get_output_port(), lidar.GetInputPort("noise_draw")
         )
-    if motion_distortion and isinstance(body, RigidBody):
-        port = "body_spatial_velocities"
-        connect_motion(builder, motion, body, {port: lidar.GetInputPort(port)})
+    for port in velocities:
+        builder.Connect(port, lidar.GetInputPort(_VELOCITIES))
     return lidar
 
 
@@ -299,7 +274,7 @@ def connect_lidar(
 
 
 def _returns_model(
-    returns: CalibratedReturns | str,
+    returns: CalibratedReturns | str | None,
     unit: str | Path | None,
     seed: int,
     name: str,
@@ -313,7 +288,7 @@ def _returns_model(
         ValueError: calibrated returns need a preset, or the seed is given
             twice.
     """
-    if returns == "ideal":
+    if returns is None or returns == "ideal":
         return None
     from cns_drake.sensors.returns.calibrated import CalibratedReturns
 
@@ -412,17 +387,6 @@ def _body_frames(plant: MultibodyPlant) -> dict[FrameId, int]:
         map(BodyIndex, range(plant.num_bodies())),
     )
     return {frame: k for k, frame in enumerate(frames) if frame is not None}
-
-
-def _unseen_id(
-    place: RigidBody | Frame | FrameId | GeometryId,
-) -> FrameId | GeometryId:
-    """Returns an id unchanged, or the frame id of a body or a frame's body."""
-    if isinstance(place, Frame):
-        place = place.body()
-    if isinstance(place, RigidBody):
-        return place.GetParentPlant().GetBodyFrameIdOrThrow(place.index())
-    return place
 
 
 def _welded_to(body: RigidBody) -> list[RigidBody]:

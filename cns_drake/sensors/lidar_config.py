@@ -4,7 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    NamedTuple,
+)
 
 from pydantic import (
     BeforeValidator,
@@ -17,7 +24,7 @@ from pydantic import (
 
 from cns_drake.base import InputError, validated
 from cns_drake.drives import LayoutName
-from cns_drake.sensors.lidar.measurement import Echoes
+from cns_drake.sensors.lidar.measurement import Echoes, MeasurementModel
 from cns_drake.sensors.lidar.patterns import SpinningPattern
 from cns_drake.sensors.sensor_config import (
     Mount,
@@ -71,8 +78,6 @@ class WeatherConfig(Section):
 class LidarDescription:
     """A LiDAR and its errors, in a scenario and in a `LidarConfig` alike.
 
-    A `LidarSection` limits the values of the fields.
-
     Attributes:
         preset: name of the LiDAR model, from the table of presets in the
             documentation; none if there is a `unit`.
@@ -113,18 +118,20 @@ class LidarDescription:
 
     preset: str | None = DEFAULT_PRESET
     unit: str | None = None
-    rings: int | None = None
-    columns: int | None = None
-    min_range: float | None = None
-    max_range: float | None = None
-    resolution: float = 0.0
-    range_noise: float = 0.0
-    dropout: float = 0.0
-    faint_dropout: float = 0.0
+    rings: Annotated[
+        int | None, field_off_by_default(None, ge=2, le=MOST_RINGS)
+    ] = None
+    columns: Annotated[int | None, Field(ge=4, le=8192)] = None
+    min_range: Annotated[float | None, Field(ge=0.0)] = None
+    max_range: Annotated[float | None, Field(gt=0.0, le=1000.0)] = None
+    resolution: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    range_noise: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
+    dropout: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    faint_dropout: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     motion_distortion: bool = False
     returns: str = "ideal"
     echoes: str = Echoes.STRONGEST.value
-    unit_seed: int = 0
+    unit_seed: Annotated[int, field_off_by_default(0, ge=0)] = 0
 
 
 def _find_unit(given: Any) -> Any:
@@ -161,28 +168,19 @@ class LidarSection(LidarDescription, Mount):
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)
-    # Fields of the description, with their limits.
     # The content of the file, so that a recording states all of it.
     unit: Annotated[
         LidarSheet | None,
         BeforeValidator(_find_unit, json_schema_input_type=str | None),
         PlainSerializer(lambda sheet: sheet and sheet.to_fields()),
     ] = field_off_by_default(None)  # type: ignore[assignment]  # Narrower.
-    rings: int | None = field_off_by_default(None, ge=2, le=MOST_RINGS)
-    columns: int | None = Field(default=None, ge=4, le=8192)
-    min_range: float | None = Field(default=None, ge=0.0)
-    max_range: float | None = Field(default=None, gt=0.0, le=1000.0)
     # About the resolution of real units; needs a third less space than exact
     # values.
-    resolution: float = Field(default=2.0**-10, ge=0.0, le=1.0)
-    range_noise: float = Field(default=0.0, ge=0.0, le=10.0)
-    dropout: float = Field(default=0.0, ge=0.0, le=1.0)
-    faint_dropout: float = Field(default=0.0, ge=0.0, le=1.0)
+    resolution: Annotated[float, Field(ge=0.0, le=1.0)] = 2.0**-10
     returns: Literal["ideal", "calibrated"] = field_off_by_default("ideal")
     echoes: Annotated[Echoes, PlainSerializer(lambda echoes: echoes.value)] = (
         field_off_by_default(Echoes.STRONGEST)
     )
-    unit_seed: int = field_off_by_default(0, ge=0)
     rate: int = field_off_by_default(20, ge=1, le=100)
     layout: LayoutName = field_off_by_default("cns")
 
@@ -361,24 +359,56 @@ def describe_unit(config: LidarSection) -> dict[str, Any]:
     }
 
 
-def make_returns(
-    config: LidarSection, weather: WeatherConfig, name: str, seed: int
-) -> "CalibratedReturns | None":
-    """Returns the model of calibrated returns; None for ideal returns.
+class LidarModel(NamedTuple):
+    """The arguments of `add_lidar` that follow from the description of a LiDAR.
+
+    Attributes:
+        pattern: the beams.
+        measurement: the model of noise, losses and rounding.
+        returns: the model of calibrated returns; None for ideal returns.
+    """
+
+    pattern: UnitPattern
+    measurement: MeasurementModel
+    returns: "CalibratedReturns | None"
+
+
+def make_lidar_model(
+    config: LidarSection,
+    name: str,
+    seed: int,
+    weather: WeatherConfig | None = None,
+    period: float | None = None,
+) -> LidarModel:
+    """Returns the model of a LiDAR that a scenario describes.
 
     Args:
         config: description of the LiDAR.
-        weather: weather of the drive.
         name: name of the LiDAR; other names give other random numbers.
         seed: seed of the random numbers.
+        weather: weather of calibrated returns; by default clear.
+        period: duration of a revolution [s]; by default 1 / `config.rate`.
+
+    Raises:
+        ValueError: see `make_pattern`.
     """
+    pattern = make_pattern(config, period)
+    measurement = MeasurementModel(
+        resolution=config.resolution,
+        range_noise=config.range_noise,
+        dropout=config.dropout,
+        faint_dropout=config.faint_dropout,
+        seed=seed,
+        sensor_name=name,
+    )
     if config.returns == "ideal":
-        return None
+        return LidarModel(pattern, measurement, None)
     # Slow to import, and not needed to describe a scenario.
     from cns_drake.sensors.returns.calibrated import CalibratedReturns
     from cns_drake.sensors.returns.weather import Weather
 
-    return CalibratedReturns(
+    weather = weather or WeatherConfig()
+    returns = CalibratedReturns(
         config.sheet.returns,
         config.echoes,
         Weather(**weather.model_dump()),
@@ -386,3 +416,4 @@ def make_returns(
         name,
         config.unit_seed,
     )
+    return LidarModel(pattern, measurement, returns)

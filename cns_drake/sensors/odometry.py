@@ -15,7 +15,7 @@ from pydrake.systems.framework import (
 
 from cns_drake.sensors.carriers import (
     body_and_pose,
-    connect_motion,
+    find_motion,
 )
 from cns_drake.sensors.system_names import check_new_sensor
 
@@ -159,10 +159,11 @@ def add_odometry(
     check_new_sensor(builder, name, own="odometry")
     carrier, X_CB = body_and_pose(body, X_PB or RigidTransform())
     is_body = X_PB is None and not isinstance(body, Frame)
+    names = ("body_poses", "body_spatial_velocities")
+    ports = find_motion(builder, motion, carrier, *names)
     sensor = builder.AddNamedSystem(
         name, OdometrySensor(carrier, None if is_body else X_CB)
     )
-    ports = ("body_poses", "body_spatial_velocities")
-    inputs = {port: sensor.GetInputPort(port) for port in ports}
-    connect_motion(builder, motion, carrier, inputs)
+    for port_name, port in zip(names, ports, strict=True):
+        builder.Connect(port, sensor.GetInputPort(port_name))
     return sensor

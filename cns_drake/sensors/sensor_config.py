@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 from cns_drake.base import NS_PER_S, InputModel
+from cns_drake.sensors.lidar.beams import HIGHEST_RATE
 
 if TYPE_CHECKING:
     from pydrake.geometry import SceneGraph
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     from cns_drake.recording import Topic
-
-# Greatest rate of a sensor [1/s].
-HIGHEST_RATE = 1000
 
 # Greatest distance of a sensor from the vehicle's origin [m]; rays are cast in
 # single precision.

@@ -32,8 +32,9 @@ from cns_drake.sensors import (
     CameraScene,
     add_cameras,
     add_described_imu,
-    add_described_lidar,
+    add_lidar,
     add_odometry,
+    make_lidar_model,
     make_pattern,
     sensor_pose,
 )
@@ -219,15 +220,14 @@ def _add_lidars(
         if traffic is not None and config.motion_distortion:
             # These frames keep moving during a revolution.
             moving_bodies = traffic.moving_frames
-        lidar = add_described_lidar(
-            config,
+        model = make_lidar_model(config, name, scenario.seed, scenario.weather)
+        lidar = add_lidar(
             builder,
             world.scene_graph,
             drive.base_link,
             sensor_pose(config),
             name=name,
-            seed=scenario.seed,
-            weather=scenario.weather,
+            **model._asdict(),
             unseen=[
                 plant.get_body(k) for k in plant.GetBodyIndices(world.vehicle)
             ],

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 import math
 from pathlib import Path
+from typing import Annotated
 
 from pydantic import Field
 
@@ -19,14 +20,15 @@ from cns_drake.sensors.sensor_config import (
 # The name of the noise's file in a recording.
 KALIBR_FILE = "imu.yaml"
 
+_Bias = Annotated[float, field_off_by_default(0.0, ge=0.0)]
+_Limit = Annotated[float | None, field_off_by_default(None, gt=0.0)]
+
 
 # Drake's YAML reads the types of the fields, which thus must not be texts, as
 # `from __future__ import annotations` makes them.
 @dataclass(init=False, repr=False, eq=False)
 class ImuDescription:
     """An IMU's rate and errors, in a scenario and in an `ImuConfig` alike.
-
-    An `ImuSection` limits the values of the fields.
 
     Attributes:
         rate: samples per second [Hz].
@@ -43,11 +45,11 @@ class ImuDescription:
     """
 
     rate: float | None = None
-    kalibr: str | None = None
-    accelerometer_turn_on_bias: float = 0.0
-    gyroscope_turn_on_bias: float = 0.0
-    accelerometer_range: float | None = None
-    gyroscope_range: float | None = None
+    kalibr: Annotated[str | None, field_off_by_default(None)] = None
+    accelerometer_turn_on_bias: _Bias = 0.0
+    gyroscope_turn_on_bias: _Bias = 0.0
+    accelerometer_range: _Limit = None
+    gyroscope_range: _Limit = None
 
 
 class ImuSection(ImuDescription, Mount):
@@ -65,11 +67,6 @@ class ImuSection(ImuDescription, Mount):
 
     xyz: Triple = (-1.0, 0.0, 1.6)
     rate: int | None = field_off_by_default(None)
-    kalibr: str | None = field_off_by_default(None)
-    accelerometer_turn_on_bias: float = field_off_by_default(0.0, ge=0.0)
-    gyroscope_turn_on_bias: float = field_off_by_default(0.0, ge=0.0)
-    accelerometer_range: float | None = field_off_by_default(None, gt=0.0)
-    gyroscope_range: float | None = field_off_by_default(None, gt=0.0)
 
     @property
     def is_ideal(self) -> bool:

@@ -162,6 +162,14 @@ def add_imu(
     system_names.check_new_sensor(builder, name, own=IMU_FRAME, parts=parts)
     systems = [f"{name}_{part}" for part in parts]
     body, X_BI = carriers.body_and_pose(body, X_PB)
+    poses, velocities, accelerations = carriers.find_motion(
+        builder,
+        motion,
+        body,
+        "body_poses",
+        "body_spatial_velocities",
+        "body_spatial_accelerations",
+    )
     # The accelerometer's default is no gravity.
     gravity = body.GetParentPlant().gravity_field().gravity_vector()
     accelerometer = builder.AddNamedSystem(
@@ -169,14 +177,11 @@ def add_imu(
     )
     gyroscope = builder.AddNamedSystem(systems[1], Gyroscope(body, X_BI))
     for sensor in (accelerometer, gyroscope):
-        inputs = {
-            "body_poses": sensor.get_body_poses_input_port(),
-            "body_spatial_velocities": sensor.get_body_velocities_input_port(),
-        }
-        carriers.connect_motion(builder, motion, body, inputs)
-    port = accelerometer.get_body_accelerations_input_port()
-    inputs = {"body_spatial_accelerations": port}
-    carriers.connect_motion(builder, motion, body, inputs)
+        builder.Connect(poses, sensor.get_body_poses_input_port())
+        builder.Connect(velocities, sensor.get_body_velocities_input_port())
+    builder.Connect(
+        accelerations, accelerometer.get_body_accelerations_input_port()
+    )
     imu = Imu(accelerometer, gyroscope, rate, noise)
     if noise is None or rate is None:
         return imu

@@ -15,6 +15,8 @@ _BAND_RAD = 0.03
 _MOST_RING = 2**16 - 1
 # Greatest value of the field `t` of a point [ns].
 _LATEST_NS = 2**32 - 1
+# Greatest rate of any sensor [1/s].
+HIGHEST_RATE = 1000
 
 
 @dataclass(frozen=True, eq=False)

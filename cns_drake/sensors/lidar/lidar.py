@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 import math
 import numbers
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
-from pydrake.geometry import FrameId, GeometryId, QueryObject, Role
+from pydrake.geometry import FrameId, GeometryId, QueryObject
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.perception import BaseField, Fields, PointCloud
@@ -35,7 +36,7 @@ from cns_drake.ray_casting import (
     RayCastingScene,
 )
 from cns_drake.scene import optional_value
-from cns_drake.sensors.lidar.beams import BeamPattern
+from cns_drake.sensors.lidar.beams import HIGHEST_RATE, BeamPattern
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.ray_queries import (
     RayHits,
@@ -47,7 +48,6 @@ from cns_drake.sensors.lidar.scanner import MeasuredReturns, Scanner
 from cns_drake.sensors.lidar.seen_geometry import (
     GeometryView,
     SeenGeometry,
-    Structures,
 )
 
 if TYPE_CHECKING:
@@ -118,6 +118,109 @@ class _CaptureTimes(NamedTuple):
         """Returns whether a scan is taken at a time [s]."""
         number = self.number(time)
         return number >= 0 and self.time(number) == time
+
+
+@dataclass(frozen=True, kw_only=True)
+class LidarOptions(GeometryView):
+    """What a LiDAR sees, how it measures, and when it takes scans.
+
+    The fields are keywords of `Lidar` and `add_lidar`, and those of a
+    `GeometryView`.
+
+    Attributes:
+        measurement: the model of noise, losses and rounding.
+        returns: the model of a real unit; None for ideal returns. With a model,
+            only the resolution is taken from `measurement`.
+        moving_bodies: frame -> index of its body in the port
+            `body_spatial_velocities`. The LiDAR has this port only if this
+            field is given.
+        causal: whether a scan is the revolution that ends at the time of the
+            output; by default the revolution starts at that time.
+        rate: scans per second of a discrete LiDAR, at most 1000 and at most one
+            scan per revolution, which computes a scan once per period and holds
+            it. By default the LiDAR is continuous: it has a scan for each time
+            at which its ports are evaluated.
+        capture_offset: time of a discrete LiDAR's first scan [s].
+
+    Raises:
+        TypeError: see `GeometryView`.
+        ValueError: the rate is not positive or too high, the offset is negative
+            or without a rate, or there is no thread.
+
+    Example:
+        from cns_drake import add_lidar
+
+        options = {"rate": 10, "causal": True}
+        add_lidar(builder, scene_graph, body, X_PB, "os1-64", **options)
+    """
+
+    measurement: MeasurementModel = IDEAL
+    returns: CalibratedReturns | None = None
+    moving_bodies: Mapping[FrameId, int] | None = None
+    causal: bool = False
+    rate: float | None = None
+    capture_offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        offset = self.capture_offset
+        if not (_is_number(offset) and offset >= 0.0):
+            raise ValueError(
+                f"capture_offset: {offset!r} is not a time from 0 on"
+            )
+        if self.rate is not None:
+            period_of_rate(self.rate)
+        elif offset:
+            raise ValueError("capture_offset: only a LiDAR with a rate has one")
+
+    def captures(self, revolution: float) -> _CaptureTimes | None:
+        """Returns when scans are taken; None for a continuous LiDAR.
+
+        Args:
+            revolution: duration of a revolution [s].
+
+        Raises:
+            ValueError: the next scan would be taken during a revolution.
+        """
+        if self.rate is None:
+            return None
+        period = period_of_rate(self.rate)
+        # A rate that was computed from the duration of a revolution is allowed.
+        if period < revolution * (1.0 - 1e-9):
+            raise ValueError(
+                f"rate: {self.rate:g} scans per second, but a revolution takes "
+                f"{revolution:g} s; give a pattern with a shorter period"
+            )
+        return _CaptureTimes(period, float(self.capture_offset))
+
+
+def period_of_rate(rate: float, longest: float = math.inf) -> float:
+    """Returns the time between two scans [s].
+
+    Args:
+        rate: scans per second.
+        longest: greatest time that is allowed [s].
+
+    Raises:
+        ValueError: the rate is not a positive number, or is out of range.
+    """
+    if not (
+        _is_number(rate) and 0.0 < rate <= HIGHEST_RATE and rate * longest >= 1
+    ):
+        least = f"at least {1.0 / longest:g} and " if longest < math.inf else ""
+        raise ValueError(
+            f"rate: {rate!r} is not a positive number per second, {least}"
+            f"up to {HIGHEST_RATE}"
+        )
+    return 1.0 / rate
+
+
+def _is_number(value: object) -> bool:
+    return (
+        isinstance(value, numbers.Real)
+        and not isinstance(value, bool)
+        and math.isfinite(value)
+    )
 
 
 class Lidar(LeafSystem):
@@ -231,18 +334,7 @@ class Lidar(LeafSystem):
         parent_frame_id: FrameId,
         X_PB: RigidTransform,
         pattern: BeamPattern,
-        *,
-        measurement: MeasurementModel = IDEAL,
-        returns: CalibratedReturns | None = None,
-        moving_bodies: Mapping[FrameId, int] | None = None,
-        role: Role = Role.kPerception,
-        unseen: Collection[FrameId | GeometryId] | None = None,
-        structures: Structures | None = None,
-        anchored_frames: Collection[FrameId] = (),
-        num_threads: int = 1,
-        causal: bool = False,
-        rate: float | None = None,
-        capture_offset: float = 0.0,
+        **options: Any,
     ):
         """Constructs the LiDAR.
 
@@ -250,59 +342,27 @@ class Lidar(LeafSystem):
             parent_frame_id: the frame P that carries the sensor.
             X_PB: pose of the sensor's body B in P.
             pattern: the beams.
-            measurement: the model of noise, losses and rounding.
-            returns: the model of a real unit; None for ideal returns. With a
-                model, only the resolution is taken from `measurement`.
-            moving_bodies: frame -> index of its body in the port
-                `body_spatial_velocities`. The LiDAR has this port only if this
-                argument is given.
-            role: role of the geometry that the LiDAR sees.
-            unseen: frames and geometries that the LiDAR does not see; by
-                default P, unless P is the frame of the world.
-            structures: table of the structures' labels and instance ids. By
-                default, structures have no class, and their ids follow the
-                alphabetical order of their names.
-            anchored_frames: frames that never move, besides the frame of the
-                world; rays are cast faster on their geometry than on geometry
-                that can move. If such a frame moves after all, all static
-                geometry is rebuilt.
-            num_threads: number of threads that share the rays; the measurement
-                does not depend on this number.
-            causal: whether a scan is the revolution that ends at the time of
-                the output; by default the revolution starts at that time.
-            rate: scans per second of a discrete LiDAR, at most one scan per
-                revolution; by default the LiDAR is continuous: it has a scan
-                for each time.
-            capture_offset: time of a discrete LiDAR's first scan [s].
+            options: any fields of `LidarOptions`.
 
         Raises:
-            TypeError: the role is no role of geometry, `unseen` has an element
-                of another type, or the number of threads is no integer.
-            ValueError: limits or period of the pattern are impossible, there is
-                no thread, the rate is not positive or higher than that of the
-                revolutions, or the offset is negative or without a rate.
+            TypeError: there is no such option, or its value is of another type.
+            ValueError: limits or period of the pattern are impossible, or an
+                option is out of range.
         """
         super().__init__()
-        view = GeometryView(
-            parent_frame_id=parent_frame_id,
-            role=role,
-            unseen=None if unseen is None else frozenset(unseen),
-            structures=structures,
-            anchored_frames=frozenset(anchored_frames),
-            num_threads=num_threads,
-        )
+        given = LidarOptions(**options)
         pattern.check()
         self.parent_frame_id = parent_frame_id
         self.X_PB = RigidTransform(X_PB)
         self.pattern = pattern
-        self.causal = bool(causal)
-        self.role = role
-        self._captures = _capture_times(rate, capture_offset, pattern.period)
-        self._scanner = Scanner(pattern, measurement, returns)
-        self._moving_bodies = dict(moving_bodies or {})
-        self._declare_inputs(has_velocities=moving_bodies is not None)
+        self.causal = given.causal
+        self.role = given.role
+        self._captures = given.captures(pattern.period)
+        self._scanner = Scanner(pattern, given.measurement, given.returns)
+        self._moving_bodies = dict(given.moving_bodies or {})
+        self._declare_inputs(has_velocities=given.moving_bodies is not None)
         self._declare_captures()
-        self._declare_caches(view)
+        self._declare_caches(given)
         self._declare_outputs()
 
     def _declare_inputs(self, *, has_velocities: bool) -> None:
@@ -361,7 +421,9 @@ class Lidar(LeafSystem):
             self.DeclareCacheEntry(
                 description=f"ray-casting scene, {what}",
                 value_producer=ValueProducer(
-                    allocate=lambda: Value(SeenGeometry(view)),
+                    allocate=lambda: Value(
+                        SeenGeometry(self.parent_frame_id, view)
+                    ),
                     calc=lambda context, seen, calc_ball=calc_ball: (
                         self._update_seen(
                             context, seen.get_value(), calc_ball(context)
@@ -884,57 +946,6 @@ class Lidar(LeafSystem):
         p_SRset = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
         p_SRset_W = np.einsum("nij,nj->ni", R_WSset[pose], p_SRset)
         set_points(cloud, (p_WSset[pose] + p_SRset_W).T, greys)
-
-
-def _capture_times(
-    rate: float | None, offset: float, revolution: float
-) -> _CaptureTimes | None:
-    """Returns when a LiDAR takes scans; None for a continuous LiDAR.
-
-    Args:
-        rate: scans per second, if any.
-        offset: time of the first scan [s].
-        revolution: duration of a revolution [s].
-
-    Raises:
-        ValueError: the rate is not positive or too high, or the offset is
-            negative or without a rate.
-    """
-    period = period_of_rate(rate)
-    if not (_is_number(offset) and offset >= 0.0):
-        raise ValueError(f"capture_offset: {offset!r} is not a time from 0 on")
-    if period is None:
-        if offset:
-            raise ValueError("capture_offset: only a LiDAR with a rate has one")
-        return None
-    # A rate that was computed from the duration of a revolution is allowed.
-    if period < revolution * (1.0 - 1e-9):
-        raise ValueError(
-            f"rate: {rate:g} scans per second, but a revolution takes "
-            f"{revolution:g} s; give a pattern with a shorter period"
-        )
-    return _CaptureTimes(period, float(offset))
-
-
-def period_of_rate(rate: float | None) -> float | None:
-    """Returns the time between two scans [s]; None without a rate.
-
-    Raises:
-        ValueError: the rate is not a positive number.
-    """
-    if rate is None:
-        return None
-    if not (_is_number(rate) and rate > 0.0):
-        raise ValueError(f"rate: {rate!r} is not a positive number per second")
-    return 1.0 / rate
-
-
-def _is_number(value: object) -> bool:
-    return (
-        isinstance(value, numbers.Real)
-        and not isinstance(value, bool)
-        and math.isfinite(value)
-    )
 
 
 def _eval_seen(entry: CacheEntry, context: Context) -> SeenGeometry:

@@ -5,14 +5,15 @@ The scene is kept from scan to scan, until the geometry changes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 import operator
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import numpy as np
 from pydrake.geometry import FrameId, GeometryId, QueryObject, Role
 from pydrake.math import RigidTransform
+from pydrake.multibody.tree import Frame, RigidBody
 
 from cns_drake.base import doing
 from cns_drake.ray_casting import Ball, KnownPoses, Motion, RayCastingScene
@@ -33,6 +34,10 @@ if TYPE_CHECKING:
     from cns_drake.sensors.returns.materials import Materials
 
 
+# What a LiDAR can leave out.
+Place: TypeAlias = RigidBody | Frame | FrameId | GeometryId
+
+
 class Structures(Protocol):
     """A table from which a LiDAR takes the labels and ids of what it hits."""
 
@@ -40,19 +45,26 @@ class Structures(Protocol):
         """Returns the labels and instance ids of structures, by their names."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class GeometryView:
     """Which geometry a LiDAR sees, and how its rays are cast.
 
     Attributes:
-        parent_frame_id: the frame P that carries the LiDAR.
         role: role of the geometry that is seen.
-        unseen: frames and geometries that are not seen; None for P, unless P is
-            the frame of the world.
-        structures: table of the structures' labels and instance ids; None for
-            ids in alphabetical order.
-        anchored_frames: frames that never move, besides the frame of the world.
-        num_threads: number of threads that share the rays.
+        unseen: bodies, frames and geometries that are not seen; by default the
+            frame that carries the LiDAR, unless this is the frame of the world.
+            A body, or a frame on it, stands for the whole body. A FrameId
+            stands for its own geometry only, because a SceneGraph does not
+            contain welds.
+        structures: table of the structures' labels and instance ids. By
+            default, structures have no class, and their ids follow the
+            alphabetical order of their names.
+        anchored_frames: frames that never move, besides the frame of the world;
+            rays are cast faster on their geometry than on geometry that can
+            move. If such a frame moves after all, all static geometry is
+            rebuilt.
+        num_threads: number of threads that share the rays; the measurement does
+            not depend on this number.
 
     Raises:
         TypeError: the role is no role of geometry, `unseen` has an element of
@@ -60,12 +72,11 @@ class GeometryView:
         ValueError: there is no thread.
     """
 
-    parent_frame_id: FrameId
-    role: Role
-    unseen: frozenset[FrameId | GeometryId] | None
-    structures: Structures | None
-    anchored_frames: frozenset[FrameId]
-    num_threads: int
+    role: Role = Role.kPerception
+    unseen: Collection[Place] | None = None
+    structures: Structures | None = None
+    anchored_frames: Collection[FrameId] = ()
+    num_threads: int = 1
 
     def __post_init__(self) -> None:
         if not isinstance(self.role, Role) or self.role == Role.kUnassigned:
@@ -75,13 +86,19 @@ class GeometryView:
                 "pydrake.geometry"
             )
         for place in self.unseen or ():
-            if not isinstance(place, FrameId | GeometryId):
+            if not isinstance(place, Place):
                 raise TypeError(
-                    f"unseen: {place!r} is not a FrameId or GeometryId; "
-                    "add_lidar also takes a RigidBody or Frame"
+                    f"unseen: {place!r} is not a FrameId, GeometryId, "
+                    "RigidBody or Frame"
                 )
         if operator.index(self.num_threads) < 1:
             raise ValueError(f"num_threads: {self.num_threads} is less than 1")
+        # The caller's collections may go on changing.
+        if self.unseen is not None:
+            ids = frozenset(map(_id_of, self.unseen))
+            object.__setattr__(self, "unseen", ids)
+        anchored = frozenset(self.anchored_frames)
+        object.__setattr__(self, "anchored_frames", anchored)
 
 
 class SeenGeometry:
@@ -100,8 +117,14 @@ class SeenGeometry:
         instance: (num_geometries,) uint16 structure of each geometry.
     """
 
-    def __init__(self, view: GeometryView):
-        """Begins without a scene; `view` says which geometry is seen."""
+    def __init__(self, parent_frame_id: FrameId, view: GeometryView):
+        """Begins without a scene.
+
+        Args:
+            parent_frame_id: the frame P that carries the LiDAR.
+            view: which geometry is seen.
+        """
+        self._parent_frame_id = parent_frame_id
         self._view = view
         self._reader = GeometryReader()
         self._geometries: tuple[PerceptionGeometry, ...] = ()
@@ -112,7 +135,7 @@ class SeenGeometry:
         self._materials: Materials | None = None
 
     def __deepcopy__(self, memo: dict) -> SeenGeometry:
-        return SeenGeometry(self._view)
+        return SeenGeometry(self._parent_frame_id, self._view)
 
     def update(
         self,
@@ -193,9 +216,9 @@ class SeenGeometry:
 
     def _read_geometry(self, records: GeometryList, world: FrameId) -> None:
         """Reads the geometry that is seen, from a list of all geometry."""
-        unseen = self._view.unseen
-        if unseen is None:
-            unseen = frozenset([self._view.parent_frame_id]) - {world}
+        unseen = {self._parent_frame_id} - {world}
+        if self._view.unseen is not None:
+            unseen = set(self._view.unseen)
         doing("reading meshes")
         self._geometries = self._reader.read(
             record
@@ -243,7 +266,7 @@ class SeenGeometry:
             if structures is None
             else structures.labels(names)
         )
-        anchored = self._view.anchored_frames | {world}
+        anchored = {*self._view.anchored_frames, world}
         # Copies: Drake's references go on changing.
         self._X_WAs = {
             frame_id: RigidTransform(calc_X_WF(frame_id))
@@ -259,3 +282,12 @@ class SeenGeometry:
             p_WS=p_WS,
         )
         self.built = self._geometries
+
+
+def _id_of(place: Place) -> FrameId | GeometryId:
+    """Returns an id unchanged, or the frame id of a body or a frame's body."""
+    if isinstance(place, Frame):
+        place = place.body()
+    if isinstance(place, RigidBody):
+        return place.GetParentPlant().GetBodyFrameIdOrThrow(place.index())
+    return place

@@ -10,9 +10,17 @@ from pydrake.multibody.plant import (
     MultibodyPlant,
 )
 from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
 import pytest
 
-from cns_drake.sensors import MeasurementModel, add_imu, add_lidar, add_odometry
+from cns_drake.sensors import (
+    Lidar,
+    MeasurementModel,
+    add_imu,
+    add_lidar,
+    add_odometry,
+    make_beam_pattern,
+)
 
 X_PS = RigidTransform([0.0, 0.0, 1.0])
 
@@ -86,6 +94,13 @@ class Site:
             "measurement: give either it or range_noise",
         ),
         ({"noise": 0.1}, TypeError, "noise"),
+        ({"rate": 1e9}, ValueError, "^rate: 1000000000.0 is not .* up to 1000"),
+        ({"rate": 0.2}, ValueError, "^rate: 0.2 is not .*, at least 0.25"),
+        (
+            {"motion_distortion": True, "motion": ConstantVectorSource([0])},
+            RuntimeError,
+            "^motion: ConstantVectorSource .* not in this builder",
+        ),
         ({"num_threads": 0}, ValueError, "^num_threads: 0 is less than 1"),
         ({"num_threads": 1.5}, TypeError, "'float' .* as an integer"),
         ({"unseen": ["wall"]}, TypeError, "^unseen: 'wall' is not a FrameId"),
@@ -95,8 +110,31 @@ class Site:
     ],
 )
 def test_a_slip_is_found_at_once(options, error, fault):
+    site = Site()
     with pytest.raises(error, match=fault):
-        Site().add(**options)
+        site.add(**options)
+    assert len(site.builder.GetSystems()) == 2
+
+
+def test_a_scan_a_nanosecond_is_refused_with_a_pattern_too():
+    pattern = make_beam_pattern("vlp-16", 1e-9)
+    with pytest.raises(ValueError, match=r"^rate: 1000000000\.0 is"):
+        Site().add(pattern=pattern, rate=1e9)
+    with pytest.raises(ValueError, match=r"^rate: 1000000000\.0 is"):
+        Lidar(Site().scene_graph.world_frame_id(), X_PS, pattern, rate=1e9)
+
+
+@pytest.mark.parametrize("fault", ["port", "other graph", "nothing to see"])
+def test_a_lidar_that_cannot_be_connected_is_not_added(fault):
+    site = Site(with_wall=fault != "nothing to see")
+    motion = site.builder.AddSystem(ConstantVectorSource([0.0]))
+    if fault == "other graph":
+        site.scene_graph = Site().scene_graph
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises((RuntimeError, UserWarning)):
+            site.add(motion_distortion=fault == "port", motion=motion)
+    assert len(site.builder.GetSystems()) == 3
 
 
 def test_a_plant_is_no_scene_graph():
