@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import yaml
 
 from cns_drake.motion import RoadProfile
 from cns_drake.sensors import ImuErrors, ImuNoise
+from docs.fill_numbers import csv_rows
 from docs.picture_parts import (
     DPI,
     FONT,
@@ -26,20 +27,16 @@ from docs.picture_parts import (
     add_heading,
     make_plain,
 )
-from docs.result_tables import aged, csv_rows, kept_in_cities
+from docs.survival import retained_in_cities
 from evaluation.methods import method_facts, shipped_methods
 from evaluation.results import (
     INK,
     MARGIN,
     PALE,
-    SURVIVES,
-    SURVIVES_NOT,
     Results,
     Row,
-    Survival,
     in_table_order,
     judge_survival,
-    listed,
     method_style,
     method_styles,
     rank_methods,
@@ -59,14 +56,16 @@ OURS = {
 }
 
 
-def survival(path: Path) -> str:
-    """Draws what methods retain of their AUC strict; returns the title.
+def survival(path: Path) -> None:
+    """Draws what methods retain of their AUC strict in rebuilt cities.
 
     Cities are the units: a point is the mean over the cities, and a bar is the
     95 % interval over them, with geometric verification. A gain in a city does
     not make up for a loss in another, see `judge_survival`.
     """
-    rows = {verified: kept_in_cities(verified) for verified in (False, True)}
+    rows = {
+        verified: retained_in_cities(verified) for verified in (False, True)
+    }
     judged = {verified: judge_survival(some) for verified, some in rows.items()}
     # The best method with geometric verification is on top.
     order = [one.method for one in judged[True]]
@@ -110,30 +109,8 @@ def survival(path: Path) -> str:
     names = [f"{title(n)}*" if n in OURS else title(n) for n in order]
     axes.set_yticks(range(len(order)), names)
     make_plain(axes)
-    finding = survival_title(judged)
-    add_heading(figure, finding)
+    add_heading(figure, "Retained AUC strict in twelve rebuilt cities")
     figure.savefig(path, dpi=DPI)
-    return finding
-
-
-def survival_title(found: Mapping[bool, Collection[Survival]]) -> str:
-    """Returns a title: which methods survive with geometric verification.
-
-    Args:
-        found: whether geometric verification was used -> whether methods
-            survive.
-    """
-
-    def named(verdict: str) -> str:
-        names = [one.method for one in found[True] if one.verdict == verdict]
-        marked = [f"{title(n)}{'*' * (n in OURS)}" for n in names]
-        return listed(marked) if marked else "no method"
-
-    survives = named(SURVIVES)
-    verb = "survive" if " and " in survives else "survives"
-    return (
-        f"With verification, {survives} {verb};\n{named(SURVIVES_NOT)} do not"
-    )
 
 
 def assumptions(path: Path) -> None:
@@ -150,22 +127,8 @@ def assumptions(path: Path) -> None:
     ticks: dict[float, str] = {}
     y = 0.0
     for place, text in places.items():
-        young, old = (
-            aged("relative_auc", "btc", years, furniture=place)
-            for years in (20, 40)
-        )
-        lost = [
-            city.capitalize()
-            for city, (mean, _, _) in young.items()
-            if mean < 0.9
-        ]
-        note = "BTC loses no tenth in 20 years"
-        if lost:
-            where = "each city" if len(lost) == len(young) else listed(lost)
-            note = f"in {where}, BTC loses a tenth between 5 and 20 years"
         axes.text(1.0, y, text, va="center", fontweight="bold")
-        y += 0.8
-        axes.text(1.0, y, note, va="center")
+        old = _retained_in_old_map(place)
         for city, shares in old.items():
             y += 1.0
             mean, *ends = (100.0 * share for share in shares)
@@ -184,10 +147,31 @@ def assumptions(path: Path) -> None:
     make_plain(axes)
     add_heading(
         figure,
-        "As shipped, BTC loses a tenth between\n"
-        "5 and 20 years; in place, nothing in 40",
+        "Retained AUC of BTC in a map of 40 years",
     )
     figure.savefig(path, dpi=DPI)
+
+
+def _retained_in_old_map(furniture: str) -> dict[str, np.ndarray]:
+    """Returns city -> what BTC retains of its AUC after 40 years (3,).
+
+    That is the mean over the realisations of the share, and of both limits of
+    its interval.
+
+    Args:
+        furniture: where new street furniture stands.
+    """
+    found: dict[str, list[list[float]]] = {}
+    for row in csv_rows("ageing.csv"):
+        if (row["method"], row["years"], row["furniture"]) == (
+            "btc",
+            "40",
+            furniture,
+        ) and (row["season"], row["turned"]) == ("same", "1"):
+            ends = ("", "_low", "_high")
+            cells = [float(row[f"relative_auc{end}"]) for end in ends]
+            found.setdefault(row["map"], []).append(cells)
+    return {city: np.mean(some, axis=0) for city, some in found.items()}
 
 
 def ranking(path: Path) -> None:
@@ -196,7 +180,7 @@ def ranking(path: Path) -> None:
     Means are over the pairs of the shipped cities.
     """
     found: dict[tuple[bool, float], list[Row]] = {}
-    for line in csv_rows("notes/ranking.csv"):
+    for line in csv_rows("ranking.csv"):
         if line["cities"] != "shipped":
             continue
         row = Row(
@@ -217,7 +201,6 @@ def ranking(path: Path) -> None:
     radii = sorted({radius for _, radius in found})
     figure = Figure(figsize=(WIDTH, 5.0), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
-    firsts = []
     for axes, verified in zip(panels, (False, True), strict=True):
         ranked = [
             {one.method: one for one in rank_methods(found[verified, radius])}
@@ -235,7 +218,6 @@ def ranking(path: Path) -> None:
                 f"{title(method)} {ranked[-1][method].value:.2f}",
                 va="center", fontsize=11,
             )  # fmt: skip
-        firsts.append({next(iter(some)) for some in ranked})
         number = len(ranked[-1])
         axes.set(ylim=(number + 0.5, 0.5), xlim=(-0.3, len(radii) + 2.2))
         axes.set_xticks(range(len(radii)), [f"{one:g}" for one in radii])
@@ -245,21 +227,13 @@ def ranking(path: Path) -> None:
         axes.set_title(f"{word} verification", loc="left")
         make_plain(axes, "y")
     panels[0].set_ylabel("rank by AUC strict (at the right: its mean)")
-    alone, verified = (
-        listed([title(name) for name in METHOD_STYLES if name in some]).lower()
-        for some in firsts
-    )
-    add_heading(
-        figure,
-        f"{verified.capitalize()} is first with verification;\n"
-        f"without it, {alone}{', by radius' * (len(firsts[0]) > 1)}",
-    )
+    add_heading(figure, "Ranks of methods over the radius of a match")
     figure.savefig(path, dpi=DPI)
 
 
 def years(path: Path) -> None:
     """Draws the table of what the age of a map costs."""
-    rows = csv_rows("notes/years.csv")
+    rows = csv_rows("years.csv")
     cities = list(dict.fromkeys(row["map"].capitalize() for row in rows))
     columns = (
         "years", "btc", "btc_least", "btc_most", "solid", "ring++",
@@ -304,14 +278,13 @@ def visible_change(path: Path) -> None:
     A line joins the means of six groups of versions, in the order of the
     measure. Beside it is Spearman's rank correlation of 1 - AUC.
     """
-    rows = csv_rows("notes/versions.csv")
+    rows = csv_rows("versions.csv")
     measures = {
         "tcr_sym": "TCR_sym",
         "visible_change_added": "visible change, without parallax",
     }
     figure = Figure(figsize=(WIDTH, 7.2), layout="constrained")
     panels = figure.subplots(2, sharex=True, sharey=True)
-    found: dict[str, list[float]] = {}
     for axes, (measure, words) in zip(panels, measures.items(), strict=True):
         axes.set_ylim(0.0, 1.0)
         for method, (colour, style, marker) in METHOD_STYLES.items():
@@ -325,7 +298,6 @@ def visible_change(path: Path) -> None:
             order = np.argsort(x, kind="stable")
             groups = np.array_split(order, 6)
             fit = spearmanr(x, 1.0 - y).statistic
-            found.setdefault(method, []).append(fit)
             axes.plot(
                 x, y, marker, color=colour, ms=3, alpha=0.35, mew=0,
                 label="_points",
@@ -342,13 +314,7 @@ def visible_change(path: Path) -> None:
         _name_lines(figure, axes, 0.11, FONT["font.size"])
     panels[0].set_title("at the right: rank correlation of 1 - AUC", loc="left")
     figure.supylabel("AUC in 58 versions of Riverside", fontsize=13)
-    closer = all(after > before for before, after in found.values())
-    add_heading(
-        figure,
-        "AUC falls more closely with visible change\nthan with TCR_sym"
-        if closer
-        else "AUC in versions of a city",
-    )
+    add_heading(figure, "AUC over two measures of change")
     figure.savefig(path, dpi=DPI)
 
 
@@ -395,7 +361,7 @@ def _name_lines(figure: Figure, axes: Axes, gap: float, size: float) -> None:
 
 def sessions(path: Path) -> None:
     """Draws R@1 of a map of January in NCLT, in Suburbia and on campuses."""
-    rows = csv_rows("notes/nclt_sessions.csv")
+    rows = csv_rows("nclt_sessions.csv")
     figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
     axes = figure.subplots()
     # No method has these colours.
@@ -404,7 +370,6 @@ def sessions(path: Path) -> None:
         "campus": ("#777777", ":", "simulated\n(4 campuses)"),
         "nclt": (INK, "-", "measured\n(NCLT)"),
     }
-    falls = {}
     for where, (colour, style, label) in looks.items():
         found: dict[float, list[list[float]]] = {}
         for row in rows:
@@ -423,7 +388,6 @@ def sessions(path: Path) -> None:
                 )
                 for end in (min, max)
             )
-        falls[where] = middle[0] - middle.min()
         axes.fill_between(days, low, high, color=colour, alpha=0.15, lw=0)
         axes.plot(days, middle, style, color=colour, marker="o", label=label)
     axes.axvspan(107, 288, color=PALE, alpha=0.25, lw=0)
@@ -433,18 +397,14 @@ def sessions(path: Path) -> None:
     axes.set_ylim(0.0, 1.02)
     make_plain(axes, "both")
     _name_lines(figure, axes, 0.16, FONT["font.size"])
-    add_heading(
-        figure,
-        f"The real curve falls by {falls['nclt']:.2f}, the simulated\n"
-        f"ones by at most {max(falls['suburbia'], falls['campus']):.2f}",
-    )
+    add_heading(figure, "R@1 of a map of January 2012")
     figure.savefig(path, dpi=DPI)
 
 
 def fleet(path: Path) -> None:
     """Draws the share of changes that so many cars a year notice."""
     noticed: dict[int, list[float]] = {}
-    for line in csv_rows("notes/upkeep.csv"):
+    for line in csv_rows("upkeep.csv"):
         wanted = line["experiment"], line["task"], line["metric"]
         if wanted == ("fleet", "seen", "seen_here"):
             share = 100.0 * float(line["value"])
@@ -467,12 +427,7 @@ def fleet(path: Path) -> None:
     axes.set(xlim=(0.0, 100.0), ylim=(max(shares) + 0.5, 0.3))
     axes.set_xlabel("changes noticed [%];  | one realisation of a city")
     make_plain(axes)
-    one, *_, most = shares.values()
-    add_heading(
-        figure,
-        f"One car a year notices {one} % of the changes,\n"
-        f"two cars {shares[2]} %, four cars {most} %",
-    )
+    add_heading(figure, "Changes that a fleet notices")
     figure.savefig(path, dpi=DPI)
 
 
@@ -496,7 +451,7 @@ def upkeep(
     """
     lines = [
         line
-        for line in csv_rows("notes/upkeep.csv")
+        for line in csv_rows("upkeep.csv")
         if line["experiment"] == experiment
     ]
     figure = Figure(
@@ -591,10 +546,7 @@ def ladder(path: Path) -> None:
     axes.grid(which="minor", color="white", lw=2)
     axes.tick_params(which="minor", length=0)
     axes.set_xlabel("retained AUC [%] in Suburbia", fontsize=11)
-    single = [cause for cause in found if cause != "all"][:3]
-    heads = [texts[cause].partition(":")[0] for cause in single]
-    names = listed([head[0].lower() + head[1:] for head in heads])
-    add_heading(figure, f"All at once costs most; alone,\n{names}")
+    add_heading(figure, "What each cause leaves")
     figure.savefig(path, dpi=DPI)
 
 

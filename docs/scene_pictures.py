@@ -31,6 +31,7 @@ from cns_drake.pictures import (
 from cns_drake.scenarios import plan_drive, shipped_maps
 from cns_drake.scene import CLASS_IDS, MapFolder
 from cns_drake.sensors import CameraSection, WeatherConfig
+from docs.fill_numbers import csv_rows
 from docs.picture_parts import (
     DPI,
     ROOT,
@@ -40,7 +41,6 @@ from docs.picture_parts import (
     with_name,
     write_tiles,
 )
-from docs.result_tables import csv_rows
 from evaluation import make_method, open_drive
 from evaluation.map_update import Label, read_session
 from evaluation.methods import LayeredOverlap, LayeredOverlapConfig
@@ -318,7 +318,7 @@ def one_query(
     queries, places = (open_drive(ROOT / folder) for folder in drives)
     answers = {
         row["method"]: row
-        for row in csv_rows(str(ROOT / file))
+        for row in csv_rows(file)
         if row["query_frame"] == str(frame)
         and (row["query"], row["database"]) == (queries.session, places.session)
         and (row[STAGE], row["protocol"], row["verified"])

@@ -1009,6 +1009,8 @@ RECIPES = {
 NOT_RUN = {
     ".venv/bin/python docs/reference_pages.py": "writes into this project; "
     "test_fields compares the pages with what is there",
+    ".venv/bin/python docs/fill_numbers.py": "writes into this project; "
+    "test_numbers compares the pages with their files",
     ".venv/bin/python tests/edges/refresh.py": "writes into this project; "
     "test_edges compares the pins with what the programs do",
     ".venv/bin/python docs/draw.py": "writes into this project; test_pictures "

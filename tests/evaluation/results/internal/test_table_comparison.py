@@ -84,67 +84,6 @@ def shipped(**columns):
     return stages.where(columns).rows
 
 
-def test_the_shipped_tables_hold_the_published_numbers():
-    """Both files of the documents, read by another reader."""
-    for name, source, version in (
-        ("stages.csv", "docs/notes/results_random_yaw.csv", None),
-        ("fresh.csv", "docs/notes/fresh.csv", "version"),
-    ):
-        found = {
-            (
-                row.map,
-                row.database,
-                row.query,
-                row.method,
-                row["both.redraw.frozen"],
-                row["both.stage"],
-                row.verified,
-                row.metric,
-            ): row
-            for row in Results.read(_BASELINES / name).rows
-        }
-        with open(source, newline="") as file:
-            lines = list(csv.DictReader(file))
-        assert lines
-        for line in lines:
-            # Drives through fresh cities have the version in their names.
-            fresh = f"_f0{line[version]}" if version else ""
-            drives = (
-                line["map"],
-                *(
-                    f"{line['map']}{fresh}_{line[one]}"
-                    for one in ("db", "query")
-                ),
-                line["method"],
-                int(line[version]) if version else None,
-            )
-            for column, place in (
-                ("auc_unchanged", ("last", False, "auc")),
-                ("auc", ("own", False, "auc")),
-                ("auc_strict_unchanged", ("last", False, "auc_strict")),
-                ("auc_strict", ("own", False, "auc_strict")),
-                ("relative_auc_strict", ("own", False, "relative_auc_strict")),
-                ("r1", ("own", False, "r1")),
-                ("relative_auc", ("own", False, "relative_auc")),
-                ("verified_auc", ("own", True, "auc")),
-                ("verified_unchanged_auc", ("last", True, "auc")),
-            ):
-                if column in line:
-                    row = found.pop((*drives, *place))
-                    assert row.value == float(line[column])
-            # The interval of the share that is kept.
-            if row := found.get((*drives, "own", False, "relative_auc")):
-                ends = float(line["kept_low"]), float(line["kept_high"])
-                assert (row.low, row.high) == ends
-        # The files of the documents have few numbers with verification.
-        rest = {place[-1] for place in found if not place[-2]}
-        assert rest <= {
-            "visible_change",
-            "recall_at_full_precision",
-            "pose_success",
-        }
-
-
 def test_an_entrant_stands_among_the_shipped(tmp_path):
     """Each value is just above the best shipped method's, or below it."""
     best = {}

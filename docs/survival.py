@@ -1,0 +1,103 @@
+"""Writes which methods survive in twelve cities: `notes/survival.csv`.
+
+    python docs/survival.py
+
+The losses are those of the shipped tables (source `tables`: a query every 10 m,
+one draw of the random yaw), and of `notes/yaw_draws.csv` (source `draws`: a
+query every 30 m, each draw and the mean of all, at four radii of a match).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import csv
+from dataclasses import replace
+from pathlib import Path
+import sys
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+# As a program, this file is not in the package `docs`.
+sys.path.insert(0, str(ROOT))
+
+from docs.fill_numbers import csv_rows  # noqa: E402
+from evaluation.results import (  # noqa: E402
+    OWN,
+    STAGE,
+    Results,
+    Row,
+    Survival,
+    judge_survival,
+)
+
+_COLUMNS = (
+    "source", "radius", "draw", "verified", "method", "loss", "low", "high",
+    "cities", "verdict",
+)  # fmt: skip
+
+
+def retained_in_cities(verified: bool) -> list[Row]:
+    """Returns retained shares of AUC strict in the shipped and fresh cities.
+
+    A fresh city counts as a city of its own: it has the streets of a shipped
+    city, but no building of it. Methods that were not measured in fresh cities
+    are left out.
+    """
+    fresh, shipped = (
+        Results.read(ROOT / f"evaluation/results/baselines/{name}.csv")
+        .where({STAGE: OWN}, metric="relative_auc_strict", verified=verified)
+        .rows
+        for name in ("fresh", "stages")
+    )
+    methods = {row.method for row in fresh}
+    return [row for row in shipped if row.method in methods] + [
+        replace(row, map=f"{row.map}, fresh {row['both.redraw.frozen']}")
+        for row in fresh
+    ]
+
+
+def lines() -> Iterator[tuple[object, ...]]:
+    """Yields the lines of the file."""
+    for verified in (False, True):
+        for one in judge_survival(retained_in_cities(verified)):
+            yield "tables", "7.5", "0", *_cells(verified, one)
+    # The lost shares of the pairs of each city.
+    losses: dict[tuple[str, ...], dict[str, dict[str, list[float]]]] = {}
+    for row in csv_rows("yaw_draws.csv"):
+        kept = float(row["auc_strict"]) / float(row["unchanged_auc_strict"])
+        of_method = losses.setdefault(
+            (row["radius"], row["verified"], row["method"]), {}
+        )
+        of_city = of_method.setdefault(f"{row['map']} {row['version']}", {})
+        of_city.setdefault(row["draw"], []).append(max(0.0, 1.0 - kept))
+    for (radius, verified, method), cities in losses.items():
+        table = np.array(
+            [
+                [np.mean(by_draw[draw]) for draw in sorted(by_draw)]
+                for by_draw in cities.values()
+            ]
+        )
+        means = {"mean": table.mean(axis=1), **dict(enumerate(table.T))}
+        for draw, of_cities in means.items():
+            one = Survival.of(method, of_cities)
+            yield "draws", radius, draw, *_cells(verified == "1", one)
+
+
+def _cells(verified: bool, one: Survival) -> tuple[object, ...]:
+    limits = (f"{limit:.6f}" for limit in (one.interval.low, one.interval.high))
+    return (
+        int(verified), one.method, f"{one.loss:.6f}", *limits, one.cities,
+        one.verdict,
+    )  # fmt: skip
+
+
+def main(path: Path = ROOT / "docs/notes/survival.csv") -> None:
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        table = csv.writer(stream, lineterminator="\n")
+        table.writerow(_COLUMNS)
+        table.writerows(lines())
+
+
+if __name__ == "__main__":
+    main()
