@@ -4,7 +4,6 @@ from evaluation.change import TemporalChange as TemporalChange
 from evaluation.change import covered as covered
 from evaluation.change import temporal_change as temporal_change
 from evaluation.drives import check_data_set as check_data_set
-from evaluation.drives import compare_drives as compare_drives
 from evaluation.drives import open_drive as open_drive
 from evaluation.maps import VoxelMap as VoxelMap
 from evaluation.maps import map_drive as map_drive

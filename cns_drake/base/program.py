@@ -51,6 +51,7 @@ def make_program(
     summary: str,
     epilog: str,
     groups: Mapping[str, Sequence[str]] | None = None,
+    gone: Mapping[str, str] | None = None,
 ) -> typer.Typer:
     """Returns an empty command-line program, to which commands are added.
 
@@ -63,18 +64,34 @@ def make_program(
         epilog: text at the end of the program's help.
         groups: heading -> commands that the help lists under it; by default
             there is a single heading for all commands.
+        gone: command, or command and option, of earlier versions -> what to use
+            instead, for the error of whoever still gives it.
     """
+    gone = gone or {}
+
+    def _check_not_gone(words: str) -> None:
+        if words in gone:
+            raise InputError(f"{words}: gone; use {gone[words]}")
 
     class Program(TyperGroup):
         def get_command(self, ctx: Any, cmd_name: str) -> Any:
             command = super().get_command(ctx, cmd_name)
             if command is None:
+                _check_not_gone(cmd_name)
                 raise InputError(
                     f"unknown command '{cmd_name}'; there are: "
                     f"{', '.join(self.commands)}"
                     f"{did_you_mean(cmd_name, self.commands)}"
                 )
             return command
+
+        def invoke(self, ctx: Any) -> Any:
+            try:
+                return super().invoke(ctx)
+            except _UsageError as error:
+                option = getattr(error, "option_name", None)
+                _check_not_gone(f"{ctx.invoked_subcommand} {option}")
+                raise
 
         def format_commands(self, ctx: Any, formatter: Any) -> None:
             if groups is None:

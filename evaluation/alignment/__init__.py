@@ -1,8 +1,7 @@
 """Alignment of drives with poses in different worlds: a public noun.
 
 `align` aligns two drives: guesses of the pose, loops between submaps, and a
-pose graph fitted to the loops. `trajectory_errors` compares an estimated
-trajectory with ground truth.
+pose graph fitted to the loops.
 """
 
 from cns_drake.base import attach

@@ -22,6 +22,12 @@ app = program.make_program(
         "Recognise places": ("pr", "report", "compare", "real"),
         "Localise, and keep maps": ("localise", "map-update"),
     },
+    gone={
+        "tcr --paths": "cns-drake export --format tum, and evo_traj of evo",
+        "localise --estimate": (
+            "cns-drake export --format tum, and evo_ape and evo_rpe of evo"
+        ),
+    },
 )
 app.command(
     cls=Command,

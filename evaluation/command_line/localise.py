@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import commands, shared_options, terminal
+from cns_drake.base import shared_options, terminal
 from evaluation.command_line import options
-from evaluation.command_line.trajectories import measure_estimate
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,28 +20,12 @@ if TYPE_CHECKING:
 
 # Drift of the odometry by default, as a share of the distance.
 _USUAL_DRIFT = 0.01
-# Parameters that have an effect together with `--estimate`.
-_WITH_ESTIMATE = (
-    "place",
-    "frame",
-    "time_offset",
-    "lidar",
-    "columns",
-    "json",
-)
 
 
 def localise(
-    context: typer.Context,
     place: Annotated[Path, typer.Argument(metavar="MAP")],
-    query: Annotated[Path | None, typer.Argument(metavar="QUERY")] = None,
-    method: Annotated[
-        str | None,
-        typer.Option(
-            "--method",
-            metavar="NAME|FILE.py",
-        ),
-    ] = None,
+    query: Annotated[Path, typer.Argument(metavar="QUERY")],
+    method: Annotated[str, typer.Option(metavar="NAME|FILE.py")],
     start: float = 0.5,
     start_turn: float = 2.0,
     seed: int = 0,
@@ -52,9 +35,6 @@ def localise(
     odometry_drift: Annotated[
         float | None, typer.Option(metavar="PART")
     ] = None,
-    estimate: Annotated[Path | None, typer.Option(metavar="FILE.tum")] = None,
-    frame: options.Frame = "lidar",
-    time_offset: Annotated[float, typer.Option(metavar="S")] = 0.0,
     align: options.Align = "auto",
     lidar: shared_options.LidarName = None,
     columns: shared_options.Columns = None,
@@ -74,13 +54,6 @@ def localise(
     clouds (.pcd .ply .npy .bin). If MAP is a drive, its scans are merged at
     their ground-truth poses. If QUERY is a point cloud, it counts as one scan,
     whose ground-truth pose is the origin of the map.
-
-    With --estimate, the command localises no scans. It measures the errors of
-    poses that another program estimated. MAP is then the drive with the ground
-    truth, and there is no QUERY. The command prints two errors: ATE, as evo
-    defines it, is the root mean square of the distances from the ground truth
-    after rigid alignment; drift, as KITTI defines it, is the error of the
-    motion over 100 m of path.
 
     Args:
         place: Drive or point cloud to use as the map.
@@ -102,12 +75,6 @@ def localise(
             share of the distance driven. With 0.01, the default, lengths are
             wrong by about 1 %, and the heading drifts by about 0.01 deg per
             metre.
-        estimate: File with a trajectory that another program estimated for MAP,
-            in the TUM format: time [s], x y z and a quaternion x y z w.
-        frame: Frame whose poses --estimate contains: the LiDAR's (lidar) or the
-            vehicle's (base_link).
-        time_offset: Time to add to the times of --estimate [s], if these times
-            come from another clock than the times of the drive.
         output: Folder for the results; created if it does not exist. The tables
             results.csv and queries.csv have the columns of a study's tables;
             localisation.csv contains all values of each query. With --track,
@@ -130,16 +97,7 @@ def localise(
         pair_of,
     )
 
-    if estimate is not None:
-        commands.check_only_with(context, "estimate", _WITH_ESTIMATE)
-        (truth,) = options.open_noted(place, lidar=lidar, columns=columns)
-        measure_estimate(truth, estimate, frame, time_offset, json=json)
-        return
-    if query is None:
-        raise InputError("QUERY: missing")
-    if method is None:
-        raise InputError("--method: missing")
-    _check_together(context, query_spacing, odometry_drift, track=track)
+    _check_together(query_spacing, odometry_drift, track=track)
     if odometry_drift is None:
         odometry_drift = _USUAL_DRIFT
     num_jobs = choose_cluster(jobs, None).num_workers
@@ -249,7 +207,6 @@ def _write_results(
 
 
 def _check_together(
-    context: typer.Context,
     query_spacing: float | None,
     odometry_drift: float | None,
     *,
@@ -262,10 +219,6 @@ def _check_together(
     """
     from cns_drake.base import InputError
 
-    for name in ("frame", "time_offset"):
-        if name in commands.given_options(context):
-            option = name.replace("_", "-")
-            raise InputError(f"--{option}: only together with --estimate")
     if track and query_spacing is not None:
         raise InputError("--query-spacing: not together with --track")
     if not track and odometry_drift is not None:

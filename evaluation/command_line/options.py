@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 # Option: when drives are aligned to one world.
 When = Literal["auto", "always", "never"]
-# Option: frame whose poses an estimated trajectory contains.
-Frame = Literal["lidar", "base_link"]
 Align = Annotated[
     When,
     typer.Option(

@@ -9,27 +9,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import commands, number_text, shared_options, terminal
+from cns_drake.base import number_text, shared_options, terminal
 from evaluation.command_line import options
-from evaluation.command_line.trajectories import compare_paths
 
 if TYPE_CHECKING:
     from evaluation.change import ChangeReport
 
 
-# Parameters that have an effect together with `--paths`.
-_WITH_PATHS = ("source", "target", "align", "lidar", "columns", "json")
-
-
 def tcr(
-    context: typer.Context,
     source: Annotated[Path, typer.Argument(metavar="A")],
     target: Annotated[Path, typer.Argument(metavar="B")],
     no_change: Annotated[Path | None, typer.Option(metavar="C")] = None,
     align: options.Align = "auto",
     lidar: shared_options.LidarName = None,
     columns: shared_options.Columns = None,
-    paths: Annotated[bool, typer.Option("--paths")] = False,
     output: options.Tables = None,
     json: shared_options.Json = False,
 ) -> None:
@@ -50,22 +43,7 @@ def tcr(
             route in A's stage. With it, the command also prints TCR_sym between
             C and the drive in the same stage. These two drives differ only in
             their routes.
-        paths: Compare the paths and speeds of the two drives, instead of
-            measuring change. Every 5 m along A, the command measures how B
-            differs from A in lateral offset, lane, heading and height. The
-            median difference of the heights is subtracted. The command also
-            prints the speeds of each car, and the share of the time during
-            which the car stands. For comparison, the command prints the same
-            numbers for two pairs of real drives: a pair of Boreas, 28 days
-            apart, and the pair KAIST 01 and 02 of MulRan.
     """
-    if paths:
-        commands.check_only_with(context, "paths", _WITH_PATHS)
-        first, second = options.open_noted(
-            source, target, lidar=lidar, columns=columns
-        )
-        compare_paths(first, second, align, json=json)
-        return
     from evaluation.change import (
         maps_in_one_world,
         registered_change,

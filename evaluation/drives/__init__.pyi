@@ -1,6 +1,3 @@
-from evaluation.drives.comparison import DriveComparison as DriveComparison
-from evaluation.drives.comparison import Driving as Driving
-from evaluation.drives.comparison import compare_drives as compare_drives
 from evaluation.drives.data_set import DataSet as DataSet
 from evaluation.drives.data_set_check import check_data_set as check_data_set
 from evaluation.drives.drive_views import NOT_FINITE as NOT_FINITE

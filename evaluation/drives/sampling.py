@@ -21,16 +21,16 @@ _LEAST_MOVE = 0.5
 _MOST_BENT = 1.1
 
 
-def corners(positions: np.ndarray, apart: float) -> list[int]:
-    """Returns indices of positions that are at least a given distance apart.
+def _corners(positions: np.ndarray) -> list[int]:
+    """Returns indices of positions that are at least 0.5 m apart.
 
     The first index is 0. Each further index belongs to the next position that
-    lies at least `apart` [m] from the previous position in the result.
+    lies at least so far from the previous position in the result.
     """
     points = positions.tolist()
     kept = [0]
     for index, point in enumerate(points):
-        if math.dist(point, points[kept[-1]]) >= apart:
+        if math.dist(point, points[kept[-1]]) >= _LEAST_MOVE:
             kept.append(index)
     return kept
 
@@ -43,7 +43,7 @@ def travelled(positions: np.ndarray) -> np.ndarray:
     is much longer than the straight line between its ends counts as that line.
     """
     steps = step_lengths(positions)
-    ends = corners(positions, _LEAST_MOVE)
+    ends = _corners(positions)
     if ends[-1] < len(steps):
         ends.append(len(steps))
     parts = np.add.reduceat(steps, ends[:-1]) if len(steps) else steps

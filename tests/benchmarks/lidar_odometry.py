@@ -46,10 +46,13 @@ from cns_drake.scenarios import (
     plan_drive,
 )
 from cns_drake.simulation import simulate
-from evaluation.alignment import segment_errors
 from evaluation.drives import travelled
 
 _TURNS = 10
+# Length of the path over which the error of a motion is measured [m].
+_SPAN = 100.0
+# Number of poses between the starts of two such parts.
+_STEP = 10
 _ADIS16448 = {
     "accelerometer_noise_density": 0.01,
     "accelerometer_random_walk": 0.0002,
@@ -178,7 +181,13 @@ def sensor_pose(recording: Path) -> np.ndarray:
 def drift(exact: np.ndarray, found: np.ndarray) -> dict:
     """Returns errors [m] of (N, 4, 4) found poses against the exact ones."""
     exact, found = (poses.inverse(X[0]) @ X for X in (exact, found))
-    starts, ends, over = segment_errors(exact, found)
+    steps = np.linalg.norm(np.diff(exact[:, :3, 3], axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    starts = np.arange(0, len(exact), _STEP)
+    ends = np.searchsorted(along, along[starts] + _SPAN, "right")
+    starts, ends = starts[ends < len(exact)], ends[ends < len(exact)]
+    moved, true = (poses.inverse(X[starts]) @ X[ends] for X in (found, exact))
+    over = poses.inverse(moved) @ true
     errors = np.linalg.norm(over[:, :3, 3], axis=1)
     off = found[:, :3, 3] - exact[:, :3, 3]
     up = off[:, 2]

@@ -21,6 +21,7 @@ from pathlib import Path
 import sys
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from cns_drake.drives import Drive
 from cns_drake.motion import pose_at
@@ -29,21 +30,28 @@ from cns_drake.scenarios import (
     RideConfig,
     Scenario,
     load_scenario,
-    shipped_drives,
+    recordable_drives,
 )
-from evaluation import compare_drives
 
 # Time between two poses [s].
 _PERIOD = 0.1
 # Number of pairs of drivers for each shipped route.
 _DRIVERS = 2
 _COLUMNS = (
-    "group", "first", "second", "stations", "met", "reverse",
-    "offset_50", "offset_90", "offset_99", "over_2m", "other_lane",
-    "heading_spread_deg", "height_50", "height_5", "height_95",
-    "tilt_50_deg", "tilt_95_deg", "tilt_spread_deg", "tilt_between_50_deg",
-    "tilt_between_95_deg", "speed_10", "speed_50", "speed_90", "standing",
+    "group", "first", "second", "met", "reverse",
+    "offset_50", "offset_90", "offset_99", "over_2m",
+    "tilt_50_deg", "tilt_between_50_deg", "tilt_between_95_deg",
 )  # fmt: skip
+# Distance between two stations along a path [m].
+_STATION_SPACING = 5.0
+# Two drives meet at a station if they pass within this distance [m].
+_MEETING_RADIUS = 12.0
+# Distance between two samples of a path, and least distance between two poses
+# of it, so that the jitter of a standing receiver does not lengthen it [m].
+_PATH_SPACING = 0.25
+_LEAST_STEP = 0.2
+# Half of the length over which a path's direction is taken [m].
+_DIRECTION_REACH = 1.0
 
 
 class _Poses(Drive):
@@ -93,48 +101,83 @@ def planned(scenario: Scenario, name: str) -> _Poses:
 
 def compared(group: str, first: Drive, second: Drive) -> dict:
     """Returns a row of the table: how the second differs from the first."""
-    found = compare_drives(first, second)
-    own, lateral, height, between = _at_stations(first, second)
-    up = second.X_WS[:, 2, :3]
-    tilt = np.degrees(np.arccos(np.clip(up[:, 2], -1.0, 1.0)))
-    spread = np.hypot(
-        found.second.roll_spread_deg, found.second.pitch_spread_deg
-    )
+    offset, reverse = offsets(first.X_WS[:, :3, 3], second.X_WS[:, :3, 3])
+    own, lateral, between = _at_stations(first, second)
+    up = second.X_WS[:, 2, 2]
     values = {
         "group": group,
         "first": first.name,
         "second": second.name,
-        "stations": found.num_stops,
-        "met": found.num_met,
-        "reverse": found.reverse,
-        "offset_50": found.offset_50,
-        "offset_90": found.offset_90,
-        "offset_99": found.offset_99,
+        "met": len(offset) + reverse,
+        "reverse": reverse / max(len(offset) + reverse, 1),
         "over_2m": np.mean(lateral > 2.0) if own else np.nan,
-        "other_lane": found.other_lane,
-        "heading_spread_deg": found.heading_spread_deg,
-        "height_50": np.median(height) if own else np.nan,
-        "height_5": found.height_5,
-        "height_95": found.height_95,
-        "tilt_50_deg": np.median(tilt),
-        "tilt_95_deg": np.percentile(tilt, 95),
-        "tilt_spread_deg": spread,
+        "tilt_50_deg": np.degrees(np.median(np.arccos(np.clip(up, -1.0, 1.0)))),
         "tilt_between_50_deg": np.median(between) if own else np.nan,
         "tilt_between_95_deg": np.percentile(between, 95) if own else np.nan,
-        "speed_10": found.second.speed_10,
-        "speed_50": found.second.speed_50,
-        "speed_90": found.second.speed_90,
-        "standing": found.second.standing,
     }
+    for part in (50, 90, 99):
+        values[f"offset_{part}"] = (
+            np.percentile(offset, part) if len(offset) else np.nan
+        )
     return {
         name: f"{value:.3f}" if isinstance(value, float) else value
         for name, value in values.items()
     }
 
 
+def offsets(p_A: np.ndarray, p_B: np.ndarray) -> tuple[np.ndarray, int]:
+    """Compares two paths every 5 m along the first.
+
+    The offset of a station is the distance, across A's direction, of the
+    nearest sample of B within 12 m whose direction differs by less than 90 deg.
+
+    Args:
+        p_A: (N, 3) positions of the first path.
+        p_B: (M, 3) positions of the second path.
+
+    Returns:
+        (K,) offsets [m]; number of stations that meet only samples of the
+        opposite direction.
+    """
+    step = round(_STATION_SPACING / _PATH_SPACING)
+    stations, tangent = (values[::step] for values in _way(p_A))
+    samples, directions = _way(p_B)
+    found, reverse = [], 0
+    near = cKDTree(samples).query_ball_point(stations, _MEETING_RADIUS)
+    for p, ahead, steps in zip(stations, tangent, near, strict=True):
+        turns = directions[steps] @ ahead
+        same = np.sort(np.array(steps, int)[turns > 0.0])
+        if len(same):
+            best = np.linalg.norm(samples[same] - p, axis=1).argmin()
+            x, y = samples[same[best]] - p
+            found.append(abs(ahead[0] * y - ahead[1] * x))
+        elif (turns < 0.0).any():
+            reverse += 1
+    return np.array(found), reverse
+
+
+def _way(p_W: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns positions (N, 2) along a path, and its directions there."""
+    kept = [0]
+    for k, p in enumerate(p_W):
+        if np.linalg.norm(p - p_W[kept[-1]]) >= _LEAST_STEP:
+            kept.append(k)
+    corners = p_W[kept]
+    step = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    passed = np.concatenate([[0.0], np.cumsum(step)])
+    s = np.arange(0.0, passed[-1], _PATH_SPACING)
+
+    def at(s: np.ndarray) -> np.ndarray:
+        return np.stack([np.interp(s, passed, c) for c in corners.T[:2]], 1)
+
+    ahead = at(s + _DIRECTION_REACH) - at(s - _DIRECTION_REACH)
+    norm = np.linalg.norm(ahead, axis=1, keepdims=True)
+    return at(s), ahead / np.maximum(norm, 1e-9)
+
+
 def _at_stations(
     first: Drive, second: Drive
-) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[int, np.ndarray, np.ndarray]:
     """Compares poses of the second drive with the nearest ones of the first.
 
     Only pairs within 12 m with the same direction (within 90 deg) count. The
@@ -142,12 +185,9 @@ def _at_stations(
     apart: the offset is measured across the first drive's heading.
 
     Returns:
-        The number of pairs, and for each pair the lateral offset, the height
-        of the second over the first, and the angle between the vertical axes
-        of both after the heading is aligned.
+        The number of pairs, and for each pair the lateral offset, and the angle
+        between the vertical axes of both after the heading is aligned.
     """
-    from scipy.spatial import cKDTree
-
     X_A, X_B = first.X_WS, second.X_WS
     step = np.linalg.norm(np.diff(X_B[:, :3, 3], axis=0), axis=1)
     passed = np.concatenate([[0.0], np.cumsum(step)])
@@ -170,7 +210,7 @@ def _at_stations(
     # as long as both sensors are mounted alike.
     cosine = np.einsum("ij,ij->i", X_A[:, 2, :3], X_B[:, 2, :3])
     between = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    return len(X_B), lateral, delta[:, 2], between
+    return len(X_B), lateral, between
 
 
 def _ahead(X_WS: np.ndarray) -> np.ndarray:
@@ -192,7 +232,7 @@ def rows(poses: Path | None) -> Iterator[dict]:
         sessions = [read_poses(file) for file in sorted(poses.glob("*.txt"))]
         for later in sessions[1:]:
             yield compared("Boreas", sessions[0], later)
-    shipped = {name: load_scenario(name) for name in shipped_drives()}
+    shipped = {name: load_scenario(name) for name in recordable_drives()}
     ways = {name: planned(own, name) for name, own in shipped.items()}
     for first, second in combinations(ways, 2):
         if shipped[first].map == shipped[second].map:

@@ -29,6 +29,7 @@ FOREIGN_OPTIONS = {
     "--tls-cert",
     "--tls-key",
     "--topic",
+    "--t_offset",
     "--fcd-output.geo",
     "--night",
 }

@@ -264,15 +264,18 @@ RECIPES = {
     "KISS-ICP settings": Recipe("mapping: {voxel_size", file="kiss.yaml"),
     "KISS-ICP": Recipe(
         "kiss_icp_pipeline output/odometry",
+        changes=(("\nevo_ape", "\n# evo_ape"),),  # A program of its own.
         after=("KISS-ICP settings", "odometry drive"),
-        prints=("compared          19 poses", "ATE"),
+        prints=("truth/odometry",),
+        makes=("results/latest/odometry_poses_tum.txt",),
         by_night=True,
     ),
     "RKO-LIO settings": Recipe("voxel_size: 2.0\n", file="rko.yaml"),
     "RKO-LIO": Recipe(
         "rko_lio output/odometry",
+        changes=(("\nevo_ape", "\n# evo_ape"),),
         after=("RKO-LIO settings", "odometry drive"),
-        prints=("poses", "ATE"),
+        makes=("results/odometry_0/odometry_0_tum.txt",),
         by_night=True,
     ),
     "help: list": Recipe("cns-drake list", prints=("metropolis_04",)),
@@ -987,9 +990,9 @@ RECIPES = {
         command=".venv/bin/python check_drives.py",
     ),
     "own scans, pairs": Recipe(
-        ".venv/bin/cns-eval tcr mine/sequences/01 mine",
+        ".venv/bin/cns-eval pr mine/sequences/01 mine",
         after=("own scans and poses",),
-        prints=("another lane", "AUC", "AUROC"),
+        prints=("AUC", "AUROC"),
     ),
     "own scans, report": Recipe(
         ".venv/bin/cns-eval report mine",
@@ -1112,7 +1115,8 @@ NOT_RUN = {
     "shipped",
     ".venv/bin/cns-eval pr data/nclt": "needs them, too",
     ".venv/bin/cns-eval pr data/sequences": "needs KITTI's scans",
-    ".venv/bin/cns-eval tcr data/boreas": "likewise, though poses alone do",
+    ".venv/bin/cns-eval tcr data/boreas": "likewise",
+    "evo_rpe tum": "a program of its own",
     ".venv/bin/cns-drake import neukolln": "needs the file that is not shipped",
     "/** A batch of rays": "C++ of a design",
     "lidars: typing.Mapping": "lines of an example of Drake's",
