@@ -216,6 +216,14 @@ def few_methods(monkeypatch):
     return ship_methods(monkeypatch, "scan-context++", "solid")
 
 
+@pytest.fixture
+def own_methods(monkeypatch):
+    """Lets a test register methods that later tests do not find."""
+    from helpers.internal.registered_methods import forget_later
+
+    forget_later(monkeypatch)
+
+
 @pytest.fixture(scope="session")
 def small_map(tmp_path_factory):
     """Folder of a map that loads at once, with stages 01 and 04."""

@@ -66,6 +66,101 @@ def write_city(folder):
     (world / "sequence_02.yaml").write_text(yaml.safe_dump(_DRIVE))
 
 
+# Archetypes, with width, depth and height [m].
+_BUILDINGS = """
+art_deco_tower 25 21 102, balcony_flats 15 13 19, banded_tower 22 19 55,
+barn 10 9 9, brick_block 14 12 23, bungalow 11 10 5, car_park 28 24 22,
+chapel 13 11 18, church 28 34 50, corner_building 20 17 30,
+corner_store 11 10 9, court_block 31 26 23, detached_house 11 10 8,
+elevated_station 20 17 12, gallery_flats 17 14 25, garden_flats 17 14 13,
+gas_station 25 21 7, glass_skyscraper 28 24 130, grid_tower 22 19 65,
+hotel 28 24 47, kiosk_row 8 7 5, mill 20 17 18, museum 36 30 21,
+observation_tower 22 19 97, office 20 17 25, park_pavilion 7 6 6,
+parking_deck 34 28 18, podium_tower 36 30 76, row_house 6 6 10,
+school 28 24 11, semi_detached 13 11 8, shop_house 8 7 11, shop_strip 10 9 7,
+shopping_hall 39 33 16, slab_tower 20 17 54, sports_hall 25 21 11,
+supermarket 28 24 9, terrace 11 10 9, town_hall 25 21 29,
+unfinished_tower 22 19 33, walk_up 13 11 13, waterfront_hall 25 21 12
+"""
+_OBJECTS = """
+advertising_panel advertising_pillar basketball_hoop bench bicycle
+bicycle_rack bollard box_planter box_truck brick_pallets bus bus_shelter
+cabinet cafe_table city_car concrete_barrier container estate excavator
+flag_poles flower_bed fountain garage garden_wall hatchback hedge hoarding
+hydrant kiosk lamp_post lamp_post_curved lamp_post_curved_double
+lamp_post_double lantern lime_tree litter_bin low_shrub market_stall
+newspaper_boxes obelisk palm parking_meter pedestrian_light phone_box
+picket_fence pickup picnic_table pine pipe_stack plane_tree poplar
+portable_toilet post_box railing recycling_bins round_planter saloon shrub
+sign_direction sign_rectangular sign_round sign_stop sign_street_name
+sign_triangular site_cabin site_fence skip slide soil_heap spruce statue
+stone_bench suv swing ticket_machine tower_crane traffic_cones traffic_light
+traffic_light_post van willow young_tree
+"""
+_ONE_ROAD = """
+defaults: {lanes: [1, 1], lane_width: 3.5, sidewalk: 2.5, kerb_height: 0.15,
+           speed_limit: 13.9}
+junctions:
+  west: {position: [-40, -40], kerb_radius: 6, dead_end: true}
+  east: {position: [500, -40], kerb_radius: 6, dead_end: true}
+roads:
+  south: {start: west, end: east}
+"""
+
+
+def write_kinds(folder):
+    """Writes a city, `kinds`, with two buildings and an object of each kind.
+
+    In its first stage the first building is lower, and the second one a site if
+    it is large enough.
+    """
+    buildings, lower, sites = [], {}, {}
+    for row, text in enumerate(_BUILDINGS.replace("\n", " ").split(",")):
+        name, *sizes = text.split()
+        width, depth, height = map(float, sizes)
+        for k in (0, 1):
+            # The second one is larger, and turned.
+            building = {
+                "archetype": name,
+                "at": [60.0 * (row % 8), 120.0 * (row // 8) + 60.0 * k],
+                "size": [width + 2.0 * k, depth + k],
+                "height": height + 1.5 * k,
+                "yaw_deg": 90.0 * k,
+            }
+            buildings.append(building)
+            one = f"{name}_{k + 1:03d}"
+            grows = {"height": round(0.55 * height, 1), "structures": [one]}
+            is_site = k and min(width, depth) >= 18.0
+            (sites if is_site else lower)[one] = grows
+    objects = [
+        {"object": name, "at": [12.0 * (k % 40), 720.0 + 25.0 * (k // 40)]}
+        for k, name in enumerate(_OBJECTS.split())
+    ]
+    plan = {
+        "seed": 7,
+        "bounds": [-100, -100, 560, 850],
+        "cars": {"saloon": 1},
+        "street": {"lamp": "lantern"},
+        "districts": [
+            {
+                "name": "field",
+                "ground": "lawn",
+                "buildings": buildings,
+                "objects": objects,
+            }
+        ],
+    }
+    stages = {
+        "01": {"story": "low", "lower": lower, "sites": sites},
+        "02": {"story": "all of it"},
+    }
+    (folder / "kinds").mkdir()
+    for file, values in (("city", plan), ("stages", {"stages": stages})):
+        text = yaml.safe_dump(values, sort_keys=False)
+        (folder / "kinds" / f"{file}.yaml").write_text(text)
+    (folder / "kinds" / "roads.yaml").write_text(_ONE_ROAD)
+
+
 def write_scenarios(folder):
     """Writes a file for each recording, of the drive through the city."""
     for name, more in _RECORDINGS.items():

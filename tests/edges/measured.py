@@ -13,6 +13,7 @@ import json
 import math
 import os
 from pathlib import Path
+import re
 import shutil
 import subprocess
 import sys
@@ -158,6 +159,27 @@ def _small_city() -> Path:
 def city(folder: Path) -> dict[str, str]:
     """Builds the stages of the small city."""
     return {"city.csv": _files(_small_city())}
+
+
+def kinds(folder: Path) -> dict[str, str]:
+    """Builds a city of all archetypes and objects: a line for each kind."""
+    inputs.write_kinds(folder)
+    run(folder, "cns_drake", "city", "kinds")
+    digests: dict[str, list] = {}
+    for path in sorted((folder / "kinds").rglob("*.*")):
+        if path.suffix in (".obj", ".sdf", ".csv"):
+            data = path.read_bytes()
+            # Without the number of a building or tile, and what follows it.
+            kind = re.sub(r"_(\d{3}|tile)_.*", "", path.stem)
+            found = digests.setdefault(kind, [0, 0, hashlib.sha256()])
+            found[0] += 1
+            found[1] += len(data)
+            found[2].update(path.name.encode() + data)
+    rows = [
+        {"kind": kind, "files": number, "bytes": size, "sha256": _short(digest)}
+        for kind, (number, size, digest) in sorted(digests.items())
+    ]
+    return {"kinds.csv": _csv(rows)}
 
 
 def age(folder: Path) -> dict[str, str]:
@@ -320,6 +342,7 @@ EDGES: dict[str, Callable[[Path], dict[str, str]]] = {
     "recording-plain": recording("plain"),
     "pr": pr,
     "scan": scan,
+    "kinds": kinds,
 }
 BY_NIGHT: dict[str, Callable[[Path], dict[str, str]]] = {
     "shipped-cities": shipped_cities,

@@ -62,29 +62,6 @@ def parse_obj(text):
     return vertices, faces
 
 
-def first_hit(vertices, triangles, origins, directions) -> np.ndarray:
-    """Distances to triangles, both sides, inf for none.
-
-    Möller and Trumbore, "Fast, minimum storage ray/triangle intersection",
-    1997.
-    """
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    ab, ac = b - a, c - a
-    hits = np.full(len(origins), np.inf)
-    for k, (o, d) in enumerate(zip(origins, directions, strict=True)):
-        h = np.cross(d, ac)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            f = 1.0 / np.einsum("ij,ij->i", ab, h)
-            u = f * np.einsum("ij,ij->i", o - a, h)
-            q = np.cross(o - a, ab)
-            v = f * (q @ d)
-            t = f * np.einsum("ij,ij->i", ac, q)
-            ok = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
-        if ok.any():
-            hits[k] = t[ok].min()
-    return hits
-
-
 def surface_points(part, meshes, rng, count=200) -> np.ndarray:
     """Random points on a part's surface in the structure frame, (N, 3)."""
     shape = part.shape

@@ -111,6 +111,18 @@ def test_check_names_what_would_change(world, capsys):
         ),
         ("city.yaml", "relief: 1.5", "relief: 1.0e+300", "relief: Input"),
         ("stages.yaml", "tree_002", "tree_902", "structure tree_902"),
+        (
+            "stages.yaml",
+            "    absent:",
+            "    lower: {a: {height: 5, structures: [bench_001]}}\n    absent:",
+            "bench_001 is neither a building nor a plant",
+        ),
+        (
+            "stages.yaml",
+            "    absent:",
+            "    sites: {a: {height: 5, structures: [tree_003]}}\n    absent:",
+            "tree_003 is no building",
+        ),
         ("roads.yaml", "start: west", "start: vest", "roads.north.start"),
     ],
 )

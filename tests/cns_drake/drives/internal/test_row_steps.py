@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
+from cns_drake.drives import to_points
 from cns_drake.drives.mcap_messages import StaticTransforms
-from cns_drake.drives.point_cloud2 import has_wrong_rows, to_points
+from cns_drake.drives.point_cloud2 import has_wrong_rows
 
 DTYPE = np.dtype([(axis, "<f4") for axis in "xyz"])
 POINTS = np.arange(36, dtype="<f4").view(DTYPE)

@@ -10,12 +10,11 @@ import pytest
 
 from cns_drake import load_scenario
 from cns_drake.base import InputError
-from cns_drake.pictures import ShownStages
+from cns_drake.pictures import ShownStages, read_drive_page
 from cns_drake.pictures.drive_page import (
     make_drive_page,
     make_pair_page,
     moving_frames,
-    read_drive_page,
 )
 from cns_drake.pictures.drive_record import (
     DriveRecord,

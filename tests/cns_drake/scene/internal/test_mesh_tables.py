@@ -11,9 +11,8 @@ from pydrake.geometry import Mesh
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.scene.foreign_meshes import ForeignMeshes
+from cns_drake.scene import ForeignMeshes, MeshFiles
 from cns_drake.scene.mesh_check import check_mesh_file
-from cns_drake.scene.mesh_files import MeshFiles
 
 PAGE = Path(__file__).parents[4] / "docs" / "formats.md"
 

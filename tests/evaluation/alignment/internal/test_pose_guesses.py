@@ -2,7 +2,6 @@ from helpers.towns import rigid
 import numpy as np
 import pytest
 
-from cns_drake.base import yaw_pose
 from evaluation.alignment.pose_guesses import Candidates, find_guesses
 
 
@@ -38,50 +37,6 @@ def test_finds_what_few_agree_on(yaw, wrong):
     assert np.count_nonzero(best.pairs >= 40) <= 3
 
 
-def test_some_drift_is_forgiven():
-    X_TS = rigid([10.0, 20.0, 0.0], -30.0)
-    candidates = make_candidates(X_TS, 60, 60, drift=0.02)
-    best = find_guesses(candidates)[0]
-    assert np.count_nonzero(best.pairs < 60) >= 55
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("seed", [100, 170, 173])
-def test_a_refined_guess_with_which_nothing_agrees(seed):
-    """All candidates are wrong, and agree by chance only."""
-    rng = np.random.default_rng(seed)
-    number = int(rng.integers(3, 80))
-    zeros = np.zeros(number)
-    p_S, p_T = (
-        np.column_stack([rng.uniform(-60, 60, (number, 2)), zeros])
-        for _ in range(2)
-    )
-    turn = rng.uniform(-0.4, 0.4, number)
-    keyframes = np.arange(number)
-    for guess in find_guesses(Candidates(keyframes, keyframes, p_S, p_T, turn)):
-        assert np.isfinite(guess.X_TS).all()
-        assert len(guess.pairs)
-
-
-def test_guesses_come_in_the_order_of_their_votes():
-    first, second = (
-        rigid([50.0, 0.0, 0.0], 10.0),
-        rigid([0.0, 90.0, 0.0], 140.0),
-    )
-    parts = [make_candidates(first, 30, 0), make_candidates(second, 50, 0)]
-    joined = Candidates(
-        np.arange(80),
-        np.arange(80),
-        *(
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("p_S", "p_T", "turn")
-        ),
-    )
-    guesses = find_guesses(joined)
-    for guess, X_TS in zip(guesses, (second, first), strict=False):
-        np.testing.assert_allclose(guess.X_TS, X_TS, atol=2.0)
-
-
 def test_one_place_votes_once():
     """A place that is proposed many times counts once."""
     X_TS = rigid([5.0, 5.0, 0.0], 45.0)
@@ -101,8 +56,3 @@ def test_one_place_votes_once():
 @pytest.mark.parametrize("number", [0, 1])
 def test_too_few_to_agree(number):
     assert find_guesses(make_candidates(np.eye(4), number, 0)) == []
-
-
-def test_upright():
-    X = yaw_pose(np.pi / 2, 1.0, 2.0, 3.0)
-    np.testing.assert_allclose(X, rigid([1.0, 2.0, 3.0], 90.0), atol=1e-15)

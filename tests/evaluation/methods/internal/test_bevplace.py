@@ -8,7 +8,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 import pytest
 from scipy.ndimage import map_coordinates
 
-from cns_drake.base import InputError
 from evaluation.clouds import count_image, image_points
 from evaluation.methods import make_method
 from evaluation.methods.bevplace import (
@@ -17,7 +16,6 @@ from evaluation.methods.bevplace import (
     describe_image,
 )
 
-RNG = np.random.default_rng(7)
 # As large as an image must be for all scales.
 SIZE = 63
 
@@ -178,13 +176,6 @@ def test_turns_by_half_a_quarter():
     assert not pixels[0, 0].any()
 
 
-def test_scales_halve():
-    sizes = [len(one) for one, _ in _turned_images(picture(size=151))]
-    assert sizes[2::5] == [151, 76, 38, 19, 9]
-    # Of 45 deg: the diagonal.
-    assert sizes[1::5] == [214, 107, 53, 27, 13]
-
-
 @pytest.mark.slow
 def test_the_method(tmp_path):
     weights = random_weights()
@@ -207,14 +198,3 @@ def test_the_method(tmp_path):
     assert np.isnan(scores[2])
     assert np.isnan(method.score(nothing, database)).all()
     assert method.relative_pose(described, database, 0) is None
-
-
-def test_weights_of_another_network(tmp_path):
-    other = random_weights()
-    del other["netvlad.centroids"]
-    path = tmp_path / "w.npz"
-    np.savez(path, **other)
-    with pytest.raises(InputError, match=r"netvlad.centroids is missing"):
-        make_method("bevplace", {"weights": path})
-    with pytest.raises(InputError, match=r"bevplace: weights: Field required"):
-        make_method("bevplace", {})

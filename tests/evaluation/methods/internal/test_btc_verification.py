@@ -9,14 +9,6 @@ from evaluation.methods.btc import find_motion, plane_overlap
 from evaluation.methods.btc_planes import Planes
 
 
-def random_motion(rng, reach=20.0):
-    quaternion = rng.normal(size=4)
-    return poses.make_pose(
-        poses.rotation_from_quaternion(quaternion),
-        rng.uniform(-reach, reach, 3),
-    )
-
-
 def turn(angle, offset=(0.0, 0.0, 0.0)):
     X = np.eye(4)
     X[:2, :2] = [
@@ -29,47 +21,6 @@ def turn(angle, offset=(0.0, 0.0, 0.0)):
 
 def moved(X, triangles):
     return triangles @ X[:3, :3].T + X[:3, 3]
-
-
-class TestAlign:
-    @pytest.mark.parametrize("seed", range(3))
-    def test_motion_of_triangles(self, seed):
-        rng = np.random.default_rng([seed, 61])
-        query = rng.uniform(-30.0, 30.0, (40, 3, 3))
-        motions = np.stack([random_motion(rng) for _ in range(40)])
-        place = np.stack(
-            [moved(X, one) for X, one in zip(motions, query, strict=True)]
-        )
-        np.testing.assert_allclose(align(query, place), motions, atol=1e-9)
-        np.testing.assert_allclose(
-            align(query[7], place[7]), motions[7], atol=1e-9
-        )
-
-    def test_mirrored_triangle_is_turned_over(self):
-        # In the plane this would need a mirror; in space a turn does it.
-        triangle = np.array([[0.0, 0.0, 1.0], [3.0, 0.0, 1.0], [0.0, 4.0, 1.0]])
-        X = align(triangle, triangle * [-1.0, 1.0, 1.0])
-        np.testing.assert_allclose(
-            X[:3, :3], np.diag([-1.0, 1.0, -1.0]), atol=1e-12
-        )
-        np.testing.assert_allclose(X[:3, 3], [0.0, 0.0, 2.0], atol=1e-12)
-
-    def test_least_squares(self):
-        rng = np.random.default_rng(62)
-        query = rng.uniform(-10.0, 10.0, (3, 3))
-        place = moved(random_motion(rng), query) + rng.normal(0.0, 0.3, (3, 3))
-
-        def cost(X):
-            return ((moved(X, query) - place) ** 2).sum()
-
-        best = align(query, place)
-        assert np.linalg.det(best[:3, :3]) == pytest.approx(1.0)
-        for _ in range(300):
-            step = poses.make_pose(
-                poses.rotation_from_quaternion([*rng.normal(0, 0.02, 3), 1.0]),
-                rng.normal(0.0, 0.05, 3),
-            )
-            assert cost(step @ best) >= cost(best)
 
 
 class TestFindMotion:

@@ -58,26 +58,6 @@ def test_against_all_distances(make, k):
     assert (np.diff(ordered, axis=1) > 0).all()
 
 
-def test_a_point_is_its_own_neighbour():
-    points = clusters(2)
-    neighbours = nearest_neighbours(points, 5)
-    assert (neighbours == np.arange(len(points))[:, None]).any(axis=1).all()
-
-
-@pytest.mark.parametrize("number", [1, 2, 15, 16, 31, 32, 33, 64])
-def test_all_points_are_neighbours(number):
-    points = np.random.default_rng([number]).normal(size=(number, 3))
-    neighbours = np.sort(nearest_neighbours(points, number), axis=1)
-    np.testing.assert_array_equal(
-        neighbours, np.tile(np.arange(number), (number, 1))
-    )
-
-
 def test_points_in_one_place():
     neighbours = nearest_neighbours(np.ones((500, 3)), 30)
     assert (np.diff(np.sort(neighbours, axis=1), axis=1) > 0).all()
-
-
-def test_same_cloud_same_neighbours():
-    one, two = (nearest_neighbours(lattice(5), 30) for _ in range(2))
-    np.testing.assert_array_equal(one, two)

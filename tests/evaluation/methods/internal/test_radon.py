@@ -44,17 +44,6 @@ def follow_rays(image, angle):
     return sums
 
 
-def test_along_the_rows_and_columns():
-    image = np.random.default_rng([1]).uniform(size=(6, 6, 2))
-    angles = np.array([0.0, 0.5, 1.0, 1.5]) * math.pi
-    result = radon(image, angles)
-    assert result.shape == (4, 6, 2)
-    np.testing.assert_allclose(result[0], image.sum(axis=0))
-    np.testing.assert_allclose(result[2], image.sum(axis=0)[::-1])
-    np.testing.assert_allclose(result[1], image.sum(axis=1)[::-1])
-    np.testing.assert_allclose(result[3], image.sum(axis=1))
-
-
 @pytest.mark.parametrize("angle_deg", [0.0, 17.0, 45.0, 133.0, 200.0, 301.0])
 def test_one_pixel_casts_a_hat(angle_deg):
     size = 15
@@ -80,12 +69,6 @@ def test_against_following_rays(angle_deg, size):
     np.testing.assert_allclose(result, follow_rays(image, angle), atol=1e-9)
 
 
-def test_opposite_rays_are_reversed():
-    image = np.random.default_rng([2]).uniform(size=(9, 9, 3))
-    one, other = radon(image, np.array([0.7, 0.7 + math.pi]))
-    np.testing.assert_allclose(one, other[::-1], atol=1e-12)
-
-
 def test_a_turned_image_shifts_the_angles():
     image = np.random.default_rng([3]).uniform(size=(8, 8, 1))
     angles = np.arange(8) * (math.pi / 4)
@@ -94,15 +77,4 @@ def test_a_turned_image_shifts_the_angles():
     shifted = np.roll(radon(image, angles), 2, axis=0)
     np.testing.assert_allclose(
         radon(np.ascontiguousarray(turned), angles), shifted, atol=1e-12
-    )
-
-
-def test_is_linear():
-    rng = np.random.default_rng([4])
-    one, two = rng.uniform(-1.0, 1.0, (2, 10, 10, 2))
-    angles = np.linspace(0.0, 3.0, 7)
-    np.testing.assert_allclose(
-        radon(2.0 * one - two, angles),
-        2.0 * radon(one, angles) - radon(two, angles),
-        atol=1e-12,
     )

@@ -2,8 +2,9 @@
 
 import pytest
 
+from evaluation.paper import paper
 from evaluation.paper.findings import MET, MISSED, aims
-from evaluation.paper.paper_values import Measured, Numbers, paper
+from evaluation.paper.paper_values import Measured, Numbers
 from evaluation.recognition import MODES
 
 

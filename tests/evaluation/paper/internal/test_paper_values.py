@@ -2,7 +2,8 @@
 
 import pytest
 
-from evaluation.paper.paper_values import Measured, paper
+from evaluation.paper import paper
+from evaluation.paper.paper_values import Measured
 
 
 def test_paper_values():

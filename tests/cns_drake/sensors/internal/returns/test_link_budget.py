@@ -7,11 +7,10 @@ import pytest
 from scipy.special import lambertw
 
 from cns_drake.scene import CLASS_IDS
-from cns_drake.sensors import HOPELESS_SNR, Weather
+from cns_drake.sensors import HOPELESS_SNR, Weather, fit_link_budget
 from cns_drake.sensors.returns.link_budget import (
     CERTAIN_SNR,
     detection_probability,
-    fit_link_budget,
     target_snr,
 )
 from cns_drake.units import LIDAR_PRESETS, ReturnsSheet

@@ -1,0 +1,46 @@
+"""The learned descriptor: images, network, scores, files of weights."""
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from evaluation.methods import (
+    FEATURES,
+    LAYERS,
+    RINGS,
+    SECTORS,
+    TURNS,
+)
+from evaluation.methods.learned import _feature_map
+
+RNG = np.random.default_rng(7)
+
+
+def weight_values(**changes):
+    rng = np.random.default_rng(3)
+    values = {"version": np.int64(1), "seen": np.array([0.5, 1.0])}
+    for number, (before, after, _, _) in enumerate(LAYERS):
+        kernel = rng.normal(size=(9 * before, after)) / np.sqrt(9 * before)
+        values[f"kernel_{number}"] = kernel.astype(np.float32)
+        values[f"bias_{number}"] = rng.normal(size=after).astype(np.float32)
+    return values | changes
+
+
+def test_the_network_by_correlations():
+    values = weight_values()
+    image = RNG.integers(0, 256, (RINGS, SECTORS, 8)).astype(np.uint8)
+    cells = image / 255.0
+    for number, (before, after, down, along) in enumerate(LAYERS):
+        kernel = values[f"kernel_{number}"].reshape(3, 3, before, after)
+        found = np.zeros((*cells.shape[:2], after)) + values[f"bias_{number}"]
+        for i in range(before):
+            wrapped = np.pad(cells[:, :, i], ((0, 0), (1, 1)), mode="wrap")
+            for j in range(after):
+                found[:, :, j] += ndimage.correlate(
+                    wrapped, kernel[:, :, i, j], mode="constant"
+                )[:, 1:-1]
+        cells = found[::down, ::along]
+        if number < len(LAYERS) - 1:
+            cells = np.maximum(cells, 0.0)
+    expected = cells.transpose(1, 0, 2).reshape(TURNS, FEATURES)
+    assert _feature_map(values, image) == pytest.approx(expected, abs=1e-4)
