@@ -45,5 +45,7 @@ from cns_drake.simulation import add_mcap_recorder as add_mcap_recorder
 from cns_drake.simulation import make_station as make_station
 from cns_drake.simulation import plan_scenario_traffic as plan_scenario_traffic
 from cns_drake.simulation import simulate as simulate
+from cns_drake.studies import causes as causes
+from cns_drake.studies import register_cause as register_cause
 from cns_drake.traffic import add_traffic as add_traffic
 from cns_drake.units import LIDAR_PRESETS as LIDAR_PRESETS

@@ -28,7 +28,7 @@ from docs.picture_parts import (
     make_plain,
 )
 from docs.survival import retained_in_cities
-from evaluation.methods import method_facts, shipped_methods
+from evaluation.methods import METHODS, shipped_methods
 from evaluation.results import (
     INK,
     MARGIN,
@@ -49,11 +49,7 @@ METHOD_STYLES = {
     if (style := method_style(name))
 }
 # The methods that this project made; all others are published ones.
-OURS = {
-    name
-    for name in shipped_methods()
-    if (facts := method_facts(name)) and not facts.source
-}
+OURS = {name for name in shipped_methods() if not METHODS[name].source}
 
 
 def survival(path: Path) -> None:

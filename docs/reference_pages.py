@@ -67,7 +67,7 @@ from cns_drake.studies import (
     Fleet,
     Losses,
     MadeMap,
-    shipped_causes,
+    causes,
 )
 from cns_drake.units import (
     LIDAR_PRESETS,
@@ -268,7 +268,7 @@ def _causes() -> str:
             + ("" if cause.combined else " (not part of `all`)"),
             _values_of_levels(cause.strengths.get("levels")),
         )
-        for cause in shipped_causes().values()
+        for cause in causes().values()
     ]
     parts = [
         "## Causes of change",

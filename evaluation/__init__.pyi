@@ -3,8 +3,10 @@ from cns_drake.drives import Drive as Drive
 from evaluation.change import TemporalChange as TemporalChange
 from evaluation.change import covered as covered
 from evaluation.change import temporal_change as temporal_change
+from evaluation.drives import DataSet as DataSet
 from evaluation.drives import check_data_set as check_data_set
 from evaluation.drives import open_drive as open_drive
+from evaluation.drives import register_data_set as register_data_set
 from evaluation.maps import VoxelMap as VoxelMap
 from evaluation.maps import map_drive as map_drive
 from evaluation.maps import voxelise as voxelise

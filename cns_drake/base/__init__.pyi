@@ -49,7 +49,8 @@ from cns_drake.base.errors import errors_at_option as errors_at_option
 from cns_drake.base.errors import one_line as one_line
 from cns_drake.base.errors import validated as validated
 from cns_drake.base.errors import value_errors as value_errors
-from cns_drake.base.families import family_members as family_members
+from cns_drake.base.families import Family as Family
+from cns_drake.base.families import import_modules as import_modules
 from cns_drake.base.figures import GONE_RGB as GONE_RGB
 from cns_drake.base.figures import NEW_RGB as NEW_RGB
 from cns_drake.base.figures import UNSEEN_RGB as UNSEEN_RGB

@@ -19,6 +19,7 @@ from cns_drake.base.errors import (
     one_line,
     shows_traceback,
 )
+from cns_drake.base.families import plugin_fault
 from cns_drake.base.process import collect_garbage_seldom
 from cns_drake.base.progress import doing
 from cns_drake.base.system_libraries import has_utf8, missing_library
@@ -249,9 +250,6 @@ def _failure_of(error: BaseException) -> tuple[str | None, int] | None:
     is_loop = str(error).startswith("Symlink loop")
     if isinstance(error, RuntimeError) and is_loop:
         return f"error: {error}", 2
-    if isinstance(error, ImportError):
-        fault = missing_library(error)
-        return None if fault is None else (f"error: {fault}", 2)
     if isinstance(error, SystemExit):
         # Drake's C++ raises SystemExit when one of its own checks fails.
         message = (
@@ -263,7 +261,10 @@ def _failure_of(error: BaseException) -> tuple[str | None, int] | None:
         return message, 0 if is_closed else status
     if isinstance(error, UnicodeError):
         return f"error: a name that is no text ({error})", 2
-    return None
+    fault = plugin_fault(error)
+    if fault is None and isinstance(error, ImportError):
+        fault = missing_library(error)
+    return None if fault is None else (f"error: {fault}", 2)
 
 
 def _open_standard_streams() -> None:

@@ -1,6 +1,7 @@
 """The formats to which recordings are exported: a family, found by name."""
 
-from cns_drake.base import family_members
+from pathlib import Path
+import pkgutil
 
 # A module with this ending has the layout of a format.
 ENDING = "_layout"
@@ -8,7 +9,9 @@ ENDING = "_layout"
 
 def export_formats() -> tuple[str, ...]:
     """Returns the names of the formats to which a recording is exported."""
+    modules = pkgutil.iter_modules([str(Path(__file__).parent)])
     return tuple(
-        name.removesuffix(ENDING)
-        for name in family_members(str(__package__), "LAYOUT = ")
+        one.name.removesuffix(ENDING)
+        for one in modules
+        if one.name.endswith(ENDING)
     )

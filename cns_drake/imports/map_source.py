@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 import functools
-import importlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cns_drake.base import InputError, family_members
+from cns_drake.base import InputError, import_modules
 from cns_drake.imports.options import ImportOptions
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ class MapSource:
     """A format from which maps are imported.
 
     A package below `cns_drake.imports` has a map source as its constant
-    `SOURCE`, and is found by this. Give `read` or `write_town`.
+    `SOURCE`. Give `read` or `write_town`.
 
     Attributes:
         title: name of the format.
@@ -62,8 +61,10 @@ class MapSource:
 @functools.cache
 def map_sources() -> tuple[MapSource, ...]:
     """Returns the formats from which maps are imported."""
-    members = family_members(str(__package__), "SOURCE = ")
-    return tuple(importlib.import_module(m).SOURCE for m in members.values())
+    modules = import_modules(str(__package__), only_packages=True)
+    return tuple(
+        one.SOURCE for one in modules.values() if hasattr(one, "SOURCE")
+    )
 
 
 def source_of(path: Path) -> MapSource:

@@ -145,7 +145,9 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
 def recording_code() -> str:
     """Returns a digest of all code that affects a recording."""
     return code_digest(
-        "cns_drake.simulation.simulation", without=("cns_drake.pictures",)
+        "cns_drake.simulation.simulation",
+        "cns_drake.transient.*",
+        without=("cns_drake.pictures",),
     )
 
 

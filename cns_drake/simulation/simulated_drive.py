@@ -58,7 +58,11 @@ class SimulationSource:
         return {
             "simulated": self.scenario.model_dump(mode="json"),
             "inputs": digest_inputs(self.scenario),
-            "code": code_digest(__name__, without=("cns_drake.pictures",)),
+            "code": code_digest(
+                __name__,
+                "cns_drake.transient.*",
+                without=("cns_drake.pictures",),
+            ),
         }
 
 

@@ -2,8 +2,9 @@ from cns_drake.studies.drives.changed_drives import Losses as Losses
 from cns_drake.studies.drives.sampled_drives import DrawnRoute as DrawnRoute
 from cns_drake.studies.drives.sampled_drives import Fleet as Fleet
 from cns_drake.studies.experiments.cause_files import Cause as Cause
+from cns_drake.studies.experiments.cause_files import causes as causes
 from cns_drake.studies.experiments.cause_files import (
-    shipped_causes as shipped_causes,
+    register_cause as register_cause,
 )
 from cns_drake.studies.experiments.experiment import Experiment as Experiment
 from cns_drake.studies.experiments.experiment import MadeMap as MadeMap

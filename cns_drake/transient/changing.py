@@ -1,12 +1,11 @@
 """Makes all changes between drives in a loaded world, in a fixed order."""
 
 import functools
-import importlib
 import itertools
 
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base import family_members
+from cns_drake.base import import_modules
 from cns_drake.scenarios import TransientConfig
 from cns_drake.scene import World
 from cns_drake.transient.effect import Effect, Phase
@@ -62,6 +61,6 @@ def change_world(
 @functools.cache
 def effects() -> tuple[Effect, ...]:
     """Returns all effects, in the order in which they are applied."""
-    modules = family_members(str(__package__), "EFFECT = ")
-    found = (importlib.import_module(m).EFFECT for m in modules.values())
+    modules = import_modules(str(__package__)).values()
+    found = (one.EFFECT for one in modules if hasattr(one, "EFFECT"))
     return tuple(sorted(found, key=lambda one: (one.phase, one.order)))

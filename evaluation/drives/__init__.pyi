@@ -12,6 +12,7 @@ from evaluation.drives.nclt import read_nclt_scan as read_nclt_scan
 from evaluation.drives.opening import data_sets as data_sets
 from evaluation.drives.opening import find_data_sets as find_data_sets
 from evaluation.drives.opening import open_drive as open_drive
+from evaluation.drives.opening import register_data_set as register_data_set
 from evaluation.drives.query_sensor import QuerySensor as QuerySensor
 from evaluation.drives.sampling import sample_frames as sample_frames
 from evaluation.drives.sampling import travelled as travelled

@@ -11,8 +11,8 @@ from cns_drake.drives import Drive
 class DataSet:
     """A layout in which drives are stored.
 
-    A module of this package has a data set as its constant `DATA_SET`, and is
-    found by this.
+    A module of this package has a data set as its constant `DATA_SET`. Register
+    one of your own with `register_data_set`.
 
     Attributes:
         title: name of the layout in messages.
@@ -28,6 +28,14 @@ class DataSet:
             data set.
         needs_scenario: whether only the file `scenario.yaml` in a drive's
             folder says in which city the drive is.
+
+    Example:
+        from evaluation import DataSet
+
+        def is_mine(path):
+            return (path / "mine.txt").is_file()
+
+        DataSet("Mine", is_mine, open_mine, "the folder with `mine.txt`")
     """
 
     title: str

@@ -1,12 +1,10 @@
 """Opening a recorded drive with the reader for its format."""
 
 from collections.abc import Mapping
-import functools
-import importlib
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import InputError, doing, family_members, listed
+from cns_drake.base import Family, InputError, doing, import_modules, listed
 from cns_drake.drives import Drive
 from evaluation.drives.data_set import DataSet
 
@@ -64,16 +62,46 @@ def open_drive(
     )
 
 
-@functools.cache
+def register_data_set(data_set: DataSet) -> DataSet:
+    """Registers a data set of your own, whose drives `open_drive` then opens.
+
+    Args:
+        data_set: the data set; all commands take its drives.
+
+    Raises:
+        ValueError: there is another data set with this title.
+
+    Example:
+        from evaluation import DataSet, register_data_set
+
+        register_data_set(
+            DataSet("Mine", is_mine, open_mine, "the folder with `mine.txt`")
+        )
+    """
+    _DATA_SETS.load_own()
+    _add(data_set)
+    return data_set
+
+
 def data_sets() -> Mapping[str, DataSet]:
-    """Returns name -> data set; the name is that of its module."""
+    """Returns the data sets by their titles in lower case."""
+    return _DATA_SETS
+
+
+def _load_own() -> None:
     # Imported late: the readers' libraries are slow to load, and a map file
     # needs none of them.
-    members = family_members(str(__package__), "DATA_SET = ")
-    return {
-        name: importlib.import_module(module).DATA_SET
-        for name, module in members.items()
-    }
+    for module in import_modules(str(__package__)).values():
+        if hasattr(module, "DATA_SET"):
+            _add(module.DATA_SET)
+
+
+_DATA_SETS: Family[DataSet] = Family("data set", _load_own)
+
+
+def _add(data_set: DataSet) -> None:
+    source = data_set.holds.__module__, data_set.holds.__qualname__
+    _DATA_SETS.add(data_set.title.lower(), data_set, source)
 
 
 def find_data_sets(path: Path) -> list[DataSet]:

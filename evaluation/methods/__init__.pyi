@@ -27,11 +27,10 @@ from evaluation.methods.method_check import check_method as check_method
 from evaluation.methods.own_files import as_users_code as as_users_code
 from evaluation.methods.own_files import load_method as load_method
 from evaluation.methods.own_files import run_module as run_module
-from evaluation.methods.registry import MethodFacts as MethodFacts
+from evaluation.methods.registry import METHODS as METHODS
 from evaluation.methods.registry import find_method as find_method
 from evaluation.methods.registry import known_methods as known_methods
 from evaluation.methods.registry import make_method as make_method
-from evaluation.methods.registry import method_facts as method_facts
 from evaluation.methods.registry import optional_methods as optional_methods
 from evaluation.methods.registry import register as register
 from evaluation.methods.registry import shipped_methods as shipped_methods

@@ -1,94 +1,24 @@
 """The registry of place-recognition methods, by their names.
 
-A shipped method is found by its file: a module of this package that has a class
-with the decorator `register`. Its name and its facts are read from the source,
-because importing all methods takes seconds.
+A shipped method is a module of this package that has a class with the decorator
+`register`.
 """
 
-import ast
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 import contextlib
-from dataclasses import dataclass, fields
 import functools
-import importlib
-import importlib.util
-from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from cns_drake.base import InputError, did_you_mean, family_members
+from cns_drake.base import Family, InputError, did_you_mean, import_modules
 from evaluation.methods.method import Method
 from evaluation.methods.own_files import users_code
 
-# Methods of the user, by name.
-_METHODS: dict[str, type[Method]] = {}
+METHODS: Family[type[Method]] = Family(
+    "method", functools.partial(import_modules, str(__package__))
+)
 _MethodClass = TypeVar("_MethodClass", bound=type[Method])
-
-
-@dataclass(frozen=True)
-class MethodFacts:
-    """What tables and charts show of a method, see `Method`.
-
-    Attributes:
-        title: its name, as its authors write it.
-        style: its colour, line style and marker; None if it has none.
-        source: its publication; empty for a method of this project.
-        standard: whether it runs by default.
-        order: its place in tables.
-    """
-
-    title: str
-    style: tuple[str, str, str] | None = Method.style
-    source: str = Method.source
-    standard: bool = Method.standard
-    order: int = Method.order
-
-
-@dataclass(frozen=True)
-class _Shipped:
-    """A shipped method: the full name of its module, and its facts."""
-
-    module: str
-    facts: MethodFacts
-
-
-@functools.cache
-def _shipped() -> Mapping[str, _Shipped]:
-    """Returns name -> the shipped method, sorted by name."""
-    found = {}
-    package = str(__package__)
-    for module in family_members(package, "@register(").values():
-        spec = importlib.util.find_spec(module)
-        assert spec is not None
-        assert spec.origin is not None
-        for node in ast.parse(Path(spec.origin).read_bytes()).body:
-            for name, values in _registered(node):
-                facts = MethodFacts(**{"title": name, **values})
-                found[name] = _Shipped(module, facts)
-    return dict(sorted(found.items()))
-
-
-def _registered(node: ast.stmt) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yields the name and the facts of a class with the decorator `register`.
-
-    A fact is a literal in the body of the class.
-    """
-    if not isinstance(node, ast.ClassDef):
-        return
-    names = {one.name for one in fields(MethodFacts)}
-    for call in node.decorator_list:
-        if isinstance(call, ast.Call) and ast.unparse(call.func) == "register":
-            yield (
-                ast.literal_eval(call.args[0]),
-                {
-                    line.targets[0].id: ast.literal_eval(line.value)
-                    for line in node.body
-                    if isinstance(line, ast.Assign)
-                    and isinstance(line.targets[0], ast.Name)
-                    and line.targets[0].id in names
-                },
-            )
 
 
 def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
@@ -111,17 +41,12 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
         raise ValueError(f"{name!r} is no name of a method")
 
     def enter(method: _MethodClass) -> _MethodClass:
+        module = method.__module__
         method.name = name
-        if method.__module__.startswith(f"{__package__}."):
-            return method  # It is found by its file.
-        other = _METHODS.get(name, method)
-        # The same class may be registered again, when its file runs again.
-        if name in _shipped() or (
-            other.__module__,
-            other.__qualname__,
-        ) != (method.__module__, method.__qualname__):
-            raise ValueError(f"there is another method {name!r}")
-        _METHODS[name] = method
+        method.title = method.title or name
+        if not module.startswith(f"{__package__}."):
+            METHODS.load_own()
+        METHODS.add(name, method, (module, method.__qualname__))
         return method
 
     return enter
@@ -130,41 +55,36 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
 def known_methods() -> tuple[str, ...]:
     """Returns the names of all methods.
 
-    These are the shipped methods, the optional methods, and methods of your own
-    whose files have been loaded.
+    These are the shipped methods, the optional methods, those of plug-ins, and
+    methods of your own whose files have been loaded.
 
     Example:
         from evaluation import known_methods
 
         print(known_methods())
     """
-    return tuple(sorted({*_METHODS, *_shipped()}))
+    return tuple(sorted(METHODS))
 
 
 def optional_methods() -> tuple[str, ...]:
-    """Returns the names of the methods that run only on request."""
-    return tuple(n for n, one in _shipped().items() if not one.facts.standard)
+    """Returns the names of the methods that run only on request.
+
+    Methods of files are left out.
+    """
+    return _installed_methods(standard=False)
 
 
 def shipped_methods() -> tuple[str, ...]:
     """Returns the names of the methods that run by default."""
-    return tuple(n for n, one in _shipped().items() if one.facts.standard)
+    return _installed_methods(standard=True)
 
 
-def method_facts(name: str) -> MethodFacts | None:
-    """Returns what tables and charts show of a method; None if it is unknown.
-
-    Args:
-        name: name of a shipped method, or of a method of your own whose file
-            has been loaded.
-    """
-    if name in _shipped():
-        return _shipped()[name].facts
-    own = _METHODS.get(name)
-    if own is None:
-        return None
-    values = {one.name: getattr(own, one.name) for one in fields(MethodFacts)}
-    return MethodFacts(**{**values, "title": own.title or name})
+def _installed_methods(*, standard: bool) -> tuple[str, ...]:
+    return tuple(
+        name
+        for name in known_methods()
+        if METHODS[name].standard == standard and METHODS[name]._file is None
+    )
 
 
 def find_method(name: str) -> type[Method]:
@@ -173,13 +93,8 @@ def find_method(name: str) -> type[Method]:
     Raises:
         InputError: there is no such method.
     """
-    if name in _METHODS:
-        return _METHODS[name]
-    if name in _shipped():
-        module = importlib.import_module(_shipped()[name].module)
-        for value in vars(module).values():
-            if isinstance(value, type) and vars(value).get("name") == name:
-                return value
+    if name in METHODS:
+        return METHODS[name]
     known = known_methods()
     raise InputError(
         f"name: no method {name!r} (known: {', '.join(known)})"

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
+import inspect
 import math
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from cns_drake.base import InputError, did_you_mean, errors_at, repeated
+from cns_drake.base import Family, InputError, did_you_mean, errors_at
 from evaluation.methods import as_users_code, run_module
 from evaluation.recognition.precision_recall import (
     WeightedMetrics,
@@ -536,7 +537,9 @@ def _shipped() -> Iterator[Metric]:
     )
 
 
-METRICS: dict[str, Metric] = {one.name: one for one in _shipped()}
+METRICS: Family[Metric] = Family("metric")
+for _one in _shipped():
+    METRICS.add(_one.name, _one, __name__)
 
 
 def metric_named(name: str) -> Metric:
@@ -591,6 +594,7 @@ def register_metric(
             title or name.replace("_", " "),
             unit,
             compute=compute,
+            file=Path(inspect.getfile(compute)),
             **fields,
         )
         if metric.least >= metric.greatest:
@@ -598,44 +602,47 @@ def register_metric(
                 f"{name}: least: {metric.least:g} is not below greatest,"
                 f" {metric.greatest:g}"
             )
-        if name in METRICS and METRICS[name].file is None:
-            raise ValueError(f"there is another metric {name!r}")
+        METRICS.add(name, metric, _source(compute))
         return metric
 
     return enter
+
+
+def _source(compute: Callable) -> tuple[str, str]:
+    return compute.__module__, compute.__qualname__
 
 
 def load_metrics(path: Path) -> list[Metric]:
     """Returns the metrics that a user's Python file registers.
 
     Raises:
-        InputError: there is no such file, it fails, or it registers no metric,
-            or one whose name another file has registered.
+        InputError: there is no such file, it fails, or it registers no metric.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     module = run_module(path)
     found = [
-        replace(value, compute=as_users_code(value.compute, path), file=path)
+        value
         for value in vars(module).values()
         if isinstance(value, Metric)
-        and value.file is None
         and value.compute
-        and METRICS.get(value.name) is not value
+        and value.compute.__module__ == module.__name__
     ]
     if not found:
         raise InputError(
             f"{path}: registers no metric; see evaluation.register_metric"
         )
-    for name in repeated(metric.name for metric in found):
-        raise InputError(f"{path}: two metrics are named {name!r}")
-    for metric in found:
-        known = METRICS.get(metric.name)
-        if known is not None and known.file != path:
-            raise InputError(f"{path}: another metric is named {metric.name!r}")
-        _try(metric)
-        METRICS[metric.name] = metric
-    return found
+    return [_checked_here(metric, path) for metric in found]
+
+
+def _checked_here(metric: Metric, path: Path) -> Metric:
+    """Returns a metric whose faults name its file."""
+    assert metric.compute is not None
+    naming = as_users_code(metric.compute, path)
+    named = replace(metric, compute=naming, file=path)
+    _try(named)
+    METRICS.add(metric.name, named, _source(metric.compute))
+    return named
 
 
 def _try(metric: Metric) -> None:

@@ -21,12 +21,6 @@ from evaluation.recognition.sign_flips import (
     jackknife_interval,
 )
 
-# The retained shares of the weighted metrics, in their order.
-_RETAINED = [
-    next(one.name for one in METRICS.values() if one.share_of == name)
-    for name in WeightedMetrics._fields
-]
-
 
 def place_numbers(
     now: PlaceOutcome, before: PlaceOutcome | None
@@ -88,14 +82,17 @@ def _compared_numbers(
     """
     outcomes = now.outcomes
     is_paired = len(before.outcomes) == len(outcomes)
-    for name, of in zip(_RETAINED, WeightedMetrics._fields, strict=True):
+    for of in WeightedMetrics._fields:
         metric = METRICS[of]
+        retained = next(
+            one.name for one in METRICS.values() if one.share_of == of
+        )
         share = kept_share(metric.of(outcomes), metric.of(before.outcomes))
         interval = UNKNOWN
         if is_paired:
             then = replace(before.outcomes, blocks=outcomes.own_blocks)
             interval = _kept_interval(metric, outcomes, then)
-        yield now.number(name, float(share), interval)
+        yield now.number(retained, float(share), interval)
     if is_paired:
         right = outcomes.is_right
         was = before.outcomes.is_right

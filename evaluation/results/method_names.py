@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 import math
 
-from evaluation.methods import method_facts
+from evaluation.methods import METHODS
 
 
 def title(label: str) -> str:
@@ -14,8 +14,8 @@ def title(label: str) -> str:
             settings, if any.
     """
     method, comma, settings = label.partition(",")
-    facts = method_facts(method)
-    return f"{facts.title if facts else method}{comma}{settings}"
+    name = METHODS[method].title if method in METHODS else method
+    return f"{name}{comma}{settings}"
 
 
 def in_table_order(methods: Iterable[str]) -> list[str]:
@@ -26,7 +26,7 @@ def in_table_order(methods: Iterable[str]) -> list[str]:
     """
 
     def place(method: str) -> tuple[float, str]:
-        facts = method_facts(method)
-        return (facts.order if facts else math.inf), method
+        known = METHODS.get(method)
+        return (known.order if known else math.inf), method
 
     return sorted(set(methods), key=place)

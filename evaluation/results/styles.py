@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from evaluation.methods import method_facts
+from evaluation.methods import METHODS
 from evaluation.results.method_names import title
 
 
@@ -70,8 +70,8 @@ def method_styles(labels: Sequence[str]) -> dict[str, MethodStyle]:
 
 def method_style(name: str) -> MethodStyle | None:
     """Returns a method's own style; None if it has none."""
-    facts = method_facts(name)
-    return MethodStyle(*facts.style) if facts and facts.style else None
+    known = METHODS.get(name)
+    return MethodStyle(*known.style) if known and known.style else None
 
 
 def _other_style(number: int) -> MethodStyle:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
+import inspect
 import os
 from pathlib import Path
 
 from cns_drake.base import (
     InputError,
+    code_digest,
     did_you_mean,
     file_digests,
     repeated,
@@ -93,14 +95,18 @@ class MethodChoice:
         Raises:
             InputError: if the method's file cannot be used.
         """
-        config = self.make().config
+        method = self.make()
+        module = type(method).__module__
+        config = method.config
         values: dict = {
             "name": self.name,
             "parameters": config.model_dump(mode="json"),
             "files": dict(_digests(config.model_dump())),
         }
-        if self.file is not None:
-            values["file"] = script_digest(self.file)
+        if module.startswith("evaluation."):
+            values["code"] = code_digest(module)
+        elif module != "__main__":
+            values["code"] = script_digest(Path(inspect.getfile(type(method))))
         return values
 
 

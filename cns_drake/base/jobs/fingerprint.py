@@ -25,8 +25,6 @@ from cns_drake.base.version import installed_versions
 _ROOT = Path(__file__).parents[3]
 # Names of the packages.
 _PACKAGES = ("cns_drake", "evaluation")
-# A function whose callers depend on all modules of their package.
-_FAMILY = "family_members"
 # Packages of others that influence numbers.
 _LIBRARIES = (
     "drake", "embreex", "numba", "numpy", "open3d", "open3d-cpu", "scipy",
@@ -127,8 +125,6 @@ def _imported_modules(module: _Module) -> Iterator[_Module]:
             continue
         package = _Module(_ROOT if own else module.root, home)
         yield package
-        if name == _FAMILY and own:  # It finds the modules beside it.
-            yield from _modules_of(module.name.rpartition(".")[0])
         inner = package._replace(name=f"{home}.{name}")
         if name and _source(inner) is not None:
             yield inner

@@ -28,6 +28,7 @@ from types import ModuleType
 
 from cns_drake.base import errors, interrupts, system_libraries
 from cns_drake.base.errors import InputError
+from cns_drake.base.families import plugin_fault
 from cns_drake.base.file_locks import exclusive, remove_lock
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.step import Reporter, Step
@@ -274,6 +275,8 @@ def _run_job(job: bytes, reporter: Reporter) -> tuple[str, str]:
             lacking = system_libraries.missing_library(error)
             if lacking:
                 return "fault", lacking
+        if fault := plugin_fault(error):
+            return "fault", fault
         reporter.note(traceback.format_exc())
         return "fault", errors.one_line(f"{type(error).__name__}: {error}")
     return "done", ""

@@ -1,6 +1,7 @@
 """A family: causes of change, one YAML file each in the folder `causes`.
 
-An experiment takes its cases from these files with the field `causes`:
+Plug-ins register more. An experiment takes its cases from causes with the field
+`causes`:
 
     causes: {each: ladder}      # a case for each cause, and `all` of them
     causes: {together: levels}  # the case `all`, of all causes
@@ -10,13 +11,18 @@ without this name is left out.
 """
 
 from collections.abc import Mapping
-import functools
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field
 
-from cns_drake.base import InputError, did_you_mean, read_yaml, validated
+from cns_drake.base import (
+    Family,
+    InputError,
+    did_you_mean,
+    read_yaml,
+    validated,
+)
 from cns_drake.sensors import Section
 from cns_drake.studies.experiments.nested_fields import SIDES, Case, merged
 
@@ -44,7 +50,7 @@ class Cause(Section):
     title: str
     about: str
     scans_only: bool = False
-    order: int
+    order: int = 100
     combined: bool = True
     strengths: dict[str, Case] = Field(min_length=1)
 
@@ -55,19 +61,65 @@ class Cause(Section):
         return tuple(side for side in SIDES if any(side in one for one in some))
 
 
-@functools.cache
-def shipped_causes() -> Mapping[str, Cause]:
-    """Returns name -> cause, in order.
+def causes() -> Mapping[str, Cause]:
+    """Returns name -> cause of each cause, shipped or registered, in order.
+
+    Example:
+        from cns_drake import causes
+
+        print(causes()["snow"].strengths["ladder"])
+    """
+    found = sorted(_CAUSES.values(), key=lambda one: (one.order, one.name))
+    return {cause.name: cause for cause in found}
+
+
+def register_cause(cause: Path | str | Mapping[str, Any]) -> Cause:
+    """Registers a cause of change of your own, and returns it.
+
+    Args:
+        cause: a YAML file of the fields of `cns_drake.studies.Cause`, whose
+            name is the default of `name`; or a mapping of these fields.
 
     Raises:
-        InputError: a file cannot be used.
+        InputError: the file cannot be read, or a field is unknown, missing or
+            not usable.
+        ValueError: there is another cause with this name.
+
+    Example:
+        from cns_drake import register_cause
+
+        register_cause(
+            {
+                "name": "deep_snow",
+                "title": "Deep snow",
+                "about": "60, 80 cm of snow",
+                "strengths": {
+                    "ladder": {"query": {"transient": {"snow": [0.6, 0.8]}}}
+                },
+            }
+        )
     """
-    found = [
-        validated(Cause, {"name": path.stem, **read_yaml(path)}, path)
-        for path in _FOLDER.glob("*.yaml")
-    ]
-    found.sort(key=lambda cause: (cause.order, cause.name))
-    return {cause.name: cause for cause in found}
+    _CAUSES.load_own()
+    return _add(cause)
+
+
+def _load_own() -> None:
+    for path in sorted(_FOLDER.glob("*.yaml")):
+        _add(path)
+
+
+_CAUSES: Family[Cause] = Family("cause", _load_own)
+
+
+def _add(cause: Path | str | Mapping[str, Any]) -> Cause:
+    if isinstance(cause, Mapping):
+        name = cause.get("name")
+        found = validated(Cause, cause, f"cause {name!r}" if name else "cause")
+    else:
+        path = Path(cause)
+        found = validated(Cause, {"name": path.stem, **read_yaml(path)}, path)
+    _CAUSES.add(found.name, found, found)
+    return found
 
 
 def with_cases(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
@@ -92,26 +144,24 @@ def with_cases(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
     ((form, name),) = asked.items()
     if form not in ("each", "together"):
         raise InputError(f"{path}: causes.{form}: neither each nor together")
-    causes = {
-        cause.name: cause
-        for cause in shipped_causes().values()
-        if name in cause.strengths
-    }
-    if not causes:
-        known = {one for c in shipped_causes().values() for one in c.strengths}
+    known = causes()
+    chosen = {key: one for key, one in known.items() if name in one.strengths}
+    if not chosen:
+        strengths = {key for one in known.values() for key in one.strengths}
         raise InputError(
             f"{path}: causes.{form}: no strengths {name!r} (known:"
-            f" {', '.join(sorted(known))}){did_you_mean(str(name), known)}"
+            f" {', '.join(sorted(strengths))})"
+            f"{did_you_mean(str(name), strengths)}"
         )
-    combined = [one.name for one in causes.values() if one.combined]
+    combined = [one.name for one in chosen.values() if one.combined]
     cases: dict[str, Any]
     if form == "each":
-        cases = {key: one.strengths[name] for key, one in causes.items()}
+        cases = {key: one.strengths[name] for key, one in chosen.items()}
         cases[ALL] = combined
     else:
         cases = {ALL: {}}
         for key in combined:
-            cases[ALL] = merged(cases[ALL], causes[key].strengths[name])
+            cases[ALL] = merged(cases[ALL], chosen[key].strengths[name])
     own = values.get("cases", {})
     # The cases stand where the causes stood.
     return {

@@ -97,7 +97,7 @@ class ImportCity(MakeMap):
         return {
             "file": digest_file(self.source),
             "options": repr(self.options),
-            "code": code_digest("cns_drake.imports.import_map"),
+            "code": code_digest("cns_drake.imports.*"),
         }
 
 

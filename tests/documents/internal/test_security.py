@@ -10,7 +10,7 @@ import pytest
 from cns_drake.base import InputError
 from cns_drake.scene import ForeignMeshes, foreign_meshes
 from evaluation.clouds import read_cloud
-from evaluation.methods import load_method, registry
+from evaluation.methods import load_method
 
 
 def rows():
@@ -70,8 +70,7 @@ def test_a_mesh_reader_that_crashes_is_a_fault(tmp_path, monkeypatch):
         meshes.read(tmp_path / "a.stl")
 
 
-def test_a_method_file_is_a_program(tmp_path, monkeypatch):
-    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
+def test_a_method_file_is_a_program(tmp_path, own_methods):
     path = tmp_path / "program.py"
     path.write_text(f"open({str(tmp_path / 'ran')!r}, 'w').close()\n")
     with pytest.raises(InputError, match="registers 0 methods"):

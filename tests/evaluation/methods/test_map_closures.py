@@ -22,11 +22,6 @@ NAME = "map-closures"
 PACKAGE = "map_closures"
 
 
-@pytest.fixture(autouse=True)
-def not_imported(own_methods, monkeypatch):
-    monkeypatch.delitem(sys.modules, "evaluation.methods.map_closures", False)
-
-
 class Program:
     """Aligns a map with those of much lower numbers and as many points."""
 

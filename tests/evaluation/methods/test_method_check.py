@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from evaluation import check_method, known_methods
+from evaluation import check_method
 from evaluation.methods import (
+    METHODS,
     Method,
     MethodConfig,
-    find_method,
     make_method,
-    method_facts,
     register,
     shipped_methods,
 )
@@ -51,23 +50,15 @@ def test_methods_that_need_weights_pass(tmp_path):
     for name in ("svt-net", "dpa-net"):
         weights = {
             key: rng.uniform(0.5, 1.0, shape).astype(np.float32) * 0.1
-            for key, shape in find_method(name).shapes.items()
+            for key, shape in METHODS[name].shapes.items()
         }
         path = tmp_path / f"{name}.npz"
         np.savez(path, **weights)
         check_method(make_method(name, {"weights": path}))
 
 
-@pytest.mark.parametrize("name", known_methods())
-def test_facts_of_the_source_are_those_of_the_class(name):
-    method, facts = find_method(name), method_facts(name)
-    for field in ("title", "style", "source", "standard", "order"):
-        assert getattr(method, field) == getattr(facts, field)
-    assert facts.title
-
-
 def test_styles_of_methods_differ():
-    styles = [method_facts(name).style for name in known_methods()]
+    styles = [one.style for one in METHODS.values()]
     given = [style for style in styles if style]
     for parts in (given, [colour for colour, *_ in given]):
         assert len(set(parts)) == len(parts)

@@ -1117,7 +1117,7 @@ def kitti(folder):
 
 
 @way(
-    "kitti: far and late", "07", *DRIVES, "data set kitti",
+    "kitti: far and late", "07", *DRIVES, "data set kitti odometry",
     "evaluation.drives.read_poses", use=kitti,
 )  # fmt: skip
 def _(folder):
@@ -1135,7 +1135,7 @@ def _(folder):
     (sequence / "calib.txt").write_text("Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n")
 
 
-@way("cns", "drive", *DRIVES, "data set cns_folder",
+@way("cns", "drive", *DRIVES, "data set cns",
      "cns_drake.drives.read_scenario", use=drive)  # fmt: skip
 def _(folder):
     from helpers import bent_drive
@@ -1230,6 +1230,7 @@ for _number in ("0", "-1", "1025", "1" + "0" * 4000, "9" * 6000, "1e9", "inf"):
 # Public names that look like readers, and read no file of a user by themselves.
 NO_FILES = {
     "cns_drake.base.decode_text": "bytes that are in memory",
+    "cns_drake.base.import_modules": "modules of this project",
     "cns_drake.base.read_bytes": "bounded by its limit",
     "cns_drake.base.read_text": "bounded by its limit",
     "cns_drake.base.read_only": "an array",

@@ -15,7 +15,6 @@ from cns_drake.studies.reproduction import (
     control_drives,
     recording_info,
 )
-from evaluation.methods import registry
 from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.results import QueryRows, Results
 from evaluation.study import drives_by_map, engine, find_recordings
@@ -153,10 +152,8 @@ class Counting(Method):
 
 @pytest.mark.night
 @pytest.mark.usefixtures("few_methods")
-def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
+def test_quick_gives_the_same_tables(tmp_path, monkeypatch, own_methods):
     """The tables include controls, and come from simulation alone."""
-    # Other tests do not find the method registered.
-    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
     town = write_town(tmp_path / "town", routes, 40)
     studies.run_here(monkeypatch, engine)

@@ -579,11 +579,7 @@ def test_costs_follow_the_number_of_places(town, tmp_path, jobs_done):
     assert number == place["places"]
 
 
-def test_an_own_method(town, tmp_path, jobs_done, monkeypatch):
-    from evaluation.methods import registry
-
-    # Other tests do not find the method registered.
-    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
+def test_an_own_method(town, tmp_path, jobs_done, own_methods):
     own = tmp_path / "counting.py"
     own.write_text(
         """

@@ -19,7 +19,7 @@ import pytest
 
 from cns_drake.base import Cluster, InputError, run_jobs
 from evaluation.drives import open_drive
-from evaluation.methods import make_method, registry, shipped_methods
+from evaluation.methods import make_method, shipped_methods
 from evaluation.recognition import PROTOCOLS, RetrievalProtocol, costs, search
 from evaluation.results import QueryRows, Results
 from evaluation.study import (
@@ -421,10 +421,8 @@ def test_finished_jobs_start_no_process(
 @pytest.mark.night
 @pytest.mark.usefixtures("unrendered_figures")
 def test_own_method_beside_the_others(
-    recordings, few_methods, tmp_path, monkeypatch
+    recordings, few_methods, tmp_path, monkeypatch, own_methods
 ):
-    # Other tests do not find the method registered.
-    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     path = tmp_path / "counting.py"
     path.write_text(OWN_METHOD)
     choices = choose_methods(["standard", path])

@@ -120,23 +120,6 @@ def test_every_kind_of_import_counts(packages):
     )
 
 
-def test_a_family_counts_with_all_its_members(packages):
-    """Members that are found by name are imported by no statement."""
-    family = packages / "evaluation" / "family"
-    family.mkdir(parents=True)
-    (packages / "evaluation" / "__init__.py").write_text("")
-    for name in ("__init__", "member", "helper"):
-        (family / f"{name}.py").write_text("")
-    text = "from cns_drake.base import family_members\n"
-    (family / "registry.py").write_text(text)
-    (packages / "evaluation" / "other.py").write_text("")
-    module = "evaluation.family.registry"
-    assert differs(family / "member.py", module)
-    assert not differs(packages / "evaluation" / "other.py", module)
-    (family / "registry.py").write_text("")
-    assert not differs(family / "member.py", module)
-
-
 @pytest.mark.parametrize(
     "end",
     [
@@ -277,8 +260,7 @@ def test_of_our_own_code_the_right_modules_count(packages):
         ("cns_drake/sensors/lidar/patterns.py", False, EXTRACTION),
         ("cns_drake/units/sheets/cns.yaml", True, SIMULATION),
         ("cns_drake/units/sheets/cns.yaml", True, EXTRACTION),
-        ("evaluation/methods/btc.py", True, EXTRACTION),
-        ("evaluation/methods/btc.py", False, SIMULATION),
+        ("evaluation/methods/btc.py", False, EXTRACTION),
         ("evaluation/results/page_template/frame.css", False, EXTRACTION),
         ("evaluation/results/page_template/frame.css", True, "evaluation.*"),
         ("cns_drake/pictures/page_template/drive.css", True, SIMULATION),

@@ -1,15 +1,15 @@
 """Files of experiments: their changes, and their faults."""
 
-import shutil
-
 import pytest
 import yaml
 
 from cns_drake.base import InputError
 from cns_drake.studies import (
     Experiment,
+    causes,
     experiment_text,
     load_experiment,
+    register_cause,
     shipped_experiments,
 )
 from cns_drake.studies.experiments import cause_files
@@ -103,25 +103,21 @@ def test_shipped_experiments_are_read_and_written(name):
 
 
 def test_a_cause_is_a_file(tmp_path, monkeypatch):
-    """A new file is in the ladder and in the levels, and nothing else is."""
-    folder = tmp_path / "causes"
-    shutil.copytree(cause_files._FOLDER, folder)
-    monkeypatch.setattr(cause_files, "_FOLDER", folder)
+    """It is in the ladder and in the levels, and nothing else is."""
     before = {name: load_experiment(name) for name in ("ladder", "levels")}
-    (folder / "hail.yaml").write_text(
-        "title: Hail\nabout: hail\norder: 99\nstrengths:\n"
+    members = dict(cause_files._CAUSES._members)
+    monkeypatch.setattr(cause_files._CAUSES, "_members", members)
+    path = tmp_path / "hail.yaml"
+    path.write_text(
+        "title: Hail\nabout: hail\nstrengths:\n"
         "  ladder: {query: {transient: {snow: [0.01, 0.02]}}}\n"
         "  levels: {database: {transient: {leaves: [1.0, 0.5]}}}\n"
     )
-    cause_files.shipped_causes.cache_clear()
-    try:
-        ladder, levels = load_experiment("ladder"), load_experiment("levels")
-        shown = tmp_path / "shown.yaml"
-        shown.write_text(experiment_text("ladder"))
-        again = load_experiment(shown)
-    finally:
-        monkeypatch.undo()
-        cause_files.shipped_causes.cache_clear()
+    assert register_cause(path) == causes()["hail"]
+    ladder, levels = load_experiment("ladder"), load_experiment("levels")
+    shown = tmp_path / "shown.yaml"
+    shown.write_text(experiment_text("ladder"))
+    again = load_experiment(shown)
     old = before["ladder"].cases
     hail = {"query": {"transient": {"snow": [0.01, 0.02]}}}
     assert ladder.cases == {**old, "hail": hail, "all": (*old["all"], "hail")}

@@ -1,0 +1,70 @@
+"""Families, and the plug-ins that add members to them."""
+
+import sys
+
+import pytest
+
+from cns_drake.base import Family, families
+from cns_drake.base.families import plugin_fault
+
+
+@pytest.fixture
+def install(tmp_path, monkeypatch):
+    """Installs packages with an entry point each, before plug-ins are read."""
+    monkeypatch.syspath_prepend(tmp_path)
+    families._load_plugins.cache_clear()
+
+    def write(name, text, module=None):
+        (tmp_path / f"{name}.py").write_text(text)
+        folder = tmp_path / f"{name}-1.0.dist-info"
+        folder.mkdir()
+        (folder / "METADATA").write_text(f"Name: {name}\nVersion: 1.0\n")
+        (folder / "entry_points.txt").write_text(
+            f"[cns_drake.plugins]\n{name}_plugin = {module or name}\n"
+        )
+
+    yield write
+    families._load_plugins.cache_clear()
+
+
+def test_members_come_in_order_and_once():
+    loaded = []
+
+    def load_own():
+        loaded.append(1)
+        family.add("own", 1, "here")
+
+    family = Family("sort", load_own)
+    family.add("added", 2, "there")
+    assert family["added"] == 2
+    assert not loaded
+    assert dict(family) == {"added": 2, "own": 1}
+    assert loaded == [1]
+    family.add("own", 3, "here")
+    assert (family.get("own"), family.get("none"), len(family)) == (3, None, 2)
+    with pytest.raises(ValueError, match="there is another sort 'own'"):
+        family.add("own", 4, "there")
+
+
+def test_broken_plugins_are_a_line_each(install, capfd):
+    """The others are there, in the order of their names."""
+    install("broken", "print('hello')\n1 / 0")
+    install("ended", "raise SystemExit(3)")
+    install("nowhere", "", "no_such_module")
+    install("right_one", "def fail():\n    return {}['key']")
+    assert list(Family("sort")) == []
+    with pytest.raises(KeyError) as raised:
+        sys.modules["right_one"].fail()
+    fault = plugin_fault(raised.value)
+    assert fault.startswith("plug-in right_one_plugin: ")
+    assert fault.endswith("right_one.py: line 2: KeyError: 'key'")
+    assert plugin_fault(ValueError()) is None
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.splitlines() == [
+        "hello",
+        "plug-in broken_plugin (broken): ZeroDivisionError: division by zero",
+        "plug-in ended_plugin (ended): SystemExit: 3",
+        "plug-in nowhere_plugin (no_such_module): ModuleNotFoundError: No"
+        " module named 'no_such_module'",
+    ]
