@@ -109,7 +109,6 @@ from cns_drake.base.number_format import parse_rows as parse_rows
 from cns_drake.base.number_format import to_number as to_number
 from cns_drake.base.number_format import whole_number as whole_number
 from cns_drake.base.own_packages import check_evaluation as check_evaluation
-from cns_drake.base.own_packages import leave_out_folder as leave_out_folder
 from cns_drake.base.points import FARTHEST_RETURN as FARTHEST_RETURN
 from cns_drake.base.points import check_range as check_range
 from cns_drake.base.points import encode_bin as encode_bin
@@ -153,6 +152,8 @@ from cns_drake.base.units import NS_PER_S as NS_PER_S
 from cns_drake.base.units import wrapped as wrapped
 from cns_drake.base.version import __version__ as __version__
 from cns_drake.base.version import installed_versions as installed_versions
+from cns_drake.base.working_folder import leave_out_folder as leave_out_folder
+from cns_drake.base.working_folder import start_python as start_python
 from cns_drake.base.xml_elements import Element as Element
 from cns_drake.base.xml_elements import read_elements as read_elements
 from cns_drake.base.xml_elements import readable_xml as readable_xml

@@ -40,13 +40,13 @@ def compiled(function: _Function) -> _Function:
     """
     # No C code calls these functions.
     options = {"nogil": True, "no_cfunc_wrapper": True}
-    try:
-        with _cached_by_content():
+    with _our_settings():
+        try:
             dispatcher = numba.njit(cache=True, **options)(function)
-    except RuntimeError:
-        # Numba raises this error if no locator finds a cache folder: here, if
-        # `_ByContent.from_function` returns None.
-        return numba.njit(**options)(function)
+        except RuntimeError:
+            # Numba raises this error if no locator finds a cache folder: here,
+            # if `_ByContent.from_function` returns None.
+            return numba.njit(**options)(function)
     lock = f"{function.__module__}.{function.__qualname__}.lock"
     dispatcher.compile = _compiling_once(
         dispatcher.compile,
@@ -66,10 +66,13 @@ def compiled_callback(function: Callable) -> int:
     """
     signature = numba.void(numba.types.CPointer(numba.int64))
     options = {"nopython": True}
-    with interlude(f"compiling {function.__name__}"), uninterrupted():
+    with (
+        interlude(f"compiling {function.__name__}"),
+        uninterrupted(),
+        _our_settings(),
+    ):
         try:
-            with _cached_by_content():
-                made = numba.cfunc(signature, cache=True, **options)(function)
+            made = numba.cfunc(signature, cache=True, **options)(function)
         except RuntimeError:  # See `compiled`.
             made = numba.cfunc(signature, **options)(function)
     _CALLBACKS.append(made)
@@ -81,15 +84,20 @@ _CALLBACKS: list[object] = []
 
 
 @contextlib.contextmanager
-def _cached_by_content() -> Iterator[None]:
-    """Makes `_ByContent` find the folders of functions that are decorated."""
-    # Numba reads this setting while it decorates, and only from here.
-    before = numba.config.CACHE_LOCATOR_CLASSES
-    numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.{_ByContent.__name__}"
+def _our_settings() -> Iterator[None]:
+    """Makes Numba compile what it decorates, and `_ByContent` find folders.
+
+    Compiled functions call each other, so NUMBA_DISABLE_JIT cannot spare them.
+    """
+    # Numba reads the first while it decorates, and only from here.
+    config = numba.config
+    before = config.CACHE_LOCATOR_CLASSES, config.DISABLE_JIT
+    config.CACHE_LOCATOR_CLASSES = f"{__name__}.{_ByContent.__name__}"
+    config.DISABLE_JIT = 0
     try:
         yield
     finally:
-        numba.config.CACHE_LOCATOR_CLASSES = before
+        config.CACHE_LOCATOR_CLASSES, config.DISABLE_JIT = before
 
 
 class _ByContent:
@@ -174,7 +182,7 @@ def _compiling_once(
                 stream = stack.enter_context(file.open("a"))
                 fcntl.lockf(stream, fcntl.LOCK_EX)
             # LLVM crashes if an interrupt ends a function that it calls.
-            with uninterrupted():
+            with _our_settings(), uninterrupted():
                 return compile_for(tuple(map(numba.types.unliteral, types)))
 
     return compile_once

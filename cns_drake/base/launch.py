@@ -11,6 +11,7 @@ from cns_drake.base.interrupts import (
     interrupt_on_termination,
 )
 from cns_drake.base.process import ONE_CORE, collect_garbage_seldom
+from cns_drake.base.working_folder import ignore_local_settings
 
 
 def start(program: str, load: Callable[[], Callable[[], None]]) -> None:
@@ -27,6 +28,7 @@ def start(program: str, load: Callable[[], Callable[[], None]]) -> None:
     for name, value in ONE_CORE.items():
         os.environ.setdefault(name, value)
     try:
+        ignore_local_settings()
         interrupt_on_termination()
         collect_garbage_seldom()
         with ended_by_interrupts(program):

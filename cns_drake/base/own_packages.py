@@ -13,22 +13,6 @@ from cns_drake.base.errors import InputError
 _ROOT = os.path.realpath(os.path.join(os.path.dirname(__file__), "../.."))
 
 
-def leave_out_folder(search_path: list[str]) -> None:
-    """Removes the current folder from a search path for modules.
-
-    `python -m` adds the current folder to the search path. A current folder
-    that contains this package is not removed.
-
-    Args:
-        search_path: `sys.path`, which is changed in place.
-    """
-    here = os.path.realpath(os.curdir)
-    if here != _ROOT:
-        search_path[:] = [
-            folder for folder in search_path if os.path.realpath(folder) != here
-        ]
-
-
 def check_evaluation() -> None:
     """Raises an error if `import evaluation` finds another package.
 

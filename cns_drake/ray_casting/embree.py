@@ -16,7 +16,7 @@ import numba
 from numba import types
 
 # With this import, numba accepts functions as arguments of compiled functions.
-from numba.extending import intrinsic, typeof_impl
+from numba.extending import intrinsic, register_jitable, typeof_impl
 
 # Types of geometries (`RTC_GEOMETRY_TYPE_...`).
 TRIANGLE = 0
@@ -184,7 +184,7 @@ def _pointer(context: object, address: object) -> tuple:
     return numba.types.voidptr(address), cast
 
 
-@numba.njit  # type: ignore[untyped-decorator]  # numba has no hints.
+@register_jitable  # type: ignore[untyped-decorator]  # numba has no hints.
 def array_at(address: int, shape: object, dtype: object) -> object:
     """In compiled code, the array at an address."""
     return numba.carray(_pointer(address), shape, dtype)

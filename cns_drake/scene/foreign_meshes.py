@@ -24,7 +24,7 @@ from typing import IO
 
 import numpy as np
 
-from cns_drake.base import missing_library
+from cns_drake.base import missing_library, start_python
 
 # Open3D returns what it has read before a fault, and warns.
 _FAULT = re.compile(
@@ -63,17 +63,12 @@ class ForeignMeshes:
                 file, or cannot be loaded.
         """
         if self._process is None:
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", __name__],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-            )
+            self._process = start_python(__name__)
         # Both are pipes, so they are not None.
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         try:
-            pickle.dump(str(path), self._process.stdin)
+            pickle.dump(str(path.absolute()), self._process.stdin)
             self._process.stdin.flush()
             answer = pickle.load(self._process.stdout)
         except (OSError, EOFError, pickle.UnpicklingError) as error:
@@ -157,7 +152,8 @@ def _read_surface(
 
 def _printed_fault(messages: IO[bytes], path: str) -> str:
     """Returns the fault that a parser has printed, or "" without one."""
-    ctypes.CDLL(None).fflush(None)  # The parsers print through C.
+    sys.stdout.flush()  # Open3D prints through Python, its parsers through C.
+    ctypes.CDLL(None).fflush(None)
     messages.seek(0)
     text = _COLOUR.sub("", messages.read().decode("utf-8", "replace"))
     found = _FAULT.search(text)

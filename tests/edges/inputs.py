@@ -4,6 +4,8 @@ Nothing here imports the project, so that a change of its insides changes none
 of these files.
 """
 
+import sys
+
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.layered_scans import seen_from, town
 from helpers.mesh_texts import (
@@ -58,6 +60,24 @@ _EXPERIMENT = {
     "methods": ["scan-context++", "solid", "layered-overlap", "ring++", "btc"],
     "protocol": {"base": "random-yaw", "query_spacing": 8.0},
 }
+
+# File that a trap writes if it runs.
+SPRUNG = "sprung"
+_TRAP = f"""
+with open(__file__.rpartition("/")[0] + "/{SPRUNG}", "w"):
+    raise ImportError
+"""
+# Modules that the programs and their processes import.
+_MODULES = (*sys.stdlib_module_names, "cns_drake", "evaluation", "matplotlib",
+            "numba", "numpy", "open3d", "pydrake", "yaml")  # fmt: skip
+
+
+def write_traps(folder):
+    """Writes modules and settings that no program may read."""
+    for name in _MODULES:
+        (folder / f"{name}.py").write_text(_TRAP)
+    (folder / ".numba_config.yaml").write_text("{{{")
+    (folder / "matplotlibrc").write_bytes(b"\xff")
 
 
 def write_city(folder):

@@ -39,13 +39,27 @@ _LOOSE_ANSWERS = 0.2
 _PICTURES = (".png", ".jpg", ".webp", ".svg")
 
 
+# Package -> file of its program.
+_PROGRAMS = {
+    package: Path(sys.executable).with_name(name)
+    for package, name in {
+        "cns_drake": "cns-drake",
+        "evaluation": "cns-eval",
+    }.items()
+}
+
+
 def run(folder: Path, program: str, *words: object) -> str:
-    """Runs a program in a folder; returns what it prints.
+    """Runs a program in a folder of traps; returns what it prints.
 
     Raises:
-        RuntimeError: it fails.
+        RuntimeError: it fails, or code of the folder runs.
     """
-    return _python(folder, "-m", program, *words)
+    inputs.write_traps(folder)
+    text = _python(folder, _PROGRAMS[program], *words)
+    if (folder / inputs.SPRUNG).exists():
+        raise RuntimeError(f"{words}: code of the working folder runs")
+    return text
 
 
 def _python(folder: Path, *words: object) -> str:
@@ -84,7 +98,7 @@ def helps(program: str, name: str) -> Callable[[Path], dict[str, str]]:
     def edge(folder: Path) -> dict[str, str]:
         verbs = _verbs(run(folder, program, "--help"))
         lines = [f"{name} --help", *(f"{name} {verb} --help" for verb in verbs)]
-        text = _python(folder, "-c", _FORKS, program, *lines)
+        text = _python(folder, "-I", "-c", _FORKS, program, *lines)
         return {f"{name}-help.txt": text}
 
     return edge

@@ -15,6 +15,7 @@ import gc
 import importlib
 import math
 import multiprocessing
+from multiprocessing import util
 from multiprocessing.connection import Connection, Pipe, wait
 from multiprocessing.process import BaseProcess
 import os
@@ -25,6 +26,7 @@ import threading
 import time
 import traceback
 from types import ModuleType
+from typing import Any
 
 from cns_drake.base import errors, interrupts, system_libraries
 from cns_drake.base.errors import InputError
@@ -32,9 +34,12 @@ from cns_drake.base.families import plugin_fault
 from cns_drake.base.file_locks import exclusive, remove_lock
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.step import Reporter, Step
-from cns_drake.base.own_packages import leave_out_folder
 from cns_drake.base.process import ONE_CORE, collect_garbage_seldom
 from cns_drake.base.progress import heard_by
+from cns_drake.base.working_folder import (
+    ignore_local_settings,
+    leave_out_folder,
+)
 
 # How long a process may take to close its files after SIGTERM [s]. A process
 # that does not react, because it is inside a library, is then killed, so that
@@ -151,8 +156,7 @@ def _environment_of_jobs() -> Iterator[None]:
         **{k: os.environ.get(k, v) for k, v in ONE_CORE.items()},
         **ALLOCATION,
         _MODULES_VARIABLE: " ".join(modules),
-        # Another package of a name that is imported, such as another version
-        # of this one, may lie in the current folder. (Python 3.11 or later.)
+        # Modules in the working folder do not count.
         "PYTHONSAFEPATH": "1",
     }
     before = {name: os.environ.get(name) for name in changed}
@@ -161,9 +165,14 @@ def _environment_of_jobs() -> Iterator[None]:
     # The process of a job would run this process's script again.
     main = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
+    options: Any = util  # Its hints lack what is not public.
+    flags = options._args_from_interpreter_flags
+    if sys.version_info < (3, 11):  # It does not know PYTHONSAFEPATH.
+        options._args_from_interpreter_flags = lambda: [*flags(), "-I"]
     try:
         yield
     finally:
+        options._args_from_interpreter_flags = flags
         sys.modules["__main__"] = main
         for name, value in before.items():
             if value is None:
@@ -302,8 +311,8 @@ def end_with_parent() -> None:
 
 def _preload_modules(modules: Iterable[str]) -> None:
     """Imports modules in the process from which job processes are forked."""
-    # Python looks for modules in the current folder first.
     leave_out_folder(sys.path)
+    ignore_local_settings()
     collect_garbage_seldom()
     os.setsid()
     for name in modules:

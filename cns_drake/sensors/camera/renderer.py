@@ -1,8 +1,6 @@
 """The renderers of cameras: their lights, and a check of this machine."""
 
 import functools
-import subprocess
-import sys
 
 import numpy as np
 from pydrake.geometry import (
@@ -18,7 +16,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 
-from cns_drake.base import InputError
+from cns_drake.base import InputError, start_python
 from cns_drake.sensors.camera.sky import HORIZON_RGB, SUN_W
 
 # Name of the renderers in the SceneGraphs of cameras.
@@ -80,9 +78,9 @@ def check_renderer() -> None:
     Raises:
         InputError: Drake cannot render here.
     """
-    words = [sys.executable, "-m", __name__]
-    done = subprocess.run(words, capture_output=True, check=False)
-    if done.returncode:
+    process = start_python(__name__)
+    process.communicate()
+    if process.returncode:
         raise InputError(
             "cameras: no renderer: Drake cannot draw here, for lack of EGL "
             "(Debian: apt install libegl1)"

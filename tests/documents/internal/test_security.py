@@ -62,7 +62,7 @@ def test_an_array_of_objects_is_not_unpickled(tmp_path):
 def test_a_mesh_reader_that_crashes_is_a_fault(tmp_path, monkeypatch):
     (tmp_path / "crashing.py").write_text("import os\nos.abort()\n")
     monkeypatch.setattr(foreign_meshes, "__name__", "crashing")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.syspath_prepend(tmp_path)
     with (
         ForeignMeshes() as meshes,
         pytest.raises(ValueError, match="Open3D cannot read it"),

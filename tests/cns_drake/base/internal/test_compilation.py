@@ -20,6 +20,10 @@ from evaluation.methods.btc_planes import group_alike
 assert numba.config.CACHE_LOCATOR_CLASSES == before
 print(len(group_alike(np.zeros((1, 3)), np.zeros((1, 3)), 0.1, 0.3)))
 """
+_IGNORED = """
+from cns_drake.base.working_folder import ignore_local_settings
+ignore_local_settings()
+"""
 
 
 @pytest.mark.night
@@ -61,7 +65,7 @@ def test_nothing_is_kept_beside_the_code(tmp_path, is_there):
 @pytest.mark.slow
 @pytest.mark.sampled(1)
 @pytest.mark.parametrize(
-    "place", ["no home", "writable by all", "another's", "here"]
+    "place", ["no home", "writable by all", "another's", "here", "ignored"]
 )
 def test_no_machine_code_where_others_can_write(tmp_path, place):
     """Numba unpickles what it finds, so it must find nothing there."""
@@ -71,8 +75,14 @@ def test_no_machine_code_where_others_can_write(tmp_path, place):
         for k, v in os.environ.items()
         if not k.startswith(("NUMBA", "HOME", "XDG"))
     }
-    who = []
-    if place == "here":
+    who, script = [], _SCRIPT
+    if place == "ignored":
+        # Numba reads the file when it is imported, and whenever it compiles.
+        (tmp_path / ".numba_config.yaml").write_text("{{{")
+        environment["XDG_CACHE_HOME"] = str(tmp_path.with_suffix(".cache"))
+        environment["NUMBA_DISABLE_JIT"] = "1"
+        script = _IGNORED + _SCRIPT
+    elif place == "here":
         # Numba itself would take the folder from this file.
         (tmp_path / ".numba_config.yaml").write_text("cache_dir: unpacked\n")
         environment["XDG_CACHE_HOME"] = str(tmp_path.with_suffix(".cache"))
@@ -95,7 +105,7 @@ def test_no_machine_code_where_others_can_write(tmp_path, place):
         else:
             os.chown(folder, 54321, 54321)
     result = subprocess.run(
-        [*who, sys.executable, "-B", "-c", _SCRIPT],
+        [*who, sys.executable, "-B", "-c", script],
         env=environment | {"PYTHONPATH": str(documents.ROOT)},
         cwd=tmp_path,
         capture_output=True,

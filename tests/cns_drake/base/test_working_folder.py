@@ -1,0 +1,33 @@
+"""Neither code nor settings of the working folder count."""
+
+import json
+
+import pytest
+
+from cns_drake.base import start_python
+
+_PROBE = """
+import json, os, sys
+answer = {"json": json.__file__, "here": os.getcwd(), "path": sys.path}
+print(json.dumps(answer))
+"""
+
+
+@pytest.mark.slow
+def test_a_python_of_its_own_is_not_in_the_working_folder(
+    tmp_path, monkeypatch
+):
+    here, modules = tmp_path / "here", tmp_path / "modules"
+    here.mkdir()
+    modules.mkdir()
+    (here / "json.py").write_text("raise ImportError\n")
+    (modules / "probe.py").write_text(_PROBE)
+    monkeypatch.chdir(here)
+    for folder in (modules, here, ""):
+        monkeypatch.syspath_prepend(folder)
+    process = start_python("probe")
+    found = json.loads(process.communicate()[0])
+    assert found["json"] == json.__file__
+    assert found["here"] == "/"
+    assert str(modules) in found["path"]
+    assert not {"", str(here)} & {*found["path"]}
