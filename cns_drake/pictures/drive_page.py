@@ -291,22 +291,12 @@ _QUEUE = """
 """.replace("ROW", str(_ROW))
 
 
-def make_static_page(meshcat: Meshcat, title: str) -> str:
-    """Returns a Meshcat scene as a web page that needs no server.
+def _static_parts(meshcat: Meshcat, title: str) -> tuple[str, str, str]:
+    """Returns the start of the page of a scene, the scene, and the end.
 
     The page is Drake's page with compressed commands, so that a city takes a
     third of the space. Browsers have been able to decompress such commands
-    since 2023.
-
-    Args:
-        meshcat: the server with the scene.
-        title: title of the page, plain text.
-    """
-    return "".join(_static_parts(meshcat, title))
-
-
-def _static_parts(meshcat: Meshcat, title: str) -> tuple[str, str, str]:
-    """Returns the start of the page of a scene, the scene, and the end.
+    since 2023. The title is plain text.
 
     HTML between the start and the scene is visible while the scene loads. A
     JavaScript module between the scene and the end runs when the page is ready.
@@ -334,15 +324,12 @@ def _static_parts(meshcat: Meshcat, title: str) -> tuple[str, str, str]:
     return f"{start}<body>\n", library + _QUEUE + scene, f"\n</body>{end}"
 
 
-def save_meshcat_page(
-    meshcat: Meshcat, path: Path | str, title: str = "Meshcat"
-) -> None:
+def save_meshcat_page(meshcat: Meshcat, path: Path | str) -> None:
     """Saves a Meshcat scene as a web page that opens without a server.
 
     Args:
         meshcat: the server with the scene.
         path: HTML file to write.
-        title: title of the page, plain text.
 
     Raises:
         InputError: the page cannot be written.
@@ -352,7 +339,7 @@ def save_meshcat_page(
 
         save_meshcat_page(meshcat, "scene.html")
     """
-    write_text(Path(path), make_static_page(meshcat, title))
+    write_text(Path(path), "".join(_static_parts(meshcat, "Meshcat")))
 
 
 def filter_rows(data: bytes) -> bytes:

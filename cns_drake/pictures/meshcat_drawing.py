@@ -51,10 +51,7 @@ _WHITE = [1.0, 1.0, 1.0, 1.0]
 
 
 def draw_parts(
-    meshcat: Meshcat,
-    path: str,
-    parts: Iterable[ColouredPart],
-    rgba: Rgba | None = None,
+    meshcat: Meshcat, path: str, parts: Iterable[ColouredPart]
 ) -> None:
     """Draws parts of a city as one mesh per class, named `<path>/<class>`.
 
@@ -62,7 +59,6 @@ def draw_parts(
         meshcat: Meshcat's server.
         path: path in Meshcat.
         parts: the parts.
-        rgba: colour of all parts; None for their own colours.
     """
     by_class: dict[str, list[ColouredPart]] = {}
     for part in parts:
@@ -75,7 +71,7 @@ def draw_parts(
         rgb[surface.triangles] = np.array([m.rgb for m in members])[
             owners, None
         ]
-        _draw_mesh(meshcat, f"{path}/{semantic_class}", surface, rgba or rgb)
+        _draw_mesh(meshcat, f"{path}/{semantic_class}", surface, rgb)
 
 
 def draw_body(

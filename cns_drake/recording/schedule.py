@@ -17,17 +17,14 @@ START_NS = 1_700_000_000_000_000_000
 _FINEST = 10**9
 
 
-def frame_stamp_ns(
-    frame: int, *, start_ns: int = START_NS, period: float = FRAME_PERIOD
-) -> int:
+def frame_stamp_ns(frame: int, *, period: float = FRAME_PERIOD) -> int:
     """Returns the time stamp of a frame [ns].
 
     Args:
         frame: number of the frame, from 0.
-        start_ns: time stamp of frame 0 [ns].
         period: time between two frames [s].
     """
-    return start_ns + round(frame * period * 1e9)
+    return START_NS + round(frame * period * 1e9)
 
 
 def frames_within(duration: float, period: float = FRAME_PERIOD) -> int:

@@ -18,27 +18,6 @@ PARSER_ERRORS = (
 
 
 @contextlib.contextmanager
-def collected_warnings() -> Iterator[list[str]]:
-    """Context manager that collects the warnings that Drake logs.
-
-    The context variable is the list of warnings, which are not printed.
-    """
-    warnings: list[str] = []
-
-    def take(record: logging.LogRecord) -> bool:
-        if record.levelno < logging.ERROR:
-            warnings.append(record.getMessage())
-        return record.levelno >= logging.ERROR
-
-    logger = logging.getLogger("drake")
-    logger.addFilter(take)
-    try:
-        yield warnings
-    finally:
-        logger.removeFilter(take)
-
-
-@contextlib.contextmanager
 def collected_errors() -> Iterator[list[str]]:
     """Context manager that collects the errors that Drake logs.
 

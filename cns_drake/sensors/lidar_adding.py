@@ -224,7 +224,6 @@ def add_lidar_view(
     meshcat: geometry.Meshcat,
     *,
     period: float | None = None,
-    color: Rgba = _VIEW_COLOR,
     point_size: float = 0.05,
 ) -> geometry.MeshcatPointCloudVisualizer:
     """Adds a live view of a LiDAR's scans in Meshcat to a diagram.
@@ -238,7 +237,6 @@ def add_lidar_view(
         meshcat: server that shows the points.
         period: time between two shown scans [s]; by default the duration of a
             revolution.
-        color: colour of the points.
         point_size: size of a point [m].
 
     Raises:
@@ -257,7 +255,7 @@ def add_lidar_view(
             meshcat, name, lidar.pattern.period if period is None else period
         ),
     )
-    view.set_default_rgba(color)
+    view.set_default_rgba(_VIEW_COLOR)
     view.set_point_size(point_size)
     builder.Connect(lidar.positions_W_output_port(), view.cloud_input_port())
     return view
