@@ -4,7 +4,11 @@ from cns_drake.base import poses as poses
 from cns_drake.base import program as program
 from cns_drake.base import shared_options as shared_options
 from cns_drake.base import terminal as terminal
+from cns_drake.base.changes import merged as merged
+from cns_drake.base.changes import nested as nested
+from cns_drake.base.changes import parse_changes as parse_changes
 from cns_drake.base.commands import Command as Command
+from cns_drake.base.commands import with_options as with_options
 from cns_drake.base.compilation import compiled as compiled
 from cns_drake.base.compilation import (
     compiled_callback as compiled_callback,

@@ -1,6 +1,8 @@
 """Commands made from functions, with help from their docstrings."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+import functools
+import inspect
 import math
 import re
 import textwrap
@@ -110,3 +112,55 @@ def check_only_with(
             raise InputError(
                 f"{shown}: not together with --{chosen.replace('_', '-')}"
             )
+
+
+def with_options(
+    keyword: str,
+    options: Mapping[str, tuple[Any, Any]],
+    make: Callable[..., Any],
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Returns a decorator that adds a group of options to a command.
+
+    The decorated function has one parameter for the whole group. On the command
+    line, the parameter is replaced by the options of the group.
+
+    Args:
+        keyword: name of the parameter for the whole group.
+        options: name -> (type, default) of each option of the group. The type
+            is annotated with the option.
+        make: function that is called with the options' values as keyword
+            arguments. The result of this function is passed to the command as
+            `keyword`.
+    """
+    added = [
+        inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=default,
+            annotation=kind,
+        )
+        for name, (kind, default) in options.items()
+    ]
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        @functools.wraps(command)
+        def run(**values: Any) -> None:
+            chosen = {name: values.pop(name) for name in options}
+            command(**values, **{keyword: make(**chosen)})
+
+        own = inspect.signature(command, eval_str=True).parameters.values()
+        parameters = [
+            *(
+                parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+                for parameter in own
+                if parameter.name != keyword
+            ),
+            *added,
+        ]
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {
+            parameter.name: parameter.annotation for parameter in parameters
+        }
+        return run
+
+    return decorate

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 import sys
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any
 
-from cns_drake.base import (
-    errors_at_option,
-    program,
-    show_progress,
-    terminal,
-    uninterrupted,
-)
+from cns_drake.base import program, show_progress, terminal, uninterrupted
 from cns_drake.command_line import options
+from cns_drake.command_line.fields import changed, field_options
 from cns_drake.command_line.suggestions import suggest_export
 
 if TYPE_CHECKING:
-    from cns_drake.scenarios import Scenario
-    from cns_drake.sensors import WeatherConfig
     from cns_drake.simulation import FinishedSimulation
 
 
@@ -34,21 +27,12 @@ def run_drive(
     name_or_file: str,
     output: Path | str,
     *,
-    frames: int | None = None,
-    lidar: str | None = None,
-    returns: Literal["ideal", "calibrated"] | None = None,
-    weather: WeatherConfig | None = None,
-    traffic: int | None = None,
-    transient: Mapping[str, float | str] | None = None,
-    driver: Literal["real", "none"] | None = None,
-    ride: str | None = None,
-    imu_rate: int | None = None,
-    camera: Mapping[str, int] | None = None,
     recording: Path | str | None = None,
     beside: Path | str | None = None,
     graphviz: Path | str | None = None,
     overwrite: bool = False,
     json: bool = False,
+    **changes: Any,
 ) -> FinishedSimulation:
     """Simulates and records a drive, and shows on stderr what it does.
 
@@ -58,31 +42,17 @@ def run_drive(
     Args:
         name_or_file: name of a shipped drive, or a scenario file.
         output: folder for the recordings.
-        frames: number of frames to record, from the start; by default all.
-        lidar: preset, or file of a data sheet, that replaces the LiDARs of the
-            scenario.
-        returns: `ideal` or `calibrated`, the model of the LiDARs' returns; by
-            default as the scenario says.
-        weather: weather; by default the weather of the scenario.
-        traffic: number of vehicles, and also of pedestrians; by default as the
-            scenario says.
-        transient: switch -> value in the section `transient`; by default as the
-            scenario says.
-        driver: `real` for a driver who wanders and changes lanes, or `none` for
-            a driver who stays in the middle of the lane; by default as the
-            scenario says.
-        ride: class of the road surface after ISO 8608, `A` to `E`, or `none`
-            for a car that stays steady; by default as the scenario says.
-        imu_rate: samples of the IMU per second; by default as the scenario
-            says.
-        camera: fields of an additional camera, named `camera`, which also
-            records depth and label images; by default no camera is added.
         recording: file for a web page of the drive, if any.
         beside: page of another drive in the same city, which the page of this
             drive then shows as well.
         graphviz: file for the Diagram as Graphviz text, if any.
         overwrite: whether to replace an existing recording.
         json: whether to print the result as JSON.
+        changes: what the options of `cns-drake simulate` for fields of the
+            scenario change, such as `frames=200`, `lidar="vlp-16"` or
+            `imu_rate=400`; `fields` are texts `FIELD=VALUE` as for `--set`,
+            `transient` and `camera` can be mappings, and `weather` is a
+            `WeatherConfig`.
 
     Raises:
         InputError: an argument cannot be used.
@@ -97,20 +67,7 @@ def run_drive(
 
     with uninterrupted():
         simulate = import_simulation()
-    scenario = _changed_scenario(
-        load_scenario(name_or_file),
-        lidar=lidar,
-        returns=returns,
-        weather=weather,
-        traffic=traffic,
-        transient=transient,
-        driver=driver,
-        ride=ride,
-        imu_rate=imu_rate,
-        camera=camera,
-    )
-    if frames is not None:
-        scenario = scenario.replaced(frames=frames)
+    scenario = changed(load_scenario(name_or_file), changes)
     with show_progress():
         run = simulate(
             scenario,
@@ -145,47 +102,6 @@ def run_drive(
     return run
 
 
-def _changed_scenario(
-    scenario: Scenario,
-    *,
-    lidar: str | None,
-    returns: Literal["ideal", "calibrated"] | None,
-    weather: WeatherConfig | None,
-    traffic: int | None,
-    transient: Mapping[str, float | str] | None,
-    driver: Literal["real", "none"] | None,
-    ride: str | None,
-    imu_rate: int | None,
-    camera: Mapping[str, int] | None,
-) -> Scenario:
-    """Returns a scenario with the changes that `run_drive` takes."""
-    if lidar is not None:
-        with errors_at_option("--lidar", "unit"):
-            scenario = scenario.with_lidar(lidar)
-    if returns is not None:
-        scenario = scenario.with_returns(returns, weather)
-    if traffic is not None:
-        scenario = scenario.with_traffic(traffic)
-    if transient:
-        scenario = scenario.with_transient(**transient)
-    if driver is not None:
-        scenario = scenario.with_driver(driver)
-        if driver == "real" and scenario.waypoints is not None:
-            terminal.note("--driver real: waypoints have no lanes to change to")
-    if ride is not None:
-        change: dict = {"ride": {"roughness": ride}}
-        scenario = scenario.with_fields(change, "--ride")
-    if imu_rate is not None:
-        change = {"imu": {"rate": imu_rate}}
-        scenario = scenario.with_fields(change, "--imu-rate")
-    if camera is not None:
-        fields = {"depth": True, "label": True, **camera}
-        scenario = scenario.with_fields(
-            {"cameras": {"camera": fields}}, "--camera"
-        )
-    return scenario
-
-
 def run_script(name: str, description: str) -> None:
     """Runs the command line of a diagram script: records one drive.
 
@@ -199,24 +115,22 @@ def run_script(name: str, description: str) -> None:
         run_script("downtown_01", "Downtown before it was built up.")
     """
 
+    @field_options("frames", "lidar", "traffic")
     def script(
         output: options.Output = Path("recordings"),
-        frames: options.Frames = None,
-        lidar: options.LidarUnit = None,
-        traffic: options.Traffic = None,
         recording: options.Recording = None,
         graphviz: options.Graphviz = None,
         overwrite: options.Overwrite = False,
+        *,
+        changes: dict[str, Any],
     ) -> None:
         run_drive(
             name,
             output,
-            frames=frames,
-            lidar=lidar,
-            traffic=traffic,
             recording=recording,
             graphviz=graphviz,
             overwrite=overwrite,
+            **changes,
         )
 
     app = program.plain_app(add_completion=False)

@@ -111,7 +111,9 @@ def export(
     start_time: Annotated[
         float | None, typer.Option(min=0.0, metavar="S")
     ] = None,
-    traffic: options.Traffic = None,
+    traffic: Annotated[
+        int | None, typer.Option(min=0, max=2000, metavar="N")
+    ] = None,
     jobs: shared_options.Jobs = None,
     scheduler: shared_options.Scheduler = None,
     json: shared_options.Json = False,

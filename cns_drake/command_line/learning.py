@@ -15,7 +15,7 @@ from cns_drake.base import (
     errors_at_option,
     terminal,
 )
-from cns_drake.command_line import options
+from cns_drake.command_line.fields import LIDAR_HELP
 
 
 class Variation(str, Enum):
@@ -36,7 +36,10 @@ def train(
     without: list[Variation] | None = None,
     drawn_streets: Annotated[bool, typer.Option("--drawn-streets")] = False,
     graded: Annotated[bool, typer.Option("--graded")] = False,
-    lidar: Annotated[list[str] | None, options.LIDAR_OPTION] = None,
+    lidar: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PRESET|FILE.yaml", help=LIDAR_HELP),
+    ] = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:

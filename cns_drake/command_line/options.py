@@ -5,9 +5,6 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.units import LIDAR_PRESETS
-
-_PRESETS = list(LIDAR_PRESETS)
 Output = Annotated[
     Path,
     typer.Option(
@@ -17,32 +14,6 @@ Output = Annotated[
 Results = Annotated[
     Path,
     typer.Option(help="Folder for the results; created if it does not exist."),
-]
-Frames = Annotated[
-    int | None,
-    typer.Option(
-        min=1,
-        metavar="N",
-        help="Number of frames (LiDAR scans) to record, from the start of the "
-        "drive; by default the whole drive. Usually there are 20 frames per "
-        "second.",
-    ),
-]
-LIDAR_OPTION = typer.Option(
-    metavar="PRESET|FILE.yaml",
-    help="Model of LiDAR to simulate: the file of a data sheet of your own, or"
-    f" the name of a preset: {', '.join(_PRESETS[:-1])} or {_PRESETS[-1]}.",
-)
-LidarUnit = Annotated[str | None, LIDAR_OPTION]
-Traffic = Annotated[
-    int | None,
-    typer.Option(
-        min=0,
-        max=2000,
-        metavar="N",
-        help="Number of moving vehicles. The same number of pedestrians is "
-        "added. By default the traffic of the scenario.",
-    ),
 ]
 Recording = Annotated[
     Path | None,

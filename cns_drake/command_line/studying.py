@@ -11,6 +11,7 @@ from cns_drake.base import (
     InputError,
     ended_by_interrupts,
     note,
+    parse_changes,
     resumable,
     shared_options,
 )
@@ -134,7 +135,6 @@ def study(
             experiment_text,
             load_experiment,
             named_programs,
-            parse_override,
             shipped_experiments,
         )
         from evaluation.study import expanded_names
@@ -159,7 +159,7 @@ def study(
         raise InputError("--output: missing")
     if not allow_code:
         # Others may have written the file; the words are the user's own.
-        own = named_programs([method, *map(parse_override, override or ())])
+        own = named_programs([method, parse_changes(override or ())])
         for field in ("methods", "metrics", "tasks"):
             for file in named_programs(getattr(experiment, field)):
                 if file not in own:

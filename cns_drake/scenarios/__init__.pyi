@@ -35,6 +35,7 @@ from cns_drake.scenarios.scenario_files import (
     make_paths_absolute as make_paths_absolute,
 )
 from cns_drake.scenarios.scenario_files import make_scenario as make_scenario
+from cns_drake.scenarios.scenario_files import set_fields as set_fields
 from cns_drake.scenarios.scenario_files import (
     write_scenarios as write_scenarios,
 )

@@ -93,7 +93,12 @@ _ALTERNATIVES: tuple[tuple[str, str, Any, str], ...] = (
         _not_both,
         "a world has no roads, give waypoints instead",
     ),
-    ("waypoints", "route", operator.ne, "give either a route or waypoints"),
+    (
+        "waypoints",
+        "route",
+        operator.ne,
+        "give either a route or waypoints; a world needs waypoints",
+    ),
     (
         "waypoints",
         "aside",
@@ -509,11 +514,12 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _check_weather(self) -> Scenario:
         ideal = [n for n, c in self.lidars.items() if c.returns == "ideal"]
-        if ideal and self.weather != WeatherConfig():
-            raise ValueError(
-                "weather: it has no effect on ideal returns; give "
-                f"lidars.{ideal[0]}.returns: calibrated"
-            )
+        for name, value in self.weather if ideal else ():
+            if value:
+                raise ValueError(
+                    f"weather.{name}: it has no effect on ideal returns; give "
+                    f"lidars.{ideal[0]}.returns: calibrated"
+                )
         return self
 
     def __eq__(self, other: object) -> bool:

@@ -1,6 +1,6 @@
 """Scenario files, and the files that a scenario names."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 import os
 from pathlib import Path
 import re
@@ -13,6 +13,7 @@ from cns_drake.base import (
     did_you_mean,
     listed,
     make_folder,
+    parse_changes,
     read_bytes,
     read_yaml,
     validated,
@@ -210,6 +211,26 @@ def make_paths_absolute(values: dict, path: Path) -> None:
             name: absolute(lidar, "unit") if isinstance(lidar, dict) else lidar
             for name, lidar in lidars.items()
         }
+
+
+def set_fields(scenario: Scenario, texts: Iterable[str]) -> Scenario:
+    """Returns a scenario with other values of fields, as --set gives them.
+
+    Relative paths start at the working directory.
+
+    Args:
+        scenario: the scenario.
+        texts: changes `FIELD=VALUE`; see `Scenario.with_fields`.
+
+    Raises:
+        InputError: a text has another form, a field is unknown, or its value is
+            not usable.
+    """
+    changes = parse_changes(texts)
+    make_paths_absolute(changes, Path("--set"))
+    changed = scenario.with_fields(changes, "--set")
+    check_files(changed, "--set")
+    return changed
 
 
 def check_files(scenario: Scenario, source: object = None) -> None:

@@ -247,7 +247,7 @@ def _leave_out(
             missing.discard(structure_name(name))
             scene_graph.RemoveGeometry(source, geometry_id)
     if missing:
-        raise InputError(f"{sdf}: no structure {min(missing)} to leave out")
+        raise InputError(f"{sdf}: without: no structure {min(missing)}")
 
 
 def _read_names(scene_graph: SceneGraph, sdf: Path) -> dict[GeometryId, str]:

@@ -1,5 +1,7 @@
 """A single scan of any SDF world from any pose."""
 
+from typing import Any
+
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiagramBuilder
@@ -8,19 +10,14 @@ from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.scene import World
-from cns_drake.sensors import (
-    BeamPattern,
-    CalibratedReturns,
-    Lidar,
-    connect_lidar,
-)
+from cns_drake.sensors import BeamPattern, Lidar, connect_lidar
 
 
 def scan_world(
     world: World,
     X_WS: RigidTransform,
     pattern: BeamPattern,
-    returns: CalibratedReturns | None = None,
+    **options: Any,
 ) -> np.ndarray:
     """Returns one LiDAR scan of a world in its initial state.
 
@@ -28,12 +25,12 @@ def scan_world(
         world: the world.
         X_WS: pose of the LiDAR in the world.
         pattern: directions and ranges of the LiDAR's beams.
-        returns: model of calibrated returns; None for ideal returns.
+        options: further fields of `LidarOptions`.
 
     Returns:
         Structured array (N,) of `POINT_DTYPE`, in the LiDAR's frame S.
     """
-    lidar, context = _stationary_lidar(world, X_WS, pattern, returns)
+    lidar, context = _stationary_lidar(world, X_WS, pattern, **options)
     return lidar.GetOutputPort("scan").Eval(context)
 
 
@@ -56,16 +53,16 @@ def _stationary_lidar(
     world: World,
     X_WS: RigidTransform,
     pattern: BeamPattern,
-    returns: CalibratedReturns | None = None,
+    **options: Any,
 ) -> tuple[Lidar, Context]:
     """Returns a LiDAR at a fixed pose in a world, and its Context."""
     lidar = Lidar(
         world.scene_graph.world_frame_id(),
         X_WS,
         pattern,
-        returns=returns,
         structures=world.structures,
         anchored_frames=world.anchored_frames(),
+        **options,
     )
     plant = world.plant
     builder = DiagramBuilder()

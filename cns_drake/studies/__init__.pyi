@@ -18,9 +18,6 @@ from cns_drake.studies.experiments.experiment_files import (
     load_experiment as load_experiment,
 )
 from cns_drake.studies.experiments.experiment_files import (
-    parse_override as parse_override,
-)
-from cns_drake.studies.experiments.experiment_files import (
     shipped_experiments as shipped_experiments,
 )
 from cns_drake.studies.ground_truth.labelled_drive import (

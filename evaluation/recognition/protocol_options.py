@@ -3,12 +3,11 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from enum import Enum
-import functools
-import inspect
 from typing import Annotated, Any
 
 import typer
 
+from cns_drake.base import with_options
 from evaluation.recognition.protocol import (
     PROTOCOLS,
     RECORDED_PROTOCOL,
@@ -122,62 +121,13 @@ _VERIFIED: _Options = {
 }
 
 
-def _with_options(
-    keyword: str, options: _Options, make: Callable[..., Any]
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Returns a decorator that adds a group of options to a command.
-
-    The decorated function has one parameter for the whole group. On the command
-    line, the parameter is replaced by the options of the group.
-
-    Args:
-        keyword: name of the parameter for the whole group.
-        options: name -> (type, default) of each option of the group.
-        make: function that is called with the options' values as keyword
-            arguments. The result of this function is passed to the command as
-            `keyword`.
-    """
-    added = [
-        inspect.Parameter(
-            name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=default,
-            annotation=kind,
-        )
-        for name, (kind, default) in options.items()
-    ]
-
-    def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        @functools.wraps(command)
-        def run(**values: Any) -> None:
-            chosen = {name: values.pop(name) for name in options}
-            command(**values, **{keyword: make(**chosen)})
-
-        own = inspect.signature(command, eval_str=True).parameters.values()
-        parameters = [
-            *(
-                parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
-                for parameter in own
-                if parameter.name != keyword
-            ),
-            *added,
-        ]
-        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        run.__annotations__ = {
-            parameter.name: parameter.annotation for parameter in parameters
-        }
-        return run
-
-    return decorate
-
-
 def _named(named_protocol: str, **fields: Any) -> RetrievalProtocol:
     return replace(PROTOCOLS[named_protocol], **fields)
 
 
 # Decorator: the command gets the protocol's options in place of its keyword
 # `protocol`.
-with_protocol = _with_options(
+with_protocol = with_options(
     "protocol", {**_NAMED, **_FIELDS, **_VERIFIED}, _named
 )
 
@@ -206,4 +156,4 @@ def with_protocols(
     names: _Options = {
         "named_protocols": (_SeveralNames, [*map(_Name, default)])
     }
-    return _with_options("protocols", {**names, **_FIELDS}, all_named)
+    return with_options("protocols", {**names, **_FIELDS}, all_named)

@@ -20,11 +20,12 @@ from cns_drake.base import (
     Family,
     InputError,
     did_you_mean,
+    merged,
     read_yaml,
     validated,
 )
 from cns_drake.sensors import Section
-from cns_drake.studies.experiments.nested_fields import SIDES, Case, merged
+from cns_drake.studies.experiments.nested_fields import SIDES, Case
 
 _FOLDER = Path(__file__).parent / "causes"
 # The case that combines causes.

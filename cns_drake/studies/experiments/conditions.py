@@ -8,6 +8,7 @@ import itertools
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from cns_drake.base import merged, nested
 from cns_drake.studies.experiments.factors import (
     FactorValues,
     leaves,
@@ -18,8 +19,6 @@ from cns_drake.studies.experiments.nested_fields import (
     SIDES,
     Case,
     Changes,
-    merged,
-    nested,
     set_field,
 )
 from evaluation.results import CAUSE, FROZEN_REDRAW, LEVEL, NO_CAUSE

@@ -14,7 +14,9 @@ from cns_drake.base import (
     InputError,
     did_you_mean,
     errors_at,
-    parse_yaml,
+    merged,
+    nested,
+    parse_changes,
     read_yaml,
     validated,
     value_errors,
@@ -25,7 +27,7 @@ from cns_drake.studies.experiments.experiment import (
     in_long_form,
     named_programs,
 )
-from cns_drake.studies.experiments.nested_fields import Changes, merged, nested
+from cns_drake.studies.experiments.nested_fields import Changes
 from evaluation.results import (
     SETTINGS,
     as_factor,
@@ -252,27 +254,13 @@ def _overridden(
     """Returns fields of an experiment with an override."""
     if not isinstance(override, str):
         return {**values, **dict([override])}
-    fields = parse_override(override)
+    fields = parse_changes([override])
     if "." not in override.partition("=")[0]:
         return _chosen_anew(values, fields)
     (first,) = fields
     if first not in Experiment.model_fields:
         return _with_method_setting(values, override)
     return merged(values, fields)
-
-
-def parse_override(text: str) -> dict[str, Any]:
-    """Returns a text `FIELD=VALUE` as nested fields of an experiment.
-
-    Raises:
-        InputError: the text has another form, or VALUE is not YAML.
-    """
-    name, equals, value = text.partition("=")
-    if not (name and equals):
-        raise InputError(f"--set: {text!r} is not FIELD=VALUE")
-    with value_errors(f"--set: {name}"):
-        parsed = parse_yaml(value)
-    return nested(name, parsed)
 
 
 def _with_method_setting(values: Changes, override: str) -> dict[str, Any]:
@@ -282,7 +270,7 @@ def _with_method_setting(values: Changes, override: str) -> dict[str, Any]:
     """
     from evaluation.methods import known_methods, shipped_methods
 
-    fields = parse_override(override)
+    fields = parse_changes([override])
     methods = values.get("methods") or {one: {} for one in shipped_methods()}
     name, _, value = override.partition("=")
     method, _, setting = name.partition(".")

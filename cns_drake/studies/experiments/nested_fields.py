@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from cns_drake.base import merged
+
 # Name of a field -> its value, which can be a mapping of further fields.
 Changes = Mapping[str, Any]
 # Sections of an experiment with fields of both drives, or of one of them.
@@ -13,27 +15,6 @@ SESSIONS = "sessions"
 FLEET = "fleet"
 # The section of each drive -> the fields that a case sets there.
 Case = dict[str, dict[str, Any]]
-
-
-def merged(values: Any, changes: Any) -> Any:
-    """Returns settings with changes applied.
-
-    Mappings, also nested ones, are changed field by field. All other values are
-    replaced as a whole.
-    """
-    if not (isinstance(values, Mapping) and isinstance(changes, Mapping)):
-        return changes
-    return {
-        **values,
-        **{n: merged(values.get(n), one) for n, one in changes.items()},
-    }
-
-
-def nested(path: str, value: Any) -> Any:
-    """Returns nested fields that contain one value, at a path."""
-    for part in reversed(path.split(".")):
-        value = {part: value}
-    return value
 
 
 def set_field(fields: dict[str, Any], path: str, value: Any) -> None:

@@ -10,6 +10,7 @@ from cns_drake.base import (
     InputError,
     errors_at,
     fingerprint,
+    merged,
     natural_key,
     validated,
 )
@@ -38,7 +39,6 @@ from cns_drake.studies.experiments.nested_fields import (
     FLEET,
     SESSIONS,
     Changes,
-    merged,
 )
 from cns_drake.studies.experiments.protocol_fields import protocol_from_fields
 from evaluation.map_update import NOT_MAINTAINED

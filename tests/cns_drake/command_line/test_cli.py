@@ -99,14 +99,18 @@ def test_simulate_and_overwrite(files, tmp_path, capfd):
     assert shorter.returncode == 0
 
 
-def test_ride_and_rate_of_the_imu(files, tmp_path, capfd):
+def test_options_change_the_fields_of_the_drive(files, tmp_path, capfd):
     drive = ("simulate", files / "drive.yaml", "--output", tmp_path)
-    varied = ("--ride", "B", "--imu-rate", 400, "--frames", 2)
+    varied = ("--ride", "B", "--imu-rate", 400, "--frames", 2, "--rain", 5)
+    varied += ("--transient", "leaves=0.5,seed=3")
     assert run_here(capfd, *drive, *varied).returncode == 0
     recorded = (tmp_path / "drive" / "scenario.yaml").read_text()
     values = yaml.safe_load(recorded)
     assert values["ride"] == {"roughness": "B", "seed": 1}
     assert values["imu"]["rate"] == 400
+    assert values["weather"]["rain"] == 5
+    assert values["lidars"]["lidar"]["returns"] == "calibrated"
+    assert values["transient"]["leaves"] == 0.5
     refused = run_here(capfd, *drive, "--imu-rate", 333)
     assert_one_line(refused, "--imu-rate: imu: rate: 333 a second")
 

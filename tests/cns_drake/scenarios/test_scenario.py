@@ -150,7 +150,7 @@ def test_returns_and_weather_are_replaced(small_map):
         ({"weather": {"rain": -1}}, r"weather.rain: .*greater"),
         (
             {"weather": {"visibility": 80}, "lidars": {"a": {}}},
-            r"weather: it has no effect on ideal returns; give lidars.a",
+            r"weather\.\w+: it has no effect on ideal returns; give lidars.a",
         ),
         (
             {"lidars": {"a": {"max_range": 0.5}}},

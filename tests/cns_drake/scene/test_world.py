@@ -182,7 +182,9 @@ def test_omitted_structures_are_neither_seen_nor_in_the_way(small_map):
 
 
 def test_omitting_missing_structures_is_an_error(small_map):
-    with pytest.raises(InputError, match=r"stage_01\.sdf: no structure spire"):
+    with pytest.raises(
+        InputError, match=r"stage_01\.sdf: without: no structure spire"
+    ):
         load_world(small_map / "stage_01.sdf", without=["tower_001", "spire"])
 
 

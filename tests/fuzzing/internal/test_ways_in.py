@@ -215,15 +215,15 @@ for _name, _text in FACTORS.items():
         (folder / "x.yaml").write_text(text)
 
 
-def parse_override(folder):
-    from cns_drake.studies import parse_override
+def parse_changes(folder):
+    from cns_drake.base import parse_changes
 
-    return parse_override((folder / "x.txt").read_text())
+    return parse_changes([(folder / "x.txt").read_text()])
 
 
 @way(
-    "experiment: an option", "both.years", "cns_drake.studies.parse_override",
-    use=parse_override,
+    "experiment: an option", "both.years", "cns_drake.base.parse_changes",
+    use=parse_changes,
 )  # fmt: skip
 def _(folder):
     (folder / "x.txt").write_text(f"both.years={'[' * 100_000}")

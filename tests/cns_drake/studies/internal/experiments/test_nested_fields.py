@@ -2,11 +2,8 @@
 
 import pytest
 
-from cns_drake.studies.experiments.nested_fields import (
-    merged,
-    nested,
-    set_field,
-)
+from cns_drake.base import merged, nested
+from cns_drake.studies.experiments.nested_fields import set_field
 
 
 def test_mappings_are_merged_and_all_else_is_replaced():
