@@ -675,7 +675,10 @@ FAULTS = [
     ("query: {lidar: sonar}", "query.lidar: .*unknown preset 'sonar'"),
     ("query: {lidar: 3}", "query.lidar: "),
     ("query: {returns: shiny}", "query.returns: 'shiny' is neither ideal nor"),
-    ("query: {weather: {visibility: 50}}", "query: .*weather: .* no effect"),
+    (
+        "query: {weather: {visibility: 50}}",
+        "query: .*weather.visibility: .* no effect",
+    ),
     (
         "query: {returns: ideal, weather: {visibility: 50}}",
         "query.weather: no effect on ideal returns",
