@@ -222,6 +222,8 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
         (["simulate", "{files}/drive.yaml", "--lidar", "x"], "--lidar: .*'x'"),
         (["simulate", "{files}/drive.yaml", "--frames", "0"], "--frames"),
         (["simulate", "{files}/drive.yaml", "--bogus"], "--bogus"),
+        (["simulate", "{files}/drive.yaml", "--camera", "6x4@2 "], "WxH@RATE"),
+        (["simulate", "{files}/drive.yaml", "--camera", "-1x3@2"], "WxH@RATE"),
         (["export", "atlantis_01", *FILM], "unknown drive 'atlantis_01'"),
         (
             ["export", "{files}/drive.yaml", *FILM, "--size", "64"],

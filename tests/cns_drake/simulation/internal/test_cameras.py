@@ -17,7 +17,6 @@ from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base import InputError
-from cns_drake.command_line.simulating import _camera_fields
 from cns_drake.drives import McapDrive
 from cns_drake.scenarios import load_scenario
 from cns_drake.sensors import check_renderer
@@ -236,14 +235,6 @@ def test_there_may_be_no_renderer(tmp_path, monkeypatch):
         simulate(scenario, tmp_path / "out")
     assert not (tmp_path / "out").exists()
     check_renderer.cache_clear()
-
-
-def test_camera_of_the_command_line():
-    expected = {"width": 640, "height": 480, "rate": 2}
-    assert _camera_fields("640x480@2") == expected
-    for text in ("640x480", "640@2", "-1x3@2", "640x480@2.5", "a", "6x4@2 "):
-        with pytest.raises(InputError, match="not of the form WxH@RATE"):
-            _camera_fields(text)
 
 
 def test_drive_page_shows_each_image_from_its_time(recording, tmp_path):
