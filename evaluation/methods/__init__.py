@@ -2,7 +2,7 @@
 
 Each method is a module of its own, which the registry finds by name; a user's
 own method is a file. What several methods share, or what is large enough to be
-read alone (parts of BTC, layers of networks), is in modules beside them.
+read alone (parts of BTC), is in modules beside them.
 """
 
 from cns_drake.base import attach

@@ -10,28 +10,41 @@ image, with 8192 numbers. The score of two scans is the negative distance of
 their descriptors. The method estimates no pose.
 
 The architecture is reimplemented from the paper and the authors' program (MIT
-licence); no weights are shipped. With the same weights, the descriptors of
-images of KITTI differ from the program's descriptors by less than 1e-4 of their
-length. Deliberate differences:
+licence); no weights are shipped. The page `docs/notes/bevplace.md` shows how to
+convert the authors' weights to an .npz file. PyTorch's own files are not read,
+because they contain pickles, which can run code. With the same weights, the
+descriptors of images of KITTI differ from the program's descriptors by less
+than 1e-4 of their length. Deliberate differences:
 
 - `evaluation.clouds.count_images.count_image` makes the image of a scan.
 - An image whose pixels are all 0 has no descriptor. A place with such an image
   is never a candidate, and a query with such an image has no candidates.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+import hashlib
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from pydantic import computed_field
 from scipy.ndimage import correlate1d
 from scipy.special import softmax
 
+from cns_drake.base import InputError, read_bytes, read_npz
 from evaluation.clouds import count_image
-from evaluation.methods.network_layers import Weights
-from evaluation.methods.published_networks import Network
+from evaluation.methods.method import Method, MethodConfig
+from evaluation.methods.network_weights import Weights, checked_weights
 from evaluation.methods.registry import register
+
+# Greatest size of a file of weights, and of its arrays together [bytes].
+_MOST_BYTES = 200_000_000
+_ADVICE = (
+    "no .npz file of this network's weights; the page docs/notes/bevplace.md"
+    " shows how to make one"
+)
 
 # Number of scales of the image.
 _SCALES = 5
@@ -341,22 +354,86 @@ def _netvlad(weights: Weights, x: np.ndarray) -> np.ndarray:
     return _unit(_unit(shares.T @ x - sums).ravel())
 
 
-@register("bevplace")
-class BevPlace(Network):
-    """The place-recognition method BEVPlace.
+class BevPlaceConfig(MethodConfig):
+    """Settings of BEVPlace.
 
-    The descriptor (8192,) of a cloud whose image is empty is NaN.
+    `sensor_height` has no effect.
+
+    Attributes:
+        weights: .npz file with the weights that the authors of the network
+            published: the arrays of the state dict, by their names.
     """
 
+    weights: Path
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def digest(self) -> str:
+        """Digest of the contents of the file `weights`: 16 hexadecimal digits.
+
+        Two files with the same name can contain different weights; their
+        digests differ.
+        """
+        content = read_bytes(self.weights, _MOST_BYTES)
+        return hashlib.sha256(content).hexdigest()[:16]
+
+
+@register("bevplace")
+class BevPlace(Method[np.ndarray, np.ndarray]):
+    """The place-recognition method BEVPlace.
+
+    The descriptor (8192,) of a cloud whose image is empty is NaN. Scores are
+    negative distances between descriptors.
+    """
+
+    Config = BevPlaceConfig
     title = "BEVPlace"
     source = "Luo et al.: ICCV 2023"
     order = 10
+    skips_places = True
     sees_images = True
     describe_time = 0.85
-    shapes = SHAPES
+    config: BevPlaceConfig
+
+    def __init__(self, config: BevPlaceConfig | None = None):
+        super().__init__(config)
+        self._weights = _read_weights(self.config.weights)
 
     def describe(self, points: np.ndarray) -> np.ndarray:
         image = count_image(points)
         if not image.any():
             return np.full(_CLUSTERS * _CHANNELS, np.nan, np.float32)
         return describe_image(self._weights, image)
+
+    def build_database(self, places: Sequence[np.ndarray]) -> np.ndarray:
+        return np.stack(places)
+
+    def score(
+        self,
+        query: np.ndarray,
+        database: np.ndarray,
+        *,
+        exhaustive: bool = False,
+    ) -> np.ndarray:
+        del exhaustive  # Always true here.
+        distances = np.linalg.norm(database - query, axis=1)
+        return -distances.astype(np.float64)
+
+
+def _read_weights(path: Path) -> dict[str, np.ndarray]:
+    """Returns the weights (float32) in an .npz file, by name.
+
+    Raises:
+        InputError: the file cannot be read, or an array is missing, of another
+            shape or not finite.
+    """
+    try:
+        found = read_npz(path, SHAPES, _MOST_BYTES)
+    except ValueError as error:
+        raise InputError(f"{path}: {_ADVICE} ({error})") from error
+    if not found:
+        raise InputError(
+            f"{path}: {_ADVICE} (no array {next(iter(SHAPES))}, with just this"
+            " name and no prefix, such as module.)"
+        )
+    return checked_weights(found, SHAPES, path)

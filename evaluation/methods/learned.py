@@ -32,7 +32,7 @@ from cns_drake.base import (
 )
 from evaluation.maps import extremes
 from evaluation.methods.method import Method, MethodConfig
-from evaluation.methods.network_layers import checked_weights
+from evaluation.methods.network_weights import checked_weights
 from evaluation.methods.registry import register
 
 # Version of the layout of files of weights.

@@ -1067,16 +1067,15 @@ NOT_RUN = {
     ".venv/bin/cns-drake study stages --method heights.py": "drives through "
     "shipped cities, for an hour",
     "method           auc, mean": "is what the recipe compare prints",
+    ".venv/bin/cns-eval pr --method network.py": "needs PyTorch; "
+    "test_own_methods has a network",
     "cns-eval pr --method map-closures": "needs an extra",
-    ".venv/bin/cns-eval pr --method svt-net": "needs weights that do not ship; "
-    "test_published_networks has some of its own",
-    ".venv/bin/cns-eval pr --method bevplace": "needs weights, too; "
-    "test_bevplace has some of its own",
+    ".venv/bin/cns-eval pr --method bevplace": "needs weights that do not "
+    "ship; test_bevplace has some of its own",
     ".venv/bin/cns-drake study stages --task place --method bevplace": "needs "
     "weights, too",
     ".venv/bin/cns-drake study ladder suburbia --quick --task": "needs "
     "weights, too",
-    "# cns-drake study outside.yaml": "needs these weights, too",
     "for half in even odd": "needs scans that do not ship",
     "import numpy as np, torch": "needs PyTorch and these weights, too",
     "cns-drake train": "needs an extra, and minutes; test_training trains",

@@ -42,21 +42,6 @@ def test_shipped_methods_pass(name):
     check_method(make_method(name, {}))
 
 
-@pytest.mark.slow
-@pytest.mark.night
-def test_methods_that_need_weights_pass(tmp_path):
-    """With random weights, the networks keep the interface, too."""
-    rng = np.random.default_rng(5)
-    for name in ("svt-net", "dpa-net"):
-        weights = {
-            key: rng.uniform(0.5, 1.0, shape).astype(np.float32) * 0.1
-            for key, shape in METHODS[name].shapes.items()
-        }
-        path = tmp_path / f"{name}.npz"
-        np.savez(path, **weights)
-        check_method(make_method(name, {"weights": path}))
-
-
 def test_styles_of_methods_differ():
     styles = [one.style for one in METHODS.values()]
     given = [style for style in styles if style]

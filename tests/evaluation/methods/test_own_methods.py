@@ -8,6 +8,7 @@ from helpers.internal.eval_program import assert_refused, make_block_scene, run
 import numpy as np
 import pytest
 
+from evaluation import check_method, evaluate, judge, open_drive, retrieve
 from evaluation.methods import load_method
 from evaluation.study import choose_methods
 
@@ -42,6 +43,27 @@ def test_the_method_in_the_documents(capsys, towns, tmp_path):
     assert_refused(capsys, [*both, "--set", "rings=x"], "heights: rings")
 
 
+def test_a_network_in_the_documents(towns):
+    """With a network of NumPy: of the file only `load` knows PyTorch."""
+    rng = np.random.default_rng(1)
+    kernel, bias = rng.normal(size=(3, 64)), rng.normal(size=64)
+
+    def network(cloud):
+        """PointNet of one layer."""
+        assert cloud.shape == (4096, 3)
+        assert cloud.dtype == np.float32
+        assert np.linalg.norm(cloud, axis=1).max() < 1.0
+        return np.tanh(3.0 * cloud @ kernel + bias).mean(axis=0)
+
+    kind = load_method(documents.ROOT / "docs/examples/network.py")
+    method = kind(kind.Config(model="mine.pt"), network)
+    check_method(method)
+    drives = (open_drive(towns / f"town_0{k}") for k in (1, 2))
+    found = retrieve(*drives, method)
+    outcomes = judge(found.scores, found.matches)
+    assert evaluate(outcomes).recall_at_1 > 0.9
+
+
 def test_the_shown_method_finds_turned_places(tmp_path):
     heights = load_method(shown_method(tmp_path))()
     scenes = [make_block_scene(seed) for seed in range(6)]
@@ -68,8 +90,8 @@ def test_the_shown_method_finds_turned_places(tmp_path):
         ),
         (
             "from evaluation.methods import Method, register\n"
-            "register('svt-net')(type('A', (Method,), {}))",
-            "there is another method 'svt-net'",
+            "register('bevplace')(type('A', (Method,), {}))",
+            "there is another method 'bevplace'",
         ),
         (
             "from evaluation.methods import Method, register\n"

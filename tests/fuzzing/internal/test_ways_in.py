@@ -411,16 +411,16 @@ def npy_header(shape, kind="<f4"):
 def weigh(folder):
     from evaluation.methods import make_method
 
-    return make_method("svt-net", {"weights": folder / "w.npz"})
+    return make_method("bevplace", {"weights": folder / "w.npz"})
 
 
 WEIGHTS = ("cns_drake.base.read_npz", "evaluation.methods.make_method")
 
 
 def first_array():
-    from evaluation.methods.svt_net import SvtNet
+    from evaluation.methods.bevplace import SHAPES
 
-    return next(iter(SvtNet.shapes))
+    return next(iter(SHAPES))
 
 
 for _name, _header in {
@@ -1376,7 +1376,7 @@ def test_a_small_file_costs_little(attempts, name):
 # Modules that readers import when they are used.
 _LIBRARIES = (
     "PIL.Image",
-    "evaluation.methods.svt_net",
+    "evaluation.methods.bevplace",
     "evaluation.results.table",
     "matplotlib.figure",
     "osmium",

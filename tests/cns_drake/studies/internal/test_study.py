@@ -681,7 +681,7 @@ def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
             "tasks.localise.starts: two starts at one distance",
         ),
         ({"methods": ["bow"]}, "methods: no method 'bow' .known: btc"),
-        ({"methods": ["svt-net"]}, "methods: svt-net: weights: Field"),
+        ({"methods": ["bevplace"]}, "methods: bevplace: weights: Field"),
         ({"methods": ["none.py"]}, "methods: .*none.py: no such file"),
         ({"methods": {"solid": {"x": 1}}}, "methods: solid: no parameter 'x'"),
         (

@@ -1,13 +1,19 @@
 """BEVPlace: each step against its definition, and the method as a whole."""
 
+import io
 import itertools
 import math
+import pickle
+import tracemalloc
+import zipfile
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 import pytest
 from scipy.ndimage import map_coordinates
 
+from cns_drake.base import InputError
+from evaluation import check_method
 from evaluation.clouds import count_image, image_points
 from evaluation.methods import make_method
 from evaluation.methods.bevplace import (
@@ -15,6 +21,7 @@ from evaluation.methods.bevplace import (
     _turned_images,
     describe_image,
 )
+from evaluation.study import choose_methods
 
 # As large as an image must be for all scales.
 SIZE = 63
@@ -182,7 +189,6 @@ def test_the_method(tmp_path):
     path = tmp_path / "w.npz"
     np.savez(path, **weights, **{"netvlad.wq.bias": np.zeros(64, np.float32)})
     method = make_method("bevplace", {"weights": path})
-    assert method.sees_images
     cloud = image_points(picture(1, 111))
     described = method.describe(cloud)
     np.testing.assert_array_equal(
@@ -198,3 +204,117 @@ def test_the_method(tmp_path):
     assert np.isnan(scores[2])
     assert np.isnan(method.score(nothing, database)).all()
     assert method.relative_pose(described, database, 0) is None
+
+
+@pytest.mark.slow
+@pytest.mark.night
+def test_it_keeps_the_interface(tmp_path):
+    np.savez(tmp_path / "w.npz", **random_weights())
+    check_method(make_method("bevplace", {"weights": tmp_path / "w.npz"}))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (None, "netvlad.centroids is missing"),
+        (np.ones((2, 2), np.float32), r"\(2, 2\) instead of \(64, 128\)"),
+        (np.full((64, 128), np.nan, np.float32), "not all are finite"),
+        (np.full((64, 128), 1e300), "not all are finite"),
+        (np.ones((64, 128), np.complex64), "not all are finite"),
+    ],
+)
+def test_other_weights(tmp_path, change, message):
+    values = random_weights() | {"netvlad.centroids": change}
+    if change is None:
+        del values["netvlad.centroids"]
+    path = tmp_path / "w.npz"
+    np.savez(path, **values)
+    with pytest.raises(InputError, match=rf"w\.npz: .*{message}") as error:
+        make_method("bevplace", {"weights": path})
+    assert "\n" not in str(error.value)
+
+
+def test_names_with_a_prefix(tmp_path):
+    """As those of a network that was trained on several devices."""
+    weights = {f"module.{k}": v for k, v in random_weights().items()}
+    np.savez(tmp_path / "w.npz", **weights)
+    with pytest.raises(InputError, match=r"no prefix, such as module\."):
+        make_method("bevplace", {"weights": tmp_path / "w.npz"})
+
+
+class Ran:
+    """Runs code when it is unpickled."""
+
+    ran = False
+
+    def __reduce__(self):
+        return setattr, (Ran, "ran", True)
+
+
+def torch_file():
+    """Returns a pickle in an archive, as `torch.save` writes it."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        archive.writestr("archive/data.pkl", pickle.dumps({"state": Ran()}))
+    return content.getvalue()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        torch_file(),
+        # Files of `torch.save` before PyTorch 1.6 begin like this.
+        b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19.\x80\x02.",
+        pickle.dumps(Ran()),
+        b"text",
+    ],
+    ids=["zip", "legacy", "pickle", "text"],
+)
+@pytest.mark.parametrize("name", ["w.pth", "w.pth.tar", "w.npz"])
+def test_files_of_pytorch_are_refused(tmp_path, content, name):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(
+        InputError, match=rf"{name}: no \.npz .*docs/notes/bevplace"
+    ) as error:
+        make_method("bevplace", {"weights": path})
+    assert "\n" not in str(error.value)
+    assert not Ran.ran
+
+
+@pytest.mark.slow
+def test_weights_can_neither_run_code_nor_fill_the_memory(tmp_path):
+    path = tmp_path / "w.npz"
+    name = "netvlad.centroids"
+    np.savez(path, **random_weights() | {name: np.array([Ran()], object)})
+    with pytest.raises(InputError, match=r"w\.npz: .*pickle"):
+        make_method("bevplace", {"weights": path})
+    assert not Ran.ran
+    np.savez_compressed(path, **{name: np.zeros(80_000_000, np.float32)})
+    assert path.stat().st_size < 1_000_000
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=rf"w\.npz: .*{name}: more than"):
+            make_method("bevplace", {"weights": path})
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most < 300_000_000
+
+
+def test_weights_must_be_given(tmp_path):
+    with pytest.raises(InputError, match=r"w\.npz: No such file"):
+        make_method("bevplace", {"weights": tmp_path / "w.npz"})
+    with pytest.raises(InputError, match="bevplace: weights: Field required"):
+        choose_methods(["bevplace"])
+
+
+def test_two_files_of_weights_are_two_methods(tmp_path):
+    digests = set()
+    for seed in (1, 2):
+        path = tmp_path / "w.npz"
+        np.savez(path, **random_weights(seed))
+        chosen = choose_methods(["bevplace"], [f"bevplace.weights={path}"])[-1]
+        digests.add(chosen.identity()["parameters"]["digest"])
+    assert len(digests) == 2
+    assert {len(one) for one in digests} == {16}
