@@ -189,15 +189,21 @@ def add_lidar(
     # Adds a port to a SceneGraph, or fails.
     geometry_port(scene_graph, lidar.role)
     _warn_of_no_geometry(scene_graph, lidar.role)
-    builder.AddNamedSystem(name, lidar)
+    systems = [builder.AddNamedSystem(name, lidar)]
     connect_lidar(builder, scene_graph, lidar)
     if lidar.is_random:
         draw = builder.AddNamedSystem(f"{name}_{_DRAW}", _make_noise_draw())
+        systems.append(draw)
         builder.Connect(
             draw.get_output_port(), lidar.GetInputPort("noise_draw")
         )
-    for port in velocities:
-        builder.Connect(port, lidar.GetInputPort(_VELOCITIES))
+    try:
+        for port in velocities:
+            builder.Connect(port, lidar.GetInputPort(_VELOCITIES))
+    except RuntimeError:  # A port of the caller's system has another type.
+        for system in systems:
+            builder.RemoveSystem(system)
+        raise
     return lidar
 
 

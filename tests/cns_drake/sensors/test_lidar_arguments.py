@@ -9,7 +9,7 @@ from pydrake.multibody.plant import (
     AddMultibodyPlantSceneGraph,
     MultibodyPlant,
 )
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ConstantVectorSource
 import pytest
 
@@ -124,16 +124,30 @@ def test_a_scan_a_nanosecond_is_refused_with_a_pattern_too():
         Lidar(Site().scene_graph.world_frame_id(), X_PS, pattern, rate=1e9)
 
 
-@pytest.mark.parametrize("fault", ["port", "other graph", "nothing to see"])
+class Speed(LeafSystem):
+    """Its velocities are no spatial velocities of bodies."""
+
+    def __init__(self):
+        super().__init__()
+        self.DeclareVectorOutputPort(
+            "body_spatial_velocities", 6, lambda context, output: None
+        )
+
+
+@pytest.mark.parametrize(
+    "fault", ["port", "type of port", "other graph", "nothing to see"]
+)
 def test_a_lidar_that_cannot_be_connected_is_not_added(fault):
     site = Site(with_wall=fault != "nothing to see")
-    motion = site.builder.AddSystem(ConstantVectorSource([0.0]))
+    is_typed = fault == "type of port"
+    motion = Speed() if is_typed else ConstantVectorSource([0.0])
+    site.builder.AddSystem(motion)
     if fault == "other graph":
         site.scene_graph = Site().scene_graph
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with pytest.raises((RuntimeError, UserWarning)):
-            site.add(motion_distortion=fault == "port", motion=motion)
+            site.add(motion_distortion="port" in fault, motion=motion, seed=1)
     assert len(site.builder.GetSystems()) == 3
 
 
