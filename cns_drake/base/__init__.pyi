@@ -28,8 +28,10 @@ from cns_drake.base.complete_files import write_part as write_part
 from cns_drake.base.complete_files import write_text as write_text
 from cns_drake.base.csv_files import check_separator as check_separator
 from cns_drake.base.csv_files import csv_text as csv_text
+from cns_drake.base.csv_files import quoted_cell as quoted_cell
 from cns_drake.base.csv_files import read_records as read_records
 from cns_drake.base.csv_files import read_rows as read_rows
+from cns_drake.base.csv_files import unquoted_cell as unquoted_cell
 from cns_drake.base.csv_files import write_csv as write_csv
 from cns_drake.base.elementary import arcsin as arcsin
 from cns_drake.base.elementary import arctan2 as arctan2

@@ -14,21 +14,48 @@ from cns_drake.base.repetitions import repeated
 
 # Control characters: no table needs them, and a terminal would obey them.
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]")
+# What a spreadsheet computes, perhaps behind quotes of ours.
+_FORMULA = re.compile("'*[=+@-]")
 
 
 def csv_text(header: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
     """Returns a header and rows as CSV.
 
-    None and NaN become empty cells; True and False become 1 and 0.
+    None and NaN become empty cells; True and False become 1 and 0; texts are
+    as `quoted_cell` returns them.
     """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(
-        [int(v) if isinstance(v, bool) else "" if v != v else v for v in row]
-        for row in rows
-    )
+    writer.writerow(map(_cell, header))
+    writer.writerows(map(_cell, row) for row in rows)
     return stream.getvalue()
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, str):
+        return quoted_cell(value)
+    if isinstance(value, bool):
+        return int(value)
+    return "" if value != value else value
+
+
+def quoted_cell(text: str) -> str:
+    """Returns a text for a table, with a quote before a formula.
+
+    A spreadsheet would compute a formula, which may be a name in somebody
+    else's file. Numbers stay, with their signs.
+    """
+    if _FORMULA.match(text) and text != "-":
+        try:
+            float(text)
+        except ValueError:
+            return f"'{text}"
+    return text
+
+
+def unquoted_cell(text: str) -> str:
+    """Returns the text of which `quoted_cell` returns `text`."""
+    return text[1:] if text[:1] == "'" and _FORMULA.match(text) else text
 
 
 def write_csv(
@@ -51,7 +78,8 @@ def write_csv(
 def read_rows(path: Path) -> list[tuple[int, list[str]]]:
     """Returns the rows of a CSV file, each with its line number.
 
-    Cells are stripped of surrounding spaces. Empty rows are left out.
+    Cells are stripped of surrounding spaces, and of quotes before formulas.
+    Empty rows are left out.
 
     Raises:
         InputError: the file cannot be read, is not CSV in UTF-8, holds a
@@ -67,7 +95,8 @@ def read_rows(path: Path) -> list[tuple[int, list[str]]]:
         check_separator(path, text)
         reader = csv.reader(lines, skipinitialspace=True)
         rows = [
-            (reader.line_num, [cell.strip() for cell in row]) for row in reader
+            (reader.line_num, [unquoted_cell(cell.strip()) for cell in row])
+            for row in reader
         ]
     except csv.Error as error:
         raise InputError(f"{path}: not CSV: {error}") from error

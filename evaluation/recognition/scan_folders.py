@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import InputError, completing, listed, track
+from cns_drake.base import InputError, completing, listed, quoted_cell, track
 from cns_drake.base import points as point_arrays
 from evaluation.clouds import OnNote, find_layout, is_cloud, no_note, read_cloud
 from evaluation.drives import cropped, cropped_with_fields
@@ -102,7 +102,8 @@ def write_scores(
             )
             for place, value in zip(place_files, values, strict=True):
                 text = "" if np.isnan(value) else repr(float(value))
-                writer.writerow([path.stem, place.stem, text])
+                names = quoted_cell(path.stem), quoted_cell(place.stem)
+                writer.writerow([*names, text])
     return reader.num_ignored
 
 

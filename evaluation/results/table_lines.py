@@ -9,7 +9,13 @@ import io
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import InputError, check_separator, read_bytes, repeated
+from cns_drake.base import (
+    InputError,
+    check_separator,
+    read_bytes,
+    repeated,
+    unquoted_cell,
+)
 from evaluation.recognition import PROTOCOL_NAMES
 from evaluation.results.cells import (
     CONTROL,
@@ -213,8 +219,8 @@ def _csv_lines(file: Path) -> list[tuple[int, list[str]]]:
         lines = [
             (
                 reader.line_num,
-                [cell.strip(" ") for cell in row]
-                if " " in "".join(row)
+                [unquoted_cell(cell.strip(" ")) for cell in row]
+                if " " in (joined := "".join(row)) or "'" in joined
                 else row,
             )
             for row in reader

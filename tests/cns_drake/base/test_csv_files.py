@@ -4,6 +4,7 @@ import pytest
 
 from cns_drake.base import (
     InputError,
+    csv_text,
     number_within,
     read_records,
     read_rows,
@@ -113,3 +114,16 @@ def test_numbers_up_to_a_size():
     ):
         with pytest.raises(InputError, match=r"^x: .* is no number up to 2"):
             number_within(text, 2.0, "x")
+
+
+def test_names_that_are_formulas_are_quoted_and_read_as_they_were(tmp_path):
+    names = ["=1+1", "@sum", "-a", "+b", "'=c", "''=d", "'e", "f", "-", "-1e-3"]
+    written = csv_text(["=name"], [[name] for name in names])
+    cells = written.splitlines()
+    assert cells[:3] == ["'=name", "'=1+1", "'@sum"]
+    assert not [c for c in cells if c[0] in "=@+-"][:-2]
+    path = write(tmp_path, written.encode())
+    assert [row for _, row in read_rows(path)] == [
+        ["=name"],
+        *([n] for n in names),
+    ]

@@ -236,7 +236,10 @@ def pair(browser, tmp_path):
         for name in ("first", "second")
     ]
     path = tmp_path / "pair.html"
-    path.write_text(make_pair_page(*pages))
+    # Tests look into the frames, which have an origin of their own.
+    text = make_pair_page(*pages)
+    assert text.count(SANDBOX) == 2
+    path.write_text(text.replace(SANDBOX, ""))
     browser.open(path.as_uri(), 1440, 900)
     for k in range(2):
         browser.wait_for(inside(k, "typeof commands !== 'undefined'"))
@@ -244,6 +247,25 @@ def pair(browser, tmp_path):
         browser.wait_for(inside(k, '!document.getElementById("loading")'))
         browser.evaluate(inside(k, "viewer.animator.pause()"))
     return browser
+
+
+SANDBOX = 'sandbox="allow-scripts"'
+TAKE = "<script>parent.document.title = 'taken'</script><h1>"
+
+
+# A software renderer takes half a minute.
+@pytest.mark.night
+@pytest.mark.slow
+@pytest.mark.skipif(not has_chromium(), reason="no chromium")
+def test_a_page_of_others_runs_in_a_frame_of_its_own(browser, tmp_path):
+    path = tmp_path / "page.html"
+    path.write_text(make_page(tmp_path).replace("<h1>", TAKE, 1))
+    page = read_drive_page(path, "a & b")
+    path.write_text(make_pair_page(page, page))
+    browser.open(path.as_uri(), 1440, 900)
+    # The first drive, whose script has run by then, still leads the second.
+    browser.evaluate("new Promise((heard) => { onmessage = heard; })")
+    assert browser.evaluate("document.title") != "taken"
 
 
 def inside(k, expression):
