@@ -5,6 +5,7 @@ from evaluation.change import covered as covered
 from evaluation.change import temporal_change as temporal_change
 from evaluation.drives import DataSet as DataSet
 from evaluation.drives import check_data_set as check_data_set
+from evaluation.drives import data_set_checks as data_set_checks
 from evaluation.drives import open_drive as open_drive
 from evaluation.drives import register_data_set as register_data_set
 from evaluation.maps import VoxelMap as VoxelMap
@@ -15,6 +16,7 @@ from evaluation.methods import MethodConfig as MethodConfig
 from evaluation.methods import check_method as check_method
 from evaluation.methods import known_methods as known_methods
 from evaluation.methods import make_method as make_method
+from evaluation.methods import method_checks as method_checks
 from evaluation.methods import register as register
 from evaluation.recognition import Metric as Metric
 from evaluation.recognition import (

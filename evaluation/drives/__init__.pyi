@@ -1,5 +1,6 @@
 from evaluation.drives.data_set import DataSet as DataSet
 from evaluation.drives.data_set_check import check_data_set as check_data_set
+from evaluation.drives.data_set_check import data_set_checks as data_set_checks
 from evaluation.drives.drive_views import NOT_FINITE as NOT_FINITE
 from evaluation.drives.drive_views import CountedDrive as CountedDrive
 from evaluation.drives.drive_views import DriveView as DriveView

@@ -1,12 +1,13 @@
-"""A public check of data sets, as Gymnasium has for environments."""
+"""Public checks of data sets, as scikit-learn has for estimators."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+import functools
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial import KDTree
 
-from cns_drake.base import FARTHEST, InputError, poses, yaw_pose
+from cns_drake.base import FARTHEST, InputError, errors_at, poses, yaw_pose
 from cns_drake.drives import Drive
 from cns_drake.units import check_preset
 from evaluation.drives.opening import open_drive
@@ -48,14 +49,10 @@ _MIRROR_Y = np.diag([1.0, -1.0, 1.0, 1.0])
 def check_data_set(path: Path | str) -> None:
     """Checks that a drive of your own can be used by all programs.
 
-    The check opens the drive and reads some of its scans. Times must increase,
-    poses must be rigid, scans must have points, and a scan must be the same
-    each time it is read. The check also looks for what readers often confuse:
-    units other than metres and nanoseconds, a LiDAR frame whose z axis points
-    down or which is left-handed, poses that are inverted or turned by a quarter
-    or half against the points, and points that are not in the LiDAR's frame.
-    Points whose coordinates are not finite are beams without a return: they are
-    allowed, and left out, as in all programs.
+    The checks, `data_set_checks`, open the drive and read some of its scans.
+    They look for what readers often confuse, such as units, the axes of a frame
+    and inverted poses. Points whose coordinates are not finite are beams
+    without a return: they are allowed, and left out, as in all programs.
 
     Args:
         path: a drive, as `open_drive` takes it.
@@ -69,41 +66,44 @@ def check_data_set(path: Path | str) -> None:
 
         check_data_set("recordings/downtown_01")
     """
-    path = Path(path)
-    drive = open_drive(path)
-    for fault in _faults(drive):
-        raise InputError(f"{path}: {fault}")
+    drive = open_drive(Path(path))
+    with errors_at(path, f"{drive.name}: "):
+        for check in data_set_checks:
+            check(drive)
 
 
-def _faults(drive: Drive) -> Iterator[str]:
-    """Yields what is wrong with a drive."""
+_Faults = Callable[[Drive], Iterator[str]]
+_Check = Callable[[Drive | Path | str], None]
+
+
+def _check(*first: _Check) -> Callable[[_Faults], _Check]:
+    """Returns a decorator: a function that yields faults becomes a check.
+
+    Args:
+        first: checks whose faults come first: they would spoil this one.
+    """
+
+    def made(faults: _Faults) -> _Check:
+        @functools.wraps(faults)
+        def check(drive: Drive | Path | str) -> None:
+            opened = (
+                drive if isinstance(drive, Drive) else open_drive(Path(drive))
+            )
+            for one in first:
+                one(opened)
+            for fault in faults(opened):
+                raise InputError(f"{opened.name}: {fault}")
+
+        return check
+
+    return made
+
+
+@_check()
+def check_names(drive: Drive) -> Iterator[str]:
+    """The drive has a name, and its LiDAR is known if it has one."""
     if not (drive.name.strip() and drive.name.isprintable()):
         yield f"name: {drive.name!r} is no name"
-    yield from _faults_of_lidar(drive)
-    number = len(drive)
-    if number < 2:
-        yield f"scans: {number} instead of two at least"
-        return
-    yield from _faults_of_times(drive.stamps_ns, number)
-    yield from _faults_of_poses(drive.X_WS, number)
-    yield from _faults_of_motion(drive)
-    frames = np.unique(np.linspace(0, number - 1, _NUM_SCANS).astype(int))
-    clouds = {}
-    for frame in frames.tolist():
-        scan = drive.scan(frame)
-        names = scan.dtype.names or ()
-        if scan.ndim != 1 or not {"x", "y", "z"} <= set(names):
-            yield f"scan {frame}: no array of points with x, y and z"
-            return
-        again = drive.scan(frame)
-        if scan.dtype != again.dtype or scan.tobytes() != again.tobytes():
-            yield f"scan {frame}: other points when it is read again"
-        clouds[frame] = _returns(scan)
-    yield from _faults_of_points(clouds)
-    yield from _faults_of_frames(drive, clouds)
-
-
-def _faults_of_lidar(drive: Drive) -> Iterator[str]:
     lidars = (drive.scenario or {}).get("lidars", {})
     if not isinstance(lidars, Mapping) or not all(
         isinstance(one, Mapping) for one in lidars.values()
@@ -118,7 +118,13 @@ def _faults_of_lidar(drive: Drive) -> Iterator[str]:
             yield f"lidars: preset: {error}"
 
 
-def _faults_of_times(stamps_ns: np.ndarray, number: int) -> Iterator[str]:
+@_check()
+def check_times(drive: Drive) -> Iterator[str]:
+    """Two scans at least, in increasing times in nanoseconds."""
+    number, stamps_ns = len(drive), drive.stamps_ns
+    if number < 2:
+        yield f"scans: {number} instead of two at least"
+        return
     if stamps_ns.shape != (number,) or stamps_ns.dtype != np.int64:
         yield (
             f"times: {stamps_ns.dtype} of shape {stamps_ns.shape} instead of"
@@ -137,7 +143,10 @@ def _faults_of_times(stamps_ns: np.ndarray, number: int) -> Iterator[str]:
         )
 
 
-def _faults_of_poses(X_WS: np.ndarray, number: int) -> Iterator[str]:
+@_check()
+def check_poses(drive: Drive) -> Iterator[str]:
+    """Each scan has a finite rigid pose."""
+    number, X_WS = len(drive), drive.X_WS
     if X_WS.shape != (number, 4, 4):
         yield f"poses: of shape {X_WS.shape}, not ({number}, 4, 4)"
         return
@@ -149,7 +158,9 @@ def _faults_of_poses(X_WS: np.ndarray, number: int) -> Iterator[str]:
         yield "poses: too far from the origin"
 
 
-def _faults_of_motion(drive: Drive) -> Iterator[str]:
+@_check(check_times, check_poses)
+def check_motion(drive: Drive) -> Iterator[str]:
+    """A vehicle can move as the poses say, and the LiDAR's z axis points up."""
     p_WS = drive.X_WS[:, :3, 3]
     steps = np.linalg.norm(np.diff(p_WS, axis=0), axis=1)
     speed = float(np.median(steps / (np.diff(drive.stamps_ns) * 1e-9)))
@@ -162,7 +173,33 @@ def _faults_of_motion(drive: Drive) -> Iterator[str]:
         yield "poses: the LiDAR's z axis points down; it must point up"
 
 
-def _faults_of_points(clouds: dict[int, np.ndarray]) -> Iterator[str]:
+def _some_frames(drive: Drive) -> list[int]:
+    frames = np.linspace(0, len(drive) - 1, _NUM_SCANS)
+    return np.unique(frames.astype(int)).tolist()
+
+
+@_check(check_times)
+def check_scans(drive: Drive) -> Iterator[str]:
+    """A scan has x, y and z, and the same points each time it is read."""
+    for frame in _some_frames(drive):
+        scan = drive.scan(frame)
+        names = scan.dtype.names or ()
+        if scan.ndim != 1 or not {"x", "y", "z"} <= set(names):
+            yield f"scan {frame}: no array of points with x, y and z"
+        again = drive.scan(frame)
+        if scan.dtype != again.dtype or scan.tobytes() != again.tobytes():
+            yield f"scan {frame}: other points when it is read again"
+
+
+def _clouds(drive: Drive) -> dict[int, np.ndarray]:
+    """Returns frame -> points (N, 3) of some scans."""
+    return {one: _returns(drive.scan(one)) for one in _some_frames(drive)}
+
+
+@_check(check_scans)
+def check_points(drive: Drive) -> Iterator[str]:
+    """Points are in metres, and the ground is below the LiDAR."""
+    clouds = _clouds(drive)
     empty = [frame for frame, cloud in clouds.items() if not len(cloud)]
     if len(empty) == len(clouds):
         yield f"scans: without points (scan {empty[0]} and others)"
@@ -218,13 +255,12 @@ def _above_ground(points: np.ndarray) -> np.ndarray:
     return points[points[:, 2] > height + _LAYER + _GROUND_MARGIN]
 
 
-def _faults_of_frames(
-    drive: Drive, clouds: dict[int, np.ndarray]
-) -> Iterator[str]:
-    """Compares each scan with later ones, as the poses place both."""
+@_check(check_scans, check_poses)
+def check_frames(drive: Drive) -> Iterator[str]:
+    """Scans fit later ones as the poses place them, and in no other way."""
     trees = {
         frame: KDTree(above)
-        for frame, cloud in clouds.items()
+        for frame, cloud in _clouds(drive).items()
         if len(above := _above_ground(cloud)) >= _FEWEST
     }
     for least_move in _LEAST_MOVES:
@@ -236,6 +272,19 @@ def _faults_of_frames(
                 "poses: neighbouring scans fit better"
                 f" ({gaps[best]:.2f} m instead of {given:.2f} m) if {best}"
             )
+
+
+# What `check_data_set` checks, for `pytest.mark.parametrize`: functions of a
+# drive, or of its path, each of which raises an InputError.
+data_set_checks: list[_Check] = [
+    check_names,
+    check_times,
+    check_poses,
+    check_motion,
+    check_scans,
+    check_points,
+    check_frames,
+]
 
 
 def _gaps(

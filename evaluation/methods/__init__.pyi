@@ -24,6 +24,7 @@ from evaluation.methods.method import check_number as check_number
 from evaluation.methods.method import checked_pose as checked_pose
 from evaluation.methods.method import checked_scores as checked_scores
 from evaluation.methods.method_check import check_method as check_method
+from evaluation.methods.method_check import method_checks as method_checks
 from evaluation.methods.own_files import as_users_code as as_users_code
 from evaluation.methods.own_files import load_method as load_method
 from evaluation.methods.own_files import run_module as run_module

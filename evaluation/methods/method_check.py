@@ -1,4 +1,4 @@
-"""A public check of methods, as Gymnasium has for environments."""
+"""Public checks of methods, as scikit-learn has for estimators."""
 
 from collections.abc import Callable, Mapping, Sequence
 import dataclasses
@@ -36,14 +36,7 @@ _PLAIN = (bool, int, float, complex, str, bytes, np.generic, type(None))
 
 
 def check_method(method: Method) -> None:
-    """Checks that a method keeps the interface `Method`.
-
-    The check describes made-up clouds, also empty ones, and compares them: all
-    results must have the right type, shape and number, be finite, be the same
-    for the same input, and survive pickling, which worker processes need. The
-    input must not be changed, and no descriptor once it has been described;
-    scores must tell places apart, and a cloud must not fit another cloud better
-    than itself.
+    """Checks that a method keeps the interface `Method`, by `method_checks`.
 
     Args:
         method: the method, with the settings to check.
@@ -57,270 +50,340 @@ def check_method(method: Method) -> None:
 
         check_method(make_method("solid", {}))
     """
+    for check in method_checks:
+        check(method)
+
+
+def check_attributes(method: Method) -> None:
+    """The method has a name, possible attributes, and a `Config` as config."""
     if not isinstance(method, Method):
         raise InputError(f"{method!r} is no Method (an object, not a class)")
-    _Check(method).run()
-
-
-class _Check:
-    """The steps of `check_method` for one method."""
-
-    def __init__(self, method: Method):
-        self._method = method
-        self._name = getattr(type(method), "name", "")
-        self._clouds: list[np.ndarray] = []
-
-    def run(self) -> None:
-        self._check_attributes()
-        self._clouds = [self._cloud(seed) for seed in range(_NUM_PLACES)]
-        places, queries = self._described()
-        as_described = _copied((places, queries))
-        database = self._call("build_database", places)
-        self._check_differences(queries, database)
-        places_again, queries_again = self._described()
-        again = self._call("build_database", places_again)
-        for number, query in enumerate(queries):
-            scores = self._scores(query, database, _NUM_PLACES)
-            if not np.array_equal(
-                self._scores(queries_again[number], again, _NUM_PLACES),
-                scores,
-                equal_nan=True,
-            ):
-                raise self._fault(
-                    "describe: the same clouds, described twice, have different"
-                    " scores; give random numbers a fixed seed"
-                )
-            self._check_own_score(scores, number)
-            self._check_poses(query, database)
-        if not _is_equal(_copied((places, queries)), as_described):
-            raise self._fault(
-                "a descriptor was changed after it was described; of a long"
-                " drive, it is read again from a file"
+    name = _name(method)
+    if not (isinstance(name, str) and name.strip()):
+        raise _fault(method, "name: missing; use the decorator register")
+    with errors_at(name):
+        check_class(type(method))
+    known = (*_FIELDS, *_RARE_FIELDS)
+    for field in method.point_fields:
+        # Drives of your own can have fields of their own.
+        if field not in known and (near := did_you_mean(field, known)):
+            raise _fault(
+                method, f"point_fields: no recording has {field!r}{near}"
             )
-        self._check_pickles(queries[0], places)
-        self._check_batches(queries, database)
-        self._check_parts(queries[0], database, places)
-        self._check_rerank(self._scores(queries[0], database, _NUM_PLACES))
-        self._check_few_points(database)
+    if not isinstance(method.config, method.Config):
+        raise _fault(method, "config: no object of the class Config")
 
-    def _described(self) -> tuple[list[Any], list[Any]]:
-        """Returns the clouds' descriptors as places, and as queries."""
-        places, queries = (
-            [self._describe(cloud, of_place=kind) for cloud in self._clouds]
-            for kind in (True, False)
+
+def check_descriptors(method: Method) -> None:
+    """Descriptors can be stored, and describing a cloud does not change it."""
+    for of_place in (True, False):
+        _describe(method, _cloud(method, 0), of_place=of_place)
+
+
+def check_scores(method: Method) -> None:
+    """Scores are finite numbers, one for each place, or NaN if that may be."""
+    _, queries, database = _described(method)
+    for query in queries:
+        _scores(method, query, database, _NUM_PLACES)
+        found = _call(
+            method, "score_in_drive", [query], database, exhaustive=True
         )
-        return places, queries
+        checked_scores(method, "score_in_drive", found, _NUM_PLACES)
 
-    def _fault(self, text: str) -> InputError:
-        return InputError(f"{self._name}: {text}")
 
-    def _call(self, function: str, *arguments: Any, **options: Any) -> Any:
-        """Returns what a function of the method returns."""
-        call: Callable = getattr(self._method, function)
-        try:
-            return call(*arguments, **options)
-        except InputError:
-            raise
-        # A SystemExit would end the program of the caller.
-        except (Exception, SystemExit) as error:
-            advice = ""
-            if "read-only" in str(error):
-                advice = " (a cloud is shared: change a copy of it)"
-            raise self._fault(
-                f"{function} raised {type(error).__name__}: {error}{advice}"
-            ) from error
-
-    def _check_attributes(self) -> None:
-        method = self._method
-        if not (isinstance(self._name, str) and self._name.strip()):
-            raise self._fault("name: missing; use the decorator register")
-        with errors_at(self._name):
-            check_class(type(method))
-        known = (*_FIELDS, *_RARE_FIELDS)
-        for field in method.point_fields:
-            # Drives of your own can have fields of their own.
-            if field not in known and (near := did_you_mean(field, known)):
-                raise self._fault(
-                    f"point_fields: no recording has {field!r}{near}"
-                )
-        if not isinstance(method.config, method.Config):
-            raise self._fault("config: no object of the class Config")
-
-    def _cloud(self, seed: int, number: int | None = None) -> np.ndarray:
-        """Returns a cloud, as a method gets it.
-
-        Args:
-            seed: seed of the cloud.
-            number: how many of its points are returned; by default all.
-        """
-        rng = np.random.default_rng([seed, 17])
-        foot = rng.uniform(-_REACH, _REACH, (_NUM_BOXES, 1, 2))
-        size = rng.uniform([1.0, 1.0, 2.0], [8.0, 8.0, 20.0], (_NUM_BOXES, 3))
-        inside = rng.uniform(size=(_NUM_BOXES, _POINTS_PER_BOX, 3))
-        # Points of a box lie on its four walls.
-        wall = rng.integers(0, 4, (_NUM_BOXES, _POINTS_PER_BOX))
-        inside[..., 0] = np.where(wall < 2, wall, inside[..., 0])
-        inside[..., 1] = np.where(wall >= 2, wall - 2, inside[..., 1])
-        boxes = inside * size[:, None]
-        boxes[..., :2] += foot
-        ground = rng.uniform(-_REACH, _REACH, (_NUM_GROUND, 3))
-        ground[:, 2] = 0.0
-        points = np.concatenate([boxes.reshape(-1, 3), ground])
-        points[:, 2] -= self._method.config.sensor_height
-        points = points[rng.permutation(len(points))][:number]
-        names = self._method.point_fields
-        if not names:
-            return points
-        cloud = np.zeros(
-            len(points),
-            [
-                *((axis, np.float64) for axis in "xyz"),
-                *((name, _FIELDS.get(name, np.float32)) for name in names),
-            ],
+def check_differences(method: Method) -> None:
+    """Scores tell places apart, at least for one query."""
+    _, queries, database = _described(method)
+    is_constant = False
+    for query in queries:
+        scores = _scores(method, query, database, _NUM_PLACES)
+        scores = scores[np.isfinite(scores)]
+        if len(np.unique(scores)) > 1:
+            return
+        is_constant |= len(scores) > 1
+    if is_constant:
+        raise _fault(
+            method,
+            "score: every place has the same score, whatever the query is",
         )
-        for axis, values in zip("xyz", points.T, strict=True):
-            cloud[axis] = values
-        return cloud
 
-    def _describe(self, cloud: np.ndarray, *, of_place: bool) -> Any:
-        function = "describe_place" if of_place else "describe"
-        given = read_only(cloud.copy())
-        found = self._call(function, given)
-        if not np.array_equal(given, cloud):
-            raise self._fault(f"{function} changes the points")
-        if fault := _not_plain(found):
-            raise self._fault(
-                f"{function} returned {fault}, which cannot be stored (numbers,"
-                " texts and arrays, or lists, tuples, dicts and dataclasses of"
-                " them)"
-            )
-        return found
 
-    def _scores(self, query: Any, database: Any, number: int) -> np.ndarray:
-        """Returns the scores of a query, after checking them."""
+def check_repetition(method: Method) -> None:
+    """The same clouds have the same scores, however often they are compared."""
+    _, queries, database = _described(method)
+    _, queries_again, again = _described(method)
+    for query, query_again in zip(queries, queries_again, strict=True):
         first, second = (
-            checked_scores(
-                self._method,
-                "score",
-                self._call("score", query, database, exhaustive=True),
-                number,
-            )
-            for _ in range(2)
+            _scores(method, query, database, _NUM_PLACES) for _ in range(2)
         )
         if not np.array_equal(first, second, equal_nan=True):
-            raise self._fault(
-                "score: two calls with the same input return different scores"
+            raise _fault(
+                method,
+                "score: two calls with the same input return different scores",
             )
-        if np.isnan(first).any() and not self._method.skips_places:
-            raise self._fault("score returned NaN, but skips_places is not set")
-        found = self._call("score_in_drive", [query], database, exhaustive=True)
-        checked_scores(self._method, "score_in_drive", found, number)
-        return first
-
-    def _check_differences(self, queries: list[Any], database: Any) -> None:
-        """Checks that scores tell places apart, at least for one query."""
-        is_constant = False
-        for query in queries:
-            scores = self._scores(query, database, _NUM_PLACES)
-            scores = scores[np.isfinite(scores)]
-            if len(np.unique(scores)) > 1:
-                return
-            is_constant |= len(scores) > 1
-        if is_constant:
-            raise self._fault(
-                "score: every place has the same score, whatever the query is"
+        third = _scores(method, query_again, again, _NUM_PLACES)
+        if not np.array_equal(third, first, equal_nan=True):
+            raise _fault(
+                method,
+                "describe: the same clouds, described twice, have different"
+                " scores; give random numbers a fixed seed",
             )
 
-    def _check_own_score(self, scores: np.ndarray, number: int) -> None:
+
+def check_own_score(method: Method) -> None:
+    """No cloud fits another cloud better than itself."""
+    _, queries, database = _described(method)
+    for number, query in enumerate(queries):
+        scores = _scores(method, query, database, _NUM_PLACES)
         own = scores[number]
         if not np.isnan(own) and own < np.nanmax(scores):
-            raise self._fault(
+            raise _fault(
+                method,
                 f"score: a cloud fits itself ({own:g}) less than another cloud"
                 f" ({np.nanmax(scores):g}); a higher score must mean more"
-                " similar"
+                " similar",
             )
 
-    def _check_poses(self, query: Any, database: Any) -> None:
-        places = range(_NUM_PLACES)
-        found = self._call("relative_poses", query, database, list(places))
-        check_number(self._method, "relative_poses", found, _NUM_PLACES)
-        for X_PQ in found:
-            checked_pose(self._method, X_PQ)
 
-    def _check_pickles(self, query: Any, places: list[Any]) -> None:
-        """Worker processes get descriptors and settings in pickles."""
-        try:
-            copies = pickle.loads(
-                pickle.dumps((query, places, self._method.config))
-            )
-        except Exception as error:
-            raise self._fault(
-                "a descriptor or the settings cannot be pickled for worker"
-                f" processes: {type(error).__name__}: {error}"
-            ) from error
-        before = self._scores(
-            query, self._call("build_database", places), len(places)
+def check_poses(method: Method) -> None:
+    """Relative poses are rigid, or None."""
+    _, queries, database = _described(method)
+    for query in queries:
+        _check_poses(method, query, database)
+
+
+def check_kept_descriptors(method: Method) -> None:
+    """No descriptor is changed after it was described."""
+    places, queries, database = _described(method)
+    as_described = _copied((places, queries))
+    for query in queries:
+        _scores(method, query, database, _NUM_PLACES)
+        _call(method, "score_in_drive", [query], database, exhaustive=True)
+        _check_poses(method, query, database)
+    if not _is_equal(_copied((places, queries)), as_described):
+        raise _fault(
+            method,
+            "a descriptor was changed after it was described; of a long"
+            " drive, it is read again from a file",
         )
-        after = self._scores(
-            copies[0], self._call("build_database", copies[1]), len(places)
+
+
+def check_pickles(method: Method) -> None:
+    """Descriptors and settings survive pickling, for worker processes."""
+    places, (query, *_), database = _described(method)
+    try:
+        copies = pickle.loads(pickle.dumps((query, places, method.config)))
+    except Exception as error:
+        raise _fault(
+            method,
+            "a descriptor or the settings cannot be pickled for worker"
+            f" processes: {type(error).__name__}: {error}",
+        ) from error
+    before = _scores(method, query, database, _NUM_PLACES)
+    copied = _call(method, "build_database", copies[1])
+    after = _scores(method, copies[0], copied, _NUM_PLACES)
+    if not np.array_equal(before, after, equal_nan=True):
+        raise _fault(method, "descriptors have other scores after pickling")
+
+
+def check_batches(method: Method) -> None:
+    """A batch of clouds is described as its clouds are one by one."""
+    _, queries, database = _described(method)
+    some = [read_only(cloud) for cloud in _clouds(method)]
+    for of_places in (False, True):
+        found = _call(method, "describe_batch", some, of_places=of_places)
+        check_number(method, "describe_batch", found, len(some))
+        if of_places:
+            continue
+        for one, query in zip(found, queries, strict=True):
+            alone = _scores(method, query, database, _NUM_PLACES)
+            scores = _scores(method, one, database, _NUM_PLACES)
+            if not np.allclose(scores, alone, rtol=1e-4, equal_nan=True):
+                raise _fault(
+                    method,
+                    "describe_batch describes a cloud in another way than"
+                    " describe",
+                )
+
+
+def check_parts(method: Method) -> None:
+    """A database that `divides` has the same scores part by part."""
+    if not method.divides:
+        return
+    places, (query, *_), database = _described(method)
+    whole = _scores(method, query, database, len(places))
+    parts = [
+        _scores(method, query, _call(method, "build_database", some), len(some))
+        for some in (places[:2], places[2:])
+    ]
+    if not np.allclose(np.concatenate(parts), whole, equal_nan=True):
+        raise _fault(
+            method,
+            "divides: the scores in parts of a database differ from those"
+            " in the whole database",
         )
-        if not np.array_equal(before, after, equal_nan=True):
-            raise self._fault("descriptors have other scores after pickling")
 
-    def _check_batches(self, queries: list[Any], database: Any) -> None:
-        some = [read_only(cloud.copy()) for cloud in self._clouds]
-        for of_places in (False, True):
-            found = self._call("describe_batch", some, of_places=of_places)
-            check_number(self._method, "describe_batch", found, len(some))
-            if of_places:
-                continue
-            for one, query in zip(found, queries, strict=True):
-                alone = self._scores(query, database, _NUM_PLACES)
-                scores = self._scores(one, database, _NUM_PLACES)
-                if not np.allclose(scores, alone, rtol=1e-4, equal_nan=True):
-                    raise self._fault(
-                        "describe_batch describes a cloud in another way than"
-                        " describe"
-                    )
 
-    def _check_parts(
-        self, query: Any, database: Any, places: list[Any]
-    ) -> None:
-        if not self._method.divides:
-            return
-        whole = self._scores(query, database, len(places))
-        parts = [
-            self._scores(query, self._call("build_database", some), len(some))
-            for some in (places[:2], places[2:])
-        ]
-        if not np.allclose(np.concatenate(parts), whole, equal_nan=True):
-            raise self._fault(
-                "divides: the scores in parts of a database differ from those"
-                " in the whole database"
-            )
+def check_rerank(method: Method) -> None:
+    """A second stage returns a score for each place that it compares."""
+    number = min(method.rerank_best, _NUM_PLACES)
+    if not number:
+        return
+    _, (described, *_), database = _described(method)
+    scores = _scores(method, described, database, _NUM_PLACES)
+    best = np.argsort(-scores)[:number]
+    query, *_ = clouds = [read_only(cloud) for cloud in _clouds(method)]
+    places = [clouds[place] for place in best]
+    found = _call(method, "rerank", query, places, scores[best])
+    checked_scores(method, "rerank", found, number)
 
-    def _check_rerank(self, scores: np.ndarray) -> None:
-        number = min(self._method.rerank_best, _NUM_PLACES)
-        if not number:
-            return
-        best = np.argsort(-scores)[:number]
-        clouds = [read_only(self._clouds[place].copy()) for place in best]
-        query = read_only(self._clouds[0].copy())
-        found = self._call("rerank", query, clouds, scores[best])
-        checked_scores(self._method, "rerank", found, number)
 
-    def _check_few_points(self, database: Any) -> None:
-        """Scans of real drives can be empty."""
-        for number in (0, 1, 5):
-            cloud = self._cloud(0, number)
-            query = self._describe(cloud, of_place=False)
-            self._scores(query, database, _NUM_PLACES)
-            self._check_poses(query, database)
-            place = self._describe(cloud, of_place=True)
-            few = self._call("build_database", [place])
-            whole = self._describe(self._clouds[0], of_place=False)
-            self._scores(whole, few, 1)
-            self._scores(query, few, 1)
+def check_few_points(method: Method) -> None:
+    """Scans with no or few points, as real drives have, are allowed."""
+    _, (whole, *_), database = _described(method)
+    for number in (0, 1, 5):
+        cloud = _cloud(method, 0, number)
+        query = _describe(method, cloud, of_place=False)
+        _scores(method, query, database, _NUM_PLACES)
+        _check_poses(method, query, database)
+        place = _describe(method, cloud, of_place=True)
+        few = _call(method, "build_database", [place])
+        _scores(method, whole, few, 1)
+        _scores(method, query, few, 1)
+
+
+# What `check_method` checks, for `pytest.mark.parametrize`: functions of a
+# method, each of which raises an InputError.
+method_checks: list[Callable[[Method], None]] = [
+    check_attributes,
+    check_descriptors,
+    check_scores,
+    check_differences,
+    check_repetition,
+    check_own_score,
+    check_poses,
+    check_kept_descriptors,
+    check_pickles,
+    check_batches,
+    check_parts,
+    check_rerank,
+    check_few_points,
+]
+
+
+def _name(method: Method) -> Any:
+    return getattr(type(method), "name", "")
+
+
+def _fault(method: Method, text: str) -> InputError:
+    return InputError(f"{_name(method)}: {text}")
+
+
+def _call(
+    method: Method, function: str, *arguments: Any, **options: Any
+) -> Any:
+    """Returns what a function of a method returns."""
+    call: Callable = getattr(method, function)
+    try:
+        return call(*arguments, **options)
+    except InputError:
+        raise
+    # A SystemExit would end the program of the caller.
+    except (Exception, SystemExit) as error:
+        advice = ""
+        if "read-only" in str(error):
+            advice = " (a cloud is shared: change a copy of it)"
+        raise _fault(
+            method,
+            f"{function} raised {type(error).__name__}: {error}{advice}",
+        ) from error
+
+
+def _cloud(method: Method, seed: int, number: int | None = None) -> np.ndarray:
+    """Returns a cloud, as a method gets it.
+
+    Args:
+        method: the method.
+        seed: seed of the cloud.
+        number: how many of its points are returned; by default all.
+    """
+    rng = np.random.default_rng([seed, 17])
+    foot = rng.uniform(-_REACH, _REACH, (_NUM_BOXES, 1, 2))
+    size = rng.uniform([1.0, 1.0, 2.0], [8.0, 8.0, 20.0], (_NUM_BOXES, 3))
+    inside = rng.uniform(size=(_NUM_BOXES, _POINTS_PER_BOX, 3))
+    # Points of a box lie on its four walls.
+    wall = rng.integers(0, 4, (_NUM_BOXES, _POINTS_PER_BOX))
+    inside[..., 0] = np.where(wall < 2, wall, inside[..., 0])
+    inside[..., 1] = np.where(wall >= 2, wall - 2, inside[..., 1])
+    boxes = inside * size[:, None]
+    boxes[..., :2] += foot
+    ground = rng.uniform(-_REACH, _REACH, (_NUM_GROUND, 3))
+    ground[:, 2] = 0.0
+    points = np.concatenate([boxes.reshape(-1, 3), ground])
+    points[:, 2] -= method.config.sensor_height
+    points = points[rng.permutation(len(points))][:number]
+    names = method.point_fields
+    if not names:
+        return points
+    cloud = np.zeros(
+        len(points),
+        [
+            *((axis, np.float64) for axis in "xyz"),
+            *((name, _FIELDS.get(name, np.float32)) for name in names),
+        ],
+    )
+    for axis, values in zip("xyz", points.T, strict=True):
+        cloud[axis] = values
+    return cloud
+
+
+def _clouds(method: Method) -> list[np.ndarray]:
+    return [_cloud(method, seed) for seed in range(_NUM_PLACES)]
+
+
+def _described(method: Method) -> tuple[list[Any], list[Any], Any]:
+    """Returns clouds as described places and queries, and their database."""
+    clouds = _clouds(method)
+    places, queries = (
+        [_describe(method, cloud, of_place=kind) for cloud in clouds]
+        for kind in (True, False)
+    )
+    return places, queries, _call(method, "build_database", places)
+
+
+def _describe(method: Method, cloud: np.ndarray, *, of_place: bool) -> Any:
+    function = "describe_place" if of_place else "describe"
+    given = read_only(cloud.copy())
+    found = _call(method, function, given)
+    if not np.array_equal(given, cloud):
+        raise _fault(method, f"{function} changes the points")
+    if fault := _not_plain(found):
+        raise _fault(
+            method,
+            f"{function} returned {fault}, which cannot be stored (numbers,"
+            " texts and arrays, or lists, tuples, dicts and dataclasses of"
+            " them)",
+        )
+    return found
+
+
+def _scores(
+    method: Method, query: Any, database: Any, number: int
+) -> np.ndarray:
+    """Returns the scores of a query, after checking their form."""
+    found = _call(method, "score", query, database, exhaustive=True)
+    scores = checked_scores(method, "score", found, number)
+    if np.isnan(scores).any() and not method.skips_places:
+        raise _fault(method, "score returned NaN, but skips_places is not set")
+    return scores
+
+
+def _check_poses(method: Method, query: Any, database: Any) -> None:
+    places = list(range(_NUM_PLACES))
+    found = _call(method, "relative_poses", query, database, places)
+    check_number(method, "relative_poses", found, _NUM_PLACES)
+    for X_PQ in found:
+        checked_pose(method, X_PQ)
 
 
 def _not_plain(value: Any) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError, poses
-from evaluation import check_data_set, open_drive
+from evaluation import check_data_set, data_set_checks, open_drive
 from evaluation.drives import data_sets
 
 NUM_SCANS = 8
@@ -132,6 +132,8 @@ def test_a_correct_drive_passes(tmp_path, name):
     write(folder, scans_in(open_drive(folder).X_WS))
     check_data_set(folder)
     check_data_set(str(folder))
+    for check in data_set_checks:
+        check(str(folder))
 
 
 SCANS = scans_in(X_WB)

@@ -1,12 +1,13 @@
 """The public check of methods, on the shipped methods and on broken ones."""
 
+import re
 import sys
 
 import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from evaluation import check_method
+from evaluation import check_method, method_checks
 from evaluation.methods import (
     METHODS,
     Method,
@@ -32,8 +33,13 @@ class Heights(Method):
         return -np.abs(database - query).sum(axis=1)
 
 
-def test_a_correct_method_passes():
-    check_method(Heights())
+@pytest.mark.parametrize("check", method_checks)
+def test_a_correct_method_passes_each_check(check):
+    """A check has a name, and says in one sentence what it checks."""
+    check(Heights())
+    assert check.__name__.startswith("check_")
+    assert check.__doc__.endswith(".")
+    assert ". " not in check.__doc__
 
 
 @pytest.mark.slow
@@ -171,11 +177,21 @@ FAULTS = {
 }
 
 
+def faults_one_by_one(method):
+    for check in method_checks:
+        try:
+            check(method)
+        except InputError as error:
+            yield str(error)
+
+
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_broken_method_is_refused_in_one_line(fault):
+    method = replaced(**FAULTS[fault])
     with pytest.raises(InputError, match=fault) as raised:
-        check_method(replaced(**FAULTS[fault]))
+        check_method(method)
     assert "\n" not in str(raised.value)
+    assert any(re.search(fault, one) for one in faults_one_by_one(method))
 
 
 @pytest.mark.parametrize("name", ["", " ", " heights", "heights ", "a\nb"])
