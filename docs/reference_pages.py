@@ -88,7 +88,7 @@ from evaluation.methods import (
     shipped_methods,
 )
 from evaluation.recognition import METRICS
-from evaluation.results import in_table_order, listed
+from evaluation.results import in_table_order
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 Sections = dict[str, type[BaseModel]]
@@ -149,7 +149,7 @@ def _sections_of_methods() -> Sections:
     names: dict[type[MethodConfig], list[str]] = {}
     for name in (*shipped_methods(), *optional_methods()):
         names.setdefault(find_method(name).Config, []).append(name)
-    return {listed(some): config for config, some in names.items()}
+    return {", ".join(some): config for config, some in names.items()}
 
 
 METHODS: Sections = {
@@ -226,7 +226,7 @@ def _data_page() -> str:
         " ([imports](../imports.md)):",
         _table(("format", "files"), maps),
         "`cns-drake export` writes recordings in the formats"
-        f" {listed(f'`{name}`' for name in export_formats())}"
+        f" {', '.join(f'`{name}`' for name in export_formats())}"
         " ([exports](../recordings.md#exports)).",
     ]
     return "\n\n".join(parts) + "\n"

@@ -52,7 +52,7 @@ def reproduce(
     with ended_by_interrupts("cns-drake"):
         from cns_drake.base import choose_cluster
         from cns_drake.studies import reproduce_maps
-        from evaluation.command_line import name_results
+        from evaluation.command_line import show_results
 
     cluster = choose_cluster(jobs, scheduler)
     if pages and not recordings:
@@ -72,8 +72,7 @@ def reproduce(
             with_costs=costs,
             on_note=note,
         )
-    typer.echo(report)
-    name_results(report)
+    show_results(report)
 
 
 def study(
@@ -170,7 +169,7 @@ def study(
     with ended_by_interrupts("cns-drake"):
         from cns_drake.base import choose_cluster
         from cns_drake.studies import run_study
-        from evaluation.command_line import name_results
+        from evaluation.command_line import show_results
 
     with resumable():
         page = run_study(
@@ -181,5 +180,4 @@ def study(
             source=name,
             on_note=note,
         )
-    typer.echo(page)
-    name_results(page)
+    show_results(page)

@@ -37,9 +37,7 @@ def report(
         output: Folder for the results; created if it does not exist.
     """
     from cns_drake.base import choose_cluster
-    from evaluation.command_line.suggestions import (
-        name_results,
-    )
+    from evaluation.command_line.suggestions import show_results
     from evaluation.study import (
         choose_methods,
         find_recordings,
@@ -64,5 +62,4 @@ def report(
         with_costs=costs,
         on_note=terminal.note,
     )
-    print(page)
-    name_results(page)
+    show_results(page)

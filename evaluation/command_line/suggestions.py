@@ -1,14 +1,18 @@
-"""Says where a command's results are, and what to open next."""
+"""Says what a command's results are, where, and what to open next."""
 
 from pathlib import Path
 
 from cns_drake.base import next_page, note
-from evaluation.results import QUERIES, RESULTS
+from evaluation.results import QUERIES, RESULTS, Results, summary_lines
 
 
-def name_results(page: Path) -> None:
-    """Prints where the page of a study is, and the tables beside it, if any."""
-    folder = page.parent
-    if (folder / RESULTS).is_file():
-        note(f"wrote {folder / RESULTS} and {QUERIES}")
+def show_results(page: Path) -> None:
+    """Prints a study's main results, and where its page and tables are."""
+    table = page.parent / RESULTS
+    if table.is_file():
+        for line in summary_lines(Results.read(table)):
+            print(line)
+    print(page)
+    if table.is_file():
+        note(f"wrote {table} and {QUERIES}")
     next_page(page)

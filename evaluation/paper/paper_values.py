@@ -8,9 +8,6 @@ from importlib import resources
 
 from evaluation.recognition import Mode
 
-TITLE = "the paper “The City that Never Settles”"
-# Drives through a real city in the paper's tables.
-KAIST = ("kaist", "01", "06")
 # Name of a map, and the stages of database and query.
 StagePair = tuple[str, str, str]
 
@@ -28,23 +25,6 @@ class Numbers:
     auc: float
     recall_at_1: float
     f1_max: float
-
-
-@dataclass(frozen=True)
-class Measured:
-    """The same numbers as a study measured them.
-
-    Attributes:
-        pair: name of the map, and the stages of database and query.
-        method: name of the method, with its settings if it has any.
-        protocol: name of the protocol.
-        by_mode: which queries count -> the numbers.
-    """
-
-    pair: StagePair
-    method: str
-    protocol: str
-    by_mode: Mapping[Mode, Numbers]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,34 +51,6 @@ class PaperValues:
         """Returns TCR_sym of two stages, given in any order."""
         first, second = sorted(stages)
         return self.changes.get((map_name, first, second))
-
-    def is_comparable(self, measured: Measured) -> bool:
-        """Returns whether the paper measured the same, with its protocol.
-
-        The paper must have results on the same map, and of the same method.
-        """
-        return (
-            measured.pair[0] in self.city_names
-            and measured.method in self.modes
-            and measured.protocol == "paper"
-        )
-
-    def counted(self, measured: Measured) -> Numbers:
-        """Returns our numbers, counted as the paper counted the method's."""
-        return measured.by_mode[self.modes[measured.method]]
-
-    def printed(self, measured: Measured) -> Numbers | None:
-        """Returns the paper's numbers of the same method on the same pair."""
-        return self.recognitions.get((*measured.pair, measured.method))
-
-    def auc_over_change(self, method: str) -> list[tuple[float, float]]:
-        """Returns the points (TCR_sym, AUC) of a method."""
-        return [
-            (change, value.auc)
-            for (city, *stages, name), value in self.recognitions.items()
-            if name == method
-            and (change := self.change(city, stages)) is not None
-        ]
 
 
 @functools.cache

@@ -2,18 +2,12 @@
 
 from collections.abc import Mapping
 
-from evaluation.paper.findings import aims, findings
-from evaluation.paper.paper_values import (
-    TITLE,
-    Measured,
-    Numbers,
-    StagePair,
-    paper,
-)
-from evaluation.recognition import MODES, QueryOutcomes, pr_curve
+from evaluation.paper.paper_values import Numbers, StagePair, paper
+from evaluation.recognition import pr_curve
 from evaluation.results import (
     OWN,
     STAGE,
+    Answers,
     Key,
     PageSection,
     QueryRows,
@@ -36,24 +30,21 @@ def paper_section(
         queries: the table of queries.
         stages: name of a drive -> its stage.
     """
-    changes = _measured_changes(results, stages)
-    measured = _measured(queries, stages)
-    if not any(pair[0] in paper().city_names for pair in changes):
+    changes = {}
+    for row in results.where({STAGE: OWN}, metric="tcr_sym").rows:
+        if (pair := _pair(row, stages)) is not None:
+            city, *both = pair
+            changes[(city, *sorted(both))] = row.value
+    if not any(city in paper().city_names for city, *_ in changes):
         return None
-    compared = [one for one in measured if paper().is_comparable(one)]
-    methods = in_table_order(one.method for one in compared)
     of_pair: dict[StagePair, dict[str, tuple[Numbers, Numbers | None]]] = {}
-    for one in compared:
-        numbers = paper().counted(one), paper().printed(one)
-        of_pair.setdefault(one.pair, {})[one.method] = numbers
-    judgements = [
-        (f"What {TITLE} claims", findings(measured, changes)),
-        (
-            "How near to the paper's numbers, to which TCR_sym and the AUC of"
-            " SOLiD were fitted",
-            aims(measured, changes),
-        ),
-    ]
+    for answers in queries.answers:
+        pair = _pair(answers, stages)
+        if pair is None or not _is_comparable(answers):
+            continue
+        printed = paper().recognitions.get((*pair, answers.label))
+        numbers = _numbers(answers), printed
+        of_pair.setdefault(pair, {})[answers.label] = numbers
     return page_section(
         "paper",
         "Paper",
@@ -62,50 +53,26 @@ def paper_section(
         changes=[
             (pair, value, paper().change(pair[0], pair[1:]))
             for pair, value in changes.items()
-            if pair[1] < pair[2]
         ],
-        methods=methods,
-        modes=paper().modes,
+        methods=in_table_order(n for found in of_pair.values() for n in found),
         recognitions=of_pair,
-        judgements=[(name, found) for name, found in judgements if found],
     )
 
 
-def _measured_changes(
-    results: Results, stages: Mapping[str, str]
-) -> dict[StagePair, float]:
-    """Returns TCR_sym of pairs of stages, in both orders."""
-    rows = results.where({STAGE: OWN}, task="change", metric="tcr_sym").rows
-    found = {}
-    for row in rows:
-        if (pair := _pair(row, stages)) is not None:
-            found[pair] = found[pair[0], pair[2], pair[1]] = row.value
-    return found
+def _is_comparable(answers: Answers) -> bool:
+    """Returns whether the paper measured this method in this city, like that.
 
-
-def _measured(queries: QueryRows, stages: Mapping[str, str]) -> list[Measured]:
-    """Returns the results of place recognition with a change of the city."""
-    return [
-        Measured(
-            pair,
-            answers.label,
-            answers.protocol,
-            {
-                mode: _numbers(
-                    answers.outcomes.subset(answers.outcomes.has_match)
-                    if mode == "filtered"
-                    else answers.outcomes
-                )
-                for mode in MODES
-            },
-        )
-        for answers in queries.answers
-        if answers.task == "place"
+    Answers without a query that has a match are not comparable.
+    """
+    return (
+        answers.task == "place"
+        and answers.map in paper().city_names
+        and answers.label in paper().modes
+        and answers.protocol == "paper"
         and not answers.verified
         and answers[STAGE] == OWN
-        and answers.outcomes.has_match.any()
-        and (pair := _pair(answers, stages)) is not None
-    ]
+        and bool(answers.outcomes.has_match.any())
+    )
 
 
 def _pair(key: Key, stages: Mapping[str, str]) -> StagePair | None:
@@ -115,7 +82,11 @@ def _pair(key: Key, stages: Mapping[str, str]) -> StagePair | None:
     return key.map, stages[key.database], stages[key.query]
 
 
-def _numbers(counted: QueryOutcomes) -> Numbers:
+def _numbers(answers: Answers) -> Numbers:
+    """Returns the numbers, counted as the paper counted the method's."""
+    counted = answers.outcomes
+    if paper().modes[answers.label] == "filtered":
+        counted = counted.subset(counted.has_match)
     curve = pr_curve(counted)
     return Numbers(
         curve.auc,

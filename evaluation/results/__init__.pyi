@@ -3,7 +3,6 @@ from evaluation.results.charts.kinds import chart_factors as chart_factors
 from evaluation.results.charts.kinds import check_factors as check_factors
 from evaluation.results.charts.kinds import draw_chart as draw_chart
 from evaluation.results.figure_files import save_figure as save_figure
-from evaluation.results.headlines import listed as listed
 from evaluation.results.keys import CAUSE as CAUSE
 from evaluation.results.keys import FROZEN_REDRAW as FROZEN_REDRAW
 from evaluation.results.keys import LAST as LAST
@@ -57,6 +56,7 @@ from evaluation.results.styles import unit_rgb as unit_rgb
 from evaluation.results.summaries import LEAST_POINTS as LEAST_POINTS
 from evaluation.results.summaries import excesses as excesses
 from evaluation.results.summaries import means as means
+from evaluation.results.summary_tables import summary_lines as summary_lines
 from evaluation.results.survival import CANNOT_SHOW as CANNOT_SHOW
 from evaluation.results.survival import MARGIN as MARGIN
 from evaluation.results.survival import SURVIVES as SURVIVES

@@ -1,4 +1,4 @@
-"""Writes the page of an experiment: findings, charts, numbers, YAML file."""
+"""Writes the page of an experiment: question, charts, numbers, YAML file."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 import math
@@ -18,41 +18,22 @@ from cns_drake.base import (
     write_csv,
     write_text,
 )
-from evaluation.recognition import METRICS, Metric, metric_named
-from evaluation.results.answer import page_answer
+from evaluation.recognition import Metric, metric_named
 from evaluation.results.charts.chart import NARROW, WIDE
 from evaluation.results.charts.kinds import DrawnChart, draw_chart
-from evaluation.results.charts.words import in_words, value_words
 from evaluation.results.figure_files import save_figure
-from evaluation.results.keys import (
-    CAUSE,
-    KEYS,
-    LEVEL,
-    PROTOCOL_BASE,
-    SETTINGS,
-)
-from evaluation.results.method_names import in_table_order
-from evaluation.results.method_names import title as title_of
+from evaluation.results.keys import KEYS, PROTOCOL_BASE
 from evaluation.results.page_frame import (
     PageSection,
     framed_page,
     page_section,
     value_text,
 )
-from evaluation.results.summaries import Summary, means, summarised
+from evaluation.results.summaries import Summary, summarised
+from evaluation.results.summary_tables import summary_tables
 from evaluation.results.table import QueryRows, Results
 
-_TASKS = {
-    "place": "Place recognition",
-    "pose": "Poses of places that were found",
-    "localise": "Localisation in the map",
-    "map": "What of the map changed",
-    "change": "Structural change",
-    "cost": "Costs",
-}
 _SUMMARIES = "summaries.csv"
-# Greatest number of columns of the table of conditions.
-_MOST_COLUMNS = 12
 # Line style of Matplotlib -> dashes of an SVG line.
 _DASHES = {"-": "none", "--": "6 3", "-.": "8 3 2 3", ":": "2 3", "": "0 99"}
 
@@ -85,22 +66,17 @@ def write_page(
             is none.
         folder: folder in which the page is written.
         title: title of the page.
-        about: the question, in words.
-        charts: descriptions of the charts, see `evaluation.results.charts`. The
-            headline says what the change of the first chart costs the methods,
-            or of the experiment's only factor, see `page_answer`; of other
-            questions, it is the message of the first chart. A chart without
-            data in the table is left out, with a note. If the experiment has
-            several
-            protocols, a chart shows the first, unless it names the factor
-            `protocol.base`.
+        about: the question, in words, which is the page's heading.
+        charts: descriptions of the charts, see `evaluation.results.charts`. A
+            chart without data in the table is left out, with a note. If the
+            experiment has several protocols, a chart shows the first, unless it
+            names the factor `protocol.base`.
         metrics: the metrics that the summary of each task shows, if the task
             has them; by default, its main metrics.
         experiment_text: the experiment as YAML.
         notes: further sentences for the page, such as on settings.
         sections: further sections, such as those of recordings.
-        on_note: is called with a note on each chart that is left out, and last
-            with the headline.
+        on_note: is called with a note on each chart that is left out.
 
     Returns:
         The path of the page.
@@ -119,23 +95,12 @@ def write_page(
     for note in missing:
         on_note(note)
     protocols = ", ".join(filter(None, results.distinct("protocol")))
-    first = charts[0] if charts else {}
-    answer = page_answer(*_charted(known, queries, first), first)
-    headline = title
-    if answer is not None:
-        headline = answer.headline
-    elif shown:
-        headline = str(shown[0]["message"])
-    about = f". {about}" if about else ""
-    intro = Markup("<p><strong>{}</strong>{}</p>").format(title, about)
-    if answer is not None and answer.evidence:
-        intro = Markup("<p>{}</p>{}").format(answer.evidence, intro)
     text = framed_page(
         title,
-        headline,
-        intro,
+        about or title,
+        Markup("<p>{}</p>").format(title) if about else Markup(),
         [
-            *_first_sections(known, shown, metrics, headline),
+            *_first_sections(known, shown, metrics),
             *sections,
             *_last_sections(results, queries, numbers, experiment_text),
         ],
@@ -144,8 +109,6 @@ def write_page(
     )
     path = folder / "index.html"
     write_text(path, text)
-    if shown or answer is not None:
-        on_note(headline)
     return path
 
 
@@ -160,7 +123,7 @@ def _drawn_charts(
     The arguments are the same as for `write_page`.
 
     Returns:
-        For each chart, its message, its legend, and the drawings for the page,
+        For each chart, its title, its legend, and the drawings for the page,
         by the names in the template; and a note on each chart that is left out,
         because it has no data.
     """
@@ -172,11 +135,9 @@ def _drawn_charts(
             save_figure(
                 alone.figure, folder / f"chart_{number}", ("pdf", "png")
             )
-            # The message is known; only curves are drawn from answers.
-            needed = answers if chart["kind"] == "curves" else None
             svgs = {
                 name: _svg(
-                    draw_chart(chart, rows, width, queries=needed),
+                    draw_chart(chart, rows, width, queries=answers),
                     f"{name}{number}",
                 )
                 for name, width in (("wide", WIDE), ("narrow", NARROW))
@@ -187,7 +148,7 @@ def _drawn_charts(
             continue
         drawn.append(
             {
-                "message": alone.message,
+                "title": alone.title,
                 "legend": alone.legend,
                 "source": alone.source,
                 **svgs,
@@ -221,7 +182,6 @@ def _first_sections(
     results: Results,
     charts: Sequence[Mapping[str, Any]],
     metrics: Sequence[Metric],
-    headline: str,
 ) -> list[PageSection]:
     """Returns the charts, and the main results of each task."""
     sections = []
@@ -233,15 +193,11 @@ def _first_sections(
                 "results.csv: the rows that are named below each chart",
                 is_open=True,
                 charts=charts,
-                headline=headline,
                 wide=WIDE,
                 dashes=_DASHES,
                 corners=marker_corners,
             )
         )
-    summary = [
-        _summary(results, task, metrics) for task in results.distinct("task")
-    ]
     return [
         *sections,
         page_section(
@@ -249,7 +205,7 @@ def _first_sections(
             "Results",
             f"results.csv: {len(results.rows)} rows with a defined value",
             is_open=True,
-            summary=summary,
+            summary=summary_tables(results, metrics),
         ),
     ]
 
@@ -294,91 +250,6 @@ def _svg(drawn: DrawnChart, prefix: str) -> Markup:
         text = stem.with_suffix(".svg").read_text()
     text = text[text.index("<svg") :]
     return Markup(re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{prefix}-", text))
-
-
-def _summary(
-    results: Results, task: str, chosen: Sequence[Metric]
-) -> dict[str, Any]:
-    """Returns a table of a task's main results: a row for each method.
-
-    Results without and with geometric verification are different parts. If
-    there are few conditions, each column is a condition with the task's main
-    metric; otherwise each column is a metric, averaged over all conditions.
-    """
-    rows = results.where(task=task).rows
-    known = dict.fromkeys(row.metric for row in rows)
-    main = [one for one in METRICS.values() if task in one.main_in]
-    metrics = next(
-        names
-        for some in (chosen, main, map(metric_named, known))
-        if (names := [one.name for one in some if one.name in known])
-    )
-    factors = _told_factors(results.where(task=task))
-    cells = dict.fromkeys(tuple(row[f] for f in factors) for row in rows)
-    by_condition = 1 < len(cells) <= _MOST_COLUMNS
-    if by_condition:
-        metrics = metrics[:1]
-    shown = ("label", "verified", "metric", *(factors if by_condition else ()))
-    found = {mean.key: mean for mean in means(rows, *shown) if mean.number}
-    # A single result has an interval of its own.
-    intervals = {
-        key: (row.low, row.high)
-        for row in rows
-        if (key := tuple(row[name] for name in shown)) in found
-        and found[key].number == 1
-        and not math.isnan(row.low + row.high)
-    }
-    columns = [
-        (metric, *(cell if by_condition else ()))
-        for metric in metrics
-        for cell in (cells if by_condition else [()])
-    ]
-    parts = [
-        {
-            "verified": bool(verified),
-            "rows": [
-                {
-                    "name": title_of(name) or "–",
-                    "cells": [
-                        (found.get(key), intervals.get(key))
-                        for key in (
-                            (name, verified, *column) for column in columns
-                        )
-                    ],
-                }
-                for name in in_table_order(row.label for row in rows)
-                if any((name, verified, *column) in found for column in columns)
-            ],
-        }
-        for verified in sorted({row.verified for row in rows})
-    ]
-    heads = [metric_named(str(metric)).label for metric, *_ in columns]
-    title = _TASKS.get(task, task)
-    if by_condition:
-        title += f": {heads[0]}"
-        if factors:
-            title += f" by {', '.join(map(in_words, factors))}"
-        heads = [
-            ", ".join(map(value_words, values, factors))
-            for _, *values in columns
-        ]
-    return {"name": title, "metrics": heads, "parts": parts}
-
-
-def _told_factors(results: Results) -> list[str]:
-    """Returns the factors in which the conditions of a task differ.
-
-    Settings of methods do not count, because they are shown with the names of
-    the methods.
-    """
-    if CAUSE in results.factors:
-        # All other factors follow from the cause and its level.
-        names = [CAUSE, LEVEL]
-    else:
-        names = [f for f in results.factors if not f.startswith(SETTINGS)]
-    return [
-        name for name in names if len({row[name] for row in results.rows}) > 1
-    ]
 
 
 def _wide_table(results: Results) -> dict[str, Any]:

@@ -224,15 +224,6 @@ def _auc_without_blocks(answers: Answers, key: Answers) -> np.ndarray:
     return weighted_metrics(answers.outcomes, left).auc
 
 
-def median_kept(shares: Iterable[float]) -> float:
-    """Returns the median of the retained shares of several pairs.
-
-    Unknown shares do not count. The result is NaN if no share is known.
-    """
-    known = [share for share in shares if not math.isnan(share)]
-    return float(np.median(known)) if known else math.nan
-
-
 def lifetime(
     times: Sequence[float], kept: Sequence[float], left: float
 ) -> float:

@@ -8,10 +8,11 @@ import math
 from pathlib import Path
 import re
 from typing import Any, NamedTuple
+import zlib
 
 import numpy as np
 
-from cns_drake.base import InputError, doing, json_values
+from cns_drake.base import InputError, doing, json_values, value_errors
 from evaluation.recognition import (
     LEAST_CITIES,
     METRICS,
@@ -21,10 +22,11 @@ from evaluation.recognition import (
     Difference,
     Interval,
     Metric,
+    common_blocks,
+    compared_by_right_answers,
     load_metrics,
     sign_flip_test,
 )
-from evaluation.results.compared_answers import compared_answers
 from evaluation.results.keys import KEYS, LAST, STAGE
 from evaluation.results.metric_tables import (
     SHIPPED,
@@ -596,8 +598,39 @@ def _differences(
         keys = [(method, condition) for condition in common]
         if all(key in table.answers for key in keys):
             asked[name] = [table.answers[key] for key in keys]
-    compared = compared_answers(asked)
+    for of_condition in zip(*asked.values(), strict=True):
+        for pair in itertools.combinations(of_condition, 2):
+            _check_same_queries(*pair)
+    compared = compared_by_right_answers(
+        {
+            name: [in_condition.outcomes for in_condition in of_method]
+            for name, of_method in asked.items()
+        },
+        # A number that identifies the query drive in all tables.
+        [
+            zlib.crc32(f"{in_condition.map} {in_condition.query}".encode())
+            for in_condition in next(iter(asked.values()), ())
+        ],
+    )
     return [Compared(*two, found) for two, found in compared.items()]
+
+
+def _check_same_queries(first: Answers, second: Answers) -> None:
+    """Raises an error unless two methods answered the same queries.
+
+    Raises:
+        InputError: the two methods answered different queries, or the queries
+            are in other blocks of street.
+    """
+    frames, others = (a.columns["query_frame"] for a in (first, second))
+    two = (
+        f"{first.experiment}: {first.database}, {first.query}:"
+        f" {first.label} and {second.label}"
+    )
+    if not np.array_equal(frames, others):
+        raise InputError(f"{two} answered different queries")
+    with value_errors(f"{two}: column block"):
+        common_blocks([first.outcomes, second.outcomes])
 
 
 def _common_conditions(

@@ -18,9 +18,7 @@ All other keys select rows: the key is a column of the table, and its value
 contains the entries of this column to show. By default, `verified` is 0
 (without geometric verification), or both in a dumbbell. The default task is
 `place`, or the first task with the metric if `place` does not have it. Each
-method has the same colour in all charts. The title says in words what the chart
-shows. If the answers to all queries are known, the title of `lines` also says
-which methods differ by the test of `evaluation.recognition.significance`.
+method has the same colour in all charts. The title names what the chart shows.
 
 `kinds` checks and draws a chart of any kind.
 """

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 
 from evaluation.recognition import METRICS
 from evaluation.results.figure_text import escape_dollars
-from evaluation.results.headlines import lead_by_right_answers
 from evaluation.results.styles import MethodStyle
 from evaluation.results.table import QueryRows, Results, Row
 
@@ -81,23 +80,6 @@ class Chart:
         """Returns an empty figure of a given height [px]."""
         size = self.width * PX, height * PX
         return Figure(figsize=size, layout="constrained")
-
-
-def with_significance(message: str, chart: Chart, at: object) -> str:
-    """Adds to a chart's message which methods differ significantly by R@1.
-
-    The message stays unchanged if the chart shows another metric than AUC.
-
-    Args:
-        message: the message.
-        chart: a chart over a factor.
-        at: the value of the factor at which the methods are compared.
-    """
-    if chart.metric != "auc":
-        return message
-    rows = [row for row in chart.rows if row[chart.keys["over"]] == at]
-    clause = lead_by_right_answers(rows, chart.queries)
-    return f"{message}; {clause}" if clause else message
 
 
 def start_at_zero(axes: Axes, x: str = "", y: str = "") -> None:

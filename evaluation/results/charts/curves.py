@@ -10,8 +10,8 @@ from evaluation.results.method_names import title
 from evaluation.results.table import Row
 
 
-def draw_curves(chart: Chart) -> tuple[str, Figure]:
-    """Returns the chart's message, and the chart.
+def draw_curves(chart: Chart) -> Figure:
+    """Returns the chart.
 
     Raises:
         InputError: the answers are unknown, or a pair of drives has several
@@ -51,4 +51,4 @@ def draw_curves(chart: Chart) -> tuple[str, Figure]:
         axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02), xlabel="recall")
         axes.grid(alpha=0.3)
     figure.supylabel("precision", fontsize=FONT)
-    return "Precision over recall", figure
+    return figure

@@ -3,7 +3,7 @@
 Results without and with geometric verification are in two panels.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import math
 import textwrap
 
@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from cns_drake.base import InputError
-from evaluation.recognition import metric_named
-from evaluation.results.answer import Change, change_of, cost_sentence
+from evaluation.recognition import kept_share
 from evaluation.results.charts.chart import (
     FONT,
     ROW,
@@ -21,79 +20,87 @@ from evaluation.results.charts.chart import (
     Chart,
     start_at_zero,
 )
-from evaluation.results.charts.words import end_words, in_words
+from evaluation.results.charts.words import in_words, value_words
 from evaluation.results.figure_text import escape_dollars
-from evaluation.results.headlines import from_least_to_greatest
-from evaluation.results.keys import SETTINGS
+from evaluation.results.keys import STAGE
 from evaluation.results.method_names import title
+from evaluation.results.summaries import means
+from evaluation.results.table import Row
 
 _PERCENT = "{:.0f}\N{NO-BREAK SPACE}%"
 # Titles of the panels.
 _PANELS = ("Without geometric verification", "With geometric verification")
+# Columns that say which drives are compared.
+_PAIR = ("map", "database", "query")
 
 
-def draw_dumbbell(chart: Chart) -> tuple[str, Figure]:
-    """Returns the chart's message, and the chart."""
+def draw_dumbbell(chart: Chart) -> Figure:
+    """Returns the chart.
+
+    Raises:
+        InputError: the factor has one value, or no pair of drives was measured
+            at its first and its last value.
+    """
     over = chart.keys["over"]
     values = chart.results.distinct(over)
     if len(values) < 2:
         raise InputError(f"charts: dumbbell: {over}: the table has one value")
-    try:
-        change = change_of(chart.rows, over, values[0], values[-1])
-    except InputError as error:
-        raise InputError(f"charts: dumbbell: {error}") from None
-    figure, panels = _panels(chart, change)
-    for axes, verified in zip(panels, change.verifications, strict=True):
-        _draw_methods(axes, chart, change, verified)
+    both = values[0], values[-1]
+    ends = _ends(chart.rows, over, *both)
+    if not ends:
+        raise InputError(f"charts: dumbbell: {over}: no pair has both ends")
+    verifications = sorted({verified for _, verified in ends})
+    figure, panels = _panels(chart, len(verifications))
+    for axes, verified in zip(panels, verifications, strict=True):
+        _draw_methods(axes, chart, ends, both, verified)
         if len(panels) > 1:
             axes.set_title(_PANELS[verified], loc="left")
         axes.grid(axis="x", alpha=0.3)
         axes.tick_params(length=0)
         start_at_zero(axes, x=chart.metric)
-    text = textwrap.fill(_axis_text(chart, change), chart.width // 9)
+    number = max(map(len, ends.values()))
+    text = textwrap.fill(_axis_text(chart, *both, number), chart.width // 9)
     figure.supxlabel(escape_dollars(text), fontsize=FONT)
-    return _message(change), figure
+    return figure
 
 
-def _message(change: Change) -> str:
-    """Returns what the chart shows: the cost, if more of the metric is better.
+def _ends(
+    rows: Sequence[Row], over: str, before: object, after: object
+) -> dict[tuple[str, bool], np.ndarray]:
+    """Returns (method, verified) -> the metric (P, 2) of P pairs of drives.
 
-    Of other metrics, and of shares, it is what is left.
+    A pair has both ends; of several seeds, the mean counts. Values are NaN
+    where a method was not measured.
     """
-    metric = metric_named(change.metric)
-    verified, *_ = change.verifications
-    if change.over.startswith(SETTINGS):
-        # Each value of a setting makes a method with a row of its own.
-        ends = {
-            name: np.array(
-                [change.ends[name, verified, p] for p in change.pairs]
-            )
-            for name in change.methods
-        }
-        found = {
-            name: float(np.nanmedian(one))
-            for name, one in ends.items()
-            if not np.isnan(one).all()
-        }
-        return f"{in_words(change.metric)}: {from_least_to_greatest(found)}"
-    if metric.better == "more" and not metric.share_of:
-        return cost_sentence(change)
-    shares = {n: 100.0 * one for n, one in change.shares(verified).items()}
-    number = len(change.pairs)
-    pairs = f"median of {number} pairs" if number > 1 else "one pair"
-    return (
-        f"Share of the {in_words(change.metric)} that is retained, {pairs}:"
-        f" {from_least_to_greatest(shares, _PERCENT)}"
+    value_at = {
+        (title(mean.key[0]), bool(mean.key[1]), mean.key[2:5], mean.key[5]): (
+            mean.value
+        )
+        for mean in means(rows, "label", "verified", *_PAIR, over)
+    }
+    at_start, at_end = (
+        dict.fromkeys(pair for _, _, pair, v in value_at if v == value)
+        for value in (before, after)
     )
+    pairs = [pair for pair in at_start if pair in at_end]
+    return {
+        name: np.array(
+            [
+                [value_at.get((*name, p, v), math.nan) for v in (before, after)]
+                for p in pairs
+            ]
+        )
+        for name in dict.fromkeys(key[:2] for key in value_at)
+        if pairs
+    }
 
 
-def _panels(chart: Chart, change: Change) -> tuple[Figure, list[Axes]]:
+def _panels(chart: Chart, number: int) -> tuple[Figure, list[Axes]]:
     """Returns a figure with a panel without, and one with verification.
 
     On a phone, one is below the other.
     """
-    number = len(change.verifications)
-    height = (1.6 * len(change.methods) + 2) * ROW
+    height = (1.6 * len(chart.styles) + 2) * ROW
     is_wide = chart.width >= WIDE
     figure = chart.figure((1 if is_wide else number) * height + 2 * ROW)
     shape = (1, number) if is_wide else (number, 1)
@@ -102,40 +109,45 @@ def _panels(chart: Chart, change: Change) -> tuple[Figure, list[Axes]]:
 
 
 def _draw_methods(
-    axes: Axes, chart: Chart, change: Change, verified: bool
+    axes: Axes,
+    chart: Chart,
+    ends: Mapping[tuple[str, bool], np.ndarray],
+    both: tuple[object, object],
+    verified: bool,
 ) -> None:
-    """Draws a row for each method: the median, and a tick for each pair."""
+    """Draws a row for each method: the means, and a tick for each pair.
+
+    The share at the right is that of the means, as in the page's table.
+    """
     side = axes.get_yaxis_transform()
-    for y, name in enumerate(change.methods):
-        colour, _, marker = chart.styles[name]
-        ends = np.array([change.ends[name, verified, p] for p in change.pairs])
-        is_whole = ~np.isnan(ends).any(axis=1)
+    for y, (name, (colour, _, marker)) in enumerate(chart.styles.items()):
+        if (name, verified) not in ends:
+            continue
+        of_pairs = ends[name, verified]
+        is_whole = ~np.isnan(of_pairs).any(axis=1)
         if is_whole.any():
-            ends = ends[is_whole]
+            of_pairs = of_pairs[is_whole]
         # Above the row: before; below: after.
-        for value, at, shift in (
-            (change.before, ends[:, 0], -0.3),
-            (change.after, ends[:, 1], 0.3),
-        ):
+        for value, at, shift in zip(both, of_pairs.T, (-0.3, 0.3), strict=True):
             mark, shown = "|", at.tolist()
-            if len(change.pairs) == 1:
+            if len(of_pairs) == 1:
                 mark, shown = "-", _interval(chart, name, verified, value)
             rows = np.full(len(shown), y + shift)
             axes.plot(shown, rows, mark, color=colour, ms=7, alpha=0.8, lw=1.2)
-        before, after = np.median(ends, axis=0)
+        before, after = of_pairs.mean(axis=0)
         axes.plot([before, after], [y, y], color=colour, lw=3.5, alpha=0.5)
         axes.plot(before, y, marker, color=colour, mfc="white", ms=8)
         axes.plot(after, y, marker, color=colour, ms=8)
-        share = change.share(name, verified)
+        share = float(kept_share(after, before))
         if not math.isnan(share):
             text = _PERCENT.format(100.0 * share)
             axes.text(
                 1.02, y, text, transform=side, va="center", fontweight="bold"
             )
     axes.set_yticks(
-        range(len(change.methods)), list(map(escape_dollars, change.methods))
+        range(len(chart.styles)), list(map(escape_dollars, chart.styles))
     )
-    axes.set_ylim(len(change.methods) - 0.4, -0.6)
+    axes.set_ylim(len(chart.styles) - 0.4, -0.6)
 
 
 def _interval(
@@ -151,19 +163,21 @@ def _interval(
     return found[0] if len(found) == 1 and not np.isnan(found).any() else ()
 
 
-def _axis_text(chart: Chart, change: Change) -> str:
+def _axis_text(chart: Chart, before: object, after: object, number: int) -> str:
     """Returns the text of the axis: the metric, and what the marks are."""
-    first, last = end_words(change.over, change.before, change.after)
+    over = chart.keys["over"]
+    at = "" if over == STAGE else f"at {in_words(over)} "
+    first, last = (f"{at}{value_words(one, over)}" for one in (before, after))
     text = f"{in_words(chart.metric)} {first} (hollow) and {last} (filled)"
-    if (number := len(change.pairs)) > 1:
+    if number > 1:
         text += (
-            f": medians of {number} pairs; ticks are pairs, before above and"
+            f": means of {number} pairs; ticks are pairs, before above and"
             " after below the line"
         )
     elif any(
-        _interval(chart, name, verified, change.after)
-        for name in change.methods
-        for verified in change.verifications
+        _interval(chart, name, verified, after)
+        for name in chart.styles
+        for verified in (False, True)
     ):
         text += "; thin lines are 95\N{NO-BREAK SPACE}% intervals"
     return f"{text}; right: the share that is left"

@@ -18,6 +18,7 @@ from evaluation.results.charts.dumbbell import draw_dumbbell
 from evaluation.results.charts.lines import draw_lines
 from evaluation.results.charts.matrix import draw_matrix
 from evaluation.results.charts.scatter import draw_scatter
+from evaluation.results.charts.words import in_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import RESERVED, SETTINGS
 from evaluation.results.method_names import in_table_order, title
@@ -34,14 +35,14 @@ class DrawnChart:
     """A chart that is drawn.
 
     Attributes:
-        message: sentence that says what the chart shows.
+        title: what the chart shows.
         source: the rows of the table that the chart shows, in words.
         figure: the drawing.
         legend: name of a method -> its style; the mapping is empty if the
             drawing itself contains the names.
     """
 
-    message: str
+    title: str
     source: str
     figure: Figure
     legend: Mapping[str, MethodStyle]
@@ -62,9 +63,9 @@ def draw_chart(
         results: the table.
         width: width of the drawing [px].
         alone: whether the drawing is shown without a page, and therefore
-            includes its message and legend.
-        queries: the answers from which the table was made, for the message on
-            significant differences; None if they are unknown.
+            includes its title and legend.
+        queries: the answers from which the table was made, for `curves`; None
+            if they are unknown.
 
     Raises:
         InputError: the chart has an unknown kind or column, or selects no rows.
@@ -81,16 +82,26 @@ def draw_chart(
     styles = {name: one for name, one in of_table.items() if name in shown}
     kind = chart["kind"]
     with figure_style({"font.size": FONT, "axes.titlesize": "medium"}):
-        message, figure = _KINDS[kind].draw(
+        figure = _KINDS[kind].draw(
             Chart(keys, results, rows, styles, width, queries)
         )
+        name = _title(keys)
         legend = {}
         if kind in ("curves", "lines", "scatter"):
             legend = _legend(figure, styles)
         if alone:
-            figure.suptitle(escape_dollars(textwrap.fill(message, width // 9)))
+            figure.suptitle(escape_dollars(textwrap.fill(name, width // 9)))
             _add_legend(figure, legend, width)
-    return DrawnChart(message, source, figure, legend)
+    return DrawnChart(name, source, figure, legend)
+
+
+def _title(keys: Mapping[str, str]) -> str:
+    """Returns what a chart shows, by the fields of its description."""
+    if "over" in keys:
+        return f"{in_words(keys['metric'])} by {in_words(keys['over'])}"
+    if "x" in keys:
+        return f"{in_words(keys['y'])} over {in_words(keys['x'])}"
+    return "Precision over recall"
 
 
 def _selected_rows(
@@ -260,12 +271,9 @@ def check_chart(chart: Mapping[str, Any]) -> dict[str, str]:
 
 
 class _Kind(NamedTuple):
-    """How charts of a kind are drawn, and the keys of their descriptions.
+    """How charts of a kind are drawn, and the keys of their descriptions."""
 
-    `draw` returns the message and the figure.
-    """
-
-    draw: Callable[[Chart], tuple[str, Figure]]
+    draw: Callable[[Chart], Figure]
     needed: tuple[str, ...]
     optional: tuple[str, ...] = ()
 

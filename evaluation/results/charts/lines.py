@@ -7,20 +7,12 @@ from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-import numpy as np
 
 from cns_drake.base import InputError
 from evaluation.recognition import metric_named
-from evaluation.results.charts.chart import (
-    FONT,
-    Chart,
-    start_at_zero,
-    with_significance,
-)
+from evaluation.results.charts.chart import FONT, Chart, start_at_zero
 from evaluation.results.charts.words import in_words
 from evaluation.results.figure_text import escape_dollars
-from evaluation.results.headlines import from_least_to_greatest
-from evaluation.results.keys import LEVEL
 from evaluation.results.method_names import title
 from evaluation.results.summaries import means
 from evaluation.results.table import Row
@@ -29,11 +21,10 @@ from evaluation.results.table import Row
 _WIDE_RANGE = 50.0
 
 
-def draw_lines(chart: Chart) -> tuple[str, Figure]:
-    """Returns the chart's message, and the chart."""
+def draw_lines(chart: Chart) -> Figure:
+    """Returns the chart."""
     over = chart.keys["over"]
     figure, panels = chart.panels(280.0, chart.panel_rows)
-    last: dict[str, list[float]] = {}
     at = sorted({_checked_number(row, over) for row in chart.rows})
     for axes, rows in zip(panels, chart.panel_rows.values(), strict=True):
         for label, (colour, style, marker) in chart.styles.items():
@@ -46,8 +37,6 @@ def draw_lines(chart: Chart) -> tuple[str, Figure]:
             )
             axes.fill_between(x, low, high, color=colour, alpha=0.15, lw=0)
             axes.plot(x, y, linestyle=style, marker=marker, color=colour, ms=5)
-            if x[-1:] == at[-1:]:
-                last.setdefault(label, []).append(y[-1])
         _spread_axis(axes, at)
         if metric_named(chart.metric).grows:
             axes.set_yscale("log")
@@ -57,13 +46,7 @@ def draw_lines(chart: Chart) -> tuple[str, Figure]:
         # A label of the whole figure would lie below its legend.
         axes.set_xlabel(escape_dollars(in_words(over)))
     figure.supylabel(escape_dollars(in_words(chart.metric)), fontsize=FONT)
-    found = {name: float(np.mean(values)) for name, values in last.items()}
-    words = f"{at[-1]:g}", in_words(over)
-    where = " ".join(words[::-1] if over == LEVEL else words)
-    message = (
-        f"{in_words(chart.metric)} at {where}: {from_least_to_greatest(found)}"
-    )
-    return with_significance(message, chart, at[-1]), figure
+    return figure
 
 
 def _checked_number(row: Row, column: str) -> float:

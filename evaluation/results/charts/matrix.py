@@ -43,8 +43,8 @@ class _Cell(NamedTuple):
     is_loss: bool
 
 
-def draw_matrix(chart: Chart) -> tuple[str, Figure]:
-    """Returns the chart's message, and the chart."""
+def draw_matrix(chart: Chart) -> Figure:
+    """Returns the chart."""
     over = chart.keys["over"]
     strips = chart.keys.get("strips")
     values = list(dict.fromkeys(row[over] for row in chart.rows))
@@ -61,17 +61,12 @@ def draw_matrix(chart: Chart) -> tuple[str, Figure]:
     # Names of methods and the caption stand below.
     around = max(_LEAST_AROUND, _CAPTIONS + _LETTER * longest)
     figure, panels = chart.panels(around + len(values) * ROW, chart.panel_rows)
-    weakest: list[tuple[float, str, str]] = []
     most_strips = 1
     for axes, rows in zip(panels, chart.panel_rows.values(), strict=True):
         cells = _cells(rows, columns, losses)
         for (name, value), cell in cells.items():
             _draw_cell(axes, names.index(name), values.index(value), cell)
             most_strips = max(most_strips, len(cell.shares))
-            words = value_words(value, over)
-            if not isinstance(value, str) or over == "map":
-                words = f"{in_words(over)} {words}"
-            weakest.append((cell.shares[-1], name, words))
         _draw_frame(axes, below, [value_words(v, over) for v in values])
     text = f"{in_words(chart.metric)} in per cent"
     if strips is not None and most_strips > 1:
@@ -83,12 +78,7 @@ def draw_matrix(chart: Chart) -> tuple[str, Figure]:
         text += "; bold where its 95 % interval lies below 100"
     text = textwrap.fill(text, chart.width // 8)
     figure.supxlabel(escape_dollars(text), fontsize=FONT)
-    share, name, words = min(weakest)
-    message = f"Least {in_words(chart.metric)}: {share:.2f}"
-    number = sum(f"{value:.2f}" == f"{share:.2f}" for value, *_ in weakest)
-    if number > 1:
-        return f"{message}, in {number} of {len(weakest)} cells", figure
-    return f"{message} ({name}; {words})", figure
+    return figure
 
 
 def _cells(

@@ -1,7 +1,6 @@
 """Scatter: a metric over another metric or a numeric factor."""
 
 from collections.abc import Iterator
-import math
 from typing import NamedTuple
 
 from matplotlib.figure import Figure
@@ -11,18 +10,12 @@ from cns_drake.base import InputError
 from evaluation.results.charts.chart import Chart, start_at_zero
 from evaluation.results.charts.words import in_words
 from evaluation.results.figure_text import escape_dollars
-from evaluation.results.headlines import from_least_to_greatest
 from evaluation.results.method_names import title
-from evaluation.results.summaries import (
-    LEAST_POINTS,
-    correlations,
-    paired_values,
-)
-from evaluation.results.table import Results
+from evaluation.results.summaries import LEAST_POINTS, paired_values
 
 
-def draw_scatter(chart: Chart) -> tuple[str, Figure]:
-    """Returns the chart's message, and the chart."""
+def draw_scatter(chart: Chart) -> Figure:
+    """Returns the chart."""
     x_name, y_name = chart.keys["x"], chart.keys["y"]
     shown = {row.identity for row in chart.rows}
     points = [
@@ -40,7 +33,6 @@ def draw_scatter(chart: Chart) -> tuple[str, Figure]:
         )
     figure = chart.figure(380.0)
     axes = figure.subplots()
-    has_points_beyond = False
     for label, (colour, style, marker) in chart.styles.items():
         known = sorted(
             (at, row.value) for row, at in points if title(row.label) == label
@@ -49,11 +41,7 @@ def draw_scatter(chart: Chart) -> tuple[str, Figure]:
             continue
         x, y = np.array(known).T
         axes.plot(x, y, marker, color=colour, mew=0, ms=5.0, alpha=0.55)
-        drawn = list(curves(x, y))
-        has_points_beyond |= bool(drawn) and not all(
-            any(curve.x[0] <= at <= curve.x[-1] for curve in drawn) for at in x
-        )
-        for curve in drawn:
+        for curve in curves(x, y):
             axes.plot(curve.x, curve.y, style, color=colour)
     axes.set(
         xlabel=escape_dollars(in_words(x_name)),
@@ -63,30 +51,7 @@ def draw_scatter(chart: Chart) -> tuple[str, Figure]:
     # On a phone there is room for a few numbers.
     axes.locator_params(axis="x", nbins=6)
     axes.grid(alpha=0.3)
-    message = _trend_message(chart)
-    if has_points_beyond:
-        message += "; curves end where gaps between points are wide"
-    return message, figure
-
-
-def _trend_message(chart: Chart) -> str:
-    """Returns each method's rank correlation with what is on the x axis."""
-    x_name, y_name = chart.keys["x"], chart.keys["y"]
-    selected = Results.of(
-        [row for row in chart.results.rows if row.metric != y_name]
-        + list(chart.rows)
-    )
-    # `correlations` are of 1 - metric: the signs change.
-    coefficients = {
-        title(correlation.method): -correlation.value
-        for correlation in correlations(selected, x_name, y_name)
-        if not math.isnan(correlation.value)
-    }
-    if not coefficients:
-        return f"{in_words(y_name)} over {in_words(x_name)}"
-    text = from_least_to_greatest(coefficients, "{:+.2f}")
-    names = f"{in_words(y_name)} with {in_words(x_name)}"
-    return f"Rank correlation of {names}: {text}"
+    return figure
 
 
 # Width of the Gaussian weights, as a part of the range of x.

@@ -1,6 +1,5 @@
 """Factors and their values in the words of charts."""
 
-import json
 import re
 
 from evaluation.recognition import METRICS
@@ -19,25 +18,6 @@ _CAUSES = {
     "lateral": "lateral offset",
     "turn": "random yaw",
 }
-# Units of factors that are lengths, by the last part of their names; of angles,
-# the name ends in `_deg`.
-_UNITS = dict.fromkeys(
-    (
-        "xyz",
-        "lateral",
-        "range_noise",
-        "radius",
-        "max_range",
-        "place_spacing",
-        "query_spacing",
-    ),
-    " m",
-)
-# Names of the components of a list.
-_COMPONENTS = {"xyz": ("x", "y", "z"), "rpy_deg": ("roll", "pitch", "yaw")}
-# Which drive a factor changes, in words.
-_DRIVES_ALONE = {"database": "a map", "query": "a query"}
-_DRIVES = {"database": " in the database", "query": " in the query"}
 # Number of characters from which on a list is shortened.
 _LONG = 60
 
@@ -69,75 +49,3 @@ def value_words(value: object, factor: str = "") -> str:
     if len(text) <= _LONG or len(values) < 4:
         return text
     return f"{values[0]}, {values[1]} and {len(values) - 2} more"
-
-
-def change_words(factor: str, before: object, after: object) -> str:
-    """Returns a change of a factor in words and units, as a subject.
-
-    Args:
-        factor: name of the factor.
-        before, after: its values.
-    """
-    drive, name = factor.partition(".")[0], factor.rpartition(".")[2]
-    if name == "stage" and (before, after) == (LAST, OWN):
-        return "a rebuilt city"
-    thing = _DRIVES_ALONE.get(drive, "a city")
-    if name == "years":
-        first, last = value_words(before), value_words(after)
-        return f"{thing} of age {last} instead of {first} years"
-    if name == "missing" and before == 0 and isinstance(after, int | float):
-        share = f"{100.0 * after:.0f}\N{NO-BREAK SPACE}%"
-        return f"{thing} without {share} of the buildings and plants"
-    where = _DRIVES.get(drive, "")
-    subject, first, last, unit = _what_differs(factor, before, after)
-    if name == "distractors":
-        return f"a database with {last} instead of {first} distractors"
-    if ".lidars." in factor and name in _COMPONENTS:
-        subject, where = f"a LiDAR mounted at {subject}", ""
-    elif name == "lidar":
-        subject = "a LiDAR"
-    return f"{subject} {last} instead of {first}{unit}{where}"
-
-
-def end_words(factor: str, before: object, after: object) -> tuple[str, str]:
-    """Returns the first and the last value of a factor in words and units."""
-    if factor == STAGE:
-        return value_words(before, factor), value_words(after, factor)
-    subject, *ends, unit = _what_differs(factor, before, after)
-    first, last = (f"at {subject} {value}{unit}" for value in ends)
-    return first, last
-
-
-def _what_differs(
-    factor: str, before: object, after: object
-) -> tuple[str, str, str, str]:
-    """Returns what differs, its first and last value, and its unit."""
-    name = factor.rpartition(".")[2]
-    unit = "°" if name.endswith("_deg") else _UNITS.get(name, "")
-    ends = _components(name, before, after)
-    if ends is None:
-        ends = in_words(factor), value_words(before), value_words(after)
-    return *ends, unit
-
-
-def _components(
-    name: str, before: object, after: object
-) -> tuple[str, str, str] | None:
-    """Returns what differs between two lists: name, first and last values.
-
-    The result is None unless a single component differs.
-    """
-    if name not in _COMPONENTS:
-        return None
-    try:
-        lists = [json.loads(str(value)) for value in (before, after)]
-        differ = [
-            (component, value_words(first), value_words(last))
-            for component, first, last in zip(
-                _COMPONENTS[name], *lists, strict=True
-            )
-            if first != last
-        ]
-    except (TypeError, ValueError):
-        return None
-    return differ[0] if len(differ) == 1 else None

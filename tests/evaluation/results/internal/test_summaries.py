@@ -179,12 +179,6 @@ def test_a_trend_needs_five_points(number, is_shown, sign):
         assert one.value == -sign
 
 
-def test_what_is_kept_is_the_median_of_what_is_known():
-    assert summaries.median_kept([0.9, math.nan, 0.1, 0.5]) == 0.5
-    assert summaries.median_kept([0.25, 0.75]) == 0.5
-    assert math.isnan(summaries.median_kept([math.nan]))
-
-
 def test_summaries_of_charts():
     rows = [
         *(

@@ -13,7 +13,7 @@ import pytest
 from scipy.stats import kendalltau
 
 from cns_drake.base import InputError
-from evaluation.command_line import name_results
+from evaluation.command_line import show_results
 from evaluation.recognition import RANDOM_YAW_PROTOCOL, RetrievalProtocol
 from evaluation.results import (
     LAST,
@@ -25,6 +25,7 @@ from evaluation.results import (
     Row,
     compare_tables,
     made_by,
+    summary_lines,
 )
 from evaluation.results.metric_tables import _BASELINES
 from evaluation.results.table_comparison import _kendall_tau, _order_p_value
@@ -593,13 +594,45 @@ def test_what_a_table_does_not_say_is_unknown(tmp_path):
 def test_the_page_and_the_tables_beside_it_are_named(tmp_path, capsys):
     page = tmp_path / "a" / "index.html"
     opened = f"next: open {page} in a browser\n"
-    name_results(page)
-    assert capsys.readouterr().err == opened
+    show_results(page)
+    assert capsys.readouterr() == (f"{page}\n", opened)
     write_table(tmp_path / "a", {"a": {"x": 0.5}})
-    name_results(page)
-    wrote, *rest = capsys.readouterr().err.splitlines(keepends=True)
+    show_results(page)
+    shown = capsys.readouterr()
+    wrote, *rest = shown.err.splitlines(keepends=True)
     assert wrote.startswith("wrote ")
     assert rest == [opened]
+    assert shown.out == (
+        f"Place recognition\nmethod  AUC\nx       0.50\n\n{page}\n"
+    )
+
+
+def test_a_terminal_shows_the_tables_of_the_page():
+    """A column a condition; intervals of single results; verification."""
+    rows = [
+        Row(
+            **key(method, "a", factors={"years": years}, verified=verified),
+            metric="auc",
+            value=value,
+            low=value - 0.25 * bool(years),
+            high=value if years else math.nan,
+        )
+        for method, verified, years, value in (
+            ("solid", False, 0, 0.75),
+            ("solid", False, 5, 0.5),
+            ("btc", False, 5, 0.25),
+            ("solid", True, 0, 1.0),
+        )
+    ]
+    assert list(summary_lines(Results.of(rows))) == [
+        "Place recognition: AUC by years",
+        "method  0     5",
+        "SOLiD   0.75  0.50 [0.25, 0.50]",
+        "BTC           0.25 [0.00, 0.25]",
+        "with geometric verification",
+        "SOLiD   1.00",
+        "",
+    ]
 
 
 def test_kendall_tau_is_that_of_a_library():
