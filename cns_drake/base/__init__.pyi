@@ -8,6 +8,7 @@ from cns_drake.base.changes import merged as merged
 from cns_drake.base.changes import nested as nested
 from cns_drake.base.changes import parse_changes as parse_changes
 from cns_drake.base.commands import Command as Command
+from cns_drake.base.commands import example as example
 from cns_drake.base.commands import with_options as with_options
 from cns_drake.base.compilation import compiled as compiled
 from cns_drake.base.compilation import (
@@ -134,7 +135,6 @@ from cns_drake.base.process import (
     collect_garbage_seldom as collect_garbage_seldom,
 )
 from cns_drake.base.process import num_cores as num_cores
-from cns_drake.base.program import example as example
 from cns_drake.base.progress import Listener as Listener
 from cns_drake.base.progress import doing as doing
 from cns_drake.base.progress import heard_by as heard_by

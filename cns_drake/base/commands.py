@@ -19,7 +19,7 @@ class Command(TyperCommand):
 
     The section `Args` of the docstring contains the help of options and
     arguments. An option without an entry in this section keeps the help of its
-    own declaration.
+    own declaration. The section `Example`, the last one, ends the help.
     """
 
     def __init__(
@@ -29,13 +29,16 @@ class Command(TyperCommand):
 
         With `python -OO` there are no docstrings, and no help.
         """
-        text, _, entries = (help or "").partition("\n\nArgs:\n")
+        text, _, lines = (help or "").partition("\n\nExample:\n")
+        text, _, entries = text.partition("\n\nArgs:\n")
         helps = {}
         for entry in re.split(r"\n(?! )", textwrap.dedent(entries)):
             name, _, meaning = entry.partition(": ")
             helps[name] = " ".join(meaning.split())
         for param in params:
             param.help = helps.get(param.name, param.help)
+        if lines:
+            settings["epilog"] = example(*textwrap.dedent(lines).splitlines())
         super().__init__(*args, help=text, params=params, **settings)
 
     def invoke(self, ctx: Any) -> Any:
@@ -52,6 +55,12 @@ class Command(TyperCommand):
             }
         )
         return super().invoke(ctx)
+
+
+def example(*lines: str) -> str:
+    """Returns text for the end of a command's help: an example to type."""
+    # What follows \b is not wrapped.
+    return "\n  ".join(("\b\nExample:", *lines))
 
 
 def check_finite(values: Mapping[str, object]) -> None:

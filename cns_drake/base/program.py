@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 import contextlib
+import itertools
 import logging
 import os
 import sys
@@ -12,6 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from cns_drake.base import interrupts
+from cns_drake.base.commands import Command
 from cns_drake.base.errors import (
     TRACEBACK_OPTION,
     InputError,
@@ -19,7 +21,7 @@ from cns_drake.base.errors import (
     one_line,
     shows_traceback,
 )
-from cns_drake.base.families import plugin_fault
+from cns_drake.base.families import import_modules, plugin_fault
 from cns_drake.base.process import collect_garbage_seldom
 from cns_drake.base.progress import doing
 from cns_drake.base.system_libraries import has_utf8, missing_library
@@ -51,10 +53,11 @@ def make_program(
     name: str,
     summary: str,
     epilog: str,
-    groups: Mapping[str, Sequence[str]] | None = None,
+    commands: str | None = None,
+    groups: Sequence[str] = (),
     gone: Mapping[str, str] | None = None,
 ) -> typer.Typer:
-    """Returns an empty command-line program, to which commands are added.
+    """Returns a command-line program.
 
     The program has the option `--version` and the options for shell completion.
     The program shows its help when called without arguments.
@@ -63,12 +66,16 @@ def make_program(
         name: name of the program, as it is typed.
         summary: text at the beginning of the program's help.
         epilog: text at the end of the program's help.
-        groups: heading -> commands that the help lists under it; by default
-            there is a single heading for all commands.
+        commands: package whose modules are the program's commands, if they
+            contain a function of the module's name. The variable `GROUP` of
+            the module is the heading of the command in the help.
+            `CONTEXT_SETTINGS`, if there are any, are settings of click.
+        groups: the headings, in their order.
         gone: command, or command and option, of earlier versions -> what to use
             instead, for the error of whoever still gives it.
     """
     gone = gone or {}
+    headings: dict[str, str] = {}
 
     def _check_not_gone(words: str) -> None:
         if words in gone:
@@ -95,11 +102,11 @@ def make_program(
                 raise
 
         def format_commands(self, ctx: Any, formatter: Any) -> None:
-            if groups is None:
-                super().format_commands(ctx, formatter)
             widest = max(map(len, self.commands))
-            for heading, names in (groups or {}).items():
-                with formatter.section(heading):
+            for heading, names in itertools.groupby(
+                self.commands, headings.get
+            ):
+                with formatter.section(heading or "Commands"):
                     formatter.write_dl(
                         [
                             (
@@ -132,13 +139,18 @@ def make_program(
         if context.invoked_subcommand is None:
             print(context.get_help())
 
+    modules = {} if commands is None else import_modules(commands)
+    found = [one for one in modules.items() if hasattr(one[1], one[0])]
+    for own_name, module in sorted(
+        found, key=lambda one: groups.index(one[1].GROUP)
+    ):
+        # An underscore stands behind a keyword of Python.
+        command = own_name.rstrip("_").replace("_", "-")
+        headings[command] = module.GROUP
+        settings = getattr(module, "CONTEXT_SETTINGS", None)
+        add = app.command(command, cls=Command, context_settings=settings)
+        add(getattr(module, own_name))
     return app
-
-
-def example(*lines: str) -> str:
-    """Returns text for the end of a command's help: an example to type."""
-    # What follows \b is not wrapped.
-    return "\n  ".join(("\b\nExample:", *lines))
 
 
 def run(

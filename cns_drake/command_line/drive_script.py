@@ -7,7 +7,13 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Any
 
-from cns_drake.base import program, show_progress, terminal, uninterrupted
+from cns_drake.base import (
+    example,
+    program,
+    show_progress,
+    terminal,
+    uninterrupted,
+)
 from cns_drake.command_line import options
 from cns_drake.command_line.fields import changed, field_options
 from cns_drake.command_line.suggestions import suggest_export
@@ -134,7 +140,7 @@ def run_script(name: str, description: str) -> None:
         )
 
     app = program.plain_app(add_completion=False)
-    epilog = program.example(f"python diagrams/{name}.py --frames 200")
+    epilog = example(f"python diagrams/{name}.py --frames 200")
     app.command(
         help=description,
         epilog=epilog,

@@ -14,6 +14,8 @@ from evaluation.command_line.printed_text import interval_text
 if TYPE_CHECKING:
     from evaluation.recognition import Interval
 
+GROUP = "Recognise places"
+
 
 def compare(
     tables: Annotated[list[Path], typer.Argument(metavar="RESULTS")],
@@ -54,6 +56,9 @@ def compare(
             each table are ranked over the conditions of that table, so that you
             can compare tables with different conditions, such as a table of
             simulated drives and a table of real drives.
+
+    Example:
+        cns-eval compare mine/results.csv
     """
     from evaluation.results import compare_tables
 

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from cns_drake.drives import Drive
     from evaluation.study import Engine, LocaliseTask, Pair
 
+GROUP = "Localise, and keep maps"
+
 # Drift of the odometry by default, as a share of the distance.
 _USUAL_DRIFT = 0.01
 
@@ -79,6 +81,10 @@ def localise(
             results.csv and queries.csv have the columns of a study's tables;
             localisation.csv contains all values of each query. With --track,
             the folder also contains a picture.
+
+    Example:
+        cns-eval localise drives/metropolis_01 \\
+            drives/metropolis_04 --method gicp --start 1
     """
     from cns_drake.base import InputError, choose_cluster
     from evaluation.localisation import (

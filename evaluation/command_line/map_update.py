@@ -10,6 +10,8 @@ import typer
 from cns_drake.base import Json, terminal
 from evaluation.command_line import options
 
+GROUP = "Localise, and keep maps"
+
 
 class BaselineName(str, Enum):
     FREE_SPACE = "free-space"
@@ -49,6 +51,9 @@ def map_update(
         output: Folder for the tables results.csv and queries.csv, and for the
             labels that were scored, A.npy and B.npy; created if it does not
             exist.
+
+    Example:
+        cns-eval map-update maps --baseline distance
     """
     from cns_drake.base import InputError
     from evaluation.map_update import read_pair, write_labels

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from evaluation.recognition import Mode, PlaceOutcome, PoseMetrics
     from evaluation.study import Engine, MethodChoice
 
+GROUP = "Recognise places"
+
 
 # Parameters that have an effect together with `--scores`.
 _WITH_SCORES = (
@@ -120,6 +122,10 @@ def pr(
             metric. Every query is compared with every place, even if the method
             usually skips some places to save time. The score of a place that
             the method rejects is empty.
+
+    Example:
+        cns-eval pr drives/metropolis_01 drives/metropolis_04 \\
+            --method scan-context++
     """
     if scores is not None:
         commands.check_only_with(context, "scores", _WITH_SCORES)

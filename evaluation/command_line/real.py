@@ -7,6 +7,8 @@ import typer
 
 from cns_drake.base import shared_options, terminal
 
+GROUP = "Recognise places"
+
 
 def real(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],
@@ -49,6 +51,9 @@ def real(
             equal intervals among the queries with a match. The database then
             contains one random match of each query. By default all queries and
             all places are used.
+
+    Example:
+        cns-eval real real_scans --output real
     """
     from cns_drake.base import choose_cluster
     from evaluation.real import measure_real

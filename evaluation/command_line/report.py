@@ -10,6 +10,8 @@ import typer
 from cns_drake.base import shared_options, terminal
 from evaluation.recognition import RetrievalProtocol, with_protocols
 
+GROUP = "Recognise places"
+
 
 @with_protocols("random-yaw")
 def report(
@@ -35,6 +37,9 @@ def report(
     Args:
         recordings: Folder that contains the recordings.
         output: Folder for the results; created if it does not exist.
+
+    Example:
+        cns-eval report drives --output report
     """
     from cns_drake.base import choose_cluster
     from evaluation.command_line.suggestions import show_results

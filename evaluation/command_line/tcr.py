@@ -15,6 +15,8 @@ from evaluation.command_line import options
 if TYPE_CHECKING:
     from evaluation.change import ChangeReport
 
+GROUP = "Measure change"
+
 
 def tcr(
     source: Annotated[Path, typer.Argument(metavar="A")],
@@ -43,6 +45,9 @@ def tcr(
             route in A's stage. With it, the command also prints TCR_sym between
             C and the drive in the same stage. These two drives differ only in
             their routes.
+
+    Example:
+        cns-eval tcr drives/metropolis_01 drives/metropolis_04
     """
     from evaluation.change import (
         maps_in_one_world,

@@ -100,7 +100,7 @@ for line in sys.stdin:
 # They import most of the rest.
 IMPORTED = (
     "cns_drake.simulation.simulation",
-    "cns_drake.command_line.simulating",
+    "cns_drake.command_line.cli",
     "evaluation.drives",
     "stages",
 )

@@ -98,6 +98,53 @@ def test_an_unknown_command_is_refused_with_the_known_ones(capsys, rest):
     assert answer("study") == (0, "done\n", "")
 
 
+def test_a_module_with_a_function_of_its_name_is_a_command(
+    tmp_path, monkeypatch, capsys
+):
+    folder = tmp_path / "found_commands"
+    folder.mkdir()
+    for name, heading in (("count_up", "Later"), ("import_", "First")):
+        (folder / f"{name}.py").write_text(
+            f"""GROUP = "{heading}"
+def {name}(number: int = 1):
+    \"\"\"Do {name}.
+
+    Args:
+        number: How often.
+
+    Example:
+        program {name} \\\\
+            --number 2
+    \"\"\"
+    print("{name}", number)
+"""
+        )
+    (folder / "helper.py").write_text("def help_them(): pass")
+    monkeypatch.syspath_prepend(tmp_path)
+    app = program.make_program(
+        "program",
+        "Summary.",
+        "",
+        commands="found_commands",
+        groups=("First", "Later"),
+    )
+
+    def main():
+        program.run(app, "program", contextlib.nullcontext())
+
+    def answer(*words):
+        return run_program(capsys, "program", main, *words)[1]
+
+    assert answer("count-up", "--number", "3") == "count_up 3\n"
+    lines = [line.strip() for line in answer("--help").splitlines()]
+    headings = lines.index("First:"), lines.index("Later:")
+    assert lines[headings[0] + 1] == "import    Do import_."
+    assert lines[headings[1] + 1] == "count-up  Do count_up."
+    help_text = answer("import", "--help")
+    assert "How often." in help_text
+    assert help_text.endswith("program import_ \\\n        --number 2\n")
+
+
 @pytest.mark.parametrize("columns", [60, 120, 200])
 def test_help_is_as_wide_as_the_terminal(monkeypatch, capsys, columns):
     app = program.make_program("program", "word " * 90, "")

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from cns_drake.command_line.maps import list_drives, table_lines
+from cns_drake.command_line.list_ import list_, table_lines
 from cns_drake.scenarios import DriveRow, recordable_drives
 
 ROWS = [
@@ -70,7 +70,7 @@ def test_columns_give_way_but_not_names(width, columns):
 def test_shipped_drives_fit_the_terminal(width, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(width))
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    list_drives()
+    list_()
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= width
     names = [line.split()[0] for line in lines[1:]]
@@ -81,6 +81,6 @@ def test_shipped_drives_fit_the_terminal(width, capsys, monkeypatch):
 @pytest.mark.slow
 def test_the_terminal_does_not_narrow_what_is_piped(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "20")
-    list_drives()
+    list_()
     for line in capsys.readouterr().out.splitlines():
         assert len(re.split("  +", line)) == 8

@@ -5,8 +5,7 @@ import pytest
 import typer
 
 from cns_drake import command_line as simulator
-from cns_drake.command_line import exporting
-from cns_drake.command_line.exporting import Format
+from cns_drake.command_line.export import _FORMATS, Format
 from evaluation import command_line as evaluation
 
 PROGRAMS = {"cns-drake": simulator, "cns-eval": evaluation}
@@ -45,9 +44,9 @@ def test_a_word_after_two_dashes_is_no_option(capsys):
     assert err == "cns-drake: error: --sensor: no recording (.mcap) there\n"
 
 
-@pytest.mark.parametrize("option", exporting._FORMATS)
+@pytest.mark.parametrize("option", _FORMATS)
 def test_options_of_other_formats_are_refused(capsys, tmp_path, option):
-    formats = exporting._FORMATS[option]
+    formats = _FORMATS[option]
     words = ["export", "a", "--output", tmp_path / "out"]
     spelled = f"--{option.replace('_', '-')}"
     # The least value of some numbers is 1; others are names.

@@ -18,6 +18,10 @@ from cns_drake.base import (
 )
 from cns_drake.command_line.suggestions import suggest_reproduction
 
+GROUP = "Make cities"
+# Years before today look like options.
+CONTEXT_SETTINGS = {"ignore_unknown_options": True}
+
 Years = Annotated[
     list[int],
     typer.Option(
@@ -105,6 +109,10 @@ def age(
         seed: Seed of all random events. Another seed gives another realisation
             of the city's ageing.
         pictures: Draw pictures of the city from the air and of three streets.
+
+    Example:
+        cns-drake age suburbia \\
+            --years 1 5 20 --seed 1 --output old_suburbia
     """
     maps, wanted = _maps_and_years(source, years)
     if len(maps) != 1:

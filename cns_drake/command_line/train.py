@@ -17,6 +17,8 @@ from cns_drake.base import (
 )
 from cns_drake.command_line.fields import LIDAR_HELP
 
+GROUP = "Study what change costs"
+
 
 class Variation(str, Enum):
     """Kinds of variation that can be left out of a training."""
@@ -79,6 +81,9 @@ def train(
             shows more of the query's scan. Without --graded, all places within
             7.5 m of a query are equally good matches. With --graded, the
             training takes about 1.5 times as long as without.
+
+    Example:
+        cns-drake train --output mine.npz --minutes 10
     """
     with ended_by_interrupts("cns-drake"):
         from cns_drake.base import choose_cluster

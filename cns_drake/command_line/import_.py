@@ -30,6 +30,8 @@ from cns_drake.imports import (
 )
 from cns_drake.scene import MapFolder
 
+GROUP = "Make cities"
+
 # Default share of the buildings that change between an added first stage and
 # today.
 _CHANGED_SHARE = 0.3
@@ -37,7 +39,7 @@ _CHANGED_SHARE = 0.3
 _SHOWN = 5
 
 
-def import_city(
+def import_(
     source: Annotated[list[str], typer.Argument(metavar="FILE")],
     output: Annotated[Path, typer.Option()],
     years: Annotated[list[int] | None, typer.Option(metavar="YEAR ...")] = None,
@@ -95,6 +97,10 @@ def import_city(
         plain: Do not add windows, lamps, parked cars and other details that the
             file does not contain. A map from an OpenDRIVE file, which contains
             no buildings, still gets buildings along its roads.
+
+    Example:
+        cns-drake import delft.city.jsonl \\
+            --years 1930 1970 2000 2020 --output delft
     """
     # The years that follow the first of --years come as arguments.
     paths = [word for word in source if not word.isdecimal()]
@@ -125,11 +131,11 @@ def import_city(
         dressed=not plain,
     )
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.imports import import_city as write_city
+        from cns_drake.imports import import_city
         from cns_drake.scenarios import write_table
 
     with errors_at_option("--output", "output"):
-        report = write_city(
+        report = import_city(
             path,
             output,
             options,
@@ -150,7 +156,7 @@ def import_city(
 
 
 # The help lists the formats.
-import_city.__doc__ = (import_city.__doc__ or "").replace(
+import_.__doc__ = (import_.__doc__ or "").replace(
     "FORMATS",
     ", ".join(
         f"{one.title} ({', '.join(one.suffixes)})" for one in map_sources()

@@ -1,4 +1,4 @@
-"""The commands `list` and `city`, on maps with roads."""
+"""The command `list`, which lists drives."""
 
 from __future__ import annotations
 
@@ -11,17 +11,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import (
-    InputError,
-    ended_by_interrupts,
-    note,
-    shared_options,
-    show,
-)
-from cns_drake.command_line.suggestions import suggest_reproduction
+from cns_drake.base import ended_by_interrupts, shared_options, show
 
 if TYPE_CHECKING:
     from cns_drake.scenarios import DriveRow
+
+GROUP = "Drive through them"
 
 _HEADINGS = (
     "drive",
@@ -46,7 +41,7 @@ _GIVE_WAY = (
 _GAP = "  "
 
 
-def list_drives(
+def list_(
     folders: Annotated[
         list[Path] | None, typer.Argument(metavar="FOLDER")
     ] = None,
@@ -61,6 +56,9 @@ def list_drives(
     Args:
         folders: Folders of your own maps, whose drives are listed; by default
             the drives of the shipped cities.
+
+    Example:
+        cns-drake list
     """
     with ended_by_interrupts("cns-drake"):
         from cns_drake.scenarios import drive_rows, shipped_cities
@@ -115,58 +113,3 @@ def table_lines(rows: list[DriveRow], width: int | None) -> Iterator[str]:
             else cells[name].rjust(widths[name])
             for name in widths
         ).rstrip()
-
-
-def city(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER")],
-    new: Annotated[bool, typer.Option("--new")] = False,
-    seed: Annotated[int | None, typer.Option(min=0, metavar="N")] = None,
-    check: Annotated[bool, typer.Option("--check")] = False,
-    repair_stages: Annotated[bool, typer.Option("--repair-stages")] = False,
-) -> None:
-    """Build the stages of a city from its roads and plan.
-
-    You write the files roads.yaml, with the roads, and city.yaml, with the
-    districts along the roads. The command generates an SDF world for each
-    stage.
-
-    Args:
-        folder: Folder with roads.yaml, city.yaml and stages.yaml. The command
-            writes the stages to this folder, and updates the folder's table of
-            drives.
-        new: Start from a folder with only roads.yaml: first write the missing
-            files, which are two stages, a drive for each stage, and a city.yaml
-            with a district for each block. Existing files are not changed.
-        seed: Seed of the random districts and drives that --new writes; by
-            default 0.
-        check: Write nothing. List the files that would change, and exit with
-            status 1 if any would.
-        repair_stages: Update the names of structures in stages.yaml. Use this
-            option after you have added something to city.yaml, because
-            additions renumber the structures. The command recognises structures
-            by their coordinates in the structures.csv of the last run.
-    """
-    with ended_by_interrupts("cns-drake"):
-        from cns_drake.city import differing_files, generate_city, start_city
-        from cns_drake.scenarios import check_table, write_table
-
-    if seed is not None and not new:
-        raise InputError("--seed: has no effect without --new")
-    if new and check:
-        raise InputError(
-            "--new and --check exclude each other; give one of them"
-        )
-    if check:
-        changed = differing_files(folder, note, repair_stages=repair_stages)
-        for path in changed:
-            print(path)
-        if changed:
-            raise typer.Exit(1)
-        return
-    check_table(folder)
-    if new:
-        start_city(folder, seed or 0, note)
-    files = generate_city(folder, note, repair_stages=repair_stages)
-    write_table(folder)
-    note(f"{len(files)} files")
-    suggest_reproduction(folder)

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from cns_drake.scenarios import Scenario
     from cns_drake.studies import ExportOptions
 
+GROUP = "Convert for other programs"
+
 
 class Format(str, Enum):
     """Formats that the command writes, beside those of `export_formats`."""
@@ -192,6 +194,10 @@ def export(
             pedestrians is added. By default the traffic of the scenario; if the
             scenario has no traffic, as many vehicles as the streets have room
             for, but at most 60.
+
+    Example:
+        cns-drake export drives/metropolis_01 \\
+            --format kitti --output kitti
     """
     _check_format(layout)
     _check_options(commands.given_options(context), layout)

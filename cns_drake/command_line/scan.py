@@ -1,4 +1,4 @@
-"""The commands `simulate`, `scan` and `generate`."""
+"""The command `scan`, which takes one scan of any SDF world."""
 
 from __future__ import annotations
 
@@ -11,77 +11,19 @@ from cns_drake.base import (
     InputError,
     doing,
     ended_by_interrupts,
-    next_command,
     note,
     shared_options,
     show,
 )
-from cns_drake.command_line import options
-from cns_drake.command_line.experiment_drives import varied_drives
 from cns_drake.command_line.fields import changed, field_options
 
 if TYPE_CHECKING:
     from cns_drake.scenarios import Scenario
 
+GROUP = "Drive through them"
+
 # Fields of a scenario that a single scan has.
 _OF_SCAN = ("lidars", "weather", "seed")
-DriveNames = Annotated[
-    list[str] | None,
-    typer.Argument(
-        metavar="NAME",
-        help="Names of shipped drives, or scenario files. If you name none, "
-        "the drives of the experiment that --vary names are recorded, or all "
-        "shipped drives if --vary is not given.",
-    ),
-]
-
-
-@field_options(
-    "frames", "lidar", "returns", "fog", "rain", "snowfall", "traffic",
-    "transient", "driver", "ride", "imu_rate", "camera",
-)  # fmt: skip
-def simulate(
-    scenario: Annotated[str, typer.Argument(metavar="NAME|SCENARIO.yaml")],
-    output: options.Output,
-    recording: options.Recording = None,
-    beside: Annotated[Path | None, typer.Option(metavar="PAGE.html")] = None,
-    graphviz: options.Graphviz = None,
-    overwrite: options.Overwrite = False,
-    json: shared_options.Json = False,
-    *,
-    changes: dict[str, Any],
-) -> None:
-    """Simulate a drive and record it.
-
-    Writes a rosbag2 folder, which ROS 2 tools can read. The folder contains a
-    file with metadata, and an MCAP file with the scans, the poses and the data
-    of all other sensors.
-
-    Args:
-        scenario: Name of a shipped drive, as cns-drake list shows it, or a
-            scenario file of your own.
-        beside: Page that --recording wrote of another drive in the same city,
-            such as an earlier stage. The page of this drive then shows both
-            drives side by side: when you move in one of them, the other goes to
-            the same place.
-    """
-    with ended_by_interrupts("cns-drake"):
-        from cns_drake.command_line import drive_script
-
-        drive_script.import_simulation()
-
-    if beside is not None and recording is None:
-        raise InputError("--beside: needs --recording, the page to write")
-    drive_script.run_drive(
-        scenario,
-        output,
-        recording=recording,
-        beside=beside,
-        graphviz=graphviz,
-        overwrite=overwrite,
-        json=json,
-        **changes,
-    )
 
 
 @field_options("lidar", "returns", "seed", "fog", "rain", "snowfall")
@@ -113,6 +55,10 @@ def scan(
         model_path: Folder with the world's model:// files. The command searches
             this folder before the folders in the environment variables
             GZ_SIM_RESOURCE_PATH and SDF_PATH. May be repeated.
+
+    Example:
+        cns-drake scan worlds/metropolis/stage_01.sdf \\
+            --pose 0 0 1.6 0 0 1.57 --output scan.pcd
     """
     with ended_by_interrupts("cns-drake"):
         import numpy as np
@@ -187,41 +133,3 @@ def _check_fields_of_scan(scenario: Scenario, plain: Scenario) -> None:
             f"--set: {changed_fields[0]}: not of a scan, which has one LiDAR, "
             "lidars.lidar, at --pose, and the fields weather and seed"
         )
-
-
-@field_options("frames")
-def generate(
-    names: DriveNames = None,
-    *,
-    output: options.Output,
-    jobs: shared_options.Jobs = None,
-    scheduler: shared_options.Scheduler = None,
-    overwrite: options.Overwrite = False,
-    vary: options.Vary = None,
-    changes: dict[str, Any],
-) -> None:
-    """Record many drives.
-
-    Simulates and records the named drives, as many at the same time as --jobs
-    says. To resume after an interruption, run the same command again: finished
-    recordings are skipped.
-    """
-    with ended_by_interrupts("cns-drake"):
-        from cns_drake.base import choose_cluster
-        from cns_drake.scenarios import load_scenario, recordable_drives
-        from cns_drake.studies import record_all
-
-    cluster = choose_cluster(jobs, scheduler)
-    if not names and vary is None:
-        names = list(recordable_drives())
-    scenarios = [load_scenario(name) for name in names or ()]
-    if vary is not None:
-        varied = varied_drives(vary, output, cluster)
-        scenarios += [
-            scenario for scenario in varied if scenario not in scenarios
-        ]
-    scenarios = [changed(scenario, changes) for scenario in scenarios]
-    record_all(scenarios, output, cluster, overwrite=overwrite)
-    for scenario in scenarios:
-        typer.echo(output / scenario.name)
-    next_command("cns-eval", "report", output, "--output", "report")

@@ -1,0 +1,66 @@
+"""The command `generate`, which records many drives."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from cns_drake.base import ended_by_interrupts, next_command, shared_options
+from cns_drake.command_line import options
+from cns_drake.command_line.experiment_drives import varied_drives
+from cns_drake.command_line.fields import changed, field_options
+
+GROUP = "Drive through them"
+
+DriveNames = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="NAME",
+        help="Names of shipped drives, or scenario files. If you name none, "
+        "the drives of the experiment that --vary names are recorded, or all "
+        "shipped drives if --vary is not given.",
+    ),
+]
+
+
+@field_options("frames")
+def generate(
+    names: DriveNames = None,
+    *,
+    output: options.Output,
+    jobs: shared_options.Jobs = None,
+    scheduler: shared_options.Scheduler = None,
+    overwrite: options.Overwrite = False,
+    vary: options.Vary = None,
+    changes: dict[str, Any],
+) -> None:
+    """Record many drives.
+
+    Simulates and records the named drives, as many at the same time as --jobs
+    says. To resume after an interruption, run the same command again: finished
+    recordings are skipped.
+
+    Example:
+        cns-drake generate metropolis_01 metropolis_04 \\
+            --output drives --jobs 2
+    """
+    with ended_by_interrupts("cns-drake"):
+        from cns_drake.base import choose_cluster
+        from cns_drake.scenarios import load_scenario, recordable_drives
+        from cns_drake.studies import record_all
+
+    cluster = choose_cluster(jobs, scheduler)
+    if not names and vary is None:
+        names = list(recordable_drives())
+    scenarios = [load_scenario(name) for name in names or ()]
+    if vary is not None:
+        varied = varied_drives(vary, output, cluster)
+        scenarios += [
+            scenario for scenario in varied if scenario not in scenarios
+        ]
+    scenarios = [changed(scenario, changes) for scenario in scenarios]
+    record_all(scenarios, output, cluster, overwrite=overwrite)
+    for scenario in scenarios:
+        typer.echo(output / scenario.name)
+    next_command("cns-eval", "report", output, "--output", "report")
