@@ -53,14 +53,10 @@ from evaluation.results.styles import PALE as PALE
 from evaluation.results.styles import method_style as method_style
 from evaluation.results.styles import method_styles as method_styles
 from evaluation.results.styles import unit_rgb as unit_rgb
-from evaluation.results.summaries import LEAST_POINTS as LEAST_POINTS
 from evaluation.results.summaries import excesses as excesses
 from evaluation.results.summaries import means as means
 from evaluation.results.summary_tables import summary_lines as summary_lines
-from evaluation.results.survival import CANNOT_SHOW as CANNOT_SHOW
 from evaluation.results.survival import MARGIN as MARGIN
-from evaluation.results.survival import SURVIVES as SURVIVES
-from evaluation.results.survival import SURVIVES_NOT as SURVIVES_NOT
 from evaluation.results.survival import Survival as Survival
 from evaluation.results.survival import judge_survival as judge_survival
 from evaluation.results.survival import largest_loss_shown as largest_loss_shown

@@ -23,10 +23,6 @@ from evaluation.results.table import Row
 RELATIVE = "relative_auc_strict"
 # Greatest mean loss with which a method survives, the margin.
 MARGIN = 0.1
-# Verdicts.
-SURVIVES = "survives"
-SURVIVES_NOT = "does not survive"
-CANNOT_SHOW = "cannot show"
 # Probability with which a loss is shown to be small, in `largest_loss_shown`.
 _POWER = 0.8
 # Number of made-up studies in `largest_loss_shown`.
@@ -63,8 +59,10 @@ class Survival(NamedTuple):
         the cities cannot show either.
         """
         if self.interval.high < MARGIN:
-            return SURVIVES
-        return SURVIVES_NOT if self.interval.low > MARGIN else CANNOT_SHOW
+            return "survives"
+        if self.interval.low > MARGIN:
+            return "does not survive"
+        return "cannot show"
 
     def to_json(self) -> dict[str, Any]:
         """Returns the attributes and the verdict; NaN becomes None."""

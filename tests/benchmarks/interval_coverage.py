@@ -33,7 +33,6 @@ from evaluation.recognition import (
     place_numbers,
 )
 from evaluation.results import (
-    SURVIVES,
     Answers,
     QueryRows,
     Results,
@@ -384,7 +383,7 @@ def _cities(
                 if len(rows) > 1:
                     count.add(ranked.interval)
                 (one,) = judge_survival(rows)
-                kept.add(one.interval, one.verdict == SURVIVES)
+                kept.add(one.interval, one.verdict == "survives")
             spread = np.sqrt(mean * (1.0 - mean) * correlation)
             scenario = f"mean {mean:g}, deviation {spread:.2f}"
             if alike:
