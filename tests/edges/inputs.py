@@ -19,13 +19,16 @@ from helpers.small_city import write_small_city
 from helpers.small_cityjson import write_blocks
 from helpers.small_opendrive import (
     TWO_LANES,
+    cubic,
     geometry,
+    lane,
     road,
     section,
     straight,
+    turn,
     write_roads,
 )
-from helpers.small_osm import write_corner
+from helpers.small_osm import OsmWriter
 import numpy as np
 import yaml
 
@@ -363,23 +366,161 @@ def write_maps(folder):
         np.save(folder / "maps" / side / "truth.npy", labels)
 
 
-def write_corner_osm(folder):
-    write_corner(folder / "corner.osm")
+# Of a quarter of OpenStreetMap: tags of houses, of nodes beside the streets, of
+# ways and of grounds.
+_HOUSES = """
+building=apartments building:levels=5 roof:shape=flat roof:colour=#aa3322
+building=house building:levels=2 roof:shape=gabled roof:levels=1
+building=house height=9 roof:shape=hipped roof:height=3 building:colour=red
+building=retail building:levels=3 shop=bakery building:material=brick
+building=office height=24 roof:shape=pyramidal start_date=1931
+building=church height=18 roof:shape=gabled amenity=place_of_worship
+building=industrial height=8 roof:shape=skillion min_height=2
+building=garages building:levels=1 end_date=1970
+building=yes roof:shape=gabled roof:orientation=across roof:material=metal
+building=hotel building:levels=6 start_date=late+1960s
+building=school building:levels=3 roof:shape=hipped start_date=C19
+building=demolished start_date=1900
+"""
+_NODES = """
+highway=street_lamp amenity=bench;direction=90 amenity=waste_basket
+amenity=post_box amenity=bicycle_parking highway=bus_stop highway=stop
+emergency=fire_hydrant barrier=bollard man_made=street_cabinet
+advertising=column natural=tree;height=9 natural=tree;leaf_type=needleleaved
+natural=tree;species=Betula;diameter_crown=5 traffic_sign=DE:274
+amenity=recycling vending=parking_tickets highway=give_way
+"""
+_AREAS = """
+landuse=grass natural=water leisure=playground landuse=forest natural=sand
+amenity=parking highway=pedestrian;area=yes leisure=pitch;surface=clay
+landuse=construction natural=scrub leisure=garden man_made=pier
+"""
+
+
+def _tags_of(text, separator=" "):
+    """Returns keys and values of OpenStreetMap; a space of a value is +."""
+    pairs = (pair.split("=") for pair in text.split(separator))
+    return {k.replace(":", "__"): v.replace("+", " ") for k, v in pairs}
+
+
+def write_quarter_osm(folder):
+    """Writes a quarter with some of what an import builds."""
+    osm = OsmWriter()
+    ring = [(-90, -60), (90, -60), (90, 60), (-90, 60), (-90, -60)]
+    osm.way(
+        ring, highway="residential", sidewalk="both", parking__right="lane",
+        maxspeed="30", name="Ring",
+    )  # fmt: skip
+    osm.way(
+        [(-90, 0), (-20, 0), (0, 0), (90, 0)], highway="tertiary", lanes="2",
+        cycleway="track", parking__both="lane",
+    )  # fmt: skip
+    osm.way([(0, -60), (0, 60)], highway="living_street", oneway="yes")
+    osm.node(0, 0, highway="crossing", crossing="zebra")
+    osm.node(-40, 0, highway="crossing", crossing="traffic_signals")
+    osm.way([(-60, -50), (-60, -8)], highway="footway", width="2.5")
+    osm.way([(20, 10), (40, 55)], highway="cycleway")
+    # Through a building, a wall and a hedge, and over all of them.
+    osm.box(-64, -40, 14, 9, building="yes", height="9")
+    passage = [(-57, -60), (-57, -45), (-57, -25), (-57, -8)]
+    osm.way(passage, highway="service", tunnel="building_passage")
+    gate = osm.node(-30, -30)
+    osm.way_of([osm.node(-30, -50), gate, osm.node(-30, -10)], barrier="wall")
+    osm.way_of([osm.node(-45, -30), gate, osm.node(-10, -30)], highway="path")
+    osm.way([(10, -50), (50, -50)], barrier="hedge", height="1.2", width="1")
+    osm.way([(10, -45), (50, -45)], barrier="fence", fence_type="chain_link")
+    osm.way([(60, -45), (85, -45)], natural="tree_row", height="8")
+    osm.way([(-120, 30), (120, 30)], highway="footway", bridge="yes", layer="1")
+    for k, text in enumerate(_HOUSES.strip().splitlines()):
+        x = (-84, -62, -36, 8, 27, 46, 65)[k % 7]
+        y = 12 if k < 7 else -28
+        osm.box(x, y, 12 + k % 4, 10, **_tags_of(text))
+    whole = osm.box(-80, 36, 24, 20, building="yes")
+    osm.box(-80, 36, 10, 20, building__part="yes", building__levels="4")
+    osm.relation({"": [whole]}, type="site")
+    hole, outer = osm.box(44, 40, 8, 8), osm.box(38, 36, 20, 18)
+    osm.relation(
+        {"outer": [outer], "inner": [hole]}, type="multipolygon",
+        building="residential", building__levels="4",
+    )  # fmt: skip
+    for k, text in enumerate(_NODES.split()):
+        osm.node(-84 + 9.5 * k, -5.5 if k % 2 else 5.5, **_tags_of(text, ";"))
+    for k, text in enumerate(_AREAS.split()):
+        osm.box(-110 + 20 * k, 75, 15, 12, **_tags_of(text, ";"))
+    osm.way([(-40, -100), (40, -100)], natural="coastline")
+    osm.write(folder / "quarter.osm")
 
 
 def write_blocks_cityjson(folder):
     write_blocks(folder / "blocks.json")
 
 
-def write_roads_opendrive(folder):
-    """Writes two streets and the bend between them."""
-    bend = geometry(
-        0.0, 150.0, 0.0, 0.0, 40.0 * np.pi / 2, '<arc curvature="0.025"/>'
+_THINGS = """<signals>
+<signal id="1" s="20" t="-6" zOffset="2" type="206" dynamic="no"
+ orientation="+"/><signal id="2" s="30" t="6" zOffset="4" type="1000001"
+ dynamic="yes" orientation="-"/><signal id="3" s="40" t="-1" zOffset="5"
+ type="274" dynamic="no"/></signals><objects>
+<object id="1" type="building" s="50" t="20" zOffset="0" hdg="0"><outline>
+<cornerLocal u="-5" v="-4" z="0" height="9"/>
+<cornerLocal u="5" v="-4" z="0" height="8"/>
+<cornerLocal u="5" v="4" z="1" height="9"/></outline></object>
+<object id="2" type="barrier" s="60" t="-12" zOffset="0"><outlines><outline
+ closed="false"><cornerRoad s="60" t="-12" dz="0" height="1"/>
+<cornerRoad s="80" t="-12" dz="0" height="1"/>
+<cornerRoad s="80" t="-13" dz="0" height="1"/></outline></outlines></object>
+<object id="3" type="pole" s="90" t="7" zOffset="0" radius="0.1" height="5"/>
+<object id="4" type="crosswalk" s="90" t="0" length="4" width="7"/>
+<object id="5" type="barrier" s="0" t="8" zOffset="0" length="0.2" width="0.2"
+ height="1"><repeat s="100" length="20" distance="0" tStart="8" tEnd="9"/>
+</object><object id="6" type="tree" s="110" t="9" zOffset="0" radius="2"
+ height="8"/></objects>"""
+
+
+def write_network_opendrive(folder):
+    """Writes streets about a junction, a bend, a slope, a bridge and things."""
+    arc = '<arc curvature="0.025"/>'
+    spiral = '<spiral curvStart="0" curvEnd="0.02"/>'
+    marks = (
+        '<roadMark sOffset="0" type="broken" color="white" width="0.12"/>'
+        '<roadMark sOffset="60" type="solid solid" color="yellow"'
+        ' width="0.12"/>'
     )
-    lanes = (section(0.0, *TWO_LANES),)
+    lanes = (
+        section(
+            0.0,
+            lane(3, "sidewalk", 2.0),
+            lane(2, "parking", 2.2),
+            lane(1, "driving", 3.5, more=marks),
+            lane(-1, "driving", 3.5, (60.0, 3.5, -0.005)),
+            lane(-2, "shoulder", (0.0, 1.5), (40.0, 0.0)),
+            lane(-3, "sidewalk", 2.0),
+        ),
+    )
+    two = (section(0.0, *TWO_LANES),)
+    hill = cubic("elevation", 0, 0.0, 0.0, 0.0, 0.0, "s") + cubic(
+        "elevation", 30, 0.0, 0.04, 0.0, 0.0, "s"
+    )
+    roll = cubic("superelevation", 0, 0.0, 0.001, 0, 0, "s")
+    above = cubic("elevation", 0, 7.0, key="s")
+    bend = geometry(0.0, 162.0, 0.0, 0.0, 40.0 * np.pi / 2, arc)
+    curve = geometry(0.0, -12.0, 0.0, np.pi, 50.0, spiral)
+    line = geometry(0.0, 12.0, 0.0, 0.0, 150.0, "<line/>")
+    north = geometry(0.0, 0.0, 12.0, np.pi / 2, 100.0, "<line/>")
     write_roads(
-        folder / "bend.xodr",
-        straight("1", 0, 0, 150, 0),
-        road("2", 40.0 * np.pi / 2, [bend], lanes),
-        straight("3", 190, 40, 190, 160),
-    )
+        folder / "network.xodr",
+        road("1", 150.0, [line], lanes, more=_THINGS),
+        road("2", 40.0 * np.pi / 2, [bend], two, lateral=roll),
+        straight("3", 202, 40, 202, 160),
+        road("4", 50.0, [curve], two),
+        road("5", 100.0, [north], two, elevation=hill),
+        straight("6", 60, -60, 60, 60, elevation=above, more=(
+            '<objects><bridge id="b" s="0" length="120" type="concrete"/>'
+            "</objects>"
+        )),
+        straight("11", -12, 0, 12, 0, junction="7",
+                 lanes=(lane(-1, "driving", 3.5),)),
+        straight("12", 12, 0, -12, 0, junction="7",
+                 lanes=(lane(-1, "driving", 3.5),)),
+        turn("13", 12, 0, np.pi, 12, -np.pi / 2, junction="7"),
+        turn("14", 0, 12, -np.pi / 2, 12, np.pi / 2, junction="7"),
+    )  # fmt: skip

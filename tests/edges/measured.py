@@ -176,24 +176,10 @@ def city(folder: Path) -> dict[str, str]:
 
 
 def kinds(folder: Path) -> dict[str, str]:
-    """Builds a city of all archetypes and objects: a line for each kind."""
+    """Builds a city of all archetypes and objects."""
     inputs.write_kinds(folder)
     run(folder, "cns_drake", "city", "kinds")
-    digests: dict[str, list] = {}
-    for path in sorted((folder / "kinds").rglob("*.*")):
-        if path.suffix in (".obj", ".sdf", ".csv"):
-            data = path.read_bytes()
-            # Without the number of a building or tile, and what follows it.
-            kind = re.sub(r"_(\d{3}|tile)_.*", "", path.stem)
-            found = digests.setdefault(kind, [0, 0, hashlib.sha256()])
-            found[0] += 1
-            found[1] += len(data)
-            found[2].update(path.name.encode() + data)
-    rows = [
-        {"kind": kind, "files": number, "bytes": size, "sha256": _short(digest)}
-        for kind, (number, size, digest) in sorted(digests.items())
-    ]
-    return {"kinds.csv": _csv(rows)}
+    return {"kinds.csv": _files(folder / "kinds")}
 
 
 def age(folder: Path) -> dict[str, str]:
@@ -220,19 +206,25 @@ def imported(
 
 
 def _files(folder: Path) -> str:
-    """Returns a line for each file of a folder; of pictures only the name."""
-    rows = []
+    """Returns a line for each file of a folder; of pictures only the name.
+
+    Meshes that differ in a number have a line together.
+    """
+    digests: dict[str, list] = {}
     for path in sorted(folder.rglob("*")):
         if path.is_file():
-            data = path.read_bytes()
-            picture = path.suffix in _PICTURES
-            rows.append(
-                {
-                    "file": path.relative_to(folder).as_posix(),
-                    "bytes": "" if picture else len(data),
-                    "sha256": "" if picture else _short(hashlib.sha256(data)),
-                }
-            )
+            name = path.relative_to(folder).as_posix()
+            data = b"" if path.suffix in _PICTURES else path.read_bytes()
+            if path.suffix == ".obj":
+                name = re.sub(r"_(\w?\d+|tile)(_.*)?\.obj", "", name)
+            found = digests.setdefault(name, [0, 0, hashlib.sha256()])
+            found[0] += 1
+            found[1] += len(data)
+            found[2].update(path.name.encode() + data)
+    rows = [
+        {"file": name, "files": number, "bytes": size, "sha256": _short(digest)}
+        for name, (number, size, digest) in sorted(digests.items())
+    ]
     return _csv(rows)
 
 
@@ -357,6 +349,18 @@ EDGES: dict[str, Callable[[Path], dict[str, str]]] = {
     "pr": pr,
     "scan": scan,
     "kinds": kinds,
+    "import-cityjson": imported(
+        inputs.write_blocks_cityjson,
+        "blocks.json",
+        "--plain",
+        "--years",
+        1930,
+        1980,
+    ),
+    "import-openstreetmap": imported(inputs.write_quarter_osm, "quarter.osm"),
+    "import-opendrive": imported(
+        inputs.write_network_opendrive, "network.xodr"
+    ),
 }
 BY_NIGHT: dict[str, Callable[[Path], dict[str, str]]] = {
     "shipped-cities": shipped_cities,
@@ -370,16 +374,6 @@ BY_NIGHT: dict[str, Callable[[Path], dict[str, str]]] = {
     "study": study,
     "real": real,
     "age": age,
-    "import-cityjson": imported(
-        inputs.write_blocks_cityjson,
-        "blocks.json",
-        "--plain",
-        "--years",
-        1930,
-        1980,
-    ),
-    "import-openstreetmap": imported(inputs.write_corner_osm, "corner.osm"),
-    "import-opendrive": imported(inputs.write_roads_opendrive, "bend.xodr"),
 }
 
 

@@ -39,18 +39,6 @@ def test_a_face_with_a_hole_however_it_lies(seed):
     assert faults.rows() == []
 
 
-def test_small_faces_stay_as_they_are():
-    faults = ImportFaults()
-    triangle = ring([(0, 0), (1, 0), (0, 1)])
-    np.testing.assert_array_equal(
-        face_triangles([triangle], "one", faults), triangle[None]
-    )
-    square = ring([(0, 0), (2, 0), (2, 2), (0, 2)])
-    assert len(face_triangles([square[::-1]], "one", faults)) == 2
-    turned = areas(face_triangles([square[::-1]], "one", faults))
-    assert turned[:, 2].sum() == pytest.approx(-4.0)
-
-
 def test_an_arrowhead_is_not_filled_across_its_notch():
     dart = ring([(0, 0), (4, 0), (1, 1), (0, 4)])
     triangles = face_triangles([dart], "one", ImportFaults())
@@ -78,24 +66,3 @@ def test_faults_are_repaired_or_left_out_and_noted(xy, kind, area):
         kind in told and example == "the one"
         for told, _, example in faults.rows()
     )
-
-
-def test_a_face_that_is_not_quite_flat_keeps_its_corners():
-    points = ring([(0, 0), (4, 0), (4, 4), (2, 5), (0, 4)])
-    points[3, 2] = 0.3
-    triangles = face_triangles([points], "one", ImportFaults())
-    heights = {round(z, 6) for z in triangles.reshape(-1, 3)[:, 2].tolist()}
-    assert heights == {0.0, 0.3}
-
-
-@pytest.mark.parametrize("size", [0.09, 0.11])
-def test_faces_that_are_bent_are_counted(size):
-    # A corner lifted by h is h / 2 from the plane through the middle.
-    faults = ImportFaults()
-    ring = np.array([(0, 0, 0), (4, 0, size), (4, 4, 0), (0, 4, size)], float)
-    triangles = face_triangles([ring], "a", faults)
-    # Folded, and nowhere farther from the corners' heights.
-    assert len(triangles) == 2
-    assert set(map(tuple, triangles.reshape(-1, 3))) == set(map(tuple, ring))
-    counted = ("face that is not plane, folded between its corners", 1, "a")
-    assert faults.rows() == ([counted] if size > 0.1 else [])

@@ -1,8 +1,6 @@
 """Roads of OpenDRIVE lie as in their file, by independent means too."""
 
 import math
-import os
-from pathlib import Path
 
 from helpers.small_opendrive import (
     cubic,
@@ -15,16 +13,13 @@ from helpers.small_opendrive import (
 )
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 from scipy.special import fresnel
 import shapely
-from shapely.geometry import LineString, Polygon
+from shapely.geometry import LineString
 
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.curves import Arc, Cubic, Spiral
-from cns_drake.imports.opendrive.imported_streets import ImportedStreets
 from cns_drake.imports.opendrive.lanes import lane_bands
-from cns_drake.imports.opendrive.road_heights import RoadHeights
 from cns_drake.imports.opendrive.road_reader import read_roads
 
 # All kinds of curves, one after the other.
@@ -175,19 +170,6 @@ def test_cubic_curves_run_at_the_speed_of_the_road():
     ) == pytest.approx(17.0, abs=1e-9)
 
 
-def test_both_sides_of_every_joint_are_there(tmp_path):
-    path = write_every_kind(tmp_path / "all.xodr")
-    bands = outlines(path)["7", -1]
-    # The lane steps from 3 m to 3.5 m, 30 m into its section.
-    first = bands[0]
-    at = np.flatnonzero(np.abs(first.s - 30.0) < 1e-9)
-    assert len(at) == 2
-    np.testing.assert_allclose(first.width[at], [3.0, 3.5], atol=1e-6)
-    # Another section begins at the section's end, at the same place.
-    assert first.s[-1] == bands[1].s[0] == 71.5
-    assert bands[1].width[0] == pytest.approx(3.25, abs=1e-6)
-
-
 def test_borders_in_place_of_widths(tmp_path):
     borders = (
         '<lane id="1" type="driving"><border sOffset="0" a="3" b="0.01" c="0"'
@@ -205,80 +187,3 @@ def test_borders_in_place_of_widths(tmp_path):
     assert found["1", 1][0].outer[-1, 1] == pytest.approx(3.5)
     assert found["1", -1][0].outer[0, 1] == pytest.approx(-4.0)
     np.testing.assert_allclose(found["1", -2][0].width, 2.0)
-
-
-def test_roads_far_off_are_moved_to_the_middle(tmp_path):
-    line = geometry(0.0, 691000.25, 5335000.5, 0.0, 50.0, "<line/>")
-    lanes = section(0.0, lane(-1, "driving", 3.0))
-    path = write_roads(
-        tmp_path / "a.xodr",
-        road("1", 50.0, [line], [lanes]),
-        header="<geoReference><![CDATA[+proj=utm +zone=32]]></geoReference>",
-    )
-    roads = read_roads(path, ImportFaults())
-    assert roads.reference_system == "+proj=utm +zone=32"
-    piece = roads.roads[0].pieces[0]
-    assert roads.origin[0] + piece.x == pytest.approx(691000.25)
-    assert roads.origin[1] + piece.y == pytest.approx(5335000.5)
-    assert max(abs(piece.x), abs(piece.y)) < 1.0
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(
-    "CNS_CITY_FILES" not in os.environ,
-    reason="CNS_CITY_FILES names no folder of real files",
-)
-def test_real_networks_against_integration():
-    paths = sorted(Path(os.environ["CNS_CITY_FILES"]).glob("*.xodr"))
-    assert paths
-    for path in paths:
-        assert deviation(path, 2.0) < 0.01, path
-        check_surface(path)
-
-
-def check_surface(path):
-    """The surface covers exactly the file's lanes, at their height."""
-    bands = [b for group in outlines(path).values() for b in group]
-    streets = ImportedStreets(bands)
-    surface = RoadHeights(bands)
-    whole = shapely.union_all(
-        [
-            streets.areas.carriageway,
-            streets.areas.sidewalks,
-            streets.areas.medians,
-        ]
-    )
-    areas, places = [], []
-    for _, _, kind, inner, outer in sampled_lanes(path, 1.0):
-        if kind == "none":
-            continue
-        area = Polygon(np.concatenate([inner, outer[::-1]])[:, :2])
-        areas.append(shapely.make_valid(area))
-        middle = (inner + outer) / 2
-        inside = shapely.contains_xy(whole.buffer(0.1), *middle[:, :2].T)
-        assert inside.all(), path
-        places.append(middle)
-    check_heights(surface, np.concatenate(places))
-    areas = shapely.union_all(areas)
-    assert areas.difference(whole.buffer(0.1)).area < 0.1
-    beyond = whole.difference(areas.buffer(0.1)).difference(
-        streets.junctions.buffer(0.1)
-    )
-    closed = [b for b in bands if b.kind == "enclosed"]
-    shut = [
-        Polygon(np.concatenate([b.inner, b.outer[::-1]])[:, :2]).buffer(0.1)
-        for b in closed
-    ]
-    assert beyond.difference(shapely.union_all(shut)).area < 0.1
-
-
-def check_heights(surface, places):
-    """Heights are those of the file, or between two contradicting ones."""
-    z = surface.heights(places[:, :2])
-    off = np.flatnonzero(np.abs(z - places[:, 2]) > 0.1)
-    near = cKDTree(places[:, :2]).query_ball_point(places[off, :2], 2.0)
-    for k, some in zip(off, near, strict=True):
-        heights = places[some, 2]
-        assert np.ptp(heights) > 0.1
-        assert heights.min() - 0.1 < z[k] < heights.max() + 0.1
-    assert len(off) < 0.01 * len(places)

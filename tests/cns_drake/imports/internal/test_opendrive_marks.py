@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-import shapely
 
-from cns_drake.imports import ImportOptions
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.lanes import lane_bands
 from cns_drake.imports.opendrive.road_marks import road_marks
 from cns_drake.imports.opendrive.road_reader import read_roads
-from cns_drake.imports.opendrive.town import build_town
 
 RADIUS = 50.0
 # A bend to the left, from its middle; two lanes of 3.5 m, one line in the
@@ -74,22 +71,6 @@ def test_lines_lie_on_their_borders(paint):
     assert nearest.max() < 0.005
 
 
-def test_lines_have_the_lengths_of_the_file(paint):
-    # From 0 to 30 m, 3 m of each 9 m; from 30 m to 90 m.
-    assert area(paint["white"]) == pytest.approx(4 * 3.0 * 0.1, rel=0.01)
-    assert area(paint["yellow"]) == pytest.approx(60.0 * 0.2, rel=0.01)
-    stretch = (RADIUS + 3.5) / RADIUS
-    expected = (90.0 + 10 * 3.0) * 0.12 * stretch
-    assert area(paint["standard"]) == pytest.approx(expected, rel=0.01)
-
-
-def test_lines_are_seen_from_above_the_ground(paint):
-    for triangles in paint.values():
-        a, b, c = np.moveaxis(triangles, 1, 0)
-        assert (np.cross(b - a, c - a)[:, 2] > 0.0).all()
-        np.testing.assert_allclose(triangles[..., 2], 0.515, atol=1e-9)
-
-
 def with_lines(*lines, kind="broken broken"):
     """Returns the road with lines of its own on the right edge."""
     inner = "".join(f"<line {line}/>" for line in lines)
@@ -126,94 +107,3 @@ def test_dashes_are_those_of_the_file(tmp_path, kind):
     assert area(dashes) == pytest.approx(inside, rel=0.01)
     outside = 80.0 * 0.25 * (edge + 0.4) / RADIUS
     assert area(line) == pytest.approx(outside, rel=0.01)
-
-
-@pytest.mark.parametrize(
-    "line",
-    ['length="-3" space="6"', 'length="0" space="6"',
-     'length="3" space="-6"', 'length="1e-9" space="1e-9"'],
-)  # fmt: skip
-def test_impossible_dashes_are_counted(tmp_path, line):
-    faults = ImportFaults()
-    text = with_lines(line, kind="broken")
-    red = painted(tmp_path / "road.xodr", text, faults)["red"]
-    rows = [("road mark with impossible dashes, made usual", 1, "1")]
-    assert faults.rows() == rows
-    stretch = (RADIUS + 3.5) / RADIUS
-    expected = 10 * 3.0 * 0.12 * stretch
-    assert area(red) == pytest.approx(expected, rel=0.01)
-
-
-def test_marks_that_are_no_paint_are_left_out(tmp_path):
-    text = with_lines('length="3" space="6"', kind="curb")
-    assert "red" not in painted(tmp_path / "road.xodr", text, ImportFaults())
-
-
-# A lane, a shoulder of 0.1 m and a sidewalk on the right, from its middle; the
-# middle and the shoulder's outer border are painted.
-KERB = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
-<road name="" length="60" id="1" junction="-1">
-<planView><geometry s="0" x="0" y="0" hdg="0.3" length="60"><line/></geometry>
-</planView>
-<lanes><laneSection s="0"><left>{left}</left>
-<center><lane id="0" type="none">
-<roadMark sOffset="0" type="solid solid" color="yellow" width="0.2"/>
-</lane></center>
-<right><lane id="-1" type="driving">
-<width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
-<lane id="-2" type="shoulder"><width sOffset="0" a="0.1" b="0" c="0" d="0"/>
-<roadMark sOffset="0" type="solid" color="white" width="0.12"/></lane>
-<lane id="-3" type="sidewalk"><width sOffset="0" a="2" b="0" c="0" d="0"/>
-<roadMark sOffset="0" type="solid" color="red"/></lane>
-</right></laneSection></lanes></road></OpenDRIVE>"""
-OTHER_LANE = """<lane id="1" type="driving">
-<width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>"""
-
-
-@pytest.mark.parametrize(
-    ("left", "yellow"), [("", (-0.46, -0.02)), (OTHER_LANE, (-0.22, 0.22))]
-)
-def test_marks_lie_beside_kerbs(tmp_path, left, yellow):
-    path = tmp_path / "road.xodr"
-    path.write_text(KERB.format(left=left))
-    (one,) = (
-        structure
-        for structure in build_town(
-            path, ImportOptions(dressed=True)
-        ).city.structures
-        if structure.name == "marks_1"
-    )
-    found = {}
-    across = np.array([-np.sin(0.3), np.cos(0.3)])
-    for part in one.model.parts:
-        mesh = one.model.meshes[part.shape.mesh]
-        found[part.name] = mesh.vertices @ [*across, 0.0]
-        size = area(mesh.vertices[mesh.triangles()])
-        lines, width = (2, 0.2) if part.name == "yellow" else (1, 0.12)
-        assert size == pytest.approx(lines * width * 60.0, rel=0.01)
-    # Nothing is painted on the far side of the sidewalk.
-    assert set(found) == {"white", "yellow"}
-    # Right of the kerb's foot at -3.6 m lie stones; without a second lane they
-    # lie on the left of the middle, too.
-    for colour, ends in (("white", (-3.58, -3.46)), ("yellow", yellow)):
-        assert found[colour].min() == pytest.approx(ends[0], abs=0.011)
-        assert found[colour].max() == pytest.approx(ends[1], abs=0.011)
-
-
-def test_marks_end_at_kerbs_that_cross_them(tmp_path):
-    """Half of the road is carriageway, up to a line across it."""
-    path = tmp_path / "road.xodr"
-    path.write_text(ROAD.replace("<arc", "<line/><!--").replace(
-        "/></geometry>", "--></geometry>"))  # fmt: skip
-    roads = read_roads(path, ImportFaults())
-    bands = [band for road in roads.roads for band in lane_bands(road)]
-    half = shapely.box(-5.0, -9.0, 40.0, 9.0)
-    (one,) = road_marks("marks", bands, carriageway=half)
-    areas = {}
-    for part in one.model.parts:
-        mesh = one.model.meshes[part.shape.mesh]
-        triangles = mesh.vertices[mesh.triangles()]
-        assert triangles[..., 0].max() <= 40.0 + 1e-9
-        areas[part.name] = area(triangles)
-    assert areas["yellow"] == pytest.approx(10.0 * 0.2, abs=0.01)
-    assert areas["white"] == pytest.approx(4 * 3.0 * 0.1, abs=0.01)

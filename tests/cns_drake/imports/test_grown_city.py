@@ -13,7 +13,6 @@ import yaml
 from cns_drake.base import InputError
 from cns_drake.command_line import app
 from cns_drake.imports import ImportOptions, import_city
-from cns_drake.imports.building_years import year_of_date
 
 
 def run(*arguments):
@@ -119,25 +118,6 @@ def test_options_that_exclude_each_other(tmp_path, options, fault):
     result = run("import", source, *options, "--output", tmp_path / "town")
     assert isinstance(result.exception, InputError)
     assert str(result.exception).startswith(fault)
-
-
-@pytest.mark.parametrize(
-    ("text", "year"),
-    [
-        ("1855", 1855), ("1855-05-13", 1855), ("~1855", 1855),
-        ("before 1910-01-20", 1910), ("after 1823", 1823), ("1860s", 1865),
-        ("~1940s", 1945), ("late 1920s", 1928), ("early 1920s", 1922),
-        ("C18", 1750), ("mid C14", 1350), ("late C19", 1880),
-        ("1914..1918", 1918), ("mid C17..late C17", 1680),
-        ("j:1918-01-31", 1918),
-        # From the wiki: 8 November 2010.
-        ("jd:2455511", 2010), ("13.5.1855", 1855), ("long ago", None),
-        ("", None), ("0000", None), ("C0", None), ("jd:9999999", None),
-        ("12345", None),
-    ],
-)  # fmt: skip
-def test_dates(text, year):
-    assert year_of_date(text) == year
 
 
 def test_demolished_buildings_stood_in_their_time(tmp_path):

@@ -5,19 +5,11 @@ import re
 from helpers.imported_osm import bounds, import_osm, volume
 from helpers.small_osm import LAT, LON, OsmWriter
 import numpy as np
-import pyproj
 import pytest
-from shapely.geometry import Polygon
 
 from cns_drake.base import InputError
 from cns_drake.imports import ImportOptions, import_city, import_openstreetmap
-from cns_drake.imports.faults import ImportFaults
-from cns_drake.imports.openstreetmap.local_metres import LocalMetres
-from cns_drake.imports.solids import extruded
 
-L_SHAPE = [(0, 0), (30, 0), (30, 8), (8, 8), (8, 30), (0, 30)]
-SHORT_L = [(0, 0), (12, 0), (12, 10), (10, 10), (10, 12), (0, 12)]
-DART = [(0, 0), (10, 4), (20, 0), (10, 20)]
 BOMB = """<?xml version="1.0"?>
 <!DOCTYPE osm [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;">]>
 <osm version="0.6"><node id="1" lat="0" lon="0"><tag k="b" v="&b;"/></node>
@@ -54,58 +46,6 @@ def test_a_building_with_parts_is_what_these_are(tmp_path):
     assert volume(one.triangles) == pytest.approx(expected, rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("roof", "part"), [("flat", 1.0), ("gabled", 0.5), ("pyramidal", 1 / 3)]
-)
-@pytest.mark.parametrize("turned", [0, 1])
-def test_roofs_hold_their_volume(roof, part, turned):
-    corners = [(1, 1), (13, 1), (13, 7), (1, 7)]
-    polygon = Polygon(corners[turned:] + corners[:turned])
-    faults = ImportFaults()
-    walls, top = extruded(polygon, 0.0, 9.0, "a", faults, roof, 3.0)
-    if roof == "flat":
-        walls, top = extruded(polygon, 0.0, 9.0, "a", faults)
-    base = np.array([[(1, 1, 0), (13, 7, 0), (13, 1, 0)],
-                     [(1, 1, 0), (1, 7, 0), (13, 7, 0)]], float)  # fmt: skip
-    whole = np.concatenate([walls, top, base])
-    assert volume(whole) == pytest.approx(72.0 * (6.0 + 3.0 * part))
-    assert faults.rows() == []
-    normals = np.cross(top[:, 1] - top[:, 0], top[:, 2] - top[:, 0])
-    assert (normals[:, 2] > 0).all()
-
-
-@pytest.mark.parametrize(
-    ("corners", "roof", "is_made"),
-    [
-        (L_SHAPE, "pyramidal", False),
-        (SHORT_L, "pyramidal", True),
-        (DART, "gabled", False),
-        (DART, "pyramidal", True),
-    ],
-)
-def test_no_roof_leaves_its_outline(corners, roof, is_made):
-    faults = ImportFaults()
-    polygon = Polygon(corners)
-    _, top = extruded(polygon, 0.0, 9.0, "a", faults, roof, 3.0)
-    flat = [Polygon(triangle) for triangle in top[..., :2]]
-    # Triangles that neither overlap nor leave the outline have its area.
-    assert sum(one.area for one in flat) == pytest.approx(polygon.area)
-    assert np.ptp(top[..., 2]) == (3.0 if is_made else 0.0)
-    made_flat = (f"roof of shape {roof}, made flat", 1, "a")
-    assert faults.rows() == ([] if is_made else [made_flat])
-
-
-def test_a_hipped_roof_slopes_on_four_sides():
-    polygon = Polygon([(0, 0), (12, 0), (12, 6), (0, 6)])
-    walls, top = extruded(polygon, 0, 9, "a", ImportFaults(), "hipped", 3.0)
-    assert walls[..., 2].max() == 6.0
-    assert top[..., 2].max() == 9.0
-    normals = np.cross(top[:, 1] - top[:, 0], top[:, 2] - top[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    assert (normals[:, 2] > 0.1).all()
-    assert len(np.unique(np.round(normals, 6), axis=0)) == 4
-
-
 def test_only_buildings_lack_a_year(tmp_path):
     osm = OsmWriter()
     osm.box(0, 20, 20, 10, building="yes", start_date="1999-04")
@@ -120,14 +60,6 @@ def test_only_buildings_lack_a_year(tmp_path):
     assert report.undated == 1
     first, second, third = report.stages.values()
     assert (second - first, third - second) == (0, 2)
-
-
-def test_impossible_roofs_are_flat_and_noted():
-    bent = Polygon([(0, 0), (9, 0), (9, 9), (5, 9), (5, 4), (0, 4)])
-    faults = ImportFaults()
-    _, top = extruded(bent, 0, 9, "a", faults, "gabled", 3.0)
-    assert (top[..., 2] == 9.0).all()
-    assert faults.rows() == [("roof of shape gabled, made flat", 1, "a")]
 
 
 def test_streets_have_width_and_sidewalks(tmp_path):
@@ -260,20 +192,6 @@ def test_limits_that_cannot_be_read_are_noted(tmp_path):
         (f"maxspeed {told}", 1, f"w{fast}"),
         (f"maxspeed:backward {told}", 1, f"w{back}"),
     ]
-
-
-@pytest.mark.parametrize(
-    ("distance", "error"), [(1500.0, 0.5), (10000.0, 22.4)]
-)
-@pytest.mark.parametrize("east", [1.0, -1.0])
-def test_places_are_as_exact_as_stated(distance, error, east):
-    x, y = east * distance, distance
-    to_degrees = pyproj.Transformer.from_crs(
-        f"+proj=aeqd +lat_0={LAT} +lon_0={LON} +ellps=WGS84", "OGC:CRS84"
-    )
-    places = np.array([to_degrees.transform(x, y)])
-    off = LocalMetres(LON, LAT)(places)[0] - (x, y)
-    assert np.hypot(*off) == pytest.approx(error, rel=0.02)
 
 
 def test_half_a_country_is_refused(tmp_path):

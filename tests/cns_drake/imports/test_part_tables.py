@@ -6,25 +6,16 @@ changes no shape.
 """
 
 import json
-from pathlib import Path
-from xml.etree import ElementTree
 
 from helpers.imported_osm import import_osm, volume
-from helpers.small_opendrive import lane, straight, write_roads
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
-import yaml
 
 from cns_drake.imports import (
-    cityjson,
     import_cityjson,
     import_openstreetmap,
-    opendrive,
 )
-from cns_drake.imports.faults import ImportFaults
-from cns_drake.imports.opendrive.lanes import lane_bands
-from cns_drake.imports.opendrive.road_reader import read_roads
 
 # The most used keys on ways and nodes that can describe a thing, by taginfo,
 # with a usual value.
@@ -257,61 +248,6 @@ def test_parts_of_another_year_are_buildings(tmp_path, date, buildings):
     assert ("date in start_date that is not understood" in kinds) == is_unclear
 
 
-SIGNAL = {"s": "50", "t": "-9", "id": "1", "type": "274", "dynamic": "no"}
-OBJECT = {"s": "80", "t": "-9", "id": "2", "type": "pole", "height": "3",
-          "radius": "0.2"}  # fmt: skip
-OF_ROADS = [
-    ("signals", "signal", SIGNAL, key)
-    for key in ("zOffset", "width", "height", "hOffset", "pitch", "roll",
-                "text", "value", "country", "subtype", "orientation",
-                "length", "new")
-] + [
-    ("objects", "object", OBJECT, key)
-    for key in ("zOffset", "width", "length", "hdg", "pitch", "roll", "subtype",
-                "dynamic", "validLength", "orientation", "perpToRoad", "new")
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("group", "tag", "given", "key"), OF_ROADS)
-def test_attributes_of_things_change_them_or_are_named(
-    tmp_path, group, tag, given, key
-):
-    def things(attributes):
-        text = " ".join(f'{k}="{v}"' for k, v in attributes.items())
-        path = write_roads(
-            tmp_path / "a.xodr",
-            straight(
-                "1", 0, 0, 200, 0, more=f"<{group}><{tag} {text}/></{group}>"
-            ),
-        )
-        faults = ImportFaults()
-        (road,) = read_roads(path, faults).roads
-        return repr(road.things), faults
-
-    before, _ = things(given)
-    after, faults = things(given | {key: "1.5"})
-    told = " ".join(fault.kind for fault in faults.rows())
-    lines = " ".join(faults.parts()).split()
-    assert (
-        before != after or f"{key} of {tag}, not read" in told or key in lines
-    )
-
-
-def test_each_element_of_opendrive_that_is_read_has_a_row():
-    page = Path(opendrive.__file__).with_name("parts.yaml")
-    elements = yaml.safe_load(page.read_text("utf-8"))["elements"]
-    children = {
-        child for row in elements.values() for child in row.get("children", ())
-    }
-    assert children <= set(elements)
-    assert {key for row in elements.values() for key in row} <= {
-        "children",
-        "read",
-        "shapeless",
-        "usual",
-    }
-
-
 @pytest.mark.parametrize(
     ("attribute", "value", "is_counted"),
     [
@@ -363,152 +299,6 @@ def house(attributes):
         },
         "vertices": corners,
     }
-
-
-# The most used attributes of OpenDRIVE, and some of none of its versions.
-ATTRIBUTES = (
-    "id name length junction rule s t x y z a b c d hdg sOffset tOffset zOffset"
-    " hOffset width height radius inner outer type subtype level direction"
-    " value unit max country text dynamic orientation pitch roll validLength"
-    " side weight color material laneChange space speed restriction code"
-    " distance tStart tEnd widthStart widthEnd heightStart heightEnd"
-    " zOffsetStart zOffsetEnd radiusStart radiusEnd lengthStart lengthEnd"
-    " detachFromReferenceLine perpToRoad closed outer fillType laneType"
-    " elementId contactPoint singleSide roadWorks curvature travelDir new"
-)
-OF_ALL = """<road id="1" length="200" junction="-1" name="a"><link><predecessor
-elementType="road" elementId="9"/><successor elementType="road"
-elementId="8"/></link><type s="0" type="town"><speed max="50" unit="km/h"/>
-</type><planView><geometry s="0" x="0" y="0" hdg="0" length="100"><line/>
-</geometry><geometry s="100" x="100" y="0" hdg="0" length="100"><arc
-curvature="0.001"/></geometry></planView><elevationProfile><elevation s="0"
-a="0" b="0" c="0" d="0"/></elevationProfile><lateralProfile><superelevation
-s="0" a="0" b="0" c="0" d="0"/></lateralProfile><lanes><laneOffset s="0"
-a="0" b="0" c="0" d="0"/><laneSection s="0"><left><lane id="1"
-type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/><height
-sOffset="0" inner="0" outer="0"/><roadMark sOffset="0" type="solid"><type
-name="solid"><line length="3" space="3" tOffset="0" sOffset="0"/></type>
-</roadMark></lane></left><center><lane id="0" type="none"/></center>
-</laneSection></lanes><objects><object id="1" type="pole" s="10" t="9"
-height="3" radius="1"><repeat s="10" length="20" distance="5" tStart="9"
-tEnd="9"/></object><object id="2" type="building" s="50"
-t="20"><outlines><outline><cornerLocal u="0" v="0" z="0"
-height="3"/><cornerLocal u="5" v="0" z="0" height="3"/><cornerLocal u="5"
-v="5" z="0" height="3"/></outline></outlines>
-</object></objects><signals><signal id="3" s="40" t="9" type="274"
-dynamic="no"/></signals></road><junction id="7" name="j"><connection id="0"
-incomingRoad="1" connectingRoad="1" contactPoint="start"/></junction>"""
-
-
-@pytest.mark.parametrize(
-    "tag",
-    sorted({e.tag for e in ElementTree.fromstring(f"<a>{OF_ALL}</a>").iter()}
-           - {"a", "left", "center"}),
-)  # fmt: skip
-def test_each_attribute_of_each_element_of_opendrive_is_accounted_for(
-    tmp_path, tag
-):
-    read = opendrive_table()[tag].get("read", [])
-    more = [
-        key for key in ATTRIBUTES.split() if key not in " ".join(read).split()
-    ]
-    root = ElementTree.fromstring(f"<OpenDRIVE>{OF_ALL}</OpenDRIVE>")
-    element = next(root.iter(tag))
-    for key in more:
-        # The names of things may refer to each other.
-        element.set(key, element.get(key, "1.5"))
-    path = tmp_path / "a.xodr"
-    path.write_text(ElementTree.tostring(root, "unicode"))
-    faults = ImportFaults()
-    read_roads(path, faults)
-    told = {fault.kind for fault in faults.rows()}
-    lines = {
-        word
-        for line in faults.parts()
-        if line.startswith(f"{tag}: ")
-        for word in line.split(": ")[-1].split()
-    }
-    for key in more:
-        assert key in lines or f"{key} of {tag}, not read" in told, key
-
-
-def opendrive_table():
-    page = Path(opendrive.__file__).with_name("parts.yaml")
-    return yaml.safe_load(page.read_text("utf-8"))["elements"]
-
-
-@pytest.mark.parametrize(("a", "is_counted"), [(-1.0, True), (3.0, False)])
-def test_negative_widths_of_lanes_are_counted(tmp_path, a, is_counted):
-    lanes = (lane(1, "driving", 3.5), lane(2, "shoulder", a),
-             lane(-1, "driving", 3.5))  # fmt: skip
-    path = write_roads(
-        tmp_path / "a.xodr",
-        straight("1", 0, 0, 100, 0, lanes=lanes),
-    )
-    (road,) = read_roads(path, ImportFaults()).roads
-    found = {band.lane.number: band.is_inverted for band in lane_bands(road)}
-    assert found == {1: False, 2: is_counted, -1: False}
-
-
-# Names that files of CityJSON use on things of any kind, and some of none.
-MEMBERS = (
-    "type lod boundaries semantics template transformationMatrix texture"
-    " material geographicalExtent address extent attributes parents children"
-    " geometry surfaces values name id identifier description function class"
-    " usage roofType storeysAboveGround storeysBelowGround measuredHeight"
-    " storeyHeightsAboveGround yearOfConstruction yearOfDemolition"
-    " relativeToTerrain relativeToWater conditionOfConstruction creationDate"
-    " terminationDate validFrom validTo h_min h_max h_dak height roofheight"
-    " slope azimuth inclination orientation area volume color colour"
-    " identificatie b3_h_maaiveld b3_dak_type bgt_status plus_status gml_id"
-    " trunkDiameter crownDiameter species direction occupancy dimension"
-    " elevation appearance version title"
-)
-
-
-@pytest.mark.parametrize(
-    "element", ["object", "geometry", "attributes", "semantics", "surface"]
-)
-def test_each_member_of_each_thing_of_cityjson_is_accounted_for(
-    tmp_path, element
-):
-    document = house({"function": "house"})
-    one = document["CityObjects"]["a"]
-    geometry = one["geometry"][0]
-    semantics = {
-        "surfaces": [{"type": "RoofSurface"}],
-        "values": [[None, 0, None, None, None, None]],
-    }
-    geometry["semantics"] = semantics
-    thing = {
-        "object": one,
-        "geometry": geometry,
-        "attributes": one["attributes"],
-        "semantics": semantics,
-        "surface": semantics["surfaces"][0],
-    }[element]
-    read = set(cityjson_table()[element]["read"])
-    more = [key for key in MEMBERS.split() if key not in read | set(thing)]
-    for key in more:
-        thing[key] = "1.5"
-    path = tmp_path / "a.json"
-    path.write_text(json.dumps(document))
-    city = import_cityjson(path, None, None)
-    assert len(city.objects) == 1
-    told = {fault.kind for fault in city.faults.rows()}
-    lines = {
-        word
-        for line in city.faults.parts()
-        if line.startswith(f"{element}: ")
-        for word in line.split(": ")[-1].split()
-    }
-    for key in more:
-        assert key in lines or f"{key} of {element}, not read" in told, key
-
-
-def cityjson_table():
-    page = Path(cityjson.__file__).with_name("parts.yaml")
-    return yaml.safe_load(page.read_text("utf-8"))["elements"]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ import resource
 import shlex
 
 from helpers.small_cityjson import CityWriter, write_blocks
-from matplotlib.image import imread
 import numpy as np
 import pytest
 from shapely.geometry import LineString, box
@@ -17,11 +16,7 @@ import yaml
 
 from cns_drake.base import InputError
 from cns_drake.command_line import app
-from cns_drake.imports import ImportOptions, import_city
-from cns_drake.imports.building_years import construction_year
-from cns_drake.imports.drives.steerable_drives import WaypointRoute
-from cns_drake.imports.imported_objects import make_object
-from cns_drake.imports.overview import draw_overview
+from cns_drake.imports import ImportOptions, import_city, import_cityjson
 from cns_drake.scenarios import load_scenario, plan_drive
 from evaluation.clouds import read_cloud
 from evaluation.drives import open_drive
@@ -242,30 +237,6 @@ def test_years_that_change_nothing(tmp_path, dates):
 
 
 @pytest.mark.usefixtures("overviews")
-def test_the_picture_shows_both_drives_where_they_share_a_street(tmp_path):
-    triangle = np.array([[[0.0, 0, 0], [40.0, 0, 0], [0, 40.0, 0]]])
-    house = make_object("house", "building", "Building", {"all": triangle}, {})
-    way = np.column_stack([np.linspace(-10.0, 50.0, 31), np.full(31, 30.0)])
-    drives = [WaypointRoute(way[k : k + 20], way[k : k + 20]) for k in (0, 11)]
-    path = tmp_path / "from_above.png"
-    draw_overview(path, [house], None, drives)
-    pixels = np.round(255 * imread(path)[:, :, :3]).astype(int)
-    red, blue = (
-        (np.abs(pixels - rgb).max(axis=2) < 8)
-        for rgb in ((0xD7, 0x19, 0x1C), (0x2C, 0x7B, 0xB6))
-    )
-    # Columns in which the one drive lies in the other; more than the markers
-    # of its ends take.
-    height = len(pixels)
-    upper = slice(0, int(0.7 * height))
-    both = red[upper].any(axis=0) & blue[upper].any(axis=0)
-    assert both.sum() > 60
-    # The legend has both colours, below the map.
-    assert red[int(0.85 * height) :].any()
-    assert blue[int(0.85 * height) :].any()
-
-
-@pytest.mark.usefixtures("overviews")
 def test_no_street_and_no_drive(tmp_path):
     city = CityWriter()
     city.box("a", 0, 0, (10, 10, 5))
@@ -323,6 +294,14 @@ def test_options_that_cannot_be(tmp_path, capsys, options, fault):
     assert not list(tmp_path.glob("out*"))
 
 
+def year_of(tmp_path, attributes, name=None):
+    city = CityWriter()
+    city.box("a", 0.0, 0.0, (20.0, 20.0, 6.0), attributes=attributes)
+    imported = import_cityjson(city.write(tmp_path / "city.json"), None, name)
+    (one,) = imported.objects
+    return one.year
+
+
 @pytest.mark.parametrize(
     ("attributes", "year"),
     [
@@ -341,8 +320,8 @@ def test_options_that_cannot_be(tmp_path, capsys, options, fault):
         ({"yearOfConstruction": "19321"}, None),
     ],
 )
-def test_years_are_found(attributes, year):
-    assert construction_year(attributes, None) == year
+def test_years_are_found(tmp_path, attributes, year):
+    assert year_of(tmp_path, attributes) == year
 
 
 def test_years_that_are_none_or_to_come_are_counted(tmp_path):
@@ -373,10 +352,10 @@ def test_years_that_are_none_or_to_come_are_counted(tmp_path):
         }
 
 
-def test_a_year_of_one_s_own():
+def test_a_year_of_one_s_own(tmp_path):
     attributes = {"built": 1750, "bouwjaar": 1900}
-    assert construction_year(attributes, "built") == 1750
-    assert construction_year(attributes, "never") is None
+    assert year_of(tmp_path, attributes, "built") == 1750
+    assert year_of(tmp_path, attributes, "never") is None
 
 
 @pytest.mark.skipif(

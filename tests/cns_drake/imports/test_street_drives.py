@@ -7,16 +7,7 @@ from shapely.geometry import LineString, Point
 
 from cns_drake.base import InputError
 from cns_drake.imports import ImportOptions, import_city, import_openstreetmap
-from cns_drake.imports.drives.steerable_drives import driven_path
-from cns_drake.imports.drives.street_graph import lane_links, make_lanes
-from cns_drake.imports.openstreetmap.city import is_marked
-from cns_drake.imports.openstreetmap.way_tags import (
-    driven_directions,
-    lanes_beside,
-)
 from cns_drake.imports.streets import Street
-from cns_drake.motion import SmoothPath
-from cns_drake.roads import POINT_SPACING, make_waypoint_path
 from cns_drake.scenarios import load_scenario, plan_drive
 
 STEP = 90.0
@@ -133,83 +124,6 @@ def street(points, nodes, forward=True, backward=True, aside=1.5):
     return Street(line, tuple(nodes), forward, backward, aside)
 
 
-def test_lanes_are_cut_where_streets_meet():
-    streets = [
-        street([(0, 0), (10, 0), (20, 0), (30, 0)], [1, 2, 3, 4]),
-        street([(20, 20), (20, 0)], [5, 3], backward=False),
-    ]
-    lanes = make_lanes(streets)
-    ends = sorted((lane.begin, lane.end, lane.length) for lane in lanes)
-    assert ends == [
-        (1, 3, 20.0), (3, 1, 20.0), (3, 4, 10.0), (4, 3, 10.0), (5, 3, 20.0),
-    ]  # fmt: skip
-    links = lane_links(lanes)
-    leads = {
-        (lanes[a].begin, lanes[a].end, lanes[b].end)
-        for a, b in zip(*links, strict=True)
-    }
-    # No drive turns round or enters the one-way street.
-    assert leads == {(1, 3, 4), (4, 3, 1), (5, 3, 1), (5, 3, 4)}
-
-
-def test_a_roundabout_is_driven_one_way():
-    angle = np.linspace(0, 2 * np.pi, 9)
-    ring = 15 * np.column_stack([np.cos(angle), np.sin(angle)])
-    nodes = [*range(10, 18), 10]
-    tags = {"highway": "residential", "junction": "roundabout"}
-    forward, backward = driven_directions(tags)
-    lanes = make_lanes(
-        [
-            street(ring, nodes, forward, backward),
-            street([(-60, 0), (-15, 0)], [1, 14]),
-            street([(15, 0), (60, 0)], [10, 2]),
-        ]
-    )
-    links = lane_links(lanes)
-    (start,) = (k for k, lane in enumerate(lanes) if lane.begin == 1)
-    after = {
-        (lanes[k].begin, lanes[k].end)
-        for a, k in zip(*links, strict=True)
-        if a == start
-    }
-    # From the west on to the east by the south: counter-clockwise.
-    assert after == {(14, 10)}
-    (part,) = (lane for lane in lanes if (lane.begin, lane.end) == (14, 10))
-    assert part.line[:, 1].min() < -10.0
-
-
-@pytest.mark.parametrize(
-    ("tags", "expected"),
-    [
-        ({}, (True, True)),
-        ({"oneway": "yes"}, (True, False)),
-        ({"oneway": "-1"}, (False, True)),
-        ({"oneway": "no", "junction": "roundabout"}, (True, True)),
-        ({"junction": "roundabout"}, (True, False)),
-        ({"highway": "motorway"}, (True, False)),
-        ({"access": "private"}, (False, False)),
-        ({"motor_vehicle": "no", "oneway": "yes"}, (False, False)),
-    ],
-)
-def test_ways_that_cars_may_use(tags, expected):
-    assert driven_directions(tags) == expected
-
-
-@pytest.mark.parametrize(
-    ("tags", "width", "expected"),
-    [
-        ({}, 8.0, 2.0),
-        ({}, 4.5, 0.0),
-        ({"lanes": "4"}, 12.0, 4.5),
-        ({"oneway": "yes"}, 4.0, 0.0),
-        ({"oneway": "yes", "lanes": "2"}, 6.0, 1.5),
-        ({"lanes": "1"}, 6.0, 0.0),
-    ],
-)
-def test_where_the_outermost_lane_lies(tags, width, expected):
-    assert lanes_beside(tags, width) == pytest.approx(expected)
-
-
 def test_zebra_crossings_have_stripes(tmp_path):
     osm = OsmWriter()
     osm.box(-5, 20, 10, 10, building="yes")
@@ -231,21 +145,6 @@ def test_zebra_crossings_have_stripes(tmp_path):
     low, high = one.triangles.min(axis=(0, 1)), one.triangles.max(axis=(0, 1))
     np.testing.assert_allclose(high - low, [3.0, 5.5, 0.0], atol=5e-3)
     np.testing.assert_allclose((high + low)[2] / 2, 0.01)
-
-
-@pytest.mark.parametrize(
-    ("tags", "expected"),
-    [
-        ({"crossing": "zebra"}, True),
-        ({"crossing": "uncontrolled"}, True),
-        ({"crossing": "uncontrolled", "crossing:markings": "no"}, False),
-        ({"crossing": "traffic_signals"}, False),
-        ({"crossing:markings": "zebra:double"}, True),
-        ({}, False),
-    ],
-)
-def test_which_crossings_have_stripes(tags, expected):
-    assert is_marked(tags) is expected
 
 
 def test_a_place_on_another_continent_is_no_way_to_go(tmp_path):
@@ -302,23 +201,6 @@ def test_no_drive_goes_through_a_wall(tmp_path, barrier):
     assert len(report.drives) == 2
     for places, _ in drives_of(tmp_path / "town"):
         assert LineString(places).distance(shape) > 1.0
-
-
-def test_a_path_is_as_the_vehicle_drives_it():
-    rng = np.random.default_rng(4)
-    for _ in range(5):
-        steps = np.column_stack([rng.uniform(15, 25, 12), rng.normal(0, 9, 12)])
-        waypoints = np.column_stack([np.cumsum(steps, axis=0), np.zeros(12)])
-        path = make_waypoint_path(waypoints, POINT_SPACING)
-        smooth = SmoothPath(path.points, path.spacing)
-        radius, place = smooth.tightest_bend()
-        driven, radii = driven_path(path.points[:, :2])
-        assert radii.min() == pytest.approx(radius, rel=0.01)
-        assert np.linalg.norm(driven[radii.argmin()] - place[:2]) < 0.3
-        u = np.linspace(0.0, smooth.end, len(driven))
-        np.testing.assert_allclose(
-            driven, smooth.evaluate(u).p[:, :2], atol=1e-9
-        )
 
 
 @pytest.mark.sampled(1)

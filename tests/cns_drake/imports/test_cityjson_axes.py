@@ -8,13 +8,27 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.imports.cityjson.reading import read_cityjson
+from cns_drake.imports import import_cityjson
 
 FOOT = 1200 / 3937  # The survey foot of the United States.
 NORTH_FIRST = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 TOKYO = "EPSG:6677"
 RIGA = "EPSG:3059"
 MADRID = "EPSG:25830"
+
+
+def read(path):
+    """Returns a city, and name -> (N, 3) corners in its reference system."""
+    city = import_cityjson(path, None, None)
+    return city, {
+        one.structure.name: one.triangles.reshape(-1, 3) + city.origin
+        for one in city.objects
+    }
+
+
+def bounds(found):
+    corners = np.concatenate(list(found.values()))
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 @pytest.mark.parametrize(
@@ -46,9 +60,7 @@ def test_coordinates_are_metres_east_north_up(tmp_path, system, place, matrix):
     city = CityWriter(origin=place)
     city.metadata = {"referenceSystem": system}
     city.box("a", 10.0, -5.0, (4.0, 3.0, 2.0), z=0.5)
-    read = read_cityjson(city.write(tmp_path / "city.json"))
-    (geometry,) = read.objects["a"].geometries
-    corners = np.concatenate([face[0] for face in geometry.faces])
+    imported, found = read(city.write(tmp_path / "city.json"))
     expected = np.array(
         [
             np.add(place, (10 + i, -5 + j, 0.5 + k))
@@ -56,11 +68,11 @@ def test_coordinates_are_metres_east_north_up(tmp_path, system, place, matrix):
         ]
     ) @ np.array(matrix).T  # fmt: skip
     np.testing.assert_allclose(
-        np.unique(np.round(corners, 6), axis=0),
+        np.unique(np.round(found["a"], 6), axis=0),
         np.unique(np.round(expected, 6), axis=0),
         atol=2e-6,
     )
-    as_used = "coordinates with east first" in str(read.faults.rows())
+    as_used = "coordinates with east first" in str(imported.faults.rows())
     assert as_used == (place == (1749000, 5427000, 10))
 
 
@@ -80,8 +92,8 @@ def test_templates_have_the_unit_of_the_system(tmp_path):
         "transformationMatrix": np.diag([2.0, 2.0, 2.0, 1.0]).ravel().tolist(),
     }
     city.add("tree", "SolitaryVegetationObject", instance)
-    read = read_cityjson(city.write(tmp_path / "city.json"))
-    low, high = read.bounds()
+    _, found = read(city.write(tmp_path / "city.json"))
+    low, high = bounds(found)
     np.testing.assert_allclose(low, np.array([980100, 190000, 40]) * FOOT)
     np.testing.assert_allclose(high - low, 2.0 * FOOT)
 
@@ -91,7 +103,7 @@ def test_degrees_without_a_word(tmp_path):
     city.metadata = {}
     city.box("a", 0.001, 0.001, (0.01, 0.01, 30.0))
     with pytest.raises(InputError, match="look like degrees"):
-        read_cityjson(city.write(tmp_path / "city.json"))
+        read(city.write(tmp_path / "city.json"))
 
 
 def test_coordinates_beyond_the_area_of_their_system_are_counted(tmp_path):
@@ -102,7 +114,7 @@ def test_coordinates_beyond_the_area_of_their_system_are_counted(tmp_path):
             f"https://www.opengis.net/def/crs/EPSG/0/{code}"
         )
         city.box("house", 0.0, 0.0, (10.0, 10.0, 5.0))
-        found = read_cityjson(city.write(tmp_path / f"{code}.json"))
+        found, _ = read(city.write(tmp_path / f"{code}.json"))
         counts = {kind: count for kind, count, _ in found.faults.rows()}
         kind = "coordinates beyond the area of their reference system"
         assert counts.get(kind, 0) == number
@@ -130,11 +142,11 @@ def test_composed_systems_have_an_order_of_axes(
     city = CityWriter(origin=(*place, 30.0))
     city.metadata = {"referenceSystem": system}
     city.box("house", 0, 0, (6, 4, 3))
-    read = read_cityjson(city.write(tmp_path / "city.json"))
-    low, high = read.bounds()
+    imported, found = read(city.write(tmp_path / "city.json"))
+    low, high = bounds(found)
     np.testing.assert_allclose(low, [*place, 30], atol=1e-6)
     np.testing.assert_allclose(high - low, [6, 4, 3], atol=1e-6)
-    rows = str(read.faults.rows())
+    rows = str(imported.faults.rows())
     assert ("read as east first" in rows) == is_north_first
     assert "beyond the area" not in rows
 
@@ -153,10 +165,10 @@ def test_a_projection_that_stretches_a_city_is_refused(
     city.box("house", 0, 0, (6, 4, 3))
     path = city.write(tmp_path / "city.json")
     if not is_refused:
-        read_cityjson(path)
+        read(path)
         return
     with pytest.raises(InputError, match="referenceSystem: in EPSG") as info:
-        read_cityjson(path)
+        read(path)
     (factor,) = re.findall(r"is (\S+) m long", str(info.value))
     assert float(factor) == pytest.approx(1 / np.cos(phi), rel=8e-3)
 
@@ -193,16 +205,12 @@ def test_no_order_of_axes_mirrors_a_city(
             (values,) = geometry["semantics"]["values"]
             geometry["semantics"]["values"] = values
         geometry["type"] = kind
-    read = read_cityjson(city.write(tmp_path / "city.json"))
-    corners = {
-        name: np.concatenate([f[0] for g in one.geometries for f in g.faces])
-        for name, one in read.objects.items()
-    }
+    imported, corners = read(city.write(tmp_path / "city.json"))
     house, mark = corners["house"], corners["mark"]
     np.testing.assert_allclose(np.ptp(house, axis=0), [6, 4, 3], atol=1e-6)
     away = mark.min(axis=0) - house.min(axis=0)
     np.testing.assert_allclose(away, [30, 15, 0], atol=1e-6)
-    rows = str(read.faults.rows())
+    rows = str(imported.faults.rows())
     as_defined = is_east_first == (system == MADRID)
     assert ("; read as" in rows) == (not as_defined)
     assert "beyond the area" not in rows
@@ -217,8 +225,8 @@ def test_an_order_that_no_face_shows_is_named(tmp_path):
         "Building",
         {"type": "MultiSurface", "lod": "2", "boundaries": faces},
     )
-    read = read_cityjson(city.write(tmp_path / "city.json"))
-    kinds = {kind for kind, _, _ in read.faults.rows()}
+    imported, _ = read(city.write(tmp_path / "city.json"))
+    kinds = {kind for kind, _, _ in imported.faults.rows()}
     assert "order of axes that no face shows, taken as defined" in kinds
 
 
@@ -227,15 +235,15 @@ def test_a_file_without_a_system_says_so(tmp_path):
     city.metadata = {}
     for k in range(2):
         city.box(f"a{k}", 9 * k, 0, (2, 2, 2))
-    read = read_cityjson(city.write(tmp_path / "city.json"))
+    imported, _ = read(city.write(tmp_path / "city.json"))
     kind = "no reference system; metres east, north and up assumed"
-    assert [row[0] for row in read.faults.rows()] == [kind]
+    assert [row[0] for row in imported.faults.rows()] == [kind]
     vertex = city.vertex
     city.vertex = lambda x, y, z: vertex(y, x, z)
     for k in range(2):
         city.box(f"a{k}", 9 * k, 0, (2, 2, 2))
-    read = read_cityjson(city.write(tmp_path / "city.json"))
-    assert any("may be mirrored" in row[0] for row in read.faults.rows())
+    imported, _ = read(city.write(tmp_path / "city.json"))
+    assert any("may be mirrored" in row[0] for row in imported.faults.rows())
 
 
 def test_lines_of_two_systems_are_refused(tmp_path):
@@ -248,8 +256,8 @@ def test_lines_of_two_systems_are_refused(tmp_path):
     path = tmp_path / "city.jsonl"
     path.write_text("\n".join(lines))
     with pytest.raises(InputError, match="line 2: metadata"):
-        read_cityjson(path)
+        read(path)
     path.write_text("\n".join(lines[:1] * 2))
-    read = read_cityjson(path)
+    imported, _ = read(path)
     kind = "object that is there twice, its last taken"
-    assert read.faults.rows() == [(kind, 1, "a")]
+    assert imported.faults.rows() == [(kind, 1, "a")]

@@ -5,10 +5,6 @@ import numpy as np
 import pytest
 
 from cns_drake.imports import import_openstreetmap
-from cns_drake.imports.dressing.dressed_city import lane_marks
-from cns_drake.imports.dressing.street_dressing import may_park_on
-from cns_drake.imports.drives.steerable_drives import WaypointRoute
-from cns_drake.imports.streets import Street
 
 
 def read(osm, folder, dressed=True):
@@ -221,39 +217,3 @@ def test_the_upper_one_of_two_bridges_is_left_out(tmp_path, layers, upper):
     assert built == {f"road_w{names[0]}", f"parapet_w{names[0]}"}
     row = ("bridge over a street or railway, left out", 1, f"w{out}")
     assert row in city.faults.rows()
-
-
-@pytest.mark.parametrize(
-    ("tags", "right", "left"),
-    [({}, True, True),
-     ({"parking:both": "no"}, False, False),
-     ({"parking:left": "no", "parking:right": "lane"}, True, False),
-     ({"parking:lane:right": "no_stopping"}, False, True),
-     ({"parking:right:restriction": "no_parking"}, False, True),
-     ({"highway": "service"}, False, False)],
-)  # fmt: skip
-def test_cars_park_on_the_side_that_tags_allow(tags, right, left):
-    street = Street(np.zeros((2, 2)), (1, 2), True, True, 1.5, 7.0, "a", tags)
-    assert may_park_on("right", street) is right
-    assert may_park_on("left", street) is left
-
-
-def test_marks_lie_on_the_middle_and_end_before_junctions():
-    main = {"highway": "secondary"}
-    line = np.array([[0.0, 0.0], [50.0, 0.0], [100.0, 0.0]])
-    side = np.array([[50.0, 0.0], [50.0, 60.0]])
-    streets = [
-        Street(line, (1, 2, 3), True, True, 2.0, 8.0, "main", main),
-        Street(side, (2, 4), True, True, 2.0, 8.0, "side", {}),
-    ]
-    path = np.column_stack([np.linspace(0, 100, 30), np.full(30, -2.0)])
-    (marks,) = lane_marks(streets, [WaypointRoute(path, path)])
-    x, y = marks.triangles[:, :, 0], marks.triangles[:, :, 1]
-    assert np.abs(y).max() == pytest.approx(0.06)
-    # Half of the street, 4 m before the junction, and half a dash.
-    assert np.abs(x - 50.0).min() > 4.0 + 4.0 - 1.5 - 1e-9
-    assert area(marks) == pytest.approx(len(x) / 2 * 3.0 * 0.12)
-    (free,) = lane_marks(streets[:1], [WaypointRoute(path, path)])
-    assert len(free.triangles) > len(marks.triangles)
-    far = path + np.array([0.0, 500.0])
-    assert not list(lane_marks(streets, [WaypointRoute(far, far)]))

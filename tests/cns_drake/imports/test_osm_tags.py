@@ -1,0 +1,251 @@
+"""What OpenStreetMap's tags say about buildings: heights, roofs, years."""
+
+from helpers.imported_osm import bounds, import_osm, volume
+from helpers.small_osm import OsmWriter
+import numpy as np
+import pytest
+
+L_SHAPE = [(0, 0), (30, 0), (30, 8), (8, 8), (8, 30), (0, 30)]
+SHORT_L = [(0, 0), (12, 0), (12, 10), (10, 10), (10, 12), (0, 12)]
+DART = [(0, 0), (10, 4), (20, 0), (10, 20)]
+
+
+def building(tmp_path, outline=((0, 0), (12, 0), (12, 6), (0, 6)), **tags):
+    """Returns a building with tags, and the city with what was counted."""
+    osm = OsmWriter()
+    osm.box(-60, 0, 10, 10, building="yes")
+    number = osm.way(outline, closed=True, building="yes", **tags)
+    city, found = import_osm(osm.write(tmp_path / "city.osm"))
+    return found[f"building_w{number}"], city.faults.rows()
+
+
+def height(tmp_path, **tags):
+    one, faults = building(tmp_path, **tags)
+    low, high = bounds(one)
+    return high[2] - low[2], faults
+
+
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory):
+    """The height of a building that says nothing about it [m]."""
+    return height(tmp_path_factory.mktemp("usual"))[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "metres"),
+    [
+        ("12", 12.0),
+        ("12.5 m", 12.5),
+        ("12,5", 12.5),
+        ("40'", 12.192),
+        ("5'6\"", 1.6764),
+        ("12'6\"", 3.81),
+        ("12' 6\"", 3.81),
+        ("12’6”", 3.81),
+        ("12 ft", 3.6576),
+        ("12ft 6in", 3.81),
+        ("12.5M", 12.5),
+        ("12,5 m", 12.5),
+        ("~15", 15.0),
+        ("ca. 15 m", 15.0),
+        ("10 - 12", 12.0),
+        ("9;12.5", 12.5),
+        ("150 cm", 1.5),
+        ("0.01 mi", 16.09344),
+        ("-5", None),
+        ("12 parsecs", None),
+        ("12 m high", None),
+        ("", None),
+        (";", None),
+        ("9;tall", None),
+        ("tall", None),
+        ("1e300", None),
+    ],
+)
+def test_lengths(tmp_path, usual, text, metres):
+    top, faults = height(tmp_path, height=text.replace('"', "&quot;"))
+    assert top == pytest.approx(metres or usual, abs=1e-4)
+    assert len(faults) == (metres is None)
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        ("3", 3.0), ("2.5", 2.5), ("2,5", 2.5), ("3;4", 4.0), ("1; 2;3", 3.0),
+        ("3-4", 4.0), ("3 – 5", 5.0), ("3 to 4", 4.0), ("~4", 4.0),
+        ("many", None), ("-2", None), ("3 m", None), ("3;x", None),
+    ],
+)  # fmt: skip
+def test_levels(tmp_path, usual, text, number):
+    """A level is 3 m high."""
+    top, faults = height(tmp_path, building__levels=text)
+    assert top == pytest.approx(3.0 * number if number else usual)
+    assert len(faults) == (number is None)
+
+
+@pytest.mark.parametrize(
+    "tags",
+    [
+        {"height": "0"},
+        {"height": "851"},
+        {"building__levels": "1000"},
+        {"building__levels": "0"},
+        {"min_height": "1e9"},
+        {"roof__height": "x"},
+    ],
+)
+def test_heights_that_cannot_be_are_the_usual_and_counted(
+    tmp_path, usual, tags
+):
+    top, faults = height(tmp_path, **tags)
+    assert top == pytest.approx(usual)
+    ((kind, number, _),) = faults
+    (key,) = tags
+    expected = f"{key.replace('__', ':')} unreadable or implausible"
+    assert kind.startswith(expected)
+    assert number == 1
+
+
+@pytest.mark.parametrize(
+    ("tags", "expected"),
+    [
+        ({"building__levels": "2", "roof__shape": "gabled"}, 9.0),
+        ({"building__levels": "2", "roof__levels": "1"}, 9.0),
+        ({"building__levels": "0", "roof__levels": "1"}, 3.0),
+        ({"height": "9", "min_height": "4"}, 5.0),
+    ],
+)
+def test_levels_in_the_roof_are_above_the_others(tmp_path, tags, expected):
+    assert height(tmp_path, **tags)[0] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("tags", "why"),
+    [
+        ({"building": "yes", "location": "underground"}, "underground"),
+        ({"building": "yes", "layer": "-1"}, "underground"),
+        ({"building": "yes", "tunnel": "yes"}, "underground"),
+        (
+            {
+                "building": "garage",
+                "building:levels": "0",
+                "building:levels:underground": "2",
+            },
+            "underground",
+        ),
+        ({"building": "demolished"}, "demolished"),
+        ({"building": "house", "demolished": "yes"}, "demolished"),
+        ({"building": "proposed"}, "proposed"),
+        ({"building": "yes", "proposed": "yes"}, "proposed"),
+        ({"building": "construction", "construction": "house"}, "unfinished"),
+        ({"building": "ruins", "layer": "1"}, None),
+        ({"building": "yes", "tunnel": "building_passage"}, None),
+        (
+            {
+                "building": "house",
+                "building:levels": "0",
+                "roof:levels": "1",
+                "building:levels:underground": "1",
+            },
+            None,
+        ),
+        ({"building": "yes", "demolished": "no"}, None),
+    ],
+)
+def test_which_buildings_stand(tmp_path, tags, why):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    osm.box(40, 0, 10, 10, **{k.replace(":", "__"): v for k, v in tags.items()})
+    city, found = import_osm(osm.write(tmp_path / "city.osm"))
+    assert len(found) == (1 if why else 2)
+    kinds = {kind: number for kind, number, _ in city.faults.rows()}
+    expected = {f"{why} building, left out": 1} if why else {}
+    assert kinds == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "year"),
+    [
+        ("1890", 1890),
+        ("79", 79),
+        ("0079", 79),
+        ("1890-05", 1890),
+        ("1890-05-31", 1890),
+        ("2010-06-09T12:00:00Z", 2010),
+        ("~1890", 1890),
+        ("circa 1890", 1890),
+        ("before 1890", 1890),
+        ("1890..1894", 1894),
+        ("1890s", 1895),
+        ("late 1890s", 1898),
+        ("C19", 1850),
+        ("early C19", 1820),
+        ("221 BC", -220),
+        ("-0220-09-10", -220),
+        ("jd:2455511", 2010),
+        # Not documented: a number is not searched in them.
+        ("1890-1894", None),
+        ("1890/1894", None),
+        ("189X", None),
+        ("1890?", None),
+        ("1890-13", None),
+        ("1890-05-32", None),
+        ("built 1890", None),
+        ("house 1890", None),
+        ("18900", None),
+        ("1890 or 1895", None),
+    ],
+)
+@pytest.mark.parametrize("key", ["start_date", "end_date"])
+def test_dates_match_as_a_whole(tmp_path, key, text, year):
+    one, faults = building(tmp_path, **{key: text})
+    assert (one.year if key == "start_date" else one.until) == year
+    kinds = [kind for kind, *_ in faults]
+    unread = f"date in {key} that is not understood"
+    assert (unread in kinds) == (year is None)
+
+
+@pytest.mark.parametrize(
+    ("roof", "part"),
+    [("flat", 1.0), ("gabled", 0.5), ("pyramidal", 1 / 3), ("hipped", 1 / 3)],
+)
+@pytest.mark.parametrize("turned", [0, 1])
+def test_roofs_hold_their_volume(tmp_path, roof, part, turned):
+    corners = [(1, 1), (13, 1), (13, 7), (1, 7)]
+    outline = corners[turned:] + corners[:turned]
+    one, faults = building(
+        tmp_path, outline, height="9", roof__height="3", roof__shape=roof
+    )
+    if roof == "hipped":  # A ridge of 6 m between two half pyramids.
+        part = (6.0 * 0.5 + 6.0 / 3.0) / 12.0
+    expected = 72.0 * (6.0 + 3.0 * part)
+    assert volume(one.triangles) == pytest.approx(expected, rel=1e-3)
+    assert faults == []
+
+
+@pytest.mark.parametrize(
+    ("corners", "roof", "is_made"),
+    [
+        (L_SHAPE, "pyramidal", False),
+        (SHORT_L, "pyramidal", True),
+        (DART, "gabled", False),
+        (DART, "pyramidal", True),
+    ],
+)
+def test_no_roof_leaves_its_outline(tmp_path, corners, roof, is_made):
+    one, faults = building(
+        tmp_path, corners, height="9", roof__height="3", roof__shape=roof
+    )
+    normals = np.cross(
+        one.triangles[:, 1] - one.triangles[:, 0],
+        one.triangles[:, 2] - one.triangles[:, 0],
+    )
+    upper = one.triangles[normals[:, 2] > 1e-6]
+    x, y = np.array([*corners, corners[0]], float).T
+    outline = abs((x[:-1] * y[1:] - x[1:] * y[:-1]).sum()) / 2
+    assert normals[normals[:, 2] > 1e-6][:, 2].sum() / 2 == pytest.approx(
+        outline, rel=1e-3
+    )
+    assert np.ptp(upper[..., 2]) == pytest.approx(3.0 if is_made else 0.0)
+    kinds = [kind for kind, *_ in faults]
+    assert kinds == ([] if is_made else [f"roof of shape {roof}, made flat"])
