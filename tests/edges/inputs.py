@@ -517,6 +517,7 @@ def write_network_opendrive(folder):
             '<objects><bridge id="b" s="0" length="120" type="concrete"/>'
             "</objects>"
         )),
+        '<junction id="7"/>',
         straight("11", -12, 0, 12, 0, junction="7",
                  lanes=(lane(-1, "driving", 3.5),)),
         straight("12", 12, 0, -12, 0, junction="7",

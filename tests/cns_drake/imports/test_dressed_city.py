@@ -5,29 +5,16 @@ import hashlib
 import re
 
 from helpers.small_osm import OsmWriter
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 import yaml
 
 from cns_drake.command_line import app
-from cns_drake.imports.dressing.dressed_buildings import dress_buildings
-from cns_drake.imports.drives.steerable_drives import WaypointRoute
-from cns_drake.imports.ground import ground_of
 from cns_drake.scenarios import write_table
 
 # The digest of an import as it was before dressing existed, but for a count of
 # what is left out, and for the ground, which now looks upwards.
 PLAIN = "2ec83d30fd418392"
-STREET = np.column_stack([np.linspace(-80, 80, 41), np.full(41, -12.0)])
-
-
-def dressed(city, path=STREET, seed=0):
-    drives = [WaypointRoute(path, path)]
-    ground = ground_of(city.objects)
-    result = dress_buildings(city.objects, drives, (), ground, seed)
-    names = {one.structure.name: one for one in result.buildings}
-    return {k: result.buildings[v] for k, v in names.items()}, result
 
 
 def write_quarter(folder):

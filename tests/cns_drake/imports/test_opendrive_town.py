@@ -136,7 +136,3 @@ def test_options_of_other_formats(source, tmp_path, option, value):
     result = run("import", source, option, value, "--output", tmp_path / "out")
     assert isinstance(result.exception, InputError)
     assert f"{option}: " in str(result.exception)
-
-
-def height(start, inner, outer):
-    return f'<height sOffset="{start}" inner="{inner}" outer="{outer}"/>'

@@ -7,7 +7,6 @@ from shapely.geometry import LineString, Point
 
 from cns_drake.base import InputError
 from cns_drake.imports import ImportOptions, import_city, import_openstreetmap
-from cns_drake.imports.streets import Street
 from cns_drake.scenarios import load_scenario, plan_drive
 
 STEP = 90.0
@@ -117,11 +116,6 @@ def test_the_file_may_set_the_side(tmp_path):
     assert import_openstreetmap(tmp_path / "city.osm", None).keeps_left
     write_grid(tmp_path / "city.osm")
     assert not import_openstreetmap(tmp_path / "city.osm", None).keeps_left
-
-
-def street(points, nodes, forward=True, backward=True, aside=1.5):
-    line = np.array(points, dtype=float)
-    return Street(line, tuple(nodes), forward, backward, aside)
 
 
 def test_zebra_crossings_have_stripes(tmp_path):

@@ -11,7 +11,6 @@ from evaluation.recognition import (
     QueryOutcomes,
     Retrieval,
     RetrievalProtocol,
-    place_numbers,
     pose_numbers,
 )
 
@@ -42,19 +41,6 @@ def outcome_of(method, outcomes, columns, errors):
 def part(number, kept):
     """Returns which queries are right: the first ones."""
     return np.arange(number) < kept
-
-
-def numbers(now, before=None):
-    """Metric -> value, and metric -> interval."""
-    found = list(place_numbers(now, before))
-    assert len({one.metric for one in found}) == len(found)
-    assert {(one.method, one.verified, one.n) for one in found} == {
-        ("solid", False, len(now.outcomes))
-    }
-    return (
-        {one.metric: one.value for one in found},
-        {one.metric: one.interval for one in found},
-    )
 
 
 def test_median_errors_are_those_of_right_answers():

@@ -1,41 +1,10 @@
 """Sloping ground: closed forms of the field, its streets and its pads."""
 
-from functools import cache
-
 import numpy as np
-import pytest
 
 from cns_drake.city.ground.elevation import (
     with_gaps_filled,
 )
-from cns_drake.roads import load_road_network
-
-# Two parallel roads, 60 m apart and 6 m apart in height. A ramp joins their
-# eastern ends.
-ROADS = """
-defaults: {sidewalk: 2.0, kerb_height: 0.2, lane_width: 3.5}
-junctions:
-  a: {position: [-60, -20], height: 1.0, dead_end: true, kerb_radius: 4}
-  b: {position: [120, -20], height: 1.0, kerb_radius: 5}
-  c: {position: [120, 40], height: 7.0, kerb_radius: 5}
-  d: {position: [-60, 40], height: 7.0, dead_end: true, kerb_radius: 4}
-roads:
-  low: {start: a, end: b}
-  ramp: {start: b, end: c}
-  high: {start: c, end: d}
-"""
-
-
-@cache
-def network(folder):
-    path = folder / "roads.yaml"
-    path.write_text(ROADS)
-    return load_road_network(path)
-
-
-@pytest.fixture
-def roads(tmp_path_factory):
-    return network(tmp_path_factory.getbasetemp())
 
 
 def test_relaxed_fills_a_strip_linearly():
