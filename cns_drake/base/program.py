@@ -66,10 +66,10 @@ def make_program(
         name: name of the program, as it is typed.
         summary: text at the beginning of the program's help.
         epilog: text at the end of the program's help.
-        commands: package whose modules are the program's commands, if they
-            contain a function of the module's name. The variable `GROUP` of
-            the module is the heading of the command in the help.
-            `CONTEXT_SETTINGS`, if there are any, are settings of click.
+        commands: package whose modules are the program's commands: each has a
+            function of the module's name, and the variable `GROUP`, which is
+            the heading of the command in the help. `CONTEXT_SETTINGS`, if there
+            are any, are settings of click.
         groups: the headings, in their order.
         gone: command, or command and option, of earlier versions -> what to use
             instead, for the error of whoever still gives it.
@@ -140,9 +140,8 @@ def make_program(
             print(context.get_help())
 
     modules = {} if commands is None else import_modules(commands)
-    found = [one for one in modules.items() if hasattr(one[1], one[0])]
     for own_name, module in sorted(
-        found, key=lambda one: groups.index(one[1].GROUP)
+        modules.items(), key=lambda one: groups.index(one[1].GROUP)
     ):
         # An underscore stands behind a keyword of Python.
         command = own_name.rstrip("_").replace("_", "-")

@@ -1,8 +1,8 @@
 """The command line `cns-drake`.
 
-A module of this package with a function of its own name is a command. A
-command's slow modules are imported when the command runs, and not before, so
-that `--help` and `list` answer at once. Interrupts wait during imports.
+Each module of the folder `commands` is a command. Its slow modules are imported
+when the command runs, and not before, so that `--help` and `list` answer at
+once. Interrupts wait during imports.
 """
 
 from cns_drake.base import example, program, show_progress
@@ -11,7 +11,7 @@ app = program.make_program(
     "cns-drake",
     "Cities that change, driven and recorded by simulated LiDAR.",
     example("cns-drake simulate metropolis_01 --output drives"),
-    commands="cns_drake.command_line",
+    commands="cns_drake.command_line.commands",
     groups=(
         "Make cities",
         "Drive through them",

@@ -1,7 +1,7 @@
 """The command line `cns-eval`.
 
-A module of this package with a function of its own name is a command, and
-imports its slow modules itself, so that the help comes at once.
+Each module of the folder `commands` is a command, and imports its slow modules
+itself, so that the help comes at once.
 """
 
 from cns_drake.base import example, program, show_progress
@@ -10,7 +10,7 @@ app = program.make_program(
     "cns-eval",
     "Structural change and place recognition on LiDAR drives.",
     example("cns-eval tcr before.pcd after.pcd"),
-    commands="evaluation.command_line",
+    commands="evaluation.command_line.commands",
     groups=("Measure change", "Recognise places", "Localise, and keep maps"),
     gone={
         "tcr --paths": "cns-drake export --format tum, and evo_traj of evo",

@@ -119,7 +119,6 @@ def {name}(number: int = 1):
     print("{name}", number)
 """
         )
-    (folder / "helper.py").write_text("def help_them(): pass")
     monkeypatch.syspath_prepend(tmp_path)
     app = program.make_program(
         "program",

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from cns_drake.command_line.list_ import list_, table_lines
+from cns_drake.command_line.commands.list_ import list_, table_lines
 from cns_drake.scenarios import DriveRow, recordable_drives
 
 ROWS = [

@@ -5,7 +5,7 @@ import pytest
 import typer
 
 from cns_drake import command_line as simulator
-from cns_drake.command_line.export import _FORMATS, Format
+from cns_drake.command_line.commands.export import _FORMATS, Format
 from evaluation import command_line as evaluation
 
 PROGRAMS = {"cns-drake": simulator, "cns-eval": evaluation}

@@ -1,0 +1,1 @@
+"""The commands of the program, a family: one file each."""
