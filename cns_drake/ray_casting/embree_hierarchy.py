@@ -20,6 +20,7 @@ from collections.abc import (
 )
 from concurrent.futures import ThreadPoolExecutor
 import ctypes
+import operator
 from typing import NamedTuple
 import weakref
 
@@ -82,6 +83,30 @@ class _Built(NamedTuple):
     scene: int
     owners: tuple[np.ndarray, ...]
     surface: TriangleSurface | None
+
+
+_EMPTY = _Built(0, (), None)
+
+
+class _Tables(NamedTuple):
+    """What `_PacketScenes` tells of the primitives of scenes.
+
+    Attributes:
+        scenes: the scenes.
+        first_primitive, primitives, vertices, triangles: see `_PacketScenes`.
+    """
+
+    scenes: Sequence[_Built]
+    first_primitive: np.ndarray
+    primitives: np.ndarray
+    vertices: np.ndarray
+    triangles: np.ndarray
+
+    def are_of(self, scenes: Sequence[_Built]) -> bool:
+        """Returns whether the tables are those of certain scenes."""
+        return len(scenes) == len(self.scenes) and all(
+            map(operator.is_, scenes, self.scenes)
+        )
 
 
 class _Places(NamedTuple):
@@ -269,7 +294,9 @@ class EmbreeHierarchy:
             for flags in (embree.COHERENT_RAYS, 0)
         )
         lanes, self._intersect = embree.native_packet(self._lib, self._device)
-        self._packet_scenes = self._make_packet_scenes(lanes, fixed, moving)
+        self._packet_scenes = self._make_packet_scenes(
+            lanes, fixed, moving, previous
+        )
         # Few rays in all directions: each for itself.
         self._scattered_scenes = self._packet_scenes._replace(
             arguments=ctypes.addressof(self._scattered)
@@ -496,7 +523,11 @@ class EmbreeHierarchy:
             raise RuntimeError(fault)
 
     def _make_packet_scenes(
-        self, lanes: int, fixed: Sequence[int], moving: Sequence[int]
+        self,
+        lanes: int,
+        fixed: Sequence[int],
+        moving: Sequence[int],
+        previous: EmbreeHierarchy | None,
     ) -> _PacketScenes:
         """Returns the scenes for `_cast_packets`.
 
@@ -504,14 +535,18 @@ class EmbreeHierarchy:
             lanes: number of rays in a packet.
             fixed: row of the group of static geometry; empty if there is none.
             moving: rows of all other groups in the hierarchy.
+            previous: hierarchy whose tables are taken if it has these groups.
         """
         # Without static geometry, the first row belongs to no group. No ray
         # meets it, and the first members of group -1 are never read.
         rows = [*(fixed or [-1]), *moving]
-        nothing = _Built(0, (), None)
-        built = [self._built[row] if row >= 0 else nothing for row in rows]
-        first_primitive, primitives = _list_primitives(built)
-        vertices, triangles = _list_triangles(built)
+        built = [self._built[row] if row >= 0 else _EMPTY for row in rows]
+        tables = None if previous is None else previous._tables
+        if tables is None or not tables.are_of(built):
+            tables = _Tables(
+                built, *_list_primitives(built), *_list_triangles(built)
+            )
+        self._tables: _Tables = tables
         counts = [len(group.members) for group in self._groups]
         indices = [index for g in self._groups for index, *_ in g.members]
         return _PacketScenes(
@@ -519,13 +554,13 @@ class EmbreeHierarchy:
             fixed=built[0].scene,
             instances=self._top,
             arguments=ctypes.addressof(self._coherent),
-            first_primitive=first_primitive,
-            primitives=primitives,
+            first_primitive=tables.first_primitive,
+            primitives=tables.primitives,
             groups=np.array(rows, np.int32),
             first_member=np.cumsum([0, *counts])[rows],
             geometries=np.array(indices, np.int32),
-            vertices=vertices,
-            triangles=triangles,
+            vertices=tables.vertices,
+            triangles=tables.triangles,
             places=self._places,
         )
 
@@ -562,7 +597,7 @@ class EmbreeHierarchy:
 
     def _build_scene(self, parts: Sequence[Primitives]) -> _Built:
         if not parts:
-            return _Built(0, (), None)
+            return _EMPTY
         scene = self._new_scene()
         for part in parts:
             handle = self._lib.rtcNewGeometry(self._device, part.kind)

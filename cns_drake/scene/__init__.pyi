@@ -25,7 +25,6 @@ from cns_drake.scene.materials import Material as Material
 from cns_drake.scene.mesh_files import MeshFiles as MeshFiles
 from cns_drake.scene.perception_geometry import GREY as GREY
 from cns_drake.scene.perception_geometry import GeometryList as GeometryList
-from cns_drake.scene.perception_geometry import GeometryReader as GeometryReader
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry as PerceptionGeometry,
 )
@@ -35,6 +34,7 @@ from cns_drake.scene.perception_geometry import (
 from cns_drake.scene.perception_geometry import geometry_port as geometry_port
 from cns_drake.scene.perception_geometry import list_geometry as list_geometry
 from cns_drake.scene.perception_geometry import merge_surfaces as merge_surfaces
+from cns_drake.scene.perception_geometry import read_geometry as read_geometry
 from cns_drake.scene.perception_geometry import (
     read_perception_geometry as read_perception_geometry,
 )

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+import functools
+import operator
+import threading
 import warnings
+import weakref
 
 import numpy as np
 from pydrake import geometry as shapes
@@ -119,12 +122,10 @@ def read_perception_geometry(
 
     Raises:
         InputError: a geometry cannot be read; see
-            `cns_drake.scene.perception_geometry.GeometryReader.read`.
+            `cns_drake.scene.perception_geometry.read_geometry`.
     """
     records = list_geometry(inspector, Role.kPerception)
-    return GeometryReader().read(
-        one for one in records if keep_frame(one.frame_id)
-    )
+    return read_geometry(one for one in records if keep_frame(one.frame_id))
 
 
 def merge_surfaces(
@@ -150,7 +151,8 @@ def merge_surfaces(
     return surfaces.merge_triangles(members)[0]
 
 
-class _GeometryRecord(NamedTuple):
+@dataclass(eq=False)
+class _GeometryRecord:
     """The data of one geometry in a SceneGraph; mesh files are not read.
 
     Attributes:
@@ -163,6 +165,8 @@ class _GeometryRecord(NamedTuple):
         rgb: diffuse colour; None if the geometry has no colour.
         reflectivity: the property ("lidar", "reflectivity"); None if the
             geometry does not have it.
+        read: the geometry, once `read_geometry` has read it.
+        is_told: whether a user knows that the geometry is left out.
     """
 
     geometry_id: GeometryId
@@ -173,29 +177,78 @@ class _GeometryRecord(NamedTuple):
     is_deformable: bool
     rgb: tuple[float, float, float] | None
     reflectivity: float | None
+    read: PerceptionGeometry | None = None
+    is_told: bool = False
+
+    @functools.cached_property
+    def key(self) -> tuple:
+        """A key that is equal only for equal data."""
+        return (
+            self.name,
+            self.frame_id,
+            self.X_FG.GetAsMatrix34().tobytes(),
+            self.is_deformable or _shape_key(self.shape),
+            self.rgb,
+            self.reflectivity,
+        )
 
 
-class GeometryList(tuple[_GeometryRecord, ...]):
+class GeometryList:
     """The records of all geometry with a role, in the order of the SceneGraph.
 
     The order is the order of `GetAllGeometryIds`. Drake documents this order as
-    stable, so the list depends only on the SceneGraph.
+    stable, so the list depends only on the SceneGraph. Whoever sees the same
+    geometry of a SceneGraph, also in another Context, shares the list.
+
+    Attributes:
+        lock: held while records are read.
+        scene: what was last made of the geometry, if somebody still has it.
     """
 
+    def __init__(self, records: Iterable[_GeometryRecord] = ()):
+        """Makes a list of records, of which nothing is made yet."""
+        self._records = tuple(records)
+        self.lock = threading.Lock()
+        self.scene: Callable[[], object] = lambda: None
+
+    def __iter__(self) -> Iterator[_GeometryRecord]:
+        return iter(self._records)
+
+    def __len__(self) -> int:
+        return len(self._records)
+
     def __deepcopy__(self, memo: dict) -> GeometryList:
-        # A Context is cloned together with this value. It never changes, and
-        # ids cannot be copied.
+        # A Context is cloned together with this value. Its geometry never
+        # changes, and ids cannot be copied.
         return self
 
 
-def list_geometry(inspector: SceneGraphInspector, role: Role) -> GeometryList:
+_NOTHING = GeometryList()
+
+
+def list_geometry(
+    inspector: SceneGraphInspector,
+    role: Role,
+    previous: GeometryList = _NOTHING,
+) -> GeometryList:
     """Returns the records of all geometry with a role.
 
     Geometry with the render label `kDoNotRender` is left out, as in images of
     Drake's cameras.
+
+    Args:
+        inspector: inspector of the SceneGraph.
+        role: the role.
+        previous: an earlier list, from which equal records are taken; the list
+            itself if all are equal.
     """
-    return GeometryList(
-        _GeometryRecord(
+    known = {record.geometry_id: record for record in previous}
+    records = []
+    for geometry_id in inspector.GetAllGeometryIds(role):
+        properties = inspector.GetProperties(geometry_id, role)
+        if _is_hidden(properties):
+            continue
+        record = _GeometryRecord(
             geometry_id,
             inspector.GetName(geometry_id),
             inspector.GetFrameId(geometry_id),
@@ -205,11 +258,13 @@ def list_geometry(inspector: SceneGraphInspector, role: Role) -> GeometryList:
             inspector.IsDeformableGeometry(geometry_id),
             *_appearance(properties),
         )
-        for geometry_id in inspector.GetAllGeometryIds(role)
-        if not _is_hidden(
-            properties := inspector.GetProperties(geometry_id, role)
-        )
+        earlier = known.get(geometry_id, record)
+        records.append(earlier if earlier.key == record.key else record)
+    is_same = len(records) == len(previous) and all(
+        map(operator.is_, records, previous)
     )
+    # An empty list is nobody's to share.
+    return previous if records and is_same else GeometryList(records)
 
 
 def _is_hidden(properties: GeometryProperties) -> bool:
@@ -250,10 +305,17 @@ def geometry_port(scene_graph: SceneGraph, role: Role) -> OutputPort:
     name = f"{role.name.removeprefix('k').lower()}_geometry"
     if scene_graph.HasOutputPort(name):
         return scene_graph.GetOutputPort(name)
+    # The lists belong to Contexts: the SceneGraph may never be freed.
+    latest = weakref.ref(_NOTHING)
 
     def calc(context: Context, output: AbstractValue) -> None:
+        nonlocal latest
         query_object = scene_graph.get_query_output_port().Eval(context)
-        output.set_value(list_geometry(query_object.inspector(), role))
+        found = list_geometry(
+            query_object.inspector(), role, latest() or _NOTHING
+        )
+        latest = weakref.ref(found)
+        output.set_value(found)
 
     return scene_graph.DeclareAbstractOutputPort(
         name,
@@ -265,74 +327,55 @@ def geometry_port(scene_graph: SceneGraph, role: Role) -> OutputPort:
     )
 
 
-class GeometryReader:
-    """Reads the shapes of recorded geometry.
+def read_geometry(
+    records: Iterable[_GeometryRecord],
+) -> tuple[PerceptionGeometry, ...]:
+    """Returns recorded geometry, in the order of the records.
 
-    The first call of `read` reads everything. Each later call reads only the
-    geometry that has changed since the previous call.
+    Each record is read once: later calls return the same object. Deformable
+    geometry is left out.
+
+    Args:
+        records: records of the geometry; see `list_geometry`.
+
+    Raises:
+        InputError: the reflectivity of a geometry is not within 0 to 1, a mesh
+            file is missing or cannot be read, or a size is too large; the
+            message names the geometry.
+
+    Warns:
+        UserWarning: a deformable geometry is left out, told once.
     """
-
-    def __init__(self) -> None:
-        """Makes a reader; nothing is read yet."""
-        self._left_out: set[GeometryId] = set()
-        self._known: dict[GeometryId, tuple[tuple, PerceptionGeometry]] = {}
-
-    def read(
-        self, records: Iterable[_GeometryRecord]
-    ) -> tuple[PerceptionGeometry, ...]:
-        """Returns recorded geometry, in the order of the records.
-
-        For a geometry that has not changed since the last call, the same object
-        is returned. Deformable geometry is left out.
-
-        Args:
-            records: records of the geometry; see `list_geometry`.
-
-        Raises:
-            InputError: the reflectivity of a geometry is not within 0 to 1, a
-                mesh file is missing or cannot be read, or a size is too large;
-                the message names the geometry.
-
-        Warns:
-            UserWarning: a deformable geometry is left out, told once.
-        """
-        known, self._known = self._known, {}
-        with ForeignMeshes() as foreign:
-            meshes = MeshFiles(foreign)
-            for record in records:
-                name, X_FG, shape = record.name, record.X_FG, record.shape
-                appearance = record.rgb, record.reflectivity
-                if record.is_deformable:
-                    self._leave_out(record)
-                    continue
+    found = []
+    with ForeignMeshes() as foreign:
+        meshes = MeshFiles(foreign)
+        for record in records:
+            if record.is_deformable:
+                _leave_out(record)
+                continue
+            if record.read is None:
                 _check_record(record)
-                pose = X_FG.GetAsMatrix34().tobytes()
-                key = name, record.frame_id, pose, _shape_key(shape), appearance
-                entry = known.get(record.geometry_id)
-                if entry is None or entry[0] != key:
-                    surface = _surface(name, shape, meshes)
-                    entry = (
-                        key,
-                        PerceptionGeometry(
-                            record.geometry_id,
-                            name,
-                            record.frame_id,
-                            X_FG,
-                            surface,
-                            *appearance,
-                        ),
-                    )
-                self._known[record.geometry_id] = entry
-        return tuple(geometry for _, geometry in self._known.values())
+                record.read = PerceptionGeometry(
+                    record.geometry_id,
+                    record.name,
+                    record.frame_id,
+                    record.X_FG,
+                    _surface(record.name, record.shape, meshes),
+                    record.rgb,
+                    record.reflectivity,
+                )
+            found.append(record.read)
+    return tuple(found)
 
-    def _leave_out(self, record: _GeometryRecord) -> None:
-        if record.geometry_id not in self._left_out:
-            self._left_out.add(record.geometry_id)
-            warnings.warn(
-                f"geometry '{record.name}': left out, because a LiDAR cannot "
-                "see deformable geometry",
-                stacklevel=2,
-            )
+
+def _leave_out(record: _GeometryRecord) -> None:
+    if not record.is_told:
+        record.is_told = True
+        warnings.warn(
+            f"geometry '{record.name}': left out, because a LiDAR cannot "
+            "see deformable geometry",
+            stacklevel=2,
+        )
 
 
 def _check_record(record: _GeometryRecord) -> None:

@@ -17,7 +17,6 @@ from cns_drake.scene import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
-    GeometryReader,
     HalfSpaceSurface,
     Material,
     PerceptionGeometry,
@@ -25,6 +24,7 @@ from cns_drake.scene import (
     TriangleSurface,
     World,
     list_geometry,
+    read_geometry,
     structure_name,
 )
 
@@ -165,7 +165,7 @@ def geometry_by_structure(
         world.scene_graph.model_inspector(), Role.kPerception
     )
     found = defaultdict(list)
-    for geometry in GeometryReader().read(
+    for geometry in read_geometry(
         one
         for one in records
         if one.frame_id in X_WFs and wanted(structure_name(one.name))

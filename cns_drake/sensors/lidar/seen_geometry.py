@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 import operator
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias, cast
+import weakref
 
 import numpy as np
 from pydrake.geometry import FrameId, GeometryId, QueryObject, Role
@@ -20,11 +21,11 @@ from cns_drake.ray_casting import Ball, KnownPoses, Motion, RayCastingScene
 from cns_drake.scene import (
     MAX_INSTANCE,
     GeometryList,
-    GeometryReader,
     Labels,
     PerceptionGeometry,
     list_geometry,
     number_structures,
+    read_geometry,
     structure_name,
 )
 
@@ -126,9 +127,8 @@ class SeenGeometry:
         """
         self._parent_frame_id = parent_frame_id
         self._view = view
-        self._reader = GeometryReader()
         self._geometries: tuple[PerceptionGeometry, ...] = ()
-        self._records: GeometryList | None = None
+        self._records = GeometryList()
         self.built: tuple[PerceptionGeometry, ...] = ()
         self._X_WAs: dict[FrameId, RigidTransform] = {}
         self.scene: RayCastingScene | None = None
@@ -160,7 +160,7 @@ class SeenGeometry:
 
         Raises:
             InputError: a geometry cannot be read; see
-                `cns_drake.scene.perception_geometry.GeometryReader.read`.
+                `cns_drake.scene.perception_geometry.read_geometry`.
         """
         inspector = query_object.inspector()
 
@@ -168,14 +168,16 @@ class SeenGeometry:
             return known.find(frame, query_object.GetPoseInWorld)
 
         if records is None:
-            records = list_geometry(inspector, self._view.role)
+            records = list_geometry(inspector, self._view.role, self._records)
         if self.scene is None or records is not self._records:
             self._read_geometry(records, inspector.world_frame_id())
         try:
             if self.scene is None or not (
                 self._is_up_to_date(calc_X_WF) and self.scene.serves(p_WS)
             ):
-                self._build_scene(inspector.world_frame_id(), calc_X_WF, p_WS)
+                self._build_scene(
+                    records, inspector.world_frame_id(), calc_X_WF, p_WS
+                )
             assert self.scene is not None
             self.scene.set_frame_poses(calc_X_WF, motions, known, seen)
         except BaseException:
@@ -220,12 +222,13 @@ class SeenGeometry:
         if self._view.unseen is not None:
             unseen = set(self._view.unseen)
         doing("reading meshes")
-        self._geometries = self._reader.read(
-            record
-            for record in records
-            if record.frame_id not in unseen
-            and record.geometry_id not in unseen
-        )
+        with records.lock:
+            self._geometries = read_geometry(
+                record
+                for record in records
+                if record.frame_id not in unseen
+                and record.geometry_id not in unseen
+            )
 
     def _is_up_to_date(
         self, calc_X_WF: Callable[[FrameId], RigidTransform]
@@ -243,13 +246,18 @@ class SeenGeometry:
 
     def _build_scene(
         self,
+        records: GeometryList,
         world: FrameId,
         calc_X_WF: Callable[[FrameId], RigidTransform],
         p_WS: np.ndarray,
     ) -> None:
         """Makes the scene of the geometry that was read.
 
+        What stands still is taken from the scene of another LiDAR or Context,
+        if there is one.
+
         Args:
+            records: the records of the geometry.
             world: the world's frame.
             calc_X_WF: returns the pose of a frame.
             p_WS: the position of the sensor in the world, (3,) [m].
@@ -278,9 +286,11 @@ class SeenGeometry:
             anchored,
             calc_X_WF,
             num_threads=self._view.num_threads,
-            previous=self.scene,
+            previous=self.scene
+            or cast("RayCastingScene | None", records.scene()),
             p_WS=p_WS,
         )
+        records.scene = weakref.ref(self.scene)
         self.built = self._geometries
 
 
