@@ -1,15 +1,13 @@
 """Copies of a mesh share memory; rays have the same hits as before."""
 
 import numpy as np
-from pydrake.geometry import FrameId, GeometryId, Mesh
+from pydrake.geometry import FrameId, GeometryId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
 from cns_drake.ray_casting import Motion, RayCastingScene, ray_groups
 from cns_drake.scene import (
     EllipsoidSurface,
-    ForeignMeshes,
-    MeshFiles,
     PerceptionGeometry,
     TriangleSurface,
 )
@@ -142,16 +140,3 @@ def test_copies_come_and_go(monkeypatch):
             scene.cast_rays(p, d, 60.0, with_normals=True),
             expected.cast_rays(p, d, 60.0, with_normals=True),
         )
-
-
-def test_one_mesh_at_one_scale_is_one_surface(tmp_path):
-    path = tmp_path / "mesh.obj"
-    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    with ForeignMeshes() as foreign:
-        meshes = MeshFiles(foreign)
-        first, again, scaled = (
-            meshes.read("one", Mesh(path, scale))
-            for scale in (1.0, 1.0, [1.0, 2.0, -1.0])
-        )
-    assert first is again
-    np.testing.assert_array_equal(scaled.p_GVset[2], [0.0, 2.0, 0.0])

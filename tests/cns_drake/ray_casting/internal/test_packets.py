@@ -1,8 +1,5 @@
 """Packets of rays: all sizes give the same hits, and the best is taken."""
 
-import ctypes
-from types import SimpleNamespace
-
 from helpers.closed_forms import ellipsoid
 from helpers.surface_geometry import make_geometry
 import numpy as np
@@ -55,31 +52,3 @@ def test_hits_of_packets_of_each_size(monkeypatch, lanes, num_rays):
     np.testing.assert_allclose(along, 1.0, atol=1e-6)
     if num_rays == 300:
         assert 50 < is_car.sum() < 250
-
-
-@pytest.mark.parametrize("most", sorted(NATIVE))
-def test_packets_fill_the_vectors_of_the_processor(most):
-    native = {number for lanes, number in NATIVE.items() if lanes <= most}
-    library = embree.load()
-    processor = SimpleNamespace(
-        rtcGetDeviceProperty=lambda device, number: number in native,
-        **{
-            name: getattr(library, name)
-            for name in (f"rtcIntersect{lanes}" for lanes in NATIVE)
-        },
-    )
-    lanes, packet = embree.native_packet(processor, 0)
-    assert lanes == most
-    function = getattr(library, f"rtcIntersect{most}")
-    assert (
-        packet.__wrapper_address__()
-        == ctypes.cast(function, ctypes.c_void_p).value
-    )
-
-
-def test_embree_supports_the_packets_taken_here():
-    library = embree.load()
-    device = library.rtcNewDevice(None)
-    lanes, _ = embree.native_packet(library, device)
-    assert library.rtcGetDeviceProperty(device, NATIVE[lanes]) == 1
-    library.rtcReleaseDevice(device)

@@ -10,7 +10,6 @@ from cns_drake.recording.object_messages import (
     BoxMessages,
     marked_boxes,
     marked_detections,
-    motion_table,
 )
 
 CLASSES = ("car", "person", "bicyclist")
@@ -83,24 +82,3 @@ def test_a_reader_finds_every_box(make, kind, boxes, read):
         # All boxes before are removed, also those that the message does not
         # name.
         assert [one.type for one in found.deletions] == [1]
-
-
-def test_the_table_of_velocities():
-    objects = make_objects(1)
-    table = motion_table(objects)
-    assert table["instance"].tolist() == [7, 45, 812]
-    assert table["moving"].tolist() == [1, 0, 1]
-    for k, axis in enumerate("xyz"):
-        np.testing.assert_allclose(table[axis], objects.p_WO[:, k], rtol=1e-6)
-        np.testing.assert_allclose(
-            table[f"v{axis}"], objects.v_WO[:, k], rtol=1e-6
-        )
-    np.testing.assert_allclose(table["yaw_rate"], objects.yaw_rate, rtol=1e-6)
-
-
-def test_a_message_lacks_no_number():
-    def forget(who, numbers):
-        return marked_detections(who, np.where(numbers % 10 < 9, numbers, 0.0))
-
-    with pytest.raises(ValueError, match="lacks some of its numbers"):
-        BoxMessages(forget).encode(make_objects(1), STAMP_NS)

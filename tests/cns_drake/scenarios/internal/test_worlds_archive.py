@@ -1,7 +1,6 @@
 """The shipped worlds survive a wheel's archive unchanged."""
 
 from concurrent.futures import ThreadPoolExecutor
-import tarfile
 
 import pytest
 
@@ -33,21 +32,6 @@ def test_files_come_out_as_they_went_in(archive):
         for path in folder.rglob("*")
         if path.is_file()
     } == FILES
-
-
-def test_a_python_without_filters_unpacks_too(archive, monkeypatch):
-    extract = tarfile.TarFile.extractall
-    monkeypatch.delattr(tarfile, "data_filter", raising=False)
-    monkeypatch.setattr(
-        tarfile.TarFile, "extractall", lambda tar, path: extract(tar, path)
-    )
-    text = (unpacked(archive) / "town/meshes/a.obj").read_text()
-    assert text == FILES["town/meshes/a.obj"]
-
-
-def test_the_same_files_give_the_same_bytes(archive, tmp_path):
-    pack(tmp_path / "worlds", tmp_path / "again.tar.xz")
-    assert (tmp_path / "again.tar.xz").read_bytes() == archive.read_bytes()
 
 
 def test_a_cache_that_cannot_be_written_is_named(archive, tmp_path):

@@ -9,10 +9,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 import pytest
 
-from cns_drake.scene import MATERIALS
 from cns_drake.sensors.camera import camera_scene, looks, sky
 from cns_drake.sensors.camera.camera_scene import (
-    face_coordinates,
     repeated_coordinates,
 )
 
@@ -79,12 +77,6 @@ def test_grey_is_twice_as_bright_as_half_of_it():
     assert brightness[1] / brightness[0] == pytest.approx(2.0, rel=0.08)
 
 
-def test_the_same_seed_gives_the_same_texture():
-    first, _ = looks.texture("brick")
-    looks.texture.cache_clear()
-    assert looks.texture("brick")[0] == first
-
-
 @pytest.mark.parametrize("heading", [0.0, 0.3, 2.0, -2.5])
 def test_walls_have_heights_in_rows_and_metres_across(heading):
     ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
@@ -97,22 +89,6 @@ def test_walls_have_heights_in_rows_and_metres_across(heading):
     np.testing.assert_allclose(step, [(0, 0), (2, 0), (2, -3)], atol=5e-3)
 
 
-def test_ground_has_places_of_a_map():
-    corners = np.array([[(5.0, 7, 1), (6.0, 7, 1), (5.0, 9, 1)]])
-    places = repeated_coordinates(corners, np.array([[0.0, 0, 1]]))[0]
-    np.testing.assert_allclose(places, [(5, -7), (6, -7), (5, -9)])
-
-
-def test_faces_cover_each_owner_once():
-    """Two plates of other sizes, with the same corners in their textures."""
-    square = np.array([(0, -1, -1), (0, 1, -1), (0, 1, 1)], float)
-    corners = np.stack([square * 0.3 + (9, 8, 2), square * 2.0])
-    normals = np.tile([1.0, 0, 0], (2, 1))
-    places = face_coordinates(corners, normals, np.array([0, 1]))
-    for one in places:
-        np.testing.assert_allclose(one, [(0, 1), (1, 1), (1, 0)], atol=1e-9)
-
-
 def test_the_sky_is_brighter_below_and_brightest_at_the_sun():
     tilt = np.deg2rad([1.0, 30.0, 85.0])
     d_W = np.stack([np.cos(tilt), 0 * tilt, np.sin(tilt)], axis=1)
@@ -120,7 +96,3 @@ def test_the_sky_is_brighter_below_and_brightest_at_the_sun():
     assert colours[0, 0] > colours[2, 0]
     assert (colours[3] == 255).all()
     assert (colours[:, 2] >= colours[:, 0]).all()
-
-
-def test_each_material_has_a_look_and_each_look_a_material():
-    assert {one.look for one in MATERIALS.values()} == set(looks.LOOKS)

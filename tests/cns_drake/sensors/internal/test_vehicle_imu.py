@@ -10,7 +10,6 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 import pytest
-from scipy.spatial.transform import Rotation
 
 from cns_drake.motion import (
     RoadProfile,
@@ -82,39 +81,6 @@ def test_it_measures_as_drakes_sensors_do(riding):
                 rtol=0,
                 atol=1e-9,
             )
-
-
-@pytest.mark.parametrize("riding", [False, True])
-def test_samples_have_the_orientation(riding):
-    trajectory = drive(riding)
-    # The time is past the end of the first block.
-    samples = Measured(trajectory, 400.0).read(1.5, "samples")
-    assert samples.first + len(samples.quat_xyzw) == 601
-    times = (samples.first + np.arange(256)) / 400.0
-    R_WB, _ = trajectory.poses(times)
-    np.testing.assert_allclose(
-        Rotation.from_quat(samples.quat_xyzw).as_matrix(),
-        R_WB @ X_BI.rotation().matrix(),
-        rtol=0,
-        atol=1e-12,
-    )
-
-
-def test_a_sample_does_not_depend_on_earlier_reads():
-    noise = ImuNoise(
-        accelerometer_noise_density=0.01,
-        gyroscope_noise_density=0.005,
-        accelerometer_random_walk=1e-3,
-        gyroscope_range=0.2,
-    )
-    numbers = np.arange(385, 641)
-    samples = Measured(drive(True), 400.0, noise).read(640 / 400.0, "samples")
-    assert samples.first == numbers[0]
-    ours = Measured(drive(True), 400.0, noise)
-    for name in NAMES:
-        # Times go backwards: earlier readings have no effect.
-        singles = [ours.read(k / 400.0, name) for k in numbers[::-1]]
-        np.testing.assert_array_equal(getattr(samples, name), singles[::-1])
 
 
 def error_of_integration(trajectory, rate):

@@ -141,6 +141,11 @@ def test_a_part_runs_nothing_of_what_it_names(tmp_path, monkeypatch):
         Part(tmp_path / "old.data").read()
 
 
+class Painter:
+    def __init__(self):
+        raise AssertionError("run")
+
+
 class Pair(NamedTuple):
     low: float
     high: float
