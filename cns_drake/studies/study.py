@@ -32,6 +32,7 @@ from cns_drake.scene import MapFolder
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
 from cns_drake.studies.experiments.conditions import (
     Condition,
+    baseline_text,
     levels_by_case,
 )
 from cns_drake.studies.experiments.experiment import Experiment
@@ -204,7 +205,12 @@ def plan_study(
     simulated = SimulatedPairs(run)
     changed = simulated.changed(found)
     engine = Engine(
-        experiment.name, tasks, dict(methods), run.output, run.on_note
+        experiment.name,
+        tasks,
+        dict(methods),
+        run.output,
+        run.on_note,
+        baseline_text(experiment),
     )
     cities: list[ShownCity] = []
     for some, simulations in zip(found, changed, strict=True):
@@ -469,7 +475,7 @@ def _recorded_conditions(
         RecordedCondition(
             one.factors,
             one.changes.get("both", {}).get("stage", OWN),
-            one.is_baseline,
+            one.baseline,
             condition_protocol(one, source),
             _recorded_database(city, one, source),
             checked_keep(

@@ -34,8 +34,9 @@ def place_numbers(
 
     Args:
         now: outcome of the method in the condition.
-        before: outcome of the method in the baseline; None to leave out the
-            results that compare the condition with the baseline.
+        before: outcome of the method in the baseline; `now` itself if the
+            condition is the baseline, whose retained shares have no interval;
+            None to leave out the results that compare with a baseline.
 
     Yields:
         The metrics of the condition. If there is a baseline, the following
@@ -89,7 +90,7 @@ def _compared_numbers(
         )
         share = kept_share(metric.of(outcomes), metric.of(before.outcomes))
         interval = UNKNOWN
-        if is_paired:
+        if is_paired and before is not now:
             then = replace(before.outcomes, blocks=outcomes.own_blocks)
             interval = _kept_interval(metric, outcomes, then)
         yield now.number(retained, float(share), interval)

@@ -28,6 +28,8 @@ OPTIONAL_KEYS = ("protocol_digest", "version")
 KEYS = (*NEEDED_KEYS, *OPTIONAL_KEYS)
 # Columns of a row behind its key.
 MEASURED = ("metric", "value", "low", "high", "n")
+# The last column of a row, in a table whose experiment names its baselines.
+BASELINE = "baseline"
 # Factor: the stage of the city in which both drives are.
 STAGE = "both.stage"
 # Its value if each drive is in its own stage.
@@ -44,7 +46,7 @@ LEVEL = "level"
 # The cause of the condition without a change.
 NO_CAUSE = "none"
 # Names that no factor can have.
-RESERVED = frozenset(("label", *KEYS, *MEASURED))
+RESERVED = frozenset(("label", *KEYS, *MEASURED, BASELINE))
 
 
 def check_metric_names(

@@ -27,7 +27,7 @@ from evaluation.results.cells import (
     WHOLE,
     CellKind,
 )
-from evaluation.results.keys import MEASURED, Key, key_columns
+from evaluation.results.keys import BASELINE, MEASURED, Key, key_columns
 from evaluation.results.table_lines import TableLine, TableLines
 
 RESULTS = "results.csv"
@@ -70,6 +70,9 @@ class Row(Key):
         value: the number; NaN if it is undefined.
         low, high: limits of the number's 95 % interval; NaN if unknown.
         n: number of queries, structures or points that count; None if unknown.
+        baseline: the values of factors that the experiment names for the
+            condition with which this one is compared, such as
+            `both.stage=last`; "" for the first values, or if unknown.
     """
 
     metric: str
@@ -77,6 +80,7 @@ class Row(Key):
     low: float = math.nan
     high: float = math.nan
     n: int | None = None
+    baseline: str = ""
 
     @classmethod
     def of(cls, number: Number, **key: Any) -> Row:
@@ -165,7 +169,7 @@ class Results:
                 twice, or contains an impossible value. The error names the
                 line, the column and the fault.
         """
-        table = TableLines.read(path, RESULTS, MEASURED)
+        table = TableLines.read(path, RESULTS, MEASURED, [BASELINE])
         rows: list[Row] = []
         lines: dict[tuple[object, ...], int] = {}
         for line, key, identity in table.keyed():
@@ -182,12 +186,17 @@ class Results:
         Raises:
             InputError: the file cannot be written, or a value is impossible.
         """
+        last = (BASELINE,) if any(row.baseline for row in self.rows) else ()
         with errors_at(str(path)):
             lines = [
-                (*_key_cells(row, self.factors), *_measured_cells(row))
+                (
+                    *_key_cells(row, self.factors),
+                    *_measured_cells(row),
+                    *(TEXT.write(row[name]) for name in last),
+                )
                 for row in self.rows
             ]
-        header = (*key_columns(self.factors), *MEASURED)
+        header = (*key_columns(self.factors), *MEASURED, *last)
         write_text(path, csv_text(header, lines))
 
     def where(
@@ -453,4 +462,7 @@ def _measured_values(line: TableLine) -> dict[str, Any]:
         "low": low,
         "high": high,
         "n": None if n < 0 else n,
+        "baseline": line.value(BASELINE, TEXT)
+        if BASELINE in line.columns
+        else "",
     }

@@ -25,6 +25,7 @@ from evaluation.recognition import (
     common_blocks,
     compared_by_right_answers,
     load_metrics,
+    metric_named,
     sign_flip_test,
 )
 from evaluation.results.keys import KEYS, LAST, STAGE
@@ -586,6 +587,14 @@ def _mismatch_notes(
     } - {""}
     if len(versions) > 1:
         yield f"measured by versions {', '.join(sorted(versions))}"
+    baselines = {
+        row.baseline or "the first values"
+        for of_method in rows.values()
+        for row in of_method
+        if metric_named(row.metric).share_of
+    }
+    if len(baselines) > 1:
+        yield f"not the same baselines: {', or '.join(sorted(baselines))}"
 
 
 def _differences(

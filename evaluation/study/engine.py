@@ -63,6 +63,9 @@ class Engine:
         output: folder of the results.
         on_note: is called with notes on what is left out, and on how long the
             study takes.
+        baseline: the values of factors that the experiment names for its
+            baselines, a column of the table of results; "" for the first
+            values.
         jobs: name -> job.
         pictures: name -> job that draws from the files of other jobs. They run
             once the tables are written, so that a picture that cannot be drawn
@@ -75,6 +78,7 @@ class Engine:
     methods: MutableMapping[str, tuple[MethodChoice, Mapping[str, Any]]]
     output: Path
     on_note: Callable[[str], None] = lambda text: None
+    baseline: str = ""
     jobs: dict[str, Job] = field(default_factory=dict)
     pictures: dict[str, Job] = field(default_factory=dict)
     measured: list[Pair] = field(default_factory=list)
@@ -183,33 +187,36 @@ class Engine:
         """
         rows: list[Row] = []
         answers: list[Answers] = []
-        baselines = self._baselines()
+        by_condition = self._pairs_by_condition()
+        baselines: dict[tuple[int, str], Any] = {}
         for one in self.measured:
-            before = baselines.get(one.place, {})
-            base = before.get(one.seed) or next(iter(before.values()), {})
+            alike = {}
+            if one.baseline is not None:
+                alike = by_condition.get(_condition(one, one.baseline), {})
+            base = alike.get(one.seed) or next(iter(alike.values()), None)
             for name in one.parts:
                 task = self.tasks[name]
                 found = self.found(one, name)
-                for number in task.numbers(found, base.get(name)):
+                before = found if base is one else None
+                if base is not None and base is not one and name in base.parts:
+                    of_base = id(base), name
+                    if of_base not in baselines:
+                        baselines[of_base] = self.found(base, name)
+                    before = baselines[of_base]
+                for number in task.numbers(found, before):
                     key = self._key(one, name, number.method, number.verified)
-                    rows.append(Row.of(number, **key))
+                    rows.append(Row.of(number, baseline=self.baseline, **key))
                 for method, verified, columns in task.answers(found):
                     key = self._key(one, name, method, verified)
                     answers.append(Answers(**key, columns=columns))
         return Results.of(rows), QueryRows.of(answers)
 
-    def _baselines(self) -> dict[tuple, dict[int, dict[str, Any]]]:
-        """Returns the baseline's results by map, drives and protocol.
-
-        The results for one map, pair of drives and protocol are a mapping by
-        seed, and for each seed a mapping by task.
-        """
-        baselines: dict[tuple, dict[int, dict[str, Any]]] = {}
+    def _pairs_by_condition(self) -> dict[tuple, dict[int, Pair]]:
+        """Returns the pairs by map, drives and factors, each by its seed."""
+        found: dict[tuple, dict[int, Pair]] = {}
         for one in self.measured:
-            if one.is_baseline:
-                values = {name: self.found(one, name) for name in one.parts}
-                baselines.setdefault(one.place, {})[one.seed] = values
-        return baselines
+            found.setdefault(_condition(one, one.factors), {})[one.seed] = one
+        return found
 
     def found(self, one: Pair, task: str) -> Any:
         """Returns a task's result for a pair; the pair's jobs must be done.
@@ -247,6 +254,11 @@ class Engine:
             "verified": verified,
             **made_by(one.stated, settings),
         }
+
+
+def _condition(one: Pair, factors: Mapping[str, Any]) -> tuple[object, ...]:
+    """Returns the key of a pair's drives in the condition of some factors."""
+    return one.map_name, one.names, frozenset(factors.items())
 
 
 def made_tasks(

@@ -163,7 +163,7 @@ def pair_of(
         "names": names,
         "factors": {},
         "seed": protocol.seed,
-        "is_baseline": False,
+        "baseline": None,
         "stated": protocol,
         "key": " ".join(names),
         "database": drives[0],

@@ -232,21 +232,25 @@ def _conditions(
     further protocol.
     """
     main, *_ = protocols
-    return [
-        RecordedCondition(
-            {
-                STAGE: stage,
-                **({PROTOCOL_BASE: name} if len(protocols) > 1 else {}),
-            },
-            stage,
-            stage == LAST,
-            protocol,
-            methods=None if name == main else _further_methods(name),
-        )
-        for stage in (LAST, OWN)
-        for name, protocol in protocols.items()
-        if stage == OWN or name == main
-    ]
+    found = []
+    for stage in (LAST, OWN):
+        for name, protocol in protocols.items():
+            if stage == LAST and name != main:
+                continue
+            factors = {STAGE: stage}
+            if len(protocols) > 1:
+                factors[PROTOCOL_BASE] = name
+            methods = None if name == main else _further_methods(name)
+            found.append(
+                RecordedCondition(
+                    factors,
+                    stage,
+                    factors | {STAGE: LAST},
+                    protocol,
+                    methods=methods,
+                )
+            )
+    return found
 
 
 def _further_methods(protocol: str) -> Collection[str] | None:

@@ -94,7 +94,7 @@ def test_examples_have_their_conditions(tmp_path, page, start, number):
     path.write_text(block)
     found = load_experiment(path).conditions
     assert len(found) == number
-    assert sum(one.is_baseline for one in found) == 1
+    assert sum(one.baseline == one.factors for one in found) == 1
     # No two are the same.
     for a, b in itertools.combinations(found, 2):
         assert a.factors != b.factors

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import itertools
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -47,14 +47,14 @@ class Condition:
             alternatives: the fields for the wanted level of change, followed by
             the fields for each lower level. The first alternative that is
             possible on a map is used.
-        is_baseline: whether all other conditions are compared with this
-            condition.
+        baseline: the factors of the condition with which this one is
+            compared, which can be this condition itself.
     """
 
     factors: Changes
     changes: Mapping[str, Changes]
     causes: tuple[tuple[Mapping[str, Changes], ...], ...] = ()
-    is_baseline: bool = False
+    baseline: Changes = field(default_factory=dict)
 
 
 class _CaseLevel(NamedTuple):
@@ -73,7 +73,9 @@ def conditions(experiment: Experiment) -> list[Condition]:
             names an unknown factor or value, or there are too many conditions.
     """
     fixed, factors = _fields_and_factors(experiment)
-    baseline = _baseline_values(experiment.baseline, factors)
+    named = _named_values(experiment, factors)
+    centre = {n: named.get(n, values[0]) for n, values in factors.items()}
+    compared = _compared_values(experiment, named, centre)
     cases = list(_case_levels(experiment))
     _check_paths_differ(factors, experiment.cases)
     number = _num_cells(experiment.design, factors) * len(cases)
@@ -89,30 +91,37 @@ def conditions(experiment: Experiment) -> list[Condition]:
             f"{number} measurements (conditions x seeds x maps x methods), more"
             f" than {_MOST_MEASUREMENTS}"
         )
-    cells = _cells(experiment.design, factors, baseline)
+    cells = _cells(experiment.design, factors, centre)
     found = []
     for cell, case in itertools.product(cells, cases):
         changes: dict[str, Any] = fixed
         for path, value in cell.items():
             changes = merged(changes, nested(path, value))
-        named = (
+        of_case = (
             {CAUSE: case.name, LEVEL: case.level} if experiment.cases else {}
         )
-        # Each protocol has a baseline of its own.
-        is_baseline = case.name == NO_CAUSE and all(
-            value == baseline[path]
-            for path, value in cell.items()
-            if not path.startswith("protocol.")
-        )
+        factors_now = {n: table_value(one) for n, one in cell.items()}
         found.append(
             Condition(
-                {**named, **{n: table_value(one) for n, one in cell.items()}},
+                of_case | factors_now,
                 changes,
                 case.causes,
-                is_baseline,
+                of_case | factors_now | compared,
             )
         )
     return found
+
+
+def baseline_text(experiment: Experiment) -> str:
+    """Returns the values that an experiment names for its baselines, as text.
+
+    The text is a column of the tables; "" if the experiment names none.
+    """
+    if not experiment.baseline:
+        return ""
+    _, factors = _fields_and_factors(experiment)
+    named = _named_values(experiment, factors)
+    return "; ".join(f"{n}={table_value(one)}" for n, one in named.items())
 
 
 def _fields_and_factors(
@@ -130,21 +139,52 @@ def _fields_and_factors(
     return fixed, factors
 
 
-def _baseline_values(
-    fields: Changes, factors: Mapping[str, list[Any]]
+def _named_values(
+    experiment: Experiment, factors: Mapping[str, list[Any]]
 ) -> dict[str, Any]:
-    """Returns the baseline's value of each factor; `fields` gives some."""
-    given = dict(leaves(fields, ()))
-    found: dict[str, Any] = {}
-    for path, values in factors.items():
-        found[path] = given.pop(path, values[0])
-        if found[path] not in values:
-            raise ValueError(
-                f"baseline.{path}: {found[path]!r} is no value of it"
-            )
-    if given:
-        raise ValueError(f"baseline.{next(iter(given))}: this is no factor")
-    return found
+    """Returns the values that the field `baseline` names, by factor."""
+    known: dict[str, Iterable[Any]] = {}
+    if experiment.cases:
+        most = max(levels_by_case(experiment).values())
+        known = {CAUSE: (NO_CAUSE, *experiment.cases), LEVEL: range(most + 1)}
+    known |= factors
+    named = dict(leaves(experiment.baseline, ()))
+    for path, value in named.items():
+        if path not in known:
+            raise ValueError(f"baseline.{path}: this is no factor")
+        if value not in known[path]:
+            raise ValueError(f"baseline.{path}: {value!r} is no value of it")
+    return named
+
+
+def _compared_values(
+    experiment: Experiment, named: Changes, centre: Changes
+) -> dict[str, Any]:
+    """Returns the factors that a baseline does not share with its condition.
+
+    By default these are all factors but those of the protocol: each protocol
+    has one baseline. If the field `baseline` names values, these are the
+    factors that it names. The centre of one factor at a time is the baseline
+    in any case.
+
+    Args:
+        experiment: the experiment.
+        named: the values that the field `baseline` names.
+        centre: the values of all factors of fields in the first condition.
+
+    Returns:
+        Name of a factor -> its value in the baseline, as in tables.
+    """
+    found = dict(named)
+    if not named or experiment.design != "product":
+        of_protocol = {n for n in centre if n.startswith("protocol.")}
+        shared = of_protocol - {*named}
+        found = {n: v for n, v in centre.items() if n not in shared} | found
+        if experiment.cases:
+            found = {CAUSE: NO_CAUSE, **found}
+    if found.get(CAUSE) == NO_CAUSE:
+        found[LEVEL] = 0
+    return {n: table_value(one) for n, one in found.items()}
 
 
 def _check_paths_differ(

@@ -193,8 +193,13 @@ class Experiment(Section):
             or fields of a protocol of your own. The field `base` then names a
             protocol, which provides the fields that you leave out. Each
             protocol has a baseline of its own.
-        baseline: values of the factors in the condition with which all other
-            conditions are compared. By default the first value of each factor.
+        baseline: values of some factors, such as `{both.stage: last}`. Each
+            condition is compared with the condition that has these values, and
+            its own values of all other factors. By default all conditions are
+            compared with one: that with the first value of each factor, and
+            without a cause of change. With the design `one-at-a-time`, this
+            condition has the values that you name, and the first values of the
+            other factors.
         frozen: table with a fingerprint of each level's drives. The table
             protects a benchmark from changes: if a drive no longer has its
             fingerprint, the study stops with an error.

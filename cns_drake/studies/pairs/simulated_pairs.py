@@ -171,7 +171,7 @@ class SimulatedPairs:
             names=one.names,
             factors={**some.factors, **one.condition.factors},
             seed=one.seed,
-            is_baseline=one.condition.is_baseline,
+            baseline={**some.factors, **one.condition.baseline},
             stated=one.stated,
             key=f"{database.name} {asked.name} {digest}",
             database=database,

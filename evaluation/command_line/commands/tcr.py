@@ -70,7 +70,6 @@ def tcr(
             both,
             (before.name, after.name),
             factors={STAGE: stage} if controls else {},
-            is_baseline=stage == LAST,
             key=stage,
         )
         for both, stage in zip(compared, (OWN, LAST), strict=False)

@@ -36,7 +36,7 @@ class RecordedCondition(NamedTuple):
         factors: name -> value of each factor of the condition.
         stage: `own` if each recording is of its own stage; `last` for the
             control, in which both recordings are of the stage of the query.
-        is_baseline: whether other conditions are compared with this one.
+        baseline: the factors of the condition with which this one is compared.
         protocol: protocol of place recognition.
         database: the recordings of the database, if there are several.
         keep: which places of these recordings are kept, see
@@ -47,7 +47,7 @@ class RecordedCondition(NamedTuple):
 
     factors: Mapping[str, Any]
     stage: str
-    is_baseline: bool
+    baseline: Mapping[str, Any]
     protocol: RetrievalProtocol
     database: tuple[RecordingInfo, ...] = ()
     keep: str | int = KEEP_ALL
@@ -101,7 +101,7 @@ def recorded_pairs(
                 names=(pair[0].name, pair[1].name),
                 factors=condition.factors,
                 seed=seed,
-                is_baseline=condition.is_baseline,
+                baseline=condition.baseline,
                 stated=condition.protocol,
                 key=f"{database.name} {query.name} {fingerprint(asked)[:8]}",
                 database=database,
@@ -178,7 +178,7 @@ def _composed_pairs(
             names=(city.name, query.name),
             factors=one.factors,
             seed=seed,
-            is_baseline=one.is_baseline,
+            baseline=one.baseline,
             stated=one.protocol,
             key=f"{named[0].name} {query.name} {digest}",
             database=named[0],

@@ -8,7 +8,6 @@ from typing import Any, Protocol
 import numpy as np
 
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, Role
-from evaluation.results import FROZEN_REDRAW
 from evaluation.study.sources import DriveSource
 
 # Length of a drive through a shipped city, about [m].
@@ -76,7 +75,8 @@ class Pair:
             conditions of the same two drives have the same names.
         factors: name -> value of each factor of the condition.
         seed: seed of everything that is random.
-        is_baseline: whether other conditions are compared with this one.
+        baseline: the factors of the condition with which this one is compared,
+            which can be this condition itself; None to compare with nothing.
         stated: protocol that the tables name: the protocol of the experiment,
             before the condition changes its queries.
         key: name of the results. Two pairs have the same key only if they
@@ -115,7 +115,7 @@ class Pair:
     names: tuple[str, str]
     factors: Mapping[str, Any]
     seed: int
-    is_baseline: bool
+    baseline: Mapping[str, Any] | None
     stated: RetrievalProtocol
     key: str
     database: NamedDrive
@@ -136,16 +136,6 @@ class Pair:
     def has_method(self, name: str) -> bool:
         """Returns whether a method of the study is measured, by its name."""
         return self.methods is None or name in self.methods
-
-    @property
-    def place(self) -> tuple[object, ...]:
-        """Key of map, drives and protocol; each key has one baseline."""
-        fixed = [
-            (name, value)
-            for name, value in self.factors.items()
-            if name == FROZEN_REDRAW or name.startswith("protocol.")
-        ]
-        return self.map_name, self.names, *fixed
 
     @property
     def closes_loops(self) -> bool:

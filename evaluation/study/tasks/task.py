@@ -102,8 +102,8 @@ class Task(abc.ABC):
 
         Args:
             found: the task's result for the pair.
-            before: the task's result for the same drives in the baseline
-                condition; None for the baseline itself, or if there is no
+            before: the task's result for the same drives in the baseline;
+                `found` itself if the pair is the baseline, None if there is no
                 baseline.
         """
 

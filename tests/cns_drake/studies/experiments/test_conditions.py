@@ -36,7 +36,8 @@ def test_the_grid_is_the_product_of_all_factors(read):
             "protocol": {"radius": radius},
         }
         # Each protocol has a baseline of its own.
-        assert one.is_baseline == (years == snow == 0)
+        baseline = dict(zip(columns, (0, 0, radius), strict=True))
+        assert one.baseline == baseline
 
 
 def test_the_baseline_comes_first(read):
@@ -54,7 +55,41 @@ def test_the_baseline_comes_first(read):
         (10, "vlp-16"),
         (10, "os1-64"),
     ]
-    assert [one.is_baseline for one in found] == [True, False, False, False]
+    # Each is compared with the same years.
+    for one in found:
+        assert one.baseline == {**one.factors, "query.lidar": "os1-64"}
+
+
+@pytest.mark.parametrize(
+    ("baseline", "found"),
+    [
+        ("", {"cause": "none", "level": 0, "both.stage": "own", "query.x": 1}),
+        ("both.stage: last", {"both.stage": "last"}),
+        (
+            "both: {stage: last}, query.x: 2",
+            {"both.stage": "last", "query.x": 2},
+        ),
+        ("cause: none", {"cause": "none", "level": 0}),
+        ("cause: snow", {"cause": "snow"}),
+        ("level: 2, protocol.radius: 5", {"level": 2, "protocol.radius": 5}),
+    ],
+)
+def test_a_baseline_shares_the_factors_that_are_not_named(
+    read, baseline, found
+):
+    experiment = read(
+        f"""
+        both: {{stage: [own, last]}}
+        query: {{x: [1, 2]}}
+        protocol: {{radius: [5, 7.5]}}
+        cases: {{snow: {{query: {{transient: {{snow: [0.1, 0.2]}}}}}}}}
+        baseline: {{{baseline}}}
+        """
+    )
+    assert len(experiment.conditions) == 2 * 2 * 2 * (1 + 2)
+    for one in experiment.conditions:
+        assert one.baseline == {**one.factors, **found}
+        assert list(one.baseline) == list(one.factors)
 
 
 def test_one_at_a_time(read):
@@ -73,6 +108,9 @@ def test_one_at_a_time(read):
         (0, 5, 0),
         (0, 0, 0.1),
     ]
+    # All are compared with the centre.
+    first = experiment.conditions[0].factors
+    assert all(one.baseline == first for one in experiment.conditions)
 
 
 def test_factors_and_cases_of_different_fields_of_a_section(read):
@@ -153,7 +191,7 @@ def test_cases_have_levels(read):
         ("all", 2),
         ("all", 3),
     ]
-    assert [one.is_baseline for one in found] == [True] + [False] * 10
+    assert all(one.baseline == found[0].factors for one in found)
     fields = {tuple(one.factors.values()): one.causes for one in found}
     assert fields["none", 0] == ()
     assert fields["snow", 2] == (({"query": {"transient": {"snow": 0.2}}},),)
@@ -197,7 +235,7 @@ def test_cases_beside_factors(read):
     found = experiment.conditions
     assert len(found) == 2 * 5
     assert list(found[0].factors) == ["cause", "level", "both.seed"]
-    assert [one.is_baseline for one in found] == [True] + [False] * 9
+    assert all(one.baseline == found[0].factors for one in found)
 
 
 def test_an_experiment_may_be_wide(read):

@@ -1,6 +1,7 @@
 """`cns-drake study`: whole experiments on a small town, and their tables."""
 
 from collections import Counter
+import math
 from pathlib import Path
 import shutil
 
@@ -393,6 +394,36 @@ def test_a_condition_without_draws_is_measured_once(town, tmp_path, jobs_done):
             assert after["relative_auc"] == pytest.approx(
                 after["auc"] / before["auc"], abs=1e-6
             )
+
+
+@pytest.mark.slow
+def test_each_lidar_is_compared_with_its_own_baseline(
+    town, tmp_path, jobs_done
+):
+    wanted = experiment(
+        town,
+        both={"lidar": ["vlp-16", "os1-32"]},
+        database={"stage": ["own", "last"]},
+        protocol={"base": "random-yaw", "query_spacing": 20},
+        baseline={"database.stage": "last"},
+    )
+    measure(wanted, tmp_path)
+    results = Results.read(tmp_path)
+    assert {row.baseline for row in results.rows} == {"database.stage=last"}
+    for lidar in ("vlp-16", "os1-32"):
+        own, last = (
+            values(results, both__lidar=lidar, database__stage=s, verified=0)
+            for s in ("own", "last")
+        )
+        assert last["auc"] > 0.0
+        assert own["relative_auc"] == pytest.approx(
+            own["auc"] / last["auc"], abs=1e-6
+        )
+    # What is compared with itself has no interval.
+    controls = results.where({"database.stage": "last"}, metric="relative_auc")
+    assert len(controls.rows) == 2 * len(results.distinct("verified"))
+    for row in controls.rows:
+        assert (row.value, math.isnan(row.low)) == (1.0, True)
 
 
 def test_queries_that_are_asked_otherwise_are_no_other_drives(town, tmp_path):

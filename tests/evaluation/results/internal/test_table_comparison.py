@@ -567,6 +567,29 @@ def test_other_numbers_of_queries_are_named(tmp_path):
     assert not any("not the same queries" in note for note in alike.notes)
 
 
+def test_other_baselines_are_named(tmp_path):
+    folders = []
+    for name, baseline in (("old", ""), ("new", f"{STAGE}={LAST}")):
+        folder = write_table(tmp_path / name, {"a": {name: 0.5}})
+        rows = [
+            replace(row, metric=metric, baseline=baseline)
+            for row in Results.read(folder).rows
+            for metric in ("auc", "relative_auc")
+        ]
+        Results.of(rows).write_csv(folder / "results.csv")
+        # Of a table without a name for its baselines, nothing changes.
+        header = (folder / "results.csv").read_text().splitlines()[0]
+        assert header.endswith(",baseline") == bool(baseline)
+        read = Results.read(folder)
+        assert {row["baseline"] for row in read.rows} == {baseline}
+        assert STAGE not in read.factors
+        folders.append(folder)
+    notes = compare_tables(folders, metric="relative_auc").notes
+    said = "not the same baselines: both.stage=last, or the first values"
+    assert said in notes
+    assert said not in compare_tables(folders, metric="auc").notes
+
+
 def test_what_a_table_does_not_say_is_unknown(tmp_path):
     """Tables of other programs have neither digest nor version."""
     folder = write_table(tmp_path / "theirs", {"a": {"x": 0.5, "y": 0.4}})

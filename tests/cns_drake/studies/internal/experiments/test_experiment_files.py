@@ -25,7 +25,7 @@ def test_a_file_of_few_words_is_enough(read):
     assert list(experiment.tasks) == ["place"]
     (only,) = experiment.conditions
     assert (only.factors, only.changes, only.causes) == ({}, {}, ())
-    assert only.is_baseline
+    assert only.baseline == {}
 
 
 def test_overrides_replace_single_fields(read):
@@ -98,7 +98,8 @@ def test_shipped_experiments_are_read_and_written(name):
         experiment = load_experiment(name, quick=quick)
         again = Experiment.model_validate(yaml.safe_load(experiment.text))
         assert again == experiment
-        assert sum(one.is_baseline for one in experiment.conditions) == 1
+        first = experiment.conditions[0].factors
+        assert all(one.baseline == first for one in experiment.conditions)
         assert experiment.about.endswith("?")
 
 
@@ -268,6 +269,11 @@ FAULTS = [
         r"baseline.database.years: \[0\] is no value of it",
     ),
     ("baseline: {query: 3}", "baseline.query: this is no factor"),
+    ("baseline: {cause: none}", "baseline.cause: this is no factor"),
+    (
+        "cases: {a: {query: {x: [1, 2]}}}\nbaseline: {level: 3}",
+        "baseline.level: 3 is no value of it",
+    ),
     ("cases: {snow: {}}", "cases.snow: "),
     ("cases: {snow: 3}", "cases.snow: "),
     ("cases: {snow: {query: {}}}", "cases.snow: query: no fields"),

@@ -32,7 +32,7 @@ def test_a_list_of_names_is_a_factor():
         {PROTOCOL_BASE: "paper"},
     ]
     # Each protocol has a baseline of its own.
-    assert all(one.is_baseline for one in found)
+    assert all(one.baseline == one.factors for one in found)
     assert [condition_protocol(one, "") for one in found] == [
         RANDOM_YAW_PROTOCOL,
         PAPER_PROTOCOL,
