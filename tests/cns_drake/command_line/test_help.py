@@ -111,7 +111,7 @@ def test_version(program, capsys):
         ("cns-drake", "sim", ["simulate"]),
         ("cns-drake", "city --n", ["--new"]),
         ("cns-eval", "pr --mode f", ["filtered"]),
-        ("cns-eval", "re", ["report", "real"]),
+        ("cns-eval", "re", ["real", "report"]),
     ],
 )
 def test_completion(program, begun, completed, capsys, monkeypatch):
