@@ -7,7 +7,6 @@ from cns_drake.base import terminal as terminal
 from cns_drake.base.changes import merged as merged
 from cns_drake.base.changes import nested as nested
 from cns_drake.base.changes import parse_changes as parse_changes
-from cns_drake.base.commands import Command as Command
 from cns_drake.base.commands import example as example
 from cns_drake.base.commands import with_options as with_options
 from cns_drake.base.compilation import compiled as compiled
@@ -78,12 +77,8 @@ from cns_drake.base.files import user_errors as user_errors
 from cns_drake.base.images import open_image as open_image
 from cns_drake.base.images import to_jpeg as to_jpeg
 from cns_drake.base.input_models import InputModel as InputModel
-from cns_drake.base.interrupts import INTERRUPTED as INTERRUPTED
 from cns_drake.base.interrupts import (
     ended_by_interrupts as ended_by_interrupts,
-)
-from cns_drake.base.interrupts import (
-    interrupt_on_termination as interrupt_on_termination,
 )
 from cns_drake.base.interrupts import interrupts_wait as interrupts_wait
 from cns_drake.base.interrupts import uninterrupted as uninterrupted
@@ -108,7 +103,6 @@ from cns_drake.base.jobs.step import Steps as Steps
 from cns_drake.base.json_text import json_values as json_values
 from cns_drake.base.json_text import parse_json as parse_json
 from cns_drake.base.launch import start as start
-from cns_drake.base.npz_files import read_npz as read_npz
 from cns_drake.base.number_format import is_number as is_number
 from cns_drake.base.number_format import number_within as number_within
 from cns_drake.base.number_format import other_separator as other_separator
@@ -127,26 +121,16 @@ from cns_drake.base.points import xyz as xyz
 from cns_drake.base.polylines import distances_along as distances_along
 from cns_drake.base.polylines import length_of as length_of
 from cns_drake.base.polylines import step_lengths as step_lengths
-from cns_drake.base.poses import FARTHEST as FARTHEST
-from cns_drake.base.poses import make_pose as make_pose
-from cns_drake.base.poses import transform as transform
-from cns_drake.base.poses import yaw_pose as yaw_pose
 from cns_drake.base.process import (
     collect_garbage_seldom as collect_garbage_seldom,
 )
 from cns_drake.base.process import num_cores as num_cores
-from cns_drake.base.progress import Listener as Listener
 from cns_drake.base.progress import doing as doing
-from cns_drake.base.progress import heard_by as heard_by
 from cns_drake.base.progress import track as track
 from cns_drake.base.progress_display import show_progress as show_progress
 from cns_drake.base.public_names import attach as attach
-from cns_drake.base.repetitions import check_once as check_once
 from cns_drake.base.repetitions import repeated as repeated
 from cns_drake.base.round_shapes import revolved as revolved
-from cns_drake.base.shared_options import Jobs as Jobs
-from cns_drake.base.shared_options import Json as Json
-from cns_drake.base.shared_options import Scheduler as Scheduler
 from cns_drake.base.system_libraries import missing_library as missing_library
 from cns_drake.base.terminal import next_command as next_command
 from cns_drake.base.terminal import next_page as next_page

@@ -19,13 +19,3 @@ def repeated(values: Iterable[_T]) -> list[_T]:
             found.append(seen[key])
         seen.setdefault(key, value)
     return found
-
-
-def check_once(values: Iterable[object]) -> None:
-    """Checks that all values differ.
-
-    Raises:
-        ValueError: a value occurs twice.
-    """
-    for value in repeated(values):
-        raise ValueError(f"{value!r} is there twice")

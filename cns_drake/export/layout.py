@@ -13,7 +13,7 @@ import re
 
 import numpy as np
 
-from cns_drake.base import FARTHEST, InputError
+from cns_drake.base import InputError, poses
 from cns_drake.drives import McapDrive
 from cns_drake.recording import to_yaml
 
@@ -147,7 +147,8 @@ def check_odometry(drive: McapDrive) -> None:
         length = np.linalg.norm(quat_xyzw, axis=1)
     position = drive.odometry["position"]
     bad = ~(np.isfinite(length) & (length > 0.0))
-    bad |= ~(np.abs(position) < FARTHEST).all(axis=1)  # NaN is False here.
+    # NaN is False here.
+    bad |= ~(np.abs(position) < poses.FARTHEST).all(axis=1)
     if bad.any():
         row = int(bad.argmax())
         raise InputError(

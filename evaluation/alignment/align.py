@@ -24,7 +24,7 @@ from typing import Literal
 
 import numpy as np
 
-from cns_drake.base import InputError, poses, yaw_pose
+from cns_drake.base import InputError, poses
 from cns_drake.drives import Drive, check_same_map
 from evaluation.alignment.loop_search import (
     SAME_PLACE,
@@ -314,7 +314,7 @@ def _same_coordinates(source: Submaps, target: Submaps) -> np.ndarray:
     if near.any():
         # The LiDARs have about the same height above the ground.
         height = float(np.median(offsets[place, np.arange(len(near)), 2][near]))
-    return yaw_pose(0.0, z=height)
+    return poses.yaw_pose(0.0, z=height)
 
 
 def _probe(

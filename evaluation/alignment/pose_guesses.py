@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import track, wrapped, yaw_pose
+from cns_drake.base import poses, track, wrapped
 from evaluation.alignment.submaps import Submaps
 from evaluation.drives import cloud_at
 from evaluation.methods import ScanContext
@@ -156,7 +156,7 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
         if votes[best] < _FEWEST_VOTES:
             break
         fitted, pairs = _refine(candidates, agreement[best] & is_left)
-        X_TS = yaw_pose(fitted.turn, *fitted.move)
+        X_TS = poses.yaw_pose(fitted.turn, *fitted.move)
         guesses.append(Guess(X_TS, np.flatnonzero(pairs)))
         is_left &= ~pairs & ~agreement[best]
         trials = [
@@ -265,7 +265,7 @@ def _mean_move(
 
 def _turned(p: np.ndarray, turn: float) -> np.ndarray:
     """Returns points (N, 3) after a turn about the vertical [rad]."""
-    return p @ yaw_pose(turn)[:3, :3].T
+    return p @ poses.yaw_pose(turn)[:3, :3].T
 
 
 def _heading(X: np.ndarray) -> float:

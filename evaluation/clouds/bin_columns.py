@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import FARTHEST, InputError, check_regular, user_errors
+from cns_drake.base import InputError, check_regular, poses, user_errors
 
 # KITTI's number of columns, used if the values do not show another.
 _USUAL = 4
@@ -106,7 +106,7 @@ def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
         if k != _USUAL and not any(size % (4 * k) for size in sizes)
     ]
     with np.errstate(invalid="ignore"):
-        if not others or (np.abs(values) >= FARTHEST).any():
+        if not others or (np.abs(values) >= poses.FARTHEST).any():
             # Impossible coordinates are refused later, when points are read.
             return layout
         # No LiDAR measures a negative intensity.

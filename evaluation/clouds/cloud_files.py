@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base import (
-    FARTHEST,
     InputError,
     check_range,
     check_regular,
+    poses,
     user_errors,
     value_errors,
 )
@@ -97,7 +97,7 @@ def read_blocks(
         read = 0
         is_noted = False
         for points in reader(path, block, on_note):
-            check_range(points, FARTHEST, first=read)
+            check_range(points, poses.FARTHEST, first=read)
             read += len(points)
             if not is_noted and (step_note := _coarse_note(points)):
                 is_noted = True

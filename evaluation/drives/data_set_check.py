@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import KDTree
 
-from cns_drake.base import FARTHEST, InputError, errors_at, poses, yaw_pose
+from cns_drake.base import InputError, errors_at, poses
 from cns_drake.drives import Drive
 from cns_drake.units import check_preset
 from evaluation.drives.opening import open_drive
@@ -154,7 +154,7 @@ def check_poses(drive: Drive) -> Iterator[str]:
         if not poses.is_pose(X):
             yield f"poses: that of scan {frame} is no finite rigid pose"
             return
-    if (np.abs(X_WS[:, :3, 3]) >= FARTHEST).any():
+    if (np.abs(X_WS[:, :3, 3]) >= poses.FARTHEST).any():
         yield "poses: too far from the origin"
 
 
@@ -347,7 +347,7 @@ def _placements(X_WA: np.ndarray, X_WB: np.ndarray) -> dict[str, np.ndarray]:
     }
     for axis, yaw_deg in (("left", 90), ("right", -90), ("back", 180)):
         # X_SC, where C is the frame of the points.
-        X_SC = yaw_pose(np.radians(yaw_deg), 0.0, 0.0)
+        X_SC = poses.yaw_pose(np.radians(yaw_deg), 0.0, 0.0)
         found[f"the points' x axis points to the {axis}"] = (
             poses.inverse(X_SC) @ X_AB @ X_SC
         )

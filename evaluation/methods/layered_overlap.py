@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
 
-from cns_drake.base import compiled, make_pose
+from cns_drake.base import compiled, poses
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.overlap_layers import GRID, NUM_LAYERS, layer_cells
 from evaluation.methods.registry import register
@@ -573,7 +573,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         R_PQ = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         half_cell = 0.5 * self.config.cell
         x, y = found.rows * half_cell, found.columns * half_cell
-        return make_pose(R_PQ, np.array([x, y, 0.0]))
+        return poses.make_pose(R_PQ, np.array([x, y, 0.0]))
 
     def _climb(
         self, query: LayeredScan, place: LayeredScan, start: np.ndarray

@@ -26,13 +26,13 @@ from cns_drake.base import (
     InputError,
     check_regular,
     note,
-    read_npz,
+    poses,
     user_errors,
-    yaw_pose,
 )
 from evaluation.maps import extremes
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.network_weights import checked_weights
+from evaluation.methods.npz_files import read_npz
 from evaluation.methods.registry import register
 
 # Version of the layout of files of weights.
@@ -267,7 +267,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
         turn = int(_correlations(query, spectrum)[:, 0].argmax())
         # What the query sees at azimuth a, the place sees at a + turn.
         yaw = 2.0 * math.pi * turn / HEADINGS
-        return yaw_pose(yaw)
+        return poses.yaw_pose(yaw)
 
     def _warn_if_it_sees_little(self, image: np.ndarray) -> None:
         """Warns once if fewer sectors have points than in any training scan."""

@@ -29,7 +29,7 @@ import numpy as np
 from pydantic import PositiveFloat, PositiveInt
 from scipy.ndimage import gaussian_filter1d
 
-from cns_drake.base import yaw_pose
+from cns_drake.base import poses
 from evaluation.maps import packed_cells
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register
@@ -206,7 +206,7 @@ class ProbeMethod(Method[Probe, ProbeDatabase]):
             return None
         # What the query sees in sector a, the place sees in a + shift.
         shift = int(cosines.argmax())
-        return yaw_pose(2.0 * math.pi * shift / self.config.sectors)
+        return poses.yaw_pose(2.0 * math.pi * shift / self.config.sectors)
 
     def _cosines(self, query: Probe, spectra: np.ndarray) -> np.ndarray:
         """Returns the cosines with D places at all headings, (D, sectors)."""

@@ -27,7 +27,7 @@ import scipy.fft
 import scipy.sparse
 import small_gicp
 
-from cns_drake.base import compiled, yaw_pose
+from cns_drake.base import compiled, poses
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register
 
@@ -292,7 +292,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         offset = fits[best][1]
         yaw = headings[best]
         cell = 2.0 * self.config.half_width / num_cells
-        return yaw_pose(yaw, -offset[0] * cell, -offset[1] * cell)
+        return poses.yaw_pose(yaw, -offset[0] * cell, -offset[1] * cell)
 
     def _bev(self, points: np.ndarray) -> np.ndarray:
         """Returns the map from above, (n, n, 6): rows along x, columns along y.

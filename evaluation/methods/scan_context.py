@@ -35,7 +35,7 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 from scipy.spatial import cKDTree
 
-from cns_drake.base import yaw_pose
+from cns_drake.base import poses
 from evaluation.maps import downsample
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register
@@ -288,7 +288,7 @@ class ScanContext(Method[Contexts, ContextDatabase]):
             # Shift s maps the place's context to the query's: what the place
             # sees at azimuth a, the query sees at a + s cells.
             side = (0.0, -1.0, 1.0)[best]
-            return yaw_pose(
+            return poses.yaw_pose(
                 -2.0 * math.pi * shift / num_columns,
                 y=side * self.config.lateral_shift,
             )

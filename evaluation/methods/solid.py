@@ -16,7 +16,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from cns_drake.base import yaw_pose
+from cns_drake.base import poses
 from cns_drake.drives import LidarField
 from evaluation.maps import Z_ORIGIN, downsample
 from evaluation.methods.method import Method, MethodConfig
@@ -222,7 +222,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
         rolled = azimuths[(cell - cell[:, None]) % num_cells]
         shift = int(np.abs(query.azimuths - rolled).sum(axis=1).argmin())
         # What the place sees at azimuth a, the query sees at a + shift.
-        return yaw_pose(-2.0 * math.pi * shift / num_cells)
+        return poses.yaw_pose(-2.0 * math.pi * shift / num_cells)
 
     def _downsampled_within_range(self, points: np.ndarray) -> np.ndarray:
         """Returns the downsampled points within range.

@@ -23,10 +23,10 @@ from cns_drake.base import (
     file_digests,
     from_xyz,
     listed,
+    poses,
     track,
     user_errors,
     xyz,
-    yaw_pose,
 )
 from cns_drake.drives import Drive, deskewed_notes, deskewed_scan
 from evaluation.clouds import (
@@ -303,7 +303,7 @@ def _read(folder: Path) -> tuple[list[Path], np.ndarray]:
         )
     headings = np.arctan2(X_WS[:, 1, 0], X_WS[:, 0, 0])
     flat = [
-        yaw_pose(yaw, x, y)
+        poses.yaw_pose(yaw, x, y)
         for yaw, (x, y) in zip(headings, X_WS[:, :2, 3], strict=True)
     ]
     return files, np.stack(flat)

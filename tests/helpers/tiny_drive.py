@@ -1,14 +1,8 @@
 """A drive that costs little: one hall, few beams, three seconds."""
 
-import contextlib
-import signal
-import sys
-
 import yaml
 
-from cns_drake.base import INTERRUPTED, interrupt_on_termination
 from cns_drake.scenarios import make_scenario
-from cns_drake.simulation import simulate
 from helpers.small_map import box_visual, world_text
 
 FRAMES = 60
@@ -62,20 +56,3 @@ def write_scenario(scenario, folder):
     file = folder / f"{scenario.name}.yaml"
     file.write_text(yaml.safe_dump(scenario.model_dump(exclude_none=True)))
     return file
-
-
-def run_and_report(scenario, output, sender):
-    """Simulates in a process of its own and prints each frame.
-
-    Exits with INTERRUPTED if SIGTERM has ended the run in good order.
-    """
-    status = INTERRUPTED
-    with contextlib.suppress(KeyboardInterrupt):
-        interrupt_on_termination()
-        sender.send(0)
-        simulate(
-            scenario, output, on_frame=lambda done, total: sender.send(done)
-        )
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        status = 0
-    sys.exit(status)

@@ -9,10 +9,9 @@ from typing import Annotated, Any
 import typer
 
 from cns_drake.base import (
-    Jobs,
-    Scheduler,
     ended_by_interrupts,
     errors_at_option,
+    shared_options,
     terminal,
 )
 from cns_drake.command_line.fields import LIDAR_HELP
@@ -42,8 +41,8 @@ def train(
         list[str] | None,
         typer.Option(metavar="PRESET|FILE.yaml", help=LIDAR_HELP),
     ] = None,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
+    jobs: shared_options.Jobs = None,
+    scheduler: shared_options.Scheduler = None,
 ) -> None:
     """Train the place-recognition method `learned`.
 

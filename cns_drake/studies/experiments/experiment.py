@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, PlainValidator, model_validator
 import yaml
 
-from cns_drake.base import InputError, check_once, validated
+from cns_drake.base import InputError, validated
 from cns_drake.imports import map_sources
 from cns_drake.scenarios import Name
 from cns_drake.sensors import Section
 from cns_drake.studies.experiments.conditions import Condition, conditions
+from cns_drake.studies.experiments.factors import check_once
 from cns_drake.studies.experiments.method_variants import (
     MethodVariant,
     method_variants,

@@ -1,10 +1,10 @@
 """Factors: the fields of an experiment that have a list of values."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 import json
 from typing import Any
 
-from cns_drake.base import check_once
+from cns_drake.base import repeated
 from cns_drake.studies.experiments.nested_fields import SESSIONS, Changes
 from cns_drake.studies.experiments.spread_values import expand_spread, is_spread
 
@@ -119,3 +119,13 @@ def table_value(value: Any) -> Any:
         text = json.dumps(value, separators=(",", ": ")).replace('"', "")
         return text.strip("{}") or "none"
     return value
+
+
+def check_once(values: Iterable[object]) -> None:
+    """Checks that all values differ.
+
+    Raises:
+        ValueError: a value occurs twice.
+    """
+    for value in repeated(values):
+        raise ValueError(f"{value!r} is there twice")

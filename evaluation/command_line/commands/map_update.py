@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import Json, terminal
+from cns_drake.base import shared_options, terminal
 from evaluation.command_line import options
 
 GROUP = "Localise, and keep maps"
@@ -25,7 +25,7 @@ def map_update(
     labels_a: Annotated[Path | None, typer.Option(metavar="FILE")] = None,
     labels_b: Annotated[Path | None, typer.Option(metavar="FILE")] = None,
     output: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
-    json: Json = False,
+    json: shared_options.Json = False,
 ) -> None:
     """Score the labels of a change detector on two maps.
 

@@ -8,7 +8,6 @@ import typer
 
 import cns_drake
 from cns_drake import command_line as cli
-from cns_drake.base import Command
 from cns_drake.units import LIDAR_PRESETS
 from evaluation import command_line as evaluation_cli
 
@@ -121,9 +120,3 @@ def test_completion(program, begun, completed, capsys, monkeypatch):
     monkeypatch.setenv("COMP_WORDS", words)
     monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
     assert run(capsys, program).split() == completed
-
-
-def test_a_command_without_docstrings():
-    # As with `python -OO`.
-    command = Command("run", help=None, params=[], callback=lambda: None)
-    assert command.help == ""

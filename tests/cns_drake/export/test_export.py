@@ -9,6 +9,7 @@ from helpers.bent_drive import NUM_SCANS, P_BS, QUAT_BS, write_drive
 from helpers.contradictions import read_messages, write_messages
 from helpers.drive_files import write_recording
 from helpers.internal.eval_program import run_program
+from helpers.internal.listening import Heard, listening
 from mcap.reader import make_reader
 from mcap.writer import Writer
 import numpy as np
@@ -17,7 +18,7 @@ from scipy.spatial.transform import Rotation
 import yaml
 
 from cns_drake.__main__ import main
-from cns_drake.base import InputError, Listener, heard_by
+from cns_drake.base import InputError
 from cns_drake.base import InputError as ReadingError
 from cns_drake.export import export_drive
 from evaluation import open_drive
@@ -367,12 +368,12 @@ class StopError(Exception):
 
 @pytest.mark.parametrize("format_name", ["cns", "kitti"])
 def test_an_interrupted_export_has_no_final_name(drive, tmp_path, format_name):
-    class Stopper(Listener):
+    class Stopper(Heard):
         def doing(self, activity, done=0, total=0, unit=""):
             if (activity, done, total) == ("writing scans", 2, NUM_SCANS):
                 raise StopError
 
-    with pytest.raises(StopError), heard_by(Stopper()):
+    with pytest.raises(StopError), listening(Stopper()):
         export_drive(drive, format_name, tmp_path / "out")
     assert not (tmp_path / "out").exists()
     # A killed export leaves its part file, which no other export uses.

@@ -3,7 +3,7 @@
 from dataclasses import replace
 import shutil
 
-from helpers.listening import listening
+from helpers.internal.listening import listening
 from helpers.small_map import write_small_map
 import pytest
 import yaml

@@ -2,7 +2,7 @@
 
 import os
 
-from helpers.listening import listening
+from helpers.internal.listening import listening
 from helpers.small_map import box_visual, scenario_values, write_small_map
 from helpers.tiny_drive import tiny_scenario
 import numpy as np

@@ -15,11 +15,12 @@ import signal
 import threading
 
 from helpers.bag_recordings import contents
-from helpers.tiny_drive import FRAMES, run_and_report, tiny_scenario
+from helpers.internal.reported_run import run_and_report
+from helpers.tiny_drive import FRAMES, tiny_scenario
 import numpy as np
 import pytest
 
-from cns_drake.base import INTERRUPTED
+from cns_drake.base.interrupts import INTERRUPTED
 
 pytestmark = pytest.mark.slow
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cns_drake.base import from_xyz, transform, yaw_pose
+from cns_drake.base import from_xyz, poses
 from evaluation.change import (
     ChangeReport,
     DriveMap,
@@ -29,7 +29,7 @@ def make_city(seed=3, num_houses=40):
         side = rng.integers(2, size=1500)
         walls[np.arange(1500), side] = rng.choice((-0.5, 0.5), 1500)
         walls = walls * size + [0.0, 0.0, 0.5 * size[2]]
-        parts.append(transform(yaw_pose(yaw, *centre), walls))
+        parts.append(poses.transform(poses.yaw_pose(yaw, *centre), walls))
     return parts
 
 
@@ -51,9 +51,9 @@ def tcr_sym(a, b):
 @pytest.mark.parametrize(
     ("X_BW", "yaw_deg"),
     [
-        (yaw_pose(np.radians(1.8)), -1.8),
-        (yaw_pose(np.radians(-2.5), 0.4, -0.7, 0.3), 2.5),
-        (yaw_pose(0.0, 1.5, 0.0, 1.5), 0.0),
+        (poses.yaw_pose(np.radians(1.8)), -1.8),
+        (poses.yaw_pose(np.radians(-2.5), 0.4, -0.7, 0.3), 2.5),
+        (poses.yaw_pose(0.0, 1.5, 0.0, 1.5), 0.0),
     ],
 )
 def test_frames_that_differ_are_found(X_BW, yaw_deg):
@@ -72,7 +72,7 @@ def test_an_apparent_change_grows_with_the_yaw():
     """As a reader sees who cannot register: Table I against Figure 1."""
     a = drive_map(CITY)
     values = [
-        tcr_sym(a, drive_map(CITY, X_WS=yaw_pose(np.radians(yaw))))
+        tcr_sym(a, drive_map(CITY, X_WS=poses.yaw_pose(np.radians(yaw))))
         for yaw in (0.0, 1.0, 1.5, 2.0, 2.5)
     ]
     assert values[0] == 0.0
@@ -92,8 +92,8 @@ def test_change_stays_change():
 
 def test_far_from_the_origin_of_the_world():
     """Coordinates as UTM has them; the yaw is about the frame's origin."""
-    X_WA = yaw_pose(0.0, 4.2e5, 5.1e6)
-    X_WB = X_WA @ yaw_pose(np.radians(1.0), 0.5, 0.2)
+    X_WA = poses.yaw_pose(0.0, 4.2e5, 5.1e6)
+    X_WB = X_WA @ poses.yaw_pose(np.radians(1.0), 0.5, 0.2)
     found = registered_change(
         drive_map(CITY, X_WS=X_WA), drive_map(CITY, X_WS=X_WB)
     )
@@ -101,14 +101,16 @@ def test_far_from_the_origin_of_the_world():
     assert found.yaw_deg == pytest.approx(-1.0, abs=0.05)
     middle = np.array([[4.2e5, 5.1e6, 0.0]])
     np.testing.assert_allclose(
-        transform(found.X_AB, middle), transform(X_AB, middle), atol=0.15
+        poses.transform(found.X_AB, middle),
+        poses.transform(X_AB, middle),
+        atol=0.15,
     )
 
 
 @pytest.mark.parametrize("yaw_deg", [20.0, 90.0])
 def test_frames_that_differ_too_much_stay(yaw_deg):
     """A pose at which little fits would explain nothing."""
-    turned = drive_map(CITY, X_WS=yaw_pose(np.radians(yaw_deg)))
+    turned = drive_map(CITY, X_WS=poses.yaw_pose(np.radians(yaw_deg)))
     found = registered_change(drive_map(CITY), turned)
     assert np.array_equal(found.X_AB, np.eye(4))
 
@@ -124,7 +126,7 @@ def test_what_cannot_be_registered():
 
 
 def test_a_note_says_when_frames_would_explain_change():
-    a, b = drive_map(CITY, "a"), drive_map(CITY, "b", yaw_pose(0.03))
+    a, b = drive_map(CITY, "a"), drive_map(CITY, "b", poses.yaw_pose(0.03))
     change = temporal_change(
         a.voxels.merged().centroids_W, b.voxels.merged().centroids_W
     )

@@ -1,5 +1,5 @@
 from helpers.drive_files import make_scan, write_recording, yaw_pose
-from helpers.listening import listening
+from helpers.internal.listening import listening
 import numpy as np
 import pytest
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError, make_pose, transform
+from cns_drake.base import InputError, poses
 from evaluation.drives import QuerySensor, cloud_at, open_drive
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition import (
@@ -44,7 +44,9 @@ class Corresponding(Method):
         R_PQ, _ = Rotation.align_vectors(
             database[place] - means[0], query - means[1]
         )
-        return make_pose(R_PQ.as_matrix(), means[0] - R_PQ.apply(means[1]))
+        return poses.make_pose(
+            R_PQ.as_matrix(), means[0] - R_PQ.apply(means[1])
+        )
 
 
 def record(folder, ys):
@@ -100,7 +102,9 @@ def test_a_turned_cloud_is_the_same_in_the_world(drives, number):
     ):
         assert np.abs(place - query).max() > 1.0
         np.testing.assert_allclose(
-            transform(X_WQ, query), transform(X_WP, place), atol=1e-9
+            poses.transform(X_WQ, query),
+            poses.transform(X_WP, place),
+            atol=1e-9,
         )
     np.testing.assert_array_equal(
         described.places.X_WS, drive.X_WS[described.places.frames]
@@ -339,7 +343,7 @@ def test_a_turn_of_360_deg_is_none(drives, monkeypatch):
     R = Rotation.from_euler("z", 2.0 * np.pi)
 
     def whole(*arguments):
-        return QuerySensor(make_pose(R.as_matrix(), np.zeros(3)))
+        return QuerySensor(poses.make_pose(R.as_matrix(), np.zeros(3)))
 
     monkeypatch.setattr(QuerySensor, "draw", whole)
     turning = RetrievalProtocol(turn_queries=True)

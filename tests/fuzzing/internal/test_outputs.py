@@ -25,8 +25,8 @@ import pytest
 import typer
 
 from cns_drake import command_line as simulator
-from cns_drake.base import INTERRUPTED as INTERRUPTED_STATUS
 from cns_drake.base import program, progress_display
+from cns_drake.base.interrupts import INTERRUPTED as INTERRUPTED_STATUS
 from cns_drake.scenarios import write_scenarios
 from evaluation import command_line as evaluation
 from evaluation.clouds import read_cloud

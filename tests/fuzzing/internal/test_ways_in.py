@@ -414,7 +414,10 @@ def weigh(folder):
     return make_method("bevplace", {"weights": folder / "w.npz"})
 
 
-WEIGHTS = ("cns_drake.base.read_npz", "evaluation.methods.make_method")
+WEIGHTS = (
+    "evaluation.methods.npz_files.read_npz",
+    "evaluation.methods.make_method",
+)
 
 
 def first_array():
@@ -1258,7 +1261,7 @@ _READER = re.compile(
 # Functions that unpack or decode a file whole -> modules that may use them.
 # Others go through these modules, which bound what is made.
 OPENERS = {
-    "zipfile.ZipFile": ("cns_drake.base.npz_files",),
+    "zipfile.ZipFile": ("evaluation.methods.npz_files",),
     # The package's own archive of shipped cities.
     "tarfile.open": ("cns_drake.scenarios.shipped",),
     "gzip.open": (),
@@ -1266,7 +1269,7 @@ OPENERS = {
     "lzma.open": (),
     # Only its header is read.
     "np.load": ("evaluation.clouds.npy_files",),
-    "np.lib.format.read_array": ("cns_drake.base.npz_files",),
+    "np.lib.format.read_array": ("evaluation.methods.npz_files",),
     # Films are made of the program's own pictures.
     "Image.open": ("cns_drake.base.images", "cns_drake.simulation.film"),
     "yaml.load": (),

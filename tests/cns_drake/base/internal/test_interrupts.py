@@ -7,11 +7,8 @@ import threading
 from helpers.internal.signal_handlers import handlers_kept
 import pytest
 
-from cns_drake.base import (
-    interrupt_on_termination,
-    interrupts_wait,
-    uninterrupted,
-)
+from cns_drake.base import interrupts_wait, uninterrupted
+from cns_drake.base.interrupts import interrupt_on_termination
 
 
 @pytest.fixture

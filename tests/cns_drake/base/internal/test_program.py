@@ -10,6 +10,7 @@ import pytest
 import typer
 
 from cns_drake.base import InputError, program
+from cns_drake.base.commands import Command
 from cns_drake.base.errors import FailedJobsError
 
 
@@ -142,6 +143,12 @@ def {name}(number: int = 1):
     help_text = answer("import", "--help")
     assert "How often." in help_text
     assert help_text.endswith("program import_ \\\n        --number 2\n")
+
+
+def test_a_command_without_docstrings():
+    # As with `python -OO`.
+    command = Command("run", help=None, params=[], callback=lambda: None)
+    assert command.help == ""
 
 
 @pytest.mark.parametrize("columns", [60, 120, 200])

@@ -5,18 +5,17 @@ import itertools
 import shutil
 import sys
 
-from helpers.listening import Heard
+from helpers.internal.listening import Heard
 import pytest
 
 from cns_drake.base import (
     doing,
-    heard_by,
     progress,
     progress_display,
     show_progress,
     track,
 )
-from cns_drake.base.progress import interlude, listener
+from cns_drake.base.progress import heard_by, interlude, listener
 from cns_drake.base.progress_display import Display, shown_times
 
 

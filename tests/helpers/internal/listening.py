@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 import contextlib
 
-from cns_drake.base import Listener, heard_by
+from cns_drake.base.progress import Listener, heard_by
 
 
 class Heard(Listener):
@@ -33,7 +33,7 @@ class Heard(Listener):
 
 
 @contextlib.contextmanager
-def listening() -> Iterator[Heard]:
-    heard = Heard()
+def listening(heard=None) -> Iterator[Heard]:
+    heard = heard or Heard()
     with heard_by(heard):
         yield heard
