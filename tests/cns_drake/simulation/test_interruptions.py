@@ -15,12 +15,10 @@ import signal
 import threading
 
 from helpers.bag_recordings import contents
-from helpers.internal.reported_run import run_and_report
+from helpers.internal.reported_run import INTERRUPTED, run_and_report
 from helpers.tiny_drive import FRAMES, tiny_scenario
 import numpy as np
 import pytest
-
-from cns_drake.base.interrupts import INTERRUPTED
 
 pytestmark = pytest.mark.slow
 
