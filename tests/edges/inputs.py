@@ -47,8 +47,9 @@ _RECORDINGS = {
     "rain_and_traffic": {
         "lidars": {"lidar": _LIDAR | {"returns": "calibrated"}},
         "weather": {"rain": 20.0},
-        "traffic": {"vehicles": 3, "walkers": 3},
+        "traffic": {"fcd": "trace.xml"},
     },
+    "queues": {"lidars": {"lidar": _LIDAR}, "traffic": {"queues": True}},
     "ride_and_camera": {
         "lidars": {"lidar": _LIDAR},
         "ride": {"roughness": "D"},
@@ -186,10 +187,39 @@ def write_kinds(folder):
 
 def write_scenarios(folder):
     """Writes a file for each recording, of the drive through the city."""
+    write_trace(folder / "trace.xml")
     for name, more in _RECORDINGS.items():
         values = _DRIVE | {"map": "town", "name": name} | more
         (folder / f"{name}.yaml").write_text(yaml.safe_dump(values))
     return tuple(_RECORDINGS)
+
+
+def write_trace(path):
+    """Writes 2 s of traffic as SUMO does: near the drive, and far away.
+
+    A bus drives off ahead of the car, a car comes towards it and disappears, a
+    bicycle turns; one person walks faster and faster, one stands.
+    """
+    rows = ["<fcd-export>"]
+    for k in range(21):
+        t = 0.1 * k
+        rows.append(f'<timestep time="{t:.2f}">')
+        users = [
+            ("vehicle", "bus", "bus", 2.0, 38.0 + t * t, 0.0),
+            ("vehicle", "bike", "bicycle", 2.0 + t, 60.0 + t**1.5, 20.0 * t),
+            ("vehicle", "far", "truck", 30.0 + 9.0 * t, 3.0, 84.0),
+            ("person", "walks", "", 6.0, 20.0 + t + 0.2 * t * t, 0.0),
+            ("person", "stands", "", -6.0, 25.0, 100.0),
+        ]
+        if k < 5:
+            users.append(("vehicle", "c", "", -2.0, 30.0 - 8.0 * t, 180.0))
+        rows += [
+            f'<{kind} id="{name}" type="{type_name}" x="{x:.3f}" y="{y:.3f}"'
+            f' angle="{angle:.2f}"/>'
+            for kind, name, type_name, x, y, angle in users
+        ]
+        rows.append("</timestep>")
+    path.write_text("\n".join([*rows, "</fcd-export>", ""]))
 
 
 def write_experiment(folder):

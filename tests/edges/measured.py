@@ -366,6 +366,7 @@ BY_NIGHT: dict[str, Callable[[Path], dict[str, str]]] = {
     "shipped-cities": shipped_cities,
     "city": city,
     "recording-rain_and_traffic": recording("rain_and_traffic"),
+    "recording-queues": recording("queues"),
     "recording-ride_and_camera": recording("ride_and_camera"),
     "tcr": tcr,
     "kitti": kitti,
