@@ -8,7 +8,6 @@ from cns_drake.motion.suspension import (
     load_suspension_rates as load_suspension_rates,
 )
 from cns_drake.motion.suspension import ride_on_springs as ride_on_springs
-from cns_drake.motion.trajectory import KNOT_PERIOD as KNOT_PERIOD
 from cns_drake.motion.trajectory import Trajectory as Trajectory
 from cns_drake.motion.trajectory import pose_at as pose_at
 from cns_drake.motion.vehicle_motion import VehicleMotion as VehicleMotion

@@ -71,18 +71,6 @@ class Trajectory:
         self._travelled = self.path.integral(lambda jet: jet.speed)
         self._ride: BodyRide | None = None
 
-    def with_positions(self, positions: np.ndarray) -> Trajectory:
-        """Returns a drive along the same path with another timing.
-
-        Args:
-            positions: (N,) path parameters [m] at times `KNOT_PERIOD` apart.
-        """
-        drive = copy.copy(self)
-        drive._time_scaling = SplineDerivatives(
-            _make_time_scaling(positions), 2
-        )
-        return drive
-
     def with_ride(self, ride: BodyRide) -> Trajectory:
         """Returns the trajectory with heave, roll and pitch of the vehicle."""
         riding = copy.copy(self)
@@ -201,7 +189,7 @@ def _path_motion(
 
 # Distance between the knots of the time scaling [s]. The acceleration changes
 # within about two of them, so the jerk stays near (acceleration / knot period).
-KNOT_PERIOD = 0.3
+_KNOT_PERIOD = 0.3
 # Distance between the places at which the limits are evaluated [m].
 _STEP = 0.1
 # Margin for places in between: the limits are smooth over several metres.
@@ -229,10 +217,10 @@ def _make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
 
     Args:
         positions: (N,) path parameters [m] at evenly spaced times, one for each
-            `KNOT_PERIOD` [s]. The first three are equal, and the last three are
-            equal, so that the drive starts and ends at rest.
+            `_KNOT_PERIOD` [s]. The first three are equal, and the last three
+            are equal, so that the drive starts and ends at rest.
     """
-    return make_uniform_spline(positions[:, None], KNOT_PERIOD)
+    return make_uniform_spline(positions[:, None], _KNOT_PERIOD)
 
 
 def _find_speed_profile(
@@ -287,7 +275,7 @@ def _drive_positions(profile: _SpeedProfile) -> np.ndarray:
         profile: speeds of the drive along the path.
 
     Returns:
-        (N,) path parameters [m], one for each `KNOT_PERIOD`, for
+        (N,) path parameters [m], one for each `_KNOT_PERIOD`, for
         `_make_time_scaling`. The first few and the last few are equal, because
         the drive starts and ends at rest.
     """
@@ -296,8 +284,8 @@ def _drive_positions(profile: _SpeedProfile) -> np.ndarray:
         [[0.0], np.cumsum(2 * np.diff(u) / (speed[1:] + speed[:-1]))]
     )
     # With REACH knots of rest at both ends, the spline is at rest there, too.
-    knots = int(np.ceil(times[-1] / KNOT_PERIOD)) + 2 * REACH
-    drive_times = (np.arange(knots + 1) - REACH) * KNOT_PERIOD
+    knots = int(np.ceil(times[-1] / _KNOT_PERIOD)) + 2 * REACH
+    drive_times = (np.arange(knots + 1) - REACH) * _KNOT_PERIOD
     return _positions_at(drive_times, times, u, speed)
 
 
@@ -308,7 +296,7 @@ def _widened_limits(limit: np.ndarray, step: float) -> np.ndarray:
     place, its speed is at most v from the time T before the place until the
     time T after it.
     """
-    period = (REACH + 1) * KNOT_PERIOD
+    period = (REACH + 1) * _KNOT_PERIOD
     reach = np.ceil((period * limit + _SMOOTHING_SLACK) / step).astype(int)
     result = limit.copy()
     for shift in range(1, int(reach.max()) + 1):

@@ -36,9 +36,9 @@ def directions(points: np.ndarray) -> np.ndarray:
 def outlines(
     places: np.ndarray,
     ahead: np.ndarray,
-    rear: float,
-    front: float,
-    half_width: float,
+    rear: float | np.ndarray,
+    front: float | np.ndarray,
+    half_width: float | np.ndarray,
 ) -> np.ndarray:
     """Returns the corners (..., 4, 2) of cars seen from above [m].
 
@@ -46,8 +46,8 @@ def outlines(
         places: (..., 2) positions of the cars' frames [m].
         ahead: (..., 2) unit vectors in which the cars point.
         rear, front: distances from the frames' origins to the rear and front
-            ends of the cars, both positive [m].
-        half_width: half the width of the cars [m].
+            ends of the cars, both positive [m]; a number, or (..., 1).
+        half_width: half the width of the cars [m]; likewise.
     """
     left = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
     corners = [

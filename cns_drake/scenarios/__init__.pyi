@@ -17,6 +17,7 @@ from cns_drake.scenarios.provenance import (
     recording_fingerprint as recording_fingerprint,
 )
 from cns_drake.scenarios.scenario import REAL_DRIVER as REAL_DRIVER
+from cns_drake.scenarios.scenario import SUMO_INSTEAD as SUMO_INSTEAD
 from cns_drake.scenarios.scenario import DriverConfig as DriverConfig
 from cns_drake.scenarios.scenario import Name as Name
 from cns_drake.scenarios.scenario import RideConfig as RideConfig

@@ -113,15 +113,6 @@ class DrivePlan:
         """
         return self._on_springs(self._rigid_motion)
 
-    def trajectory_at(self, positions: np.ndarray) -> Trajectory:
-        """Returns the motion of a car that keeps its distance to other cars.
-
-        Args:
-            positions: (N,) distances along the path at evenly spaced times [m],
-                see `cns_drake.traffic.traffic_plan.TrafficPlan`.
-        """
-        return self._on_springs(self._rigid_motion.with_positions(positions))
-
     @cached_property
     def _rigid_motion(self) -> Trajectory:
         """The motion of a car without springs."""

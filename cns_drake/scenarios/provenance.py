@@ -92,15 +92,15 @@ def _input_files(scenario: Scenario) -> dict[str, Path]:
     if scenario.waypoints is not None:
         inputs["waypoints"] = Path(scenario.waypoints)
     roads = folder.roads
-    has_traffic = not scenario.traffic.is_off
+    traffic = scenario.traffic
     if scenario.waypoints is None or (
-        roads.is_file() and (has_traffic or not scenario.transient.is_off)
+        roads.is_file() and (traffic.queues or not scenario.transient.is_off)
     ):
         inputs["roads"] = roads
-    elif has_traffic:
-        inputs["lanes"] = folder.lanes
-    if scenario.traffic.fcd is not None:
-        inputs["fcd"] = Path(scenario.traffic.fcd)
+    if traffic.is_recorded:
+        inputs["traffic"] = folder.traffic
+    if traffic.fcd is not None:
+        inputs["fcd"] = Path(traffic.fcd)
     return inputs
 
 

@@ -114,8 +114,8 @@ _ALTERNATIVES: tuple[tuple[str, str, Any, str], ...] = (
     ),
 )
 
-# More vehicles or pedestrians than any map can hold.
-_MOST_TRAFFIC = 2000
+# What to do where a map has no recorded traffic, or too little.
+SUMO_INSTEAD = "give a trace of SUMO instead, with traffic: {fcd: FILE}"
 
 
 class RideConfig(Section):
@@ -162,8 +162,6 @@ class DriverConfig(Section):
         lane_changes: average number of lane changes per kilometre [1/km], where
             there is a neighbouring lane. The car returns to its lane after 15
             to 270 m.
-        follows: whether the car moves among the vehicles of `traffic` and keeps
-            its distance to the vehicle ahead.
         seed: seed of all random choices of the driver: a number or a text. By
             default the name of the drive.
     """
@@ -171,7 +169,6 @@ class DriverConfig(Section):
     wander: float = Field(default=0.0, ge=0.0, le=1.0)
     wander_length: float = Field(default=50.0, ge=20.0, le=1000.0)
     lane_changes: float = Field(default=0.0, ge=0.0, le=10.0)
-    follows: bool = False
     seed: int | str | None = None
 
     @field_validator("seed", mode="before")
@@ -201,9 +198,7 @@ class DriverConfig(Section):
 # Pairs of drives of Boreas and of MulRan KAIST differ by 0.5 m in a lane, and
 # are in different lanes on 10 to 17 % of the way. The correlation of their
 # offsets is 1/e at 45 to 55 m; changes of lane shorten it.
-REAL_DRIVER = DriverConfig(
-    wander=0.35, wander_length=65.0, lane_changes=9.0, follows=True
-)
+REAL_DRIVER = DriverConfig(wander=0.35, wander_length=65.0, lane_changes=9.0)
 
 
 class TrafficConfig(Section):
@@ -211,19 +206,22 @@ class TrafficConfig(Section):
 
     Attributes:
         vehicles: number of cars, vans, trucks, buses, motorcycles and bicycles
-            that drive along the map's roads.
-        walkers: number of pedestrians on the map's sidewalks and crossings.
-        seed: seed of all random choices for vehicles and pedestrians: their
-            kinds, starting places and routes.
-        fcd: file of a SUMO trace (floating-car data) to replay instead of
-            planned traffic; `vehicles` and `walkers` must then be 0.
+            from the map's recorded traffic, at most 60. The shipped maps have
+            recorded traffic of 600 s.
+        walkers: number of pedestrians from the map's recorded traffic, at most
+            60.
+        seed: seed of all random choices: which vehicles and pedestrians, from
+            when on in the recorded traffic; kinds, in queues and in a trace
+            that names none.
+        fcd: file of a SUMO trace (floating-car data) to replay instead;
+            `vehicles` and `walkers` must then be 0.
         queues: whether vehicles stand in queues in all lanes, as in a rush
             hour, except where the recording vehicle is. No other traffic is
             then possible.
     """
 
-    vehicles: int = Field(default=0, ge=0, le=_MOST_TRAFFIC)
-    walkers: int = Field(default=0, ge=0, le=_MOST_TRAFFIC)
+    vehicles: int = Field(default=0, ge=0)
+    walkers: int = Field(default=0, ge=0)
     seed: int = Field(default=1, ge=0)
     fcd: str | None = field_off_by_default(None)
     queues: bool = field_off_by_default(False)
@@ -243,13 +241,14 @@ class TrafficConfig(Section):
         return self
 
     @property
+    def is_recorded(self) -> bool:
+        """Whether there is some of the map's recorded traffic."""
+        return self.vehicles > 0 or self.walkers > 0
+
+    @property
     def is_off(self) -> bool:
         """Whether there is no traffic."""
-        return (
-            self.fcd is None
-            and self.vehicles == self.walkers == 0
-            and not self.queues
-        )
+        return self.fcd is None and not (self.is_recorded or self.queues)
 
 
 class TransientConfig(Section):

@@ -20,7 +20,7 @@ from cns_drake.base import (
     value_errors,
     write_text,
 )
-from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario import SUMO_INSTEAD, Scenario
 from cns_drake.scenarios.shipped import shipped_drives, shipped_maps
 from cns_drake.scene import MapFolder, drive_name
 from cns_drake.sensors import KALIBR_FILE
@@ -237,7 +237,8 @@ def check_files(scenario: Scenario, source: object = None) -> None:
     """Checks that all files that a scenario names exist.
 
     The files are the map, stage, world, waypoints, IMU file and SUMO trace.
-    With traffic, the map must have roads or lanes.
+    Traffic needs a map: queues need roads, and vehicles and pedestrians the
+    map's recorded traffic.
 
     Args:
         scenario: the scenario.
@@ -263,9 +264,9 @@ def check_files(scenario: Scenario, source: object = None) -> None:
             )
     if scenario.imu.kalibr is not None:
         scenario.imu.sample_rate(scenario.fastest_rate)
-    has_traffic = not scenario.traffic.is_off
+    traffic = scenario.traffic
     if scenario.map is None:
-        if has_traffic:
+        if not traffic.is_off:
             raise InputError(
                 f"{source}: traffic: a world has no roads; give a map with some"
             )
@@ -284,10 +285,15 @@ def check_files(scenario: Scenario, source: object = None) -> None:
             f"{source}: stage: map '{scenario.map}' has no stage "
             f"'{scenario.stage}'; it has: {stages}"
         )
-    if has_traffic and not (folder.roads.is_file() or folder.lanes.is_file()):
+    if traffic.queues and not folder.roads.is_file():
         raise InputError(
-            f"{source}: traffic: the map has no roads: neither "
-            f"{folder.roads.name} nor {folder.lanes.name} in {folder.path}"
+            f"{source}: traffic: queues: no {folder.roads.name} in "
+            f"{folder.path}: {SUMO_INSTEAD}"
+        )
+    if traffic.is_recorded and not folder.traffic.is_file():
+        raise InputError(
+            f"{source}: traffic: no recorded traffic, {folder.traffic.name}, "
+            f"in {folder.path}: {SUMO_INSTEAD}"
         )
 
 

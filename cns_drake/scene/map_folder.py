@@ -11,6 +11,7 @@ PLAN_NAME = "city.yaml"
 STAGES_NAME = "stages.yaml"
 STRUCTURES_NAME = "structures.csv"
 LANES_NAME = "lanes.json"
+TRAFFIC_NAME = "traffic.npz"
 MESH_FOLDER = "meshes"
 
 
@@ -27,6 +28,7 @@ class MapFolder:
         name: the name of the map.
         roads: the road network.
         lanes: lanes and walkways of an imported map, for traffic.
+        traffic: recorded traffic on the map's roads and sidewalks.
         plan: the generated city's plan, from which its stages are made.
         stage_plan: the table that lists, for each stage, which structures are
             missing.
@@ -42,6 +44,7 @@ class MapFolder:
         self.name = path.name
         self.roads = path / ROADS_NAME
         self.lanes = path / LANES_NAME
+        self.traffic = path / TRAFFIC_NAME
         self.plan = path / PLAN_NAME
         self.stage_plan = path / STAGES_NAME
         self.structures = path / STRUCTURES_NAME

@@ -6,9 +6,11 @@ from cns_drake.simulation.scan_files import save_scan as save_scan
 from cns_drake.simulation.scanning import scan_world as scan_world
 from cns_drake.simulation.scanning import still_scene as still_scene
 from cns_drake.simulation.scenario_traffic import EGO_BOX as EGO_BOX
-from cns_drake.simulation.scenario_traffic import load_ways as load_ways
 from cns_drake.simulation.scenario_traffic import (
     plan_scenario_traffic as plan_scenario_traffic,
+)
+from cns_drake.simulation.scenario_traffic import (
+    recorded_traffic as recorded_traffic,
 )
 from cns_drake.simulation.sensor_recording import (
     add_mcap_recorder as add_mcap_recorder,

@@ -32,9 +32,7 @@ from cns_drake.pictures import height_rgb
 from cns_drake.scenarios import DrivePlan, Scenario, plan_drive
 from cns_drake.sensors import CameraSection, check_renderer, optical_pose
 from cns_drake.simulation.loaded_drive import load_drive
-from cns_drake.simulation.scenario_traffic import load_ways
 from cns_drake.simulation.station import make_station
-from cns_drake.traffic import room_for_vehicles, room_for_walkers
 
 # Images per second.
 RATE = 10
@@ -58,16 +56,15 @@ _TRAFFIC = 60
 def with_some_traffic(scenario: Scenario) -> Scenario:
     """Adds 60 vehicles and 60 pedestrians to a scenario without traffic.
 
-    A scenario that already has traffic, or whose streets have no room for so
-    much traffic, is returned unchanged.
+    A scenario that already has traffic, or whose map has no recorded traffic,
+    is returned unchanged.
     """
-    folder = scenario.folder
-    is_possible = folder.roads.is_file() or folder.lanes.is_file()
-    if scenario.map is None or not is_possible or not scenario.traffic.is_off:
+    has_recorded = scenario.map is not None and (
+        scenario.folder.traffic.is_file()
+    )
+    if not has_recorded or not scenario.traffic.is_off:
         return scenario
-    graph, walkways, _ = load_ways(folder)
-    room = min(room_for_vehicles(graph), room_for_walkers(walkways))
-    return scenario if room < _TRAFFIC else scenario.with_traffic(_TRAFFIC)
+    return scenario.with_traffic(_TRAFFIC)
 
 
 def check_film(path: Path, size: tuple[int, int]) -> None:

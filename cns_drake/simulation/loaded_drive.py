@@ -185,28 +185,19 @@ class LoadedDrive:
 def load_drive(plan: DrivePlan) -> LoadedDrive:
     """Plans the traffic of a drive, and loads its stage.
 
-    If the vehicle keeps its distance to the vehicle ahead (field
-    `driver.follows`), the drive is slower than planned without traffic.
-
     Raises:
         InputError: the scenario cannot be run.
     """
     scenario = plan.scenario
     doing("planning the drive")
     trajectory = plan.trajectory
-    if not scenario.driver.follows:
-        count_frames(scenario, trajectory)  # An error comes at once.
+    frames = count_frames(scenario, trajectory)  # An error comes at once.
     world = load_stage(plan)
     traffic = None
     if not scenario.traffic.is_off:
-        doing("planning the traffic")
+        doing("reading the traffic")
         traffic = plan_traffic_of_drive(plan, trajectory, world)
         world = with_traffic(world, traffic)
-        if traffic.positions is not None:
-            trajectory = plan.trajectory_at(traffic.positions)
     return LoadedDrive(
-        scenario.replaced(frames=count_frames(scenario, trajectory)),
-        trajectory,
-        world,
-        traffic,
+        scenario.replaced(frames=frames), trajectory, world, traffic
     )

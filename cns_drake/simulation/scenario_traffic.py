@@ -1,48 +1,39 @@
 """The traffic of a scenario: its plan, and its structures in the world."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base import InputError, arctan2
 from cns_drake.motion import Trajectory
-from cns_drake.recording import FRAME_PERIOD
-from cns_drake.roads import RoadNetwork, load_road_network
-from cns_drake.scenarios import DrivePlan, Scenario, TrafficConfig, count_frames
-from cns_drake.scene import GROUND_CLASSES, MapFolder, World
-from cns_drake.simulation.stage_loading import load_stage
+from cns_drake.roads import load_road_network
+from cns_drake.scenarios import (
+    SUMO_INSTEAD,
+    DrivePlan,
+    Scenario,
+    check_files,
+    count_frames,
+)
+from cns_drake.scene import World
 from cns_drake.traffic import (
     EgoBox,
     EgoPath,
     LaneFile,
-    LaneGraph,
     TrafficPlan,
-    Walkway,
-    kept_clear,
     make_lane_graph,
     make_walkways,
     plan_queues,
-    plan_traffic,
+    play_recorded,
     play_trace,
     read_fcd,
     read_lanes,
-    room_for_vehicles,
-    room_for_walkers,
+    read_recorded,
     traffic_structures,
-    with_unmarked_crossings,
 )
-from cns_drake.transient import geometry_by_structure
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
-# A car that follows others takes at most this multiple of the time that it
-# would need alone, plus a wait.
-_SLOWEST_RATIO = 6.0
-# This wait [s].
-_LONGEST_WAIT = 600.0
 
 
 def plan_scenario_traffic(
@@ -57,14 +48,13 @@ def plan_scenario_traffic(
             not be part of a diagram yet.
 
     Raises:
-        InputError: the map has no roads or sidewalks, or no room for that many
-            vehicles or pedestrians, or a SUMO trace cannot be replayed on this
-            map.
+        InputError: the map has no recorded traffic or not so much, or a SUMO
+            trace cannot be replayed on this map.
 
     Example:
         from cns_drake import load_scenario, plan_drive, plan_scenario_traffic
 
-        scenario = load_scenario("metropolis_04").with_traffic(60)
+        scenario = load_scenario("metropolis_04").with_traffic(40)
         plan = plan_scenario_traffic(scenario, plan_drive(scenario))
     """
     return plan_traffic_of_drive(DrivePlan(scenario), trajectory, world)
@@ -79,37 +69,69 @@ def plan_traffic_of_drive(
     """
     scenario = drive.scenario
     wanted = scenario.traffic
-    graph, walkways, _ = load_ways(scenario.folder, drive.network)
+    check_files(scenario)
     ego = _ego_path(trajectory)
+    last_frame = (
+        count_frames(scenario, trajectory) - 1
+    ) * scenario.frame_period
+    if wanted.queues:
+        assert drive.network is not None
+        return plan_queues(
+            drive.network,
+            seed=wanted.seed,
+            duration=trajectory.duration,
+            ego=ego,
+            ego_box=EGO_BOX,
+        )
     if wanted.fcd is not None:
         trace = Path(wanted.fcd)
-        num_frames = count_frames(scenario, trajectory)
+        graph, walkways, _ = load_ways(drive)
         return play_trace(
             read_fcd(trace),
             trace,
             graph,
             walkways,
             seed=wanted.seed,
-            duration=(num_frames - 1) * scenario.frame_period,
+            duration=last_frame,
             end=trajectory.duration,
             ego=ego,
             ego_box=EGO_BOX,
         )
-    if wanted.queues:
-        return plan_queues(
-            graph,
-            seed=wanted.seed,
-            duration=trajectory.duration,
-            ego=ego,
-            ego_box=EGO_BOX,
+    recorded = recorded_traffic(scenario)
+    if last_frame > recorded.vehicles.duration:
+        raise InputError(
+            f"{scenario.source}: traffic: the recorded traffic of the map takes"
+            f" {recorded.vehicles.duration:g} s, but the drive takes"
+            f" {last_frame:.2f} s: lower frames, or {SUMO_INSTEAD}"
         )
-    _check_room(wanted, _error_source(scenario), graph, walkways)
-    if wanted.walkers:
-        world = world or load_stage(drive, with_vehicle=False)
-        obstacles = _sidewalk_obstacles(world)
-        walkways = kept_clear(walkways, obstacles)
-        graph, walkways = with_unmarked_crossings(graph, walkways, obstacles)
-    return _plan_moving_traffic(scenario, trajectory, ego, graph, walkways)
+    return play_recorded(
+        recorded,
+        vehicles=wanted.vehicles,
+        walkers=wanted.walkers,
+        seed=wanted.seed,
+        duration=trajectory.duration,
+        ego=ego,
+        ego_box=EGO_BOX,
+    )
+
+
+def recorded_traffic(scenario: Scenario) -> TrafficPlan:
+    """Returns the recorded traffic of a scenario's map.
+
+    Raises:
+        InputError: the file cannot be used, or has too little traffic for the
+            scenario.
+    """
+    recorded = read_recorded(scenario.folder.traffic)
+    there = len(recorded.kinds), recorded.walkers.values.shape[1]
+    for who, most in zip(("vehicles", "walkers"), there, strict=True):
+        wanted = getattr(scenario.traffic, who)
+        if wanted > most:
+            raise InputError(
+                f"{scenario.source}: traffic: {who}: {wanted} are too many; the"
+                f" recorded traffic of the map has {most}: {SUMO_INSTEAD}"
+            )
+    return recorded
 
 
 def _ego_path(trajectory: Trajectory) -> EgoPath:
@@ -126,106 +148,18 @@ def _ego_path(trajectory: Trajectory) -> EgoPath:
     return ego
 
 
-def _error_source(scenario: Scenario) -> str:
-    """Returns the start of the message of an error in the traffic's fields."""
-    return f"{scenario.source}: traffic"
-
-
-def _plan_moving_traffic(
-    scenario: Scenario,
-    trajectory: Trajectory,
-    ego: EgoPath,
-    graph: LaneGraph,
-    walkways: Sequence[Walkway],
-) -> TrafficPlan:
-    """Plans vehicles and pedestrians that move by their own rules.
-
-    Raises:
-        InputError: there is no room for a vehicle, or the car that follows
-            other vehicles never arrives.
-    """
-    wanted = scenario.traffic
-    follows = scenario.driver.follows
-    plan = plan_traffic(
-        graph,
-        walkways,
-        vehicles=wanted.vehicles,
-        walkers=wanted.walkers,
-        seed=wanted.seed,
-        # Traffic is planned for the whole drive, not only for its frames.
-        duration=_SLOWEST_RATIO * trajectory.duration + _LONGEST_WAIT
-        if follows
-        else trajectory.duration + FRAME_PERIOD,
-        ego=(lambda t: ego(0.0 * t)) if follows else ego,
-        ego_box=EGO_BOX,
-        drive=trajectory if follows else None,
-    )
-    if wanted.vehicles and not plan.kinds:
-        raise InputError(
-            f"{_error_source(scenario)}: the car leaves no room for vehicles"
-        )
-    if follows and plan.positions is None:
-        raise InputError(
-            f"{scenario.source}: driver: follows: the car is held up for ever; "
-            "take fewer vehicles"
-        )
-    return plan
-
-
-def _sidewalk_obstacles(world: World) -> list[BaseGeometry]:
-    """Returns footprints of objects that can stand on sidewalks [m].
-
-    Buildings are left out, because walkways lead along them.
-    """
-    passed = GROUND_CLASSES | {"building"}
-    structures = geometry_by_structure(
-        world, lambda name: world.structures[name].semantic_class not in passed
-    )
-    return [structure.footprint for structure in structures.values()]
-
-
-def load_ways(
-    folder: MapFolder, network: RoadNetwork | None = None
-) -> LaneFile:
+def load_ways(drive: DrivePlan) -> LaneFile:
     """Returns the lanes and walkways that traffic follows on a map.
-
-    Args:
-        folder: the map.
-        network: the map's road network, if already loaded.
 
     Raises:
         InputError: the map has neither roads nor lanes.
     """
+    folder = drive.scenario.folder
     if not folder.roads.is_file():
         return read_lanes(folder.lanes)
-    network = network or load_road_network(folder.roads)
+    network = drive.network or load_road_network(folder.roads)
     graph = make_lane_graph(network)
     return LaneFile(graph, make_walkways(network, graph))
-
-
-def _check_room(
-    wanted: TrafficConfig,
-    where: str,
-    graph: LaneGraph,
-    walkways: Sequence[Walkway],
-) -> None:
-    """Checks that roads and sidewalks have room for the traffic."""
-    room = room_for_vehicles(graph)
-    if wanted.vehicles > room:
-        raise InputError(
-            f"{where}: vehicles: {wanted.vehicles} are too many; the roads "
-            f"hold {room}"
-        )
-    room = room_for_walkers(walkways)
-    if wanted.walkers and not room:
-        raise InputError(
-            f"{where}: walkers: the map has no sidewalks; leave walkers out"
-        )
-    if wanted.walkers > room:
-        raise InputError(
-            f"{where}: walkers: {wanted.walkers} are too many; the sidewalks "
-            f"hold {room}"
-        )
 
 
 def with_traffic(world: World, plan: TrafficPlan) -> World:
@@ -239,7 +173,6 @@ def with_traffic(world: World, plan: TrafficPlan) -> World:
     notes = world.notes + plan.notes
     if plan.left_out:
         notes += (
-            f"traffic: {plan.left_out} left out: they would have met others "
-            "or the car",
+            f"traffic: {plan.left_out} left out: they would have met the car",
         )
     return replace(world, structures=table.joined(entries), notes=notes)

@@ -1,7 +1,8 @@
 """Road users that move during a drive: a public noun, the traffic plan.
 
-The motion of vehicles and pedestrians is planned before the drive, from the
-roads and a seed. During the drive, the poses are interpolated from this plan.
+The motion of vehicles and pedestrians is read before the drive, from a map's
+recorded traffic or a trace of SUMO. During the drive, the poses are
+interpolated.
 """
 
 from cns_drake.base import attach

@@ -13,13 +13,13 @@ from cns_drake.traffic.lane_graph import make_crossing as make_crossing
 from cns_drake.traffic.lane_joining import DirectedLane as DirectedLane
 from cns_drake.traffic.lane_joining import join_lanes as join_lanes
 from cns_drake.traffic.lane_joining import usual_limit as usual_limit
-from cns_drake.traffic.overlaps import find_overlaps as find_overlaps
 from cns_drake.traffic.polylines import SPACING as SPACING
 from cns_drake.traffic.polylines import resampled as resampled
 from cns_drake.traffic.queues import plan_queues as plan_queues
+from cns_drake.traffic.recorded_traffic import play_recorded as play_recorded
+from cns_drake.traffic.recorded_traffic import read_recorded as read_recorded
 from cns_drake.traffic.road_lanes import make_lane_graph as make_lane_graph
 from cns_drake.traffic.road_lanes import make_walkways as make_walkways
-from cns_drake.traffic.traffic_motion import WALKER_SIZE as WALKER_SIZE
 from cns_drake.traffic.traffic_motion import TrafficMotion as TrafficMotion
 from cns_drake.traffic.traffic_motion import add_traffic as add_traffic
 from cns_drake.traffic.traffic_motion import connect_traffic as connect_traffic
@@ -27,14 +27,3 @@ from cns_drake.traffic.traffic_motion import (
     traffic_structures as traffic_structures,
 )
 from cns_drake.traffic.traffic_plan import TrafficPlan as TrafficPlan
-from cns_drake.traffic.traffic_planning import plan_traffic as plan_traffic
-from cns_drake.traffic.traffic_planning import (
-    room_for_vehicles as room_for_vehicles,
-)
-from cns_drake.traffic.unmarked_crossings import (
-    with_unmarked_crossings as with_unmarked_crossings,
-)
-from cns_drake.traffic.vehicle_records import CURRENT as CURRENT
-from cns_drake.traffic.vehicle_records import VEHICLE as VEHICLE
-from cns_drake.traffic.walkers import room_for_walkers as room_for_walkers
-from cns_drake.traffic.walkway_clearing import kept_clear as kept_clear

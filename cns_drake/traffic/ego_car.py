@@ -1,6 +1,6 @@
-"""The ego car's box, and when it is on each lane and crossing."""
+"""The ego car's box, and which road users it would meet."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,15 +8,11 @@ import shapely
 
 from cns_drake.base import cos, sin
 from cns_drake.roads import outlines
-from cns_drake.traffic.lane_graph import LaneGraph
+from cns_drake.traffic.tracks import Tracks
 
-# Time step of the plan [s].
+# Greatest time between two comparisons of road users with the ego car [s]: they
+# notice everything that crosses its path.
 STEP = 0.1
-# Half the width of the strip of a lane that vehicles need, including their
-# distance from the ego car [m].
-_HALF_LANE = 1.45
-# Least distance of two places whose direction is computed [m].
-_LEAST_LENGTH = 1e-6
 # The ego car's motion: times (K,) -> places (K, 2) [m] and headings (K,) [rad].
 EgoPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
@@ -61,90 +57,43 @@ class EgoBox(NamedTuple):
         return outlines(xy, ahead, -self.rear, self.front, self.half_width)
 
 
-class EgoPlaces(NamedTuple):
-    """Where the ego car is at K times, by P pieces and C crossings.
-
-    Attributes:
-        until: (K, P + C) float32, see `Streets.until`.
-        rear, front: (K, P) float32, see `Streets.ego_rear`.
-        speed: (K, P) float32, see `Streets.ego_speed`.
-    """
-
-    until: np.ndarray
-    rear: np.ndarray
-    front: np.ndarray
-    speed: np.ndarray
+# Number of times that are compared at once.
+_AT_ONCE = 200
 
 
-def find_ego(
-    graph: LaneGraph, box: EgoBox, xy: np.ndarray, yaw: np.ndarray
-) -> EgoPlaces:
-    """Returns on which pieces and crossings the ego car is, and when.
-
-    For the arguments, see `cns_drake.traffic.streets.make_streets`.
-    """
-    # A car that stands is processed only once.
-    poses = np.column_stack([xy, yaw])
-    is_new = np.append(True, (np.diff(poses, axis=0) != 0.0).any(axis=1))
-    corners = box.corners(xy[is_new], yaw[is_new])
-    lines = np.array(
-        [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
-    )
-    areas = [
-        line.buffer(_HALF_LANE, cap_style="flat", join_style="mitre")
-        for line in lines
-    ] + [crossing.area for crossing in graph.crossings]
-    which, places = shapely.STRtree(areas).query(
-        shapely.polygons(corners), predicate="intersects"
-    )
-    until = np.full((len(corners), len(areas)), np.inf, np.float32)
-    until[which, places] = 0.0
-    on_piece = places < len(lines)
-    which, places = which[on_piece], places[on_piece]
-    along = shapely.line_locate_point(
-        lines[places][:, None], shapely.points(corners[which])
-    )
-    behind, ahead = along.min(axis=1), along.max(axis=1)
-    rear, front, x, y = np.zeros((4, len(corners), len(lines)))
-    rear[which, places], front[which, places] = behind, ahead
-    x[which, places], y[which, places] = _tangents(
-        lines[places], behind, ahead
-    ).T
-    velocity = np.gradient(xy, STEP, axis=0)
-    pose = np.cumsum(is_new) - 1
-    speed = velocity[:, :1] * x[pose] + velocity[:, 1:] * y[pose]
-    return EgoPlaces(
-        _times_until(until[pose]),
-        *(each.astype(np.float32) for each in (rear[pose], front[pose], speed)),
-    )
-
-
-def _tangents(
-    lines: np.ndarray, behind: np.ndarray, ahead: np.ndarray
+def meets_ego(
+    tracks: Tracks,
+    sizes: Sequence[tuple[float, ...]],
+    times: np.ndarray,
+    ego: EgoPath,
+    box: EgoBox,
 ) -> np.ndarray:
-    """Returns unit vectors (N, 2) from one place of each line to another.
+    """Returns (N,) which bodies overlap the ego car at any of the times.
 
     Args:
-        lines: (N,) the lines.
-        behind, ahead: (N,) places along the lines [m].
+        tracks: tracks of the N bodies, with the coordinates of `TrafficPlan`.
+        sizes: length and width of each body's box [m]; a height is ignored.
+        times: (K,) the times [s].
+        ego: motion of the ego car.
+        box: size of the ego car.
     """
-    tangent = np.subtract(
-        *(
-            shapely.get_coordinates(shapely.line_interpolate_point(lines, end))
-            for end in (ahead, behind)
+    half = np.array([size[:2] for size in sizes]).reshape(-1, 2) / 2
+    reach = np.hypot(*half.T) + np.hypot(*box.half_size)
+    met = np.zeros(len(half), bool)
+    for some in np.array_split(times, len(times) // _AT_ONCE + 1):
+        xy, yaw = ego(some)
+        values, _ = tracks.at(some)
+        x, y = np.moveaxis(values[:, :, :2], -1, 0)
+        middle = box.middles(xy, yaw)
+        near = np.hypot(x - middle[:, :1], y - middle[:, 1:2]) < reach
+        time, body = np.nonzero(near & tracks.is_present(some))
+        own = values[time, body]
+        ahead = np.column_stack([cos(own[:, 3]), sin(own[:, 3])])
+        long, wide = half[body, :1], half[body, 1:]
+        bodies = outlines(own[:, :2], ahead, long, long, wide)
+        overlap = shapely.intersects(
+            np.asarray(shapely.polygons(box.corners(xy[time], yaw[time]))),
+            np.asarray(shapely.polygons(bodies)),
         )
-    )
-    length = np.linalg.norm(tangent, axis=1)
-    return tangent / np.maximum(length, _LEAST_LENGTH)[:, None]
-
-
-def _times_until(until: np.ndarray) -> np.ndarray:
-    """Returns the times until the ego car is at places, at each time step [s].
-
-    Args:
-        until: (K, N) 0 where the ego car is at the place, otherwise infinite;
-            changed in place.
-    """
-    for k in range(len(until) - 2, -1, -1):
-        np.minimum(until[k], until[k + 1] + STEP, out=until[k])
-    return until
+        met[body[overlap]] = True
+    return met

@@ -21,14 +21,15 @@ from cns_drake.base import (
     step_lengths,
     value_errors,
 )
-from cns_drake.traffic.ego_car import EgoBox, EgoPath
+from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meets_ego
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
-from cns_drake.traffic.overlaps import find_overlaps
-from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
 from cns_drake.traffic.tracks import Tracks
-from cns_drake.traffic.traffic_plan import TrafficPlan
+from cns_drake.traffic.traffic_plan import (
+    WALKER_SIZE,
+    TrafficPlan,
+    gait_phases,
+)
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
-from cns_drake.traffic.walkers import gait_rate
 
 # In a trace that belongs to the map, at least half of the vehicles are closer
 # than this to its lanes [m].
@@ -37,9 +38,6 @@ _OFF_ROAD = 5.0
 _OFF_ROAD_PERSONS = 50.0
 # A drive may take this much longer than the trace because of rounding [s].
 _ROUNDING = 1e-6
-# Greatest time between two comparisons of road users with the ego car [s]: they
-# notice everything that crosses its path.
-_COMPARISON_STEP = 0.1
 # Kinds of cars from which a vehicle of unknown type is drawn.
 _CARS = tuple(kind for kind in KINDS if kind.semantic_class == "car")
 # Heights that differ by more than this belong to different roads [m].
@@ -426,12 +424,12 @@ def play_trace(
     ground = _LaneHeights(np.concatenate([lanes, *strips]))
     rows = [_person_rows(person, ground, trace.dt) for person in trace.persons]
     walkers = _make_tracks(trace, trace.persons, rows)
-    half = [(kind.size[0] / 2, kind.size[1] / 2) for kind in kinds]
-    step = min(trace.dt, _COMPARISON_STEP)
+    step = min(trace.dt, STEP)
     times = np.arange(0.0, min(trace.duration, end) + step, step)
-    kept = ~_meet_ego(vehicles, half, times, ego, ego_box)
-    half = [(WALKER_LENGTH / 2, WALKER_WIDTH / 2)] * len(trace.persons)
-    kept_walkers = ~_meet_ego(walkers, half, times, ego, ego_box)
+    sizes = [kind.size for kind in kinds]
+    kept = ~meets_ego(vehicles, sizes, times, ego, ego_box)
+    sizes = [WALKER_SIZE] * len(trace.persons)
+    kept_walkers = ~meets_ego(walkers, sizes, times, ego, ego_box)
     return TrafficPlan(
         tuple(
             kind for kind, is_kept in zip(kinds, kept, strict=True) if is_kept
@@ -605,11 +603,9 @@ def _person_rows(
         heights: heights of lanes and walkways.
         dt: time between two steps [s].
     """
-    steps = step_lengths(person.xy)
-    turned = dt * gait_rate(steps / dt)
     # A random phase that depends only on the name.
     start = zlib.crc32(person.name.encode()) % 1000 * 2e-3 * np.pi
-    phase = start + np.concatenate([[0.0], np.cumsum(turned)])
+    phase = start + gait_phases(person.xy, dt)
     z = heights.along(person.xy, person.z, None)
     return np.column_stack([person.xy, z, person.yaw, phase])
 
@@ -643,32 +639,3 @@ def _make_tracks(
         )
         present[road_user.steps, k] = True
     return Tracks(trace.dt, values, present)
-
-
-def _meet_ego(
-    tracks: Tracks,
-    half: Sequence[tuple[float, float]],
-    times: np.ndarray,
-    ego: EgoPath,
-    box: EgoBox,
-) -> np.ndarray:
-    """Returns (N,) which bodies overlap the ego car at any of the times.
-
-    Args:
-        tracks: tracks of the N bodies.
-        half: half the length and half the width of each body [m].
-        times: (K,) the times [s].
-        ego: motion of the ego car.
-        box: size of the ego car.
-    """
-    num = len(half)
-    poses = np.full((len(times), 1 + num, 3), np.nan)
-    poses[:, 0] = box.middles(*ego(times))
-    for k, time in enumerate(times):
-        there = np.flatnonzero(tracks.is_present(time))
-        values, _ = tracks.at(time)
-        poses[k, 1 + there] = values[there][:, [0, 1, 3]]
-    halves = np.array([box.half_size, *half])
-    found = np.zeros((1 + num, 1 + num), bool)
-    find_overlaps(poses, halves, found)
-    return found[0, 1:]

@@ -28,6 +28,11 @@ class Tracks:
     values: np.ndarray
     present: np.ndarray | None = None
 
+    @property
+    def duration(self) -> float:
+        """The time of the last entry [s]."""
+        return self.dt * (len(self.values) - 1)
+
     def at(self, t: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Returns the bodies' coordinates at a time t [s], and their rates.
 

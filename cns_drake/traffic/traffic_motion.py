@@ -24,11 +24,8 @@ from cns_drake.recording import RecordedObjects
 from cns_drake.scene import MAX_INSTANCE, StructureEntry, StructureTable
 from cns_drake.sensors import check_unused_names
 from cns_drake.traffic.body_shapes import Limb, vehicle_limbs, walker_limbs
-from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
-from cns_drake.traffic.traffic_plan import TrafficPlan
+from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 
-# A pedestrian's box, which contains swinging limbs [m].
-WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
 # Faster bodies are labelled as moving, all others as standing [m/s].
 MOVING_SPEED = 0.5
 # Speed at which limbs swing with their full amplitude [m/s].
@@ -97,7 +94,7 @@ class TrafficMotion(LeafSystem):
         """Declares the ports.
 
         Args:
-            plan: planned motion.
+            plan: their motion.
             bodies: the vehicles of the plan, and then its pedestrians.
             source_id: geometry source of the bodies.
             turn: time over which the output `body_spatial_velocities` is
@@ -193,10 +190,10 @@ class TrafficMotion(LeafSystem):
 
 
 def traffic_structures(plan: TrafficPlan, first: int = 1) -> StructureTable:
-    """Returns a table with name, instance id and class of all planned bodies.
+    """Returns a table with name, instance id and class of all bodies.
 
     Args:
-        plan: the planned traffic.
+        plan: the traffic.
         first: instance id of the first body; the ids of the other bodies
             follow.
 
@@ -239,7 +236,7 @@ def make_traffic(
     Args:
         scene_graph: SceneGraph to which the geometry is added, under a source
             of its own.
-        plan: the planned traffic.
+        plan: the traffic.
         seed: seed of colours and sizes.
         structures: table with an instance id for each body; by default
             `traffic_structures` of the plan.
@@ -282,7 +279,7 @@ def add_traffic(
     Args:
         builder: builder of a diagram with `scene_graph`.
         scene_graph: SceneGraph to which the geometry is added.
-        plan: the planned traffic.
+        plan: the traffic.
         seed: seed of colours and sizes.
         structures: table with an instance id for each body; by default
             `traffic_structures` of the plan.
@@ -417,7 +414,7 @@ def bodies_at(plan: TrafficPlan, t: float) -> BodyStates:
     """Returns the states of all bodies at a time.
 
     Args:
-        plan: the planned traffic.
+        plan: the traffic.
         t: time since the start of the drive [s].
     """
     vehicles, vehicle_rates = plan.vehicles.at(t)

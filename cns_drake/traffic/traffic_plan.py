@@ -1,4 +1,4 @@
-"""The planned motion of all traffic in a drive."""
+"""The motion of all traffic in a drive."""
 
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ import numpy as np
 from cns_drake.traffic.tracks import Tracks
 from cns_drake.traffic.vehicle_kinds import VehicleKind
 
+# A pedestrian's box, which contains swinging limbs: length, width, height [m].
+WALKER_SIZE = (0.84, 0.6, 1.8)
+
 
 @dataclass(frozen=True)
 class TrafficPlan:
-    """The planned motion of vehicles and pedestrians.
+    """The motion of vehicles and pedestrians.
 
     Attributes:
         kinds: kind of each of the N vehicles.
@@ -21,11 +24,8 @@ class TrafficPlan:
             [rad].
         walkers: tracks of the pedestrians, with five coordinates each: x, y, z
             on the ground [m], yaw and phase of the gait [rad].
-        left_out: number of requested bodies that are left out because they
-            would collide.
-        positions: (K,) distances of the ego car along its path at times
-            `cns_drake.motion.speed_profile.KNOT_PERIOD` apart [m]; None if the
-            ego car does not follow other vehicles.
+        left_out: number of bodies that are left out because they would meet the
+            ego car.
         notes: notes for the user.
     """
 
@@ -33,5 +33,20 @@ class TrafficPlan:
     vehicles: Tracks
     walkers: Tracks
     left_out: int = 0
-    positions: np.ndarray | None = None
     notes: tuple[str, ...] = ()
+
+
+def gait_phases(xy: np.ndarray, dt: float) -> np.ndarray:
+    """Returns how the phase of pedestrians' gait grows from 0, (M, ...) [rad].
+
+    A stride consists of two steps. The length of a stride is 0.4 m plus the
+    distance walked in 0.7 s.
+
+    Args:
+        xy: (M, ..., 2) places of pedestrians at M times [m].
+        dt: time between two of these times [s].
+    """
+    speed = np.linalg.norm(np.diff(xy, axis=0), axis=-1) / dt
+    turned = dt * (2.0 * np.pi * speed / (0.7 * speed + 0.4))
+    start = np.zeros_like(xy[:1, ..., 0])
+    return np.concatenate([start, np.cumsum(turned, axis=0)])

@@ -23,9 +23,9 @@ from cns_drake.scenarios import (
     make_paths_absolute,
     plan_drive,
 )
-from cns_drake.scene import MapFolder, load_world, structures_in
+from cns_drake.scene import load_world, structures_in
 from cns_drake.sensors import Section, WeatherConfig
-from cns_drake.simulation import load_ways
+from cns_drake.simulation import recorded_traffic
 from cns_drake.studies.drives.named_stages import find_stage
 from cns_drake.studies.drives.sampled_drives import DrawnRoute
 from cns_drake.studies.drives.side_fields import QUERY_FIELDS
@@ -35,7 +35,6 @@ from cns_drake.studies.drives.viewpoints import (
     with_lidars_moved,
 )
 from cns_drake.studies.experiments.nested_fields import Changes
-from cns_drake.traffic import room_for_vehicles
 from cns_drake.units import check_preset, is_sheet_file
 from evaluation.results import LAST, OWN
 
@@ -44,10 +43,6 @@ _UNUSED_FIELDS = (*QUERY_FIELDS, "distractors", "years", "rates")
 # Sections whose random numbers depend on the seed of the condition.
 _SEEDED = ("transient", "traffic", "ride", "driver")
 _RETURNS = ("ideal", "calibrated")
-# Greatest share of the roads' room for traffic: the car needs some, too.
-_MOST_ROOM = 0.5
-# The same for a car that follows others, because then all wait for each other.
-_FOLLOWED_ROOM = 0.25
 
 # A function that takes a drive, years, rates of change and a seed. It returns
 # folder and stage of the drive's map, aged by these years.
@@ -105,7 +100,6 @@ class DriveChanger:
         # many drives of a fleet share one.
         self._drawn: dict[tuple[Path, float, int], Route] = {}
         self._networks: dict[Path, RoadNetwork] = {}
-        self._rooms: dict[Path, int] = {}
 
     def changed(
         self,
@@ -142,7 +136,7 @@ class DriveChanger:
         for name in _SEEDED:
             if isinstance(left.get(name), dict):
                 left[name] = {"seed": seed, **left[name]}
-        self._fit_traffic(drive, unchanged.folder, left)
+        self._fit_driver(drive, left)
         return self._with_scenario_fields(drive, place, left)
 
     def _with_sensors(
@@ -288,42 +282,16 @@ class DriveChanger:
             self._networks[roads] = load_road_network(roads)
         return self._networks[roads]
 
-    def _room(self, folder: MapFolder) -> int:
-        """Returns the number of vehicles that the roads of a map hold."""
-        if folder.path not in self._rooms:
-            has_roads = folder.roads.is_file()
-            network = self._network(folder.roads) if has_roads else None
-            graph = load_ways(folder, network).graph
-            self._rooms[folder.path] = room_for_vehicles(graph)
-        return self._rooms[folder.path]
-
-    def _fit_traffic(
-        self, drive: Scenario, folder: MapFolder, left: dict[str, Any]
-    ) -> None:
-        """Reduces traffic to what roads hold; drops impossible lane changes.
-
-        Args:
-            drive: the drive so far.
-            folder: the map of the unchanged drive, whose roads are the same.
-            left: fields of the drive, which are changed.
-        """
-        driver, traffic = (
-            one if isinstance(one := left.get(name), Mapping) else {}
-            for name in ("driver", "traffic")
-        )
-        if driver.get("lane_changes") and drive.waypoints:
+    def _fit_driver(self, drive: Scenario, left: dict[str, Any]) -> None:
+        """Drops impossible lane changes from the fields `left` of a drive."""
+        driver = left.get("driver")
+        if (
+            isinstance(driver, Mapping)
+            and driver.get("lane_changes")
+            and drive.waypoints
+        ):
             self._on_note("waypoints have no lanes to change")
             left["driver"] = {**driver, "lane_changes": 0.0}
-        if not traffic:
-            return
-        share = _FOLLOWED_ROOM if driver.get("follows") else _MOST_ROOM
-        most = int(share * self._room(folder))
-        for name in ("vehicles", "walkers"):
-            if isinstance(given := traffic.get(name), int) and given > most:
-                self._on_note(
-                    f"{given} {name} do not fit the roads; {most} move"
-                )
-                traffic = left["traffic"] = {**traffic, name: most}
 
     def _with_scenario_fields(
         self, drive: Scenario, place: str, left: Changes
@@ -370,6 +338,8 @@ class DriveChanger:
         where = f"{self._source}: {place}"
         with errors_at(where, f"{drive.source}: "):
             check_files(drive)
+            if "traffic" in given and drive.traffic.is_recorded:
+                recorded_traffic(drive)
             # Other sections seldom fail, and a plan takes time.
             if set(given) - {*_SEEDED, "seed"}:
                 count_frames(drive, plan_drive(drive))

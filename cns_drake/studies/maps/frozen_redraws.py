@@ -29,7 +29,7 @@ from evaluation.results import FROZEN_REDRAW
 
 _COLUMNS = ("map", "number", "seed", "turn_deg", "stages")
 # The driver, frozen with the seeds.
-_DRIVER = {"wander": 0.35, "lane_changes": 6.0, "follows": True}
+_DRIVER = {"wander": 0.35, "lane_changes": 6.0}
 
 
 @dataclass(frozen=True)

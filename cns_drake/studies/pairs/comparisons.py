@@ -294,7 +294,7 @@ class PairMaker:
                 missing = error
                 del left["stage"]
             try:
-                self._check_roads(left.get("traffic"))
+                self._check_traffic(left.get("traffic"))
             except MissingError as error:
                 missing = error
                 del left["traffic"]
@@ -311,17 +311,17 @@ class PairMaker:
         with errors_at(f"{self.source}: {place}.stage"):
             return find_stage(wanted, self._unchanged[side], self._last_stage)
 
-    def _check_roads(self, traffic: Any) -> None:
-        """Checks that the map has roads for its traffic."""
+    def _check_traffic(self, traffic: Any) -> None:
+        """Checks that the map has what its traffic needs."""
         folder = self.query.folder
-        has_roads = folder.roads.is_file() or folder.lanes.is_file()
-        if has_roads or not isinstance(traffic, Mapping):
+        if not isinstance(traffic, Mapping):
             return
-        if any(traffic.get(n) for n in ("vehicles", "walkers", "queues")):
-            raise MissingError(
-                f"neither {folder.roads.name} nor {folder.lanes.name}: no"
-                " traffic"
-            )
+        for needed, fields in (
+            (folder.traffic, ("vehicles", "walkers")),
+            (folder.roads, ("queues",)),
+        ):
+            if not needed.is_file() and any(map(traffic.get, fields)):
+                raise MissingError(f"no {needed.name}: no traffic")
 
     def _check_rates(
         self,
