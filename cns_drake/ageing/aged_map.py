@@ -52,11 +52,12 @@ from cns_drake.scenarios import (
     write_table,
 )
 from cns_drake.scene import (
-    LANES_NAME,
+    IMPORT_NAME,
     MAX_INSTANCE,
     MESH_FOLDER,
     ROADS_NAME,
     STRUCTURES_NAME,
+    TRAFFIC_NAME,
     USUAL_MATERIALS,
     MapFolder,
     check_new_map,
@@ -441,14 +442,15 @@ def _swept_area(trajectory: Trajectory) -> BaseGeometry:
 def _copy_inputs(
     folder: MapFolder, drives: Iterable[Path], draft: Path
 ) -> None:
-    """Copies roads, views and the waypoints of drives."""
+    """Copies roads, traffic, views and the waypoints of drives."""
     for path in drives:
         way = load_scenario(path).waypoints
         if way is not None:
             shutil.copyfile(way, draft / _way_name(path))
     for name in (
         ROADS_NAME,
-        LANES_NAME,
+        TRAFFIC_NAME,
+        IMPORT_NAME,
         folder.views.name,
     ):
         if is_there(folder.path / name):
@@ -482,7 +484,7 @@ def _write_drives(
         if "base" in values:
             scenario = load_scenario(path)
             values = describe_scenario(scenario, folder.path)
-        # Other files, such as recorded traffic, are not copied.
+        # Other files, such as traces of SUMO, are not copied.
         make_paths_absolute(values, path)
         kept = {
             key: value

@@ -1,10 +1,7 @@
 """An imported city, independent of its file format."""
 
 from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field
-
-import numpy as np
+from dataclasses import dataclass
 
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.imported_objects import ImportedObject
@@ -33,21 +30,6 @@ class SmallObject:
 
 
 @dataclass(frozen=True)
-class StreetPlaces:
-    """Crossings, traffic signals and footpaths of a city.
-
-    Attributes:
-        crossed: nodes of streets at which people cross.
-        signals: (N, 2) places of traffic signals [m].
-        paths: middle lines of footpaths, (M, 2) each [m].
-    """
-
-    crossed: AbstractSet[int] = frozenset()
-    signals: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
-    paths: Sequence[np.ndarray] = ()
-
-
-@dataclass(frozen=True)
 class ForeignCity:
     """The content of a city's file.
 
@@ -60,7 +42,6 @@ class ForeignCity:
         faults: counts of parts that were repaired or left out. Small objects
             count as left out, until a dressed city places them.
         streets: streets with known lanes, in which drives are searched.
-        street_places: crossings, traffic signals and footpaths.
         keeps_left: whether traffic keeps left.
         axes: description of the coordinates, if they are not metres east, north
             and up.
@@ -72,7 +53,6 @@ class ForeignCity:
     reference_system: str
     faults: ImportFaults
     streets: Sequence[Street] = ()
-    street_places: StreetPlaces = field(default_factory=StreetPlaces)
     keeps_left: bool = False
     axes: tuple[str, ...] = ()
     small_objects: Sequence[SmallObject] = ()

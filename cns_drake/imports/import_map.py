@@ -31,7 +31,6 @@ from cns_drake.imports.ground import ground_of, ground_structures
 from cns_drake.imports.grown_city import grow
 from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.map_source import MapSource, source_of
-from cns_drake.imports.openstreetmap.traffic import lane_text_of_streets
 from cns_drake.imports.options import DriveOn, ImportOptions
 from cns_drake.imports.report import ImportReport
 from cns_drake.imports.staged_city import StagedCity, stage_city
@@ -41,7 +40,7 @@ from cns_drake.roads import (
     load_waypoint_path,
     read_waypoints,
 )
-from cns_drake.scene import LANES_NAME, MESH_FOLDER, check_new_map
+from cns_drake.scene import MESH_FOLDER, check_new_map
 
 # A function that gets a map's folder, and the name of each stage -> the numbers
 # of structures and triangles in the stage.
@@ -105,7 +104,6 @@ def import_city(
             dressing = dress_city(staged, city, drives, ground, options.seed)
             staged = dressing.city
         doing(f"writing {output}")
-        _write_lanes(draft, source, city, bare, staged.kept, drives, side)
         guessed_ground = (
             dressing.guessed_ground
             if dressing
@@ -145,47 +143,6 @@ def _find_drives(
     """Returns at most two drives: along streets or, without them, anywhere."""
     streets = StreetGraph(city.streets, space, side)
     return find_drives(streets) or find_drives(CellGraph(space))
-
-
-def _write_lanes(
-    draft: Path,
-    source: Path,
-    city: ForeignCity,
-    bare: Sequence[ImportedObject],
-    kept: Sequence[ImportedObject],
-    drives: Sequence[WaypointRoute],
-    side: DriveOn,
-) -> None:
-    """Writes the lanes for traffic to a map's folder, if there are any.
-
-    Args:
-        draft: folder of the map.
-        source: the imported file.
-        city: the content of this file.
-        bare: structures of the city without details.
-        kept: structures of the city, with details if it is dressed.
-        drives: the drives.
-        side: side of the street on which traffic keeps.
-    """
-    names = {one.structure.name for one in bare}
-    added = [one for one in kept if one.structure.name not in names]
-    lanes = lane_text_of_streets(
-        city.streets,
-        city.street_places,
-        [*bare, *added],
-        [
-            one
-            for one in added
-            if one.object_type not in ("Sidewalk", "Lane mark")
-        ],
-        drives,
-        side,
-    )
-    if lanes is not None:
-        (draft / LANES_NAME).write_text(lanes, "utf-8")
-    elif city.streets and drives:
-        kind = "no lanes for traffic: none leads on for ever"
-        city.faults.add(kind, source.name)
 
 
 def _report_of(

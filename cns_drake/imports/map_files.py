@@ -19,7 +19,13 @@ from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.options import ImportOptions
 from cns_drake.imports.report import REPORT_NAME, ImportReport
 from cns_drake.imports.staged_city import StagedCity
-from cns_drake.scene import MESH_FOLDER, STRUCTURES_NAME, MapFolder, stage_name
+from cns_drake.scene import (
+    IMPORT_NAME,
+    MESH_FOLDER,
+    STRUCTURES_NAME,
+    MapFolder,
+    stage_name,
+)
 
 # Column of the structure table: the year in which a building was built.
 YEAR_COLUMN = "built"
@@ -186,7 +192,7 @@ def write_facts(
         sort_keys=False,
         allow_unicode=True,
     )
-    (draft / "import.yaml").write_text(comment + text, "utf-8")
+    (draft / IMPORT_NAME).write_text(comment + text, "utf-8")
 
 
 def write_report(draft: Path, report: ImportReport) -> None:

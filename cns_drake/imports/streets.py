@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
@@ -13,8 +12,6 @@ import numpy as np
 KERB_HEIGHT = 0.12
 # Width of a sidewalk whose file gives none [m].
 SIDEWALK_WIDTH = 2.0
-# Drives and traffic take no sharper turn from one street into another.
-SHARPEST_TURN_DEG = 125.0
 
 
 @dataclass(frozen=True)
@@ -70,10 +67,8 @@ def ends_at_nodes(streets: Iterable[Street]) -> Counter[int]:
     return ends
 
 
-def cut_at_nodes(
-    streets: Sequence[Street], also: AbstractSet[int] = frozenset()
-) -> Iterator[StreetPiece]:
-    """Yields the pieces of streets, cut where they meet and at nodes in `also`.
+def cut_at_nodes(streets: Sequence[Street]) -> Iterator[StreetPiece]:
+    """Yields the pieces of streets, cut where they meet.
 
     The pieces of a street follow each other in the direction of its line.
     """
@@ -83,7 +78,7 @@ def cut_at_nodes(
         cuts = [
             k
             for k, node in enumerate(street.nodes)
-            if k in (0, last) or uses[node] > 1 or node in also
+            if k in (0, last) or uses[node] > 1
         ]
         for first, after in pairwise(cuts):
             line = street.line[first : after + 1]

@@ -3,14 +3,12 @@ from cns_drake.roads.carriageway import Areas as Areas
 from cns_drake.roads.carriageway import (
     union_without_slits as union_without_slits,
 )
-from cns_drake.roads.centreline import blend as blend
 from cns_drake.roads.centreline import sample_stations as sample_stations
 from cns_drake.roads.driver_offsets import FINE_SPACING as FINE_SPACING
 from cns_drake.roads.driver_offsets import driven_path as driven_path
 from cns_drake.roads.driver_offsets import kerbs as kerbs
 from cns_drake.roads.lane_path import POINT_SPACING as POINT_SPACING
 from cns_drake.roads.lane_path import LanePath as LanePath
-from cns_drake.roads.network import STRAIGHT_LIMIT_DEG as STRAIGHT_LIMIT_DEG
 from cns_drake.roads.network import Connection as Connection
 from cns_drake.roads.network import RoadNetwork as RoadNetwork
 from cns_drake.roads.network import load_road_network as load_road_network

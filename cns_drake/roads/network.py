@@ -30,7 +30,7 @@ Turn = Literal["left", "straight", "right"]
 _Pose = tuple[float, float, float, float]
 
 # A path through a junction is a turn if its heading changes by more than this.
-STRAIGHT_LIMIT_DEG = 35.0
+_STRAIGHT_LIMIT_DEG = 35.0
 # Beyond this change of heading it is a U-turn, which is not allowed.
 _U_TURN_LIMIT_DEG = 150.0
 # Roads may overlap by this much before they count as crossing [m^2].
@@ -220,7 +220,7 @@ def _turn_of(angle_deg: float, num_arms: int) -> Turn:
 
     Where a junction has only two roads, all turns are straight on.
     """
-    if num_arms == 2 or abs(angle_deg) <= STRAIGHT_LIMIT_DEG:
+    if num_arms == 2 or abs(angle_deg) <= _STRAIGHT_LIMIT_DEG:
         return "straight"
     return "left" if angle_deg > 0 else "right"
 

@@ -10,7 +10,7 @@ ROADS_NAME = "roads.yaml"
 PLAN_NAME = "city.yaml"
 STAGES_NAME = "stages.yaml"
 STRUCTURES_NAME = "structures.csv"
-LANES_NAME = "lanes.json"
+IMPORT_NAME = "import.yaml"
 TRAFFIC_NAME = "traffic.npz"
 MESH_FOLDER = "meshes"
 
@@ -27,7 +27,7 @@ class MapFolder:
         path: the folder.
         name: the name of the map.
         roads: the road network.
-        lanes: lanes and walkways of an imported map, for traffic.
+        import_facts: where an imported map comes from.
         traffic: recorded traffic on the map's roads and sidewalks.
         plan: the generated city's plan, from which its stages are made.
         stage_plan: the table that lists, for each stage, which structures are
@@ -43,7 +43,7 @@ class MapFolder:
         self.path = path
         self.name = path.name
         self.roads = path / ROADS_NAME
-        self.lanes = path / LANES_NAME
+        self.import_facts = path / IMPORT_NAME
         self.traffic = path / TRAFFIC_NAME
         self.plan = path / PLAN_NAME
         self.stage_plan = path / STAGES_NAME

@@ -29,6 +29,7 @@ from cns_drake.scene import World
 from cns_drake.sensors import sensor_pose
 from cns_drake.simulation.scenario_traffic import (
     plan_traffic_of_drive,
+    things_in_the_way,
     with_traffic,
 )
 from cns_drake.simulation.stage_loading import load_stage
@@ -197,7 +198,9 @@ def load_drive(plan: DrivePlan) -> LoadedDrive:
     if not scenario.traffic.is_off:
         doing("reading the traffic")
         traffic = plan_traffic_of_drive(plan, trajectory, world)
-        world = with_traffic(world, traffic)
+        if in_the_way := things_in_the_way(scenario, world, traffic):
+            world = load_stage(plan, without=in_the_way)
+        world = with_traffic(world, traffic, in_the_way)
     return LoadedDrive(
         scenario.replaced(frames=frames), trajectory, world, traffic
     )

@@ -1,13 +1,14 @@
 """The traffic of a scenario: its plan, and its structures in the world."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import shapely
 
 from cns_drake.base import InputError, arctan2
 from cns_drake.motion import Trajectory
-from cns_drake.roads import load_road_network
 from cns_drake.scenarios import (
     SUMO_INSTEAD,
     DrivePlan,
@@ -15,25 +16,26 @@ from cns_drake.scenarios import (
     check_files,
     count_frames,
 )
-from cns_drake.scene import World
+from cns_drake.scene import GROUND_CLASSES, MOVING_IDS, World, metres_on_map
+from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.traffic import (
     EgoBox,
     EgoPath,
-    LaneFile,
+    FcdTrace,
     TrafficPlan,
-    make_lane_graph,
-    make_walkways,
     plan_queues,
     play_recorded,
     play_trace,
     read_fcd,
-    read_lanes,
     read_recorded,
     traffic_structures,
 )
+from cns_drake.transient import GroundSurface, geometry_by_structure
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
+# The ground is read this far around the places of a trace [m].
+_AROUND_TRACE = 20.0
 
 
 def plan_scenario_traffic(
@@ -84,13 +86,13 @@ def plan_traffic_of_drive(
             ego_box=EGO_BOX,
         )
     if wanted.fcd is not None:
-        trace = Path(wanted.fcd)
-        graph, walkways, _ = load_ways(drive)
+        path = Path(wanted.fcd)
+        trace = read_fcd(path, lambda: metres_on_map(scenario.folder))
+        world = world or load_stage(drive, with_vehicle=False)
         return play_trace(
-            read_fcd(trace),
             trace,
-            graph,
-            walkways,
+            path,
+            _ground_around(world, trace).levels,
             seed=wanted.seed,
             duration=last_frame,
             end=trajectory.duration,
@@ -148,22 +150,62 @@ def _ego_path(trajectory: Trajectory) -> EgoPath:
     return ego
 
 
-def load_ways(drive: DrivePlan) -> LaneFile:
-    """Returns the lanes and walkways that traffic follows on a map.
+def _ground_around(world: World, trace: FcdTrace) -> GroundSurface:
+    """Returns the ground of a world around the places of a trace."""
+    places = np.concatenate(
+        [one.xy for one in (*trace.vehicles, *trace.persons)]
+    )
+    near = shapely.box(*places.min(axis=0), *places.max(axis=0))
+    ground = geometry_by_structure(
+        world,
+        lambda name: world.structures[name].semantic_class in GROUND_CLASSES,
+    )
+    return GroundSurface(ground, near.buffer(_AROUND_TRACE))
 
-    Raises:
-        InputError: the map has neither roads nor lanes.
+
+def things_in_the_way(
+    scenario: Scenario, world: World, plan: TrafficPlan
+) -> list[str]:
+    """Returns the parked vehicles through which the traffic of a trace drives.
+
+    They stand in lanes of narrow streets of imported cities. Those that the
+    scenario's temporary changes have put there are left out.
+
+    Args:
+        scenario: the scenario.
+        world: the world of its stage, which is not part of a diagram yet.
+        plan: the traffic.
     """
-    folder = drive.scenario.folder
-    if not folder.roads.is_file():
-        return read_lanes(folder.lanes)
-    network = drive.network or load_road_network(folder.roads)
-    graph = make_lane_graph(network)
-    return LaneFile(graph, make_walkways(network, graph))
+    if scenario.traffic.fcd is None:
+        return []
+    parked = geometry_by_structure(
+        world,
+        lambda name: (
+            world.structures[name].semantic_class in MOVING_IDS
+            and not world.structures[name].causes
+        ),
+    )
+    ways = [
+        shapely.LineString(rows[:, :2]).buffer(kind.size[1] / 2)
+        for kind, rows in zip(
+            plan.kinds, np.moveaxis(plan.vehicles.values, 1, 0), strict=True
+        )
+    ]
+    feet = [structure.footprint for structure in parked.values()]
+    met, _ = shapely.STRtree(ways).query(feet, "intersects")
+    names = list(parked)
+    return [names[k] for k in np.unique(met).tolist()]
 
 
-def with_traffic(world: World, plan: TrafficPlan) -> World:
+def with_traffic(
+    world: World, plan: TrafficPlan, in_the_way: Sequence[str] = ()
+) -> World:
     """Returns a world whose structure table and notes include the traffic.
+
+    Args:
+        world: the world.
+        plan: the traffic.
+        in_the_way: names of structures that are left out for it.
 
     Raises:
         InputError: there are more structures than ids.
@@ -175,4 +217,6 @@ def with_traffic(world: World, plan: TrafficPlan) -> World:
         notes += (
             f"traffic: {plan.left_out} left out: they would have met the car",
         )
+    if in_the_way:
+        notes += (f"traffic: {len(in_the_way)} things in its way left out",)
     return replace(world, structures=table.joined(entries), notes=notes)

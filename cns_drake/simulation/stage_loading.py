@@ -8,41 +8,39 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base import doing
-from cns_drake.scenarios import DrivePlan, Scenario, ground_notes, vehicle_file
+from cns_drake.scenarios import DrivePlan, ground_notes, vehicle_file
 from cns_drake.scene import World, load_world
-from cns_drake.traffic import read_lanes
 from cns_drake.transient import change_world
 
 # Distance from the car's middle line to its sides, with a margin [m].
 _HALF_WIDTH = 1.3
 
 
-def load_stage(plan: DrivePlan, *, with_vehicle: bool = True) -> World:
+def load_stage(
+    plan: DrivePlan, *, with_vehicle: bool = True, without: Sequence[str] = ()
+) -> World:
     """Loads the world of a drive's stage, with its temporary changes.
 
     Args:
         plan: the plan of the drive. The temporary changes (field `transient`)
             are made near its path.
         with_vehicle: whether the world contains the vehicle.
+        without: names of further structures that are left out.
 
     Raises:
         InputError: the scenario's files cannot be used.
     """
     scenario = plan.scenario
     doing("reading the stage")
-    in_the_way = _structures_on_lanes(scenario)
     world = load_world(
         scenario.world_file,
         vehicle=vehicle_file() if with_vehicle else None,
-        without=(*scenario.without, *in_the_way),
+        without=(*scenario.without, *without),
         model_paths=scenario.model_paths,
     )
     if scenario.world is not None:
         notes = ground_notes(scenario, plan.trajectory)
         world = replace(world, notes=(*world.notes, *notes))
-    if in_the_way:
-        note = f"traffic: {len(in_the_way)} things in its lanes left out"
-        world = replace(world, notes=(*world.notes, note))
     if scenario.transient.is_off:
         return world
     trajectory = plan.trajectory
@@ -53,13 +51,3 @@ def load_stage(plan: DrivePlan, *, with_vehicle: bool = True) -> World:
     if plan.network is not None:
         driven = driven.union(plan.network.areas.lane_area)
     return change_world(world, scenario.transient, drive, driven)
-
-
-def _structures_on_lanes(scenario: Scenario) -> Sequence[str]:
-    """Returns the names of structures that stand where traffic drives."""
-    if scenario.traffic.is_off or scenario.map is None:
-        return ()
-    folder = scenario.folder
-    if folder.roads.is_file() or not folder.lanes.is_file():
-        return ()
-    return read_lanes(folder.lanes).in_the_way

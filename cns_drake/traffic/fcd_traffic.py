@@ -3,26 +3,27 @@
 Format: https://sumo.dlr.de/docs/Simulation/Output/FCDOutput.html
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 import zlib
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from cns_drake.base import (
     Element,
     InputError,
+    arctan2,
     cos,
+    errors_at,
     read_elements,
     sin,
     step_lengths,
     value_errors,
+    wrapped,
 )
 from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meets_ego
-from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.tracks import Tracks
 from cns_drake.traffic.traffic_plan import (
     WALKER_SIZE,
@@ -31,25 +32,15 @@ from cns_drake.traffic.traffic_plan import (
 )
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
 
-# In a trace that belongs to the map, at least half of the vehicles are closer
-# than this to its lanes [m].
-_OFF_ROAD = 5.0
-# The same for persons, in a trace without vehicles [m].
-_OFF_ROAD_PERSONS = 50.0
 # A drive may take this much longer than the trace because of rounding [s].
 _ROUNDING = 1e-6
 # Kinds of cars from which a vehicle of unknown type is drawn.
 _CARS = tuple(kind for kind in KINDS if kind.semantic_class == "car")
 # Heights that differ by more than this belong to different roads [m].
 _LEVEL_HEIGHT = 1.5
-# A height is found from at most this many points of lanes, the nearest ones.
-_MOST_POINTS = 24
-# These points are at most this far away [m].
+# A road user that has moved by less since its last place is on the same level
+# [m].
 _REACH = 6.0
-# Least cosine of the angle between a vehicle and its lane.
-_LEAST_COSINE = 0.7
-
-
 # Greatest deviation of times from even spacing, because of rounding in the file
 # [s].
 _TIME_TOLERANCE = 2e-3
@@ -80,6 +71,17 @@ _MOST_JUMPS = 1000
 _MOST_RATIO = 3.0
 # Shorter distances by the speeds are not compared [m].
 _COMPARED = 10.0
+# In degrees, this ratio is less.
+_DEGREES_RATIO = 1e-4
+# Length of a degree on the Earth, at the most [m].
+_DEGREE = 112e3
+# The course of a vehicle that moves by at least this much is known [m].
+_COURSE_FROM = 2.0
+
+# A function that takes places (N, 2) [m], and whether it is about roads or all
+# other ground. It returns all heights one above the other: (M,) the numbers of
+# the places, and (M,) a height at each [m].
+Levels = Callable[[np.ndarray, bool], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -134,8 +136,16 @@ class FcdTrace:
         return self.dt * (self.num_steps - 1)
 
 
-def read_fcd(path: Path) -> FcdTrace:
+def read_fcd(
+    path: Path, from_degrees: Callable[[], Callable[[np.ndarray], np.ndarray]]
+) -> FcdTrace:
     """Reads a SUMO trace from a file.
+
+    Args:
+        path: the file.
+        from_degrees: called if the places of the trace are in degrees; returns
+            a function that takes longitudes and latitudes (N, 2) [deg], and
+            returns places (N, 2) in W [m].
 
     Raises:
         InputError: the file cannot be read or is not a trace, or the trace is
@@ -148,12 +158,21 @@ def read_fcd(path: Path) -> FcdTrace:
         times = np.array([step.number("time") for step in steps])
         begin, dt = _sampling_times(path, times)
         vehicles = _traced_objects(steps, "vehicle")
+        persons = _traced_objects(steps, "person")
+        in_degrees = _is_in_degrees([*vehicles, *persons], dt)
+        riding = _RIDING / _DEGREE if in_degrees else _RIDING
         left_out = {
-            "persons, while they ride in vehicles": _remove_riders(steps)
+            "persons, while they ride in vehicles": _remove_riders(
+                steps, riding
+            )
         }
         for tag, names in _other_elements(steps).items():
             left_out[f"elements {tag}"] = names
         persons = _traced_objects(steps, "person")
+    if in_degrees:
+        with errors_at(f"{path}: its places are longitudes and latitudes"):
+            convert = from_degrees()
+        vehicles, persons = _in_metres(convert, vehicles, persons)
     notes = [
         f"{path}: left out: {len(names)} {what}"
         for what, names in left_out.items()
@@ -182,11 +201,63 @@ def read_fcd(path: Path) -> FcdTrace:
     return FcdTrace(begin, dt, len(times), vehicles, persons, tuple(notes))
 
 
-def _remove_riders(steps: list[Element]) -> set[str]:
+def _is_in_degrees(objects: Sequence[TracedObject], dt: float) -> bool:
+    """Returns whether the places of a trace are longitudes and latitudes.
+
+    They then change by far less than its speeds say. `dt` is the time between
+    two steps [s].
+    """
+    by_places, by_speeds = _ways(objects, dt)
+    return (
+        by_speeds > _COMPARED
+        and by_places < _DEGREES_RATIO * by_speeds
+        and all((np.abs(one.xy) <= (180.0, 90.0)).all() for one in objects)
+    )
+
+
+def _in_metres(
+    convert: Callable[[np.ndarray], np.ndarray],
+    vehicles: Sequence[TracedObject],
+    persons: Sequence[TracedObject],
+) -> tuple[tuple[TracedObject, ...], tuple[TracedObject, ...]]:
+    """Returns vehicles and persons of a trace in degrees, in the frame W.
+
+    SUMO's angles are from the north of its own projection. The angle from there
+    to the north of W is found from the vehicles, which move as they point.
+
+    Args:
+        convert: function that takes longitudes and latitudes (N, 2) [deg], and
+            returns places (N, 2) [m].
+        vehicles, persons: vehicles and persons, with places in degrees.
+    """
+    moved = [
+        [replace(one, xy=convert(one.xy)) for one in some]
+        for some in (vehicles, persons)
+    ]
+    turns = [np.zeros(0)]
+    for one in moved[0]:
+        x, y = np.diff(one.xy, axis=0).T
+        middle = (one.yaw[1:] + one.yaw[:-1]) / 2
+        far = np.hypot(x, y) > _COURSE_FROM
+        turns.append(wrapped(arctan2(y[far], x[far]) - middle[far]))
+    known = np.concatenate(turns)
+    turn = float(np.median(known)) if len(known) else 0.0
+    vehicles, persons = (
+        tuple(replace(one, yaw=one.yaw + turn) for one in some)
+        for some in moved
+    )
+    return vehicles, persons
+
+
+def _remove_riders(steps: list[Element], within: float) -> set[str]:
     """Removes persons from the steps at which they ride in vehicles.
 
     SUMO writes a rider at the front of the vehicle. Newer versions also name
     the vehicle.
+
+    Args:
+        steps: the time steps of the trace, which are changed.
+        within: greatest distance from the front, in the unit of places.
 
     Returns:
         The ids of all removed persons.
@@ -204,7 +275,7 @@ def _remove_riders(steps: list[Element]) -> set[str]:
         for person in list(step.all("person")):
             away = places - (person.number("x"), person.number("y"))
             apart = np.hypot(*away.T).min(initial=np.inf)
-            if person.value("vehicle", "") or apart < _RIDING:
+            if person.value("vehicle", "") or apart < within:
                 riders.add(person.value("id"))
                 step.remove(person)
     return riders
@@ -293,12 +364,7 @@ def _check_unit(path: Path, objects: Sequence[TracedObject], dt: float) -> None:
     Raises:
         InputError: the places are not in metres.
     """
-    by_places = by_speeds = 0.0
-    for one in objects:
-        # The speed at a time is that of the step before.
-        known = (np.diff(one.steps) == 1) & np.isfinite(one.speed[1:])
-        by_places += step_lengths(one.xy)[known].sum()
-        by_speeds += dt * np.abs(one.speed[1:][known]).sum()
+    by_places, by_speeds = _ways(objects, dt)
     if by_speeds < _COMPARED:
         return
     ratio = by_places / by_speeds
@@ -306,8 +372,23 @@ def _check_unit(path: Path, objects: Sequence[TracedObject], dt: float) -> None:
         raise InputError(
             f"{path}: the places are not in metres: the way of all road users"
             f" is {by_places:.3g} by their places, and {by_speeds:.3g} m by"
-            " their speeds; run SUMO without --fcd-output.geo"
+            " their speeds"
         )
+
+
+def _ways(objects: Sequence[TracedObject], dt: float) -> tuple[float, float]:
+    """Returns the way of all objects by their places, and by their speeds.
+
+    The second is in metres, and the first in the unit of the places. `dt` is
+    the time between two steps [s].
+    """
+    by_places = by_speeds = 0.0
+    for one in objects:
+        # The speed at a time is that of the step before.
+        known = (np.diff(one.steps) == 1) & np.isfinite(one.speed[1:])
+        by_places += float(step_lengths(one.xy)[known].sum())
+        by_speeds += float(dt * np.abs(one.speed[1:][known]).sum())
+    return by_places, by_speeds
 
 
 def _without_jumps(
@@ -376,8 +457,7 @@ def _kind_name(vehicle: TracedObject) -> str:
 def play_trace(
     trace: FcdTrace,
     path: Path,
-    graph: LaneGraph,
-    walkways: Sequence[Walkway],
+    levels: Levels,
     *,
     seed: int,
     duration: float,
@@ -394,8 +474,7 @@ def play_trace(
     Args:
         trace: the trace that SUMO wrote.
         path: file of the trace, for error messages.
-        graph, walkways: lanes and walkways of the map, from which the heights
-            of road users follow.
+        levels: heights of the map's ground, on which road users are.
         seed: seed by which the kinds of cars are sampled.
         duration: time of the last frame [s].
         end: time at which the ego car arrives [s].
@@ -412,17 +491,13 @@ def play_trace(
             f"s on, but the drive takes {duration:.2f} s: record more, or "
             "lower frames"
         )
-    lanes = np.concatenate([piece.points for piece in graph.pieces])
-    _check_place(trace, path, lanes)
+    _check_place(trace, path, levels)
     kinds = [_vehicle_kind(vehicle, seed) for vehicle in trace.vehicles]
-    heights = _LaneHeights(lanes)
-    trace = _at_map_heights(trace, heights)
+    trace = _at_map_heights(trace, levels)
     pairs = zip(trace.vehicles, kinds, strict=True)
-    rows = [_vehicle_rows(*pair, heights) for pair in pairs]
+    rows = [_vehicle_rows(*pair, levels) for pair in pairs]
     vehicles = _make_tracks(trace, trace.vehicles, rows)
-    strips = [walkway.points for walkway in walkways]
-    ground = _LaneHeights(np.concatenate([lanes, *strips]))
-    rows = [_person_rows(person, ground, trace.dt) for person in trace.persons]
+    rows = [_person_rows(person, levels, trace.dt) for person in trace.persons]
     walkers = _make_tracks(trace, trace.persons, rows)
     step = min(trace.dt, STEP)
     times = np.arange(0.0, min(trace.duration, end) + step, step)
@@ -441,108 +516,83 @@ def play_trace(
     )
 
 
-def _check_place(trace: FcdTrace, path: Path, lanes: np.ndarray) -> None:
-    """Checks that vehicles are on lanes; without vehicles, checks persons.
-
-    Args:
-        trace: the trace.
-        path: its file, for error messages.
-        lanes: (N, 3) points of all lanes [m].
+def _check_place(trace: FcdTrace, path: Path, levels: Levels) -> None:
+    """Checks that vehicles are on roads; without vehicles, checks persons.
 
     Raises:
-        InputError: half of the trace is too far from the lanes.
+        InputError: half of the trace is beside the roads, or the ground.
     """
     traced = trace.vehicles or trace.persons
     places = np.concatenate([road_user.xy for road_user in traced])
-    distances, _ = cKDTree(lanes[:, :2]).query(places)
-    off_road = _OFF_ROAD if trace.vehicles else _OFF_ROAD_PERSONS
-    if np.median(distances) > off_road:
+    on_road = np.isfinite(_heights(levels, places, of_road=True))
+    if not trace.vehicles:
+        on_road |= np.isfinite(_heights(levels, places, of_road=False))
+    if on_road.mean() < 0.5:
+        low, high = places.min(axis=0), places.max(axis=0)
+        ground = "roads" if trace.vehicles else "ground"
         raise InputError(
-            f"{path}: half of the trace is more than {off_road:g} m from the "
-            f"map's lanes: the trace is at {_extent_text(places)}, the lanes "
-            f"are at {_extent_text(lanes)}; give a trace of this map, without "
-            "an offset"
+            f"{path}: half of the trace is beside the map's {ground}: it is at"
+            f" x {low[0]:.0f} to {high[0]:.0f}, y {low[1]:.0f} to"
+            f" {high[1]:.0f} m; give a trace of this map, without an offset"
         )
 
 
-def _extent_text(places: np.ndarray) -> str:
-    """Returns the extent of places (N, 2 or 3) [m] in words."""
-    low, high = places.min(axis=0), places.max(axis=0)
-    return f"x {low[0]:.0f} to {high[0]:.0f}, y {low[1]:.0f} to {high[1]:.0f} m"
+def _heights(levels: Levels, xy: np.ndarray, *, of_road: bool) -> np.ndarray:
+    """Returns the greatest heights (N,) at places (N, 2) [m]; NaN without one.
+
+    Args:
+        levels: heights of the ground.
+        xy: the places [m].
+        of_road: whether the heights are those of roads, or of other ground.
+    """
+    highest = np.full(len(xy), -np.inf)
+    np.maximum.at(highest, *levels(xy, of_road))
+    return np.where(np.isfinite(highest), highest, np.nan)
 
 
-class _LaneHeights:
-    """Heights of the ground, interpolated between points on lanes."""
+def _heights_along(
+    levels: Levels, xy: np.ndarray, z: np.ndarray, *, on_road: bool
+) -> np.ndarray:
+    """Returns the heights (M,) of one road user at successive places [m].
 
-    def __init__(self, points: np.ndarray):
-        """Takes points (N, 3) on the ground along lanes [m]."""
-        self._tree = cKDTree(points[:, :2])
-        self._z = points[:, 2]
-        steps = np.diff(points[:, :2], axis=0, prepend=points[:1, :2])
-        self._heading = np.arctan2(steps[:, 1], steps[:, 0])
+    Where two roads cross at different heights, the road user is on the road
+    that is nearest to its given height. Without given heights, the road user
+    stays at the height at which it arrived, or else is on the upper road.
+    Beside the map's ground, it stays at the nearest known height.
 
-    def at(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the heights (N,) of the ground at places (N, 2) [m].
-
-        Each height is a mean of the heights of the nearest points, weighted by
-        nearness.
-        """
-        distance, near = self._tree.query(xy, k=min(4, len(self._z)))
-        distance, near = (
-            np.reshape(values, (len(xy), -1)) for values in (distance, near)
-        )
-        return self._weighted(distance, near)
-
-    def along(
-        self, xy: np.ndarray, z: np.ndarray, yaw: np.ndarray | None
-    ) -> np.ndarray:
-        """Returns the heights (M,) of one road user at successive places [m].
-
-        Where two roads cross at different heights, the road user is on the road
-        that is nearest to its given height. Without given heights, the road
-        user stays on the road on which it arrived, or else is on a road with a
-        lane in its direction.
-
-        Args:
-            xy: (M, 2) places [m].
-            z: (M,) approximate heights [m]; NaN if they are unknown.
-            yaw: (M,) headings [rad]; None if the direction does not count.
-        """
-        found = self.at(xy)
-        count = min(_MOST_POINTS, len(self._z))
-        distance, near = (
-            np.reshape(values, (len(xy), -1))
-            for values in self._tree.query(xy, k=count)
-        )
-        is_near = distance < _REACH
-        levels = np.where(is_near, self._z[near], np.nan)
-        for k in np.flatnonzero(np.ptp(self._z[near], axis=1) > _LEVEL_HEIGHT):
-            usable = np.flatnonzero(is_near[k])
-            if not len(usable) or np.ptp(levels[k][usable]) <= _LEVEL_HEIGHT:
-                continue
-            if yaw is not None:
-                turn = self._heading[near[k][usable]] - yaw[k]
-                alike = usable[np.abs(np.cos(turn)) > _LEAST_COSINE]
-                usable = alike if len(alike) else usable
-            moved = np.hypot(*(xy[k] - xy[k - 1])) if k else np.inf
-            goal = levels[k][usable[0]]
-            if np.isfinite(z[k]):
-                goal = z[k]
-            elif moved < _REACH:
-                goal = found[k - 1]
-            off = np.abs(levels[k][usable] - goal)
-            usable = usable[off < off.min() + _LEVEL_HEIGHT / 2][:4]
-            (found[k],) = self._weighted(
-                distance[k][None, usable], near[k][None, usable]
-            )
-        return found
-
-    def _weighted(self, distance: np.ndarray, near: np.ndarray) -> np.ndarray:
-        weight = 1.0 / np.maximum(distance, 0.05) ** 2
-        return np.sum(weight * self._z[near], axis=1) / weight.sum(axis=1)
+    Args:
+        levels: heights of the ground.
+        xy: (M, 2) places [m].
+        z: (M,) approximate heights [m]; NaN if they are unknown.
+        on_road: whether other ground than roads counts only where no road is.
+    """
+    of_road, other = (levels(xy, kind) for kind in (True, False))
+    if on_road:
+        beside = ~np.isin(other[0], of_road[0])
+        other = other[0][beside], other[1][beside]
+    place = np.concatenate([of_road[0], other[0]])
+    height = np.concatenate([of_road[1], other[1]])
+    order = np.argsort(place, kind="stable")
+    ends = np.searchsorted(place[order], np.arange(len(xy) + 1))
+    found = np.full(len(xy), np.nan)
+    for k in range(len(xy)):
+        here = height[order[ends[k] : ends[k + 1]]]
+        if not len(here):
+            continue
+        goal = here.max()
+        if np.isfinite(z[k]):
+            goal = z[k]
+        elif k and np.hypot(*(xy[k] - xy[k - 1])) < _REACH:
+            goal = found[k - 1] if np.isfinite(found[k - 1]) else goal
+        level = here[np.abs(here - goal).argmin()]
+        found[k] = here[here < level + _LEVEL_HEIGHT].max()
+    known = np.flatnonzero(np.isfinite(found))
+    if not len(known):
+        return np.nan_to_num(z)
+    return np.interp(np.arange(len(xy)), known, found[known])
 
 
-def _at_map_heights(trace: FcdTrace, heights: _LaneHeights) -> FcdTrace:
+def _at_map_heights(trace: FcdTrace, levels: Levels) -> FcdTrace:
     """Returns a trace whose heights have the same zero as the map's heights.
 
     A trace without heights stays as it is.
@@ -553,12 +603,9 @@ def _at_map_heights(trace: FcdTrace, heights: _LaneHeights) -> FcdTrace:
     if not with_heights:
         return trace
     z = np.concatenate([vehicle.z for vehicle in with_heights])
-    zero = float(
-        np.median(
-            heights.at(np.concatenate([vehicle.xy for vehicle in with_heights]))
-            - z
-        )
-    )
+    xy = np.concatenate([vehicle.xy for vehicle in with_heights])
+    off = _heights(levels, xy, of_road=True) - z
+    zero = float(np.nanmedian(off)) if np.isfinite(off).any() else 0.0
     vehicles, persons = (
         tuple(replace(road_user, z=road_user.z + zero) for road_user in traced)
         for traced in (trace.vehicles, trace.persons)
@@ -577,36 +624,34 @@ def _vehicle_kind(vehicle: TracedObject, seed: int) -> VehicleKind:
 
 
 def _vehicle_rows(
-    vehicle: TracedObject, kind: VehicleKind, heights: _LaneHeights
+    vehicle: TracedObject, kind: VehicleKind, levels: Levels
 ) -> np.ndarray:
     """Returns the coordinates (M, 5) of a vehicle; see `TrafficPlan`.
 
     Args:
         vehicle: the vehicle, with its place at M steps.
         kind: its kind.
-        heights: heights of the lanes.
+        levels: heights of the ground.
     """
     ahead = np.column_stack([cos(vehicle.yaw), sin(vehicle.yaw)])
     xy = vehicle.xy - kind.size[0] / 2 * ahead
     # An upward slope is a rotation about -y.
-    z = heights.along(xy, vehicle.z, vehicle.yaw)
+    z = _heights_along(levels, xy, vehicle.z, on_road=True)
     return np.column_stack([xy, z, vehicle.yaw, -vehicle.slope])
 
 
-def _person_rows(
-    person: TracedObject, heights: _LaneHeights, dt: float
-) -> np.ndarray:
+def _person_rows(person: TracedObject, levels: Levels, dt: float) -> np.ndarray:
     """Returns the coordinates (M, 5) of a pedestrian; see `TrafficPlan`.
 
     Args:
         person: the pedestrian, with its place at M steps.
-        heights: heights of lanes and walkways.
+        levels: heights of the ground.
         dt: time between two steps [s].
     """
     # A random phase that depends only on the name.
     start = zlib.crc32(person.name.encode()) % 1000 * 2e-3 * np.pi
     phase = start + gait_phases(person.xy, dt)
-    z = heights.along(person.xy, person.z, None)
+    z = _heights_along(levels, person.xy, person.z, on_road=False)
     return np.column_stack([person.xy, z, person.yaw, phase])
 
 

@@ -99,6 +99,20 @@ class GroundSurface:
         found = np.max([self._sides[k].heights(xy) for k in kinds], axis=0)
         return np.where(np.isfinite(found), found, np.nan)
 
+    def levels(
+        self, xy: np.ndarray, of_road: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns all heights of the ground at places, one above the other [m].
+
+        Args:
+            xy: (N, 2) places in W [m].
+            of_road: whether the ground is the carriageway, or all other ground.
+
+        Returns:
+            (M,) the numbers of the places, and (M,) a height at each.
+        """
+        return self._sides[of_road].levels(xy)
+
     def lowest(self, area: BaseGeometry, default: float) -> float:
         """Returns the least height of the ground at the corners of an area [m].
 

@@ -28,12 +28,20 @@ class UpperSides:
         The height is -inf at a place without a surface.
         """
         highest = np.full(len(xy), -np.inf)
+        np.maximum.at(highest, *self.levels(xy))
+        return highest
+
+    def levels(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the heights of all surfaces at places (N, 2) [m].
+
+        The results are (M,) the numbers of the places, and (M,) a height of a
+        surface at each.
+        """
         place, triangle = self._tree.query(shapely.points(xy), "intersects")
         corner = self._triangles[triangle, 0]
         normal = self._normals[triangle]
         aside = ((xy[place] - corner[:, :2]) * normal[:, :2]).sum(axis=1)
-        np.maximum.at(highest, place, corner[:, 2] - aside / normal[:, 2])
-        return highest
+        return place, corner[:, 2] - aside / normal[:, 2]
 
     def hides(self, points: np.ndarray) -> np.ndarray:
         """Returns (N,) bool: whether points (N, 3) lie below a surface."""

@@ -19,8 +19,10 @@ from cns_drake.imports.drives.steerable_drives import (
 )
 from cns_drake.imports.drives.way_graph import WayGraph
 from cns_drake.imports.options import DriveOn
-from cns_drake.imports.streets import SHARPEST_TURN_DEG, Street, cut_at_nodes
+from cns_drake.imports.streets import Street, cut_at_nodes
 
+# Drives take no sharper turn from one street into another.
+_SHARPEST_TURN_DEG = 125.0
 # Distance between the points of a way along lanes [m].
 _LANE_SPACING = 1.0
 # Share of their lateral offset that cars keep in a turn. In narrow streets and
@@ -112,7 +114,7 @@ def _leads_on(lane: StreetLane, after: StreetLane) -> bool:
     a, b = lane.line[-1] - lane.line[-2], after.line[1] - after.line[0]
     cross = a[0] * b[1] - a[1] * b[0]
     dot = a @ b
-    return bool(abs(np.degrees(np.arctan2(cross, dot))) <= SHARPEST_TURN_DEG)
+    return bool(abs(np.degrees(np.arctan2(cross, dot))) <= _SHARPEST_TURN_DEG)
 
 
 def lane_path(lanes: Sequence[StreetLane], spacing: float) -> np.ndarray:

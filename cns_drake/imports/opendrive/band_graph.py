@@ -10,7 +10,6 @@ from cns_drake.base import length_of, step_lengths, wrapped
 from cns_drake.imports.drives import search, steerable_drives, way_graph
 from cns_drake.imports.drives.steerable_drives import Obstacle, WaypointRoute
 from cns_drake.imports.opendrive.lanes import DRIVEN, LaneBand
-from cns_drake.traffic import usual_limit
 
 # A lane follows another one if its start is within this distance of the other's
 # end [m].
@@ -18,8 +17,6 @@ _JOINED_WITHIN = 0.6
 # A lane follows another one only if their headings differ by less than this
 # [rad].
 _ASTRAY = np.radians(20.0)
-# A lane at least this long may be a ring that follows itself [m].
-_SHORTEST_RING = 10.0
 # A car needs this width at both ends of a lane [m].
 _LEAST_WIDTH = 1.8
 # Shorter lanes are not driven [m].
@@ -49,8 +46,6 @@ class BandGraph(way_graph.WayGraph):
     Attributes:
         bands: the N driven lanes.
         lines: for each lane, its path in driving direction, (M, 3) in W [m].
-        followers: pairs of lane numbers; the second lane of a pair follows the
-            first lane.
     """
 
     def __init__(self, bands: Sequence[LaneBand]):
@@ -60,12 +55,9 @@ class BandGraph(way_graph.WayGraph):
         # A drive may use each road only once. In a junction, each way is a
         # road.
         self._roads = np.array([band.road.name for band in self.bands])
-        before, after = self._followers(lengths)
-        self.followers = list(zip(before.tolist(), after.tolist(), strict=True))
-        others = before != after
-        super().__init__(np.array(lengths), before[others], after[others])
+        super().__init__(np.array(lengths), *self._followers())
 
-    def _followers(self, lengths: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    def _followers(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns pairs of lanes, where the second lane follows the first.
 
         The result is two arrays (L,) of lane numbers.
@@ -81,8 +73,7 @@ class BandGraph(way_graph.WayGraph):
             for lane, followers in enumerate(near):
                 for after in sorted(followers):
                     turn = wrapped(first[after] - last[lane])
-                    may_be_ring = lengths[lane] > _SHORTEST_RING
-                    if abs(turn) < _ASTRAY and (after != lane or may_be_ring):
+                    if abs(turn) < _ASTRAY and after != lane:
                         pairs.append((lane, after))
         before, after = np.array(pairs, dtype=int).reshape(-1, 2).T
         return before, after
@@ -115,7 +106,7 @@ class BandGraph(way_graph.WayGraph):
         for window in _SMOOTHING:
             drive = steerable_drives.steerable_drive(_smoothed(points, window))
             if isinstance(drive, WaypointRoute):
-                limit = usual_limit_of(self.bands[k] for k in way)
+                limit = _usual_limit(self.bands[k] for k in way)
                 return replace(drive, limit=limit)
         return drive
 
@@ -148,7 +139,7 @@ def _driven_line(band: LaneBand) -> np.ndarray:
     return line[kept]
 
 
-def usual_limit_of(bands: Iterable[LaneBand]) -> float:
+def _usual_limit(bands: Iterable[LaneBand]) -> float:
     """Returns the median of the speed limit along lanes [m/s]."""
     limits, lengths = [], []
     for band in bands:
@@ -156,7 +147,10 @@ def usual_limit_of(bands: Iterable[LaneBand]) -> float:
         limit = band.road.limits.at(middle, middle)
         limits.append(np.where(limit > 0.0, limit, _DEFAULT_LIMIT))
         lengths.append(np.diff(band.s))
-    return usual_limit(np.concatenate(limits), np.concatenate(lengths))
+    limit, length = np.concatenate(limits), np.concatenate(lengths)
+    order = np.argsort(limit)
+    reached = np.cumsum(length[order])
+    return float(limit[order][np.searchsorted(reached, reached[-1] / 2.0)])
 
 
 def _heading(ends: np.ndarray) -> float:

@@ -17,7 +17,6 @@ from cns_drake.base import (
     InputError,
     distances_along,
     doing,
-    length_of,
     value_errors,
 )
 from cns_drake.city import (
@@ -37,7 +36,7 @@ from cns_drake.imports.drives import search, steerable_drives
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.imported_objects import make_object
-from cns_drake.imports.opendrive.band_graph import BandGraph, usual_limit_of
+from cns_drake.imports.opendrive.band_graph import BandGraph
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
 from cns_drake.imports.opendrive.lanes import (
     LEAST_WIDTH,
@@ -54,13 +53,6 @@ from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
 from cns_drake.imports.options import ImportOptions
 from cns_drake.scene import GROUND_CLASSES
-from cns_drake.traffic import (
-    DirectedLane,
-    Walkway,
-    join_lanes,
-    lane_text,
-    resampled,
-)
 
 # Height of sidewalks above the road if the file states none [m].
 _KERB_HEIGHT = 0.1
@@ -76,15 +68,6 @@ _BAY_LENGTHS = (5.8, 7.4)
 _TAKEN_SHARE = 0.6
 # Least width of a parking lane [m].
 _LEAST_PARKING = 1.9
-_SIDEWALKS = frozenset({"sidewalk", "walking"})
-# Least distance of pedestrians from the edges of a sidewalk [m].
-_FROM_EDGE = 0.45
-# Greatest distance of pedestrians from the middle of a sidewalk [m].
-_MOST_HALF_WIDTH = 1.05
-# There are no pedestrians where this distance would be smaller [m].
-_LEAST_HALF_WIDTH = 0.3
-# Least length of a sidewalk with pedestrians [m].
-_SHORTEST_WALKWAY = 5.0
 # The underside of a bridge is this far below its upper side [m].
 _DECK_DEPTH = np.array([0.0, 0.0, 0.8])
 # Triangles are dropped if twice their area is not greater than this [m^2].
@@ -115,7 +98,6 @@ class Town:
         stages: how the town looked in each stage.
         streets: areas of the streets, except bridges.
         drives: the proposed drives, at most two.
-        lanes: text of the lane file; None if there are no lanes for traffic.
         kinds: kind of structure -> number of structures.
         faults: the repaired and omitted parts of the file, by kind of fault.
     """
@@ -126,7 +108,6 @@ class Town:
     stages: Stages
     streets: ImportedStreets
     drives: list[WaypointRoute]
-    lanes: str | None
     kinds: dict[str, int]
     faults: ImportFaults
 
@@ -183,11 +164,6 @@ def _build(
         city = _near_drives(city, drives, options.within, faults)
     imported = {one.name for some in of_file for one in some}
     generated = [one for one in city.structures if one.name not in imported]
-    lanes_of_traffic = lane_text_of_bands(streets.bands, streets.kerbs)
-    if lanes_of_traffic is None:
-        faults.add(
-            "no lanes for traffic: each comes to a dead end", source.name
-        )
     return Town(
         roads=roads,
         seed=options.seed,
@@ -195,7 +171,6 @@ def _build(
         stages=_make_stages(City(tuple(generated), city.cars), options.grow),
         streets=streets.on_ground,
         drives=drives,
-        lanes=lanes_of_traffic,
         kinds=_counts_by_kind(roads, of_file, generated),
         faults=faults,
     )
@@ -560,47 +535,6 @@ def _counts_by_kind(
         "plants, sampled at random": drawn["vegetation"],
     }
     return {kind: number for kind, number in kinds.items() if number}
-
-
-def lane_text_of_bands(
-    bands: Sequence[LaneBand], kerbs: KerbHeights
-) -> str | None:
-    """Returns the text of a lane file; None if there is no lane to drive on.
-
-    `bands` contains the lanes of the whole network, and `kerbs` the heights of
-    sidewalks above the road.
-    """
-    graph = BandGraph(bands)
-    lanes = [
-        DirectedLane(
-            line,
-            usual_limit_of([band]),
-            band.road.junction is not None,
-        )
-        for band, line in zip(graph.bands, graph.lines, strict=True)
-    ]
-    joined = join_lanes(lanes, graph.followers)
-    if not joined.pieces:
-        return None
-    sidewalks = [band for band in bands if band.lane.kind in _SIDEWALKS]
-    return lane_text(joined, _walkways(sidewalks, kerbs))
-
-
-def _walkways(bands: Sequence[LaneBand], kerbs: KerbHeights) -> list[Walkway]:
-    """Returns a walkway for each sidewalk; pedestrians turn at its ends."""
-    walkways: list[Walkway] = []
-    for band in bands:
-        half = min(float(band.width.min()) / 2 - _FROM_EDGE, _MOST_HALF_WIDTH)
-        length = length_of(band.middle)
-        if half < _LEAST_HALF_WIDTH or length < _SHORTEST_WALKWAY:
-            continue
-        first = 2 * len(walkways)
-        kerb = kerbs(band.middle[:, :2])
-        points = resampled(
-            np.column_stack([band.middle[:, :2], band.middle[:, 2] + kerb])
-        )
-        walkways.append(Walkway(points, half, first, first + 1))
-    return walkways
 
 
 def split_levels(

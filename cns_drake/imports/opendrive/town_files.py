@@ -10,7 +10,7 @@ from cns_drake.imports import map_files, overview
 from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.opendrive.town import Town
 from cns_drake.imports.report import ImportReport
-from cns_drake.scene import LANES_NAME, MESH_FOLDER
+from cns_drake.scene import MESH_FOLDER
 
 # About the radius of a tree's crown, in pictures [m].
 _CROWN_RADIUS = 1.5
@@ -58,8 +58,6 @@ def write_town(
     (draft / MESH_FOLDER).mkdir(exist_ok=True)
     for name, text in files.items():
         (draft / name).write_text(text, "utf-8")
-    if town.lanes is not None:
-        (draft / LANES_NAME).write_text(town.lanes, "utf-8")
     map_files.write_facts(
         draft,
         source,

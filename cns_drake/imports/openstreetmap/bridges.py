@@ -13,7 +13,6 @@ from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.openstreetmap.area_looks import AreaLook, raised_object
 from cns_drake.imports.openstreetmap.features import OsmWay
-from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.tags import has_tag
 from cns_drake.imports.openstreetmap.way_tags import (
     is_railway,
@@ -23,6 +22,7 @@ from cns_drake.imports.openstreetmap.way_tags import (
     street_width,
 )
 from cns_drake.imports.streets import SIDEWALK_WIDTH
+from cns_drake.scene import LocalMetres
 
 # Distance of a parapet from the edge of the street [m].
 _PARAPET_FROM_EDGE = 0.2

@@ -30,10 +30,10 @@ from cns_drake.imports.openstreetmap.building_tags import (
     why_absent,
 )
 from cns_drake.imports.openstreetmap.features import OsmArea, Tags
-from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.passages import Passage, Passages
 from cns_drake.imports.openstreetmap.tags import has_tag
 from cns_drake.imports.solids import extruded
+from cns_drake.scene import LocalMetres
 
 # How the report counts buildings that are not made as in the file.
 TWICE = "building drawn twice, taken once"

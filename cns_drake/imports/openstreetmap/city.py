@@ -49,7 +49,6 @@ from cns_drake.imports.openstreetmap.features import (
     Tags,
 )
 from cns_drake.imports.openstreetmap.grounds import ground_areas
-from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.passages import (
     Passage,
     WayOpenings,
@@ -76,6 +75,7 @@ from cns_drake.imports.openstreetmap.way_tags import (
 from cns_drake.imports.part_tables import PartTable
 from cns_drake.imports.solids import extruded
 from cns_drake.imports.streets import Street
+from cns_drake.scene import LocalMetres
 
 _PARTS = PartTable(Path(__file__).with_name("parts.yaml"))
 # Greatest height of a barrier [m].
@@ -186,7 +186,6 @@ def import_openstreetmap(
         "WGS 84",
         faults,
         driven,
-        streets.street_places(features, local),
         any(way.tags.get("driving_side") == "left" for way in features.ways),
         small_objects=list(make_small_objects(features, local)),
     )

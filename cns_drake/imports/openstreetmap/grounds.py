@@ -9,9 +9,9 @@ from cns_drake.imports.colours import LAWN, WATER, Rgb
 from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.openstreetmap.area_looks import AreaLook, flat_object
 from cns_drake.imports.openstreetmap.features import OsmFeatures, Tags
-from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.tags import TABLES, has_tag
 from cns_drake.imports.openstreetmap.way_tags import is_tunnel, path_width
+from cns_drake.scene import LocalMetres
 
 _SAND: Rgb = (0.76, 0.68, 0.51)
 _GRAVEL: Rgb = (0.50, 0.47, 0.43)

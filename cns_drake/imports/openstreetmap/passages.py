@@ -17,7 +17,6 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.features import OsmWay, Tags
-from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.tags import (
     has_tag,
     is_inside,
@@ -30,6 +29,7 @@ from cns_drake.imports.openstreetmap.way_tags import (
     street_width,
     way_width,
 )
+from cns_drake.scene import LocalMetres
 
 # Usual clear height of a passage for a street [m].
 _STREET_HEIGHT = 4.5

@@ -16,7 +16,7 @@ from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.openstreetmap.area_looks import flat_object
 from cns_drake.imports.openstreetmap.features import OsmWay
 from cns_drake.imports.openstreetmap.grounds import WATER_LOOK
-from cns_drake.imports.openstreetmap.local_metres import LocalMetres
+from cns_drake.scene import LocalMetres
 
 # A coastline that ends within the city is extended by this length [m].
 _COAST_EXTENSION = 3000.0

@@ -12,7 +12,6 @@ from shapely.geometry import LineString
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.foreign_city import SmallObject
 from cns_drake.imports.openstreetmap.features import OsmFeatures, Tags
-from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.tags import (
     TABLES,
     has_tag,
@@ -20,6 +19,7 @@ from cns_drake.imports.openstreetmap.tags import (
     length,
     tag_value,
 )
+from cns_drake.scene import LocalMetres
 
 # Names of directions, clockwise from north.
 _COMPASS = (

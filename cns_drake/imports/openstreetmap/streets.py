@@ -2,19 +2,16 @@
 
 from collections.abc import Iterable, Iterator
 
-import numpy as np
 import shapely
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.imports import faces
 from cns_drake.imports.faults import ImportFaults
-from cns_drake.imports.foreign_city import StreetPlaces
 from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.openstreetmap.area_looks import AreaLook, flat_object
 from cns_drake.imports.openstreetmap.bridges import Bridges
 from cns_drake.imports.openstreetmap.features import OsmFeatures, OsmWay, Tags
-from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.speed_tags import speed_limit
 from cns_drake.imports.openstreetmap.tags import has_tag
 from cns_drake.imports.openstreetmap.way_tags import (
@@ -26,6 +23,7 @@ from cns_drake.imports.openstreetmap.way_tags import (
     street_width,
 )
 from cns_drake.imports.streets import KERB_HEIGHT, SIDEWALK_WIDTH, Street
+from cns_drake.scene import LocalMetres
 
 _ROAD = AreaLook("Road", "road", None, 0.0)
 _WALK = AreaLook("Sidewalk", "sidewalk", None, KERB_HEIGHT)
@@ -142,33 +140,3 @@ def drivable_streets(
                 )
             )
     return streets
-
-
-def street_places(features: OsmFeatures, local: LocalMetres) -> StreetPlaces:
-    """Returns the crossings, traffic signals and footpaths of a file.
-
-    `local` converts longitudes and latitudes to coordinates in metres.
-    """
-    signals = [
-        place
-        for _, tags, place in features.nodes
-        if tags.get("highway") == "traffic_signals"
-    ]
-    paths = [
-        local(line)
-        for _, tags, line, _ in features.ways
-        if path_width(tags) is not None
-        and tags.get("highway") not in ("steps", "cycleway")
-        and tags.get("footway") != "crossing"
-        and not is_tunnel(tags)
-        and not has_tag(tags, "area")
-    ]
-    return StreetPlaces(
-        frozenset(
-            number
-            for number, tags in features.crossings
-            if tags.get("crossing") != "no"
-        ),
-        local(np.array(signals).reshape(-1, 2)),
-        paths,
-    )
