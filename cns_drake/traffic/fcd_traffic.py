@@ -75,8 +75,10 @@ _COMPARED = 10.0
 _DEGREES_RATIO = 1e-4
 # Length of a degree on the Earth, at the most [m].
 _DEGREE = 112e3
-# The course of a vehicle that moves by at least this much is known [m].
-_COURSE_FROM = 2.0
+# A vehicle moves as it points if it moves by at least this much [m], in a bend
+# of at least this radius [m].
+_COURSE_FROM = 0.3
+_STRAIGHT = 500.0
 
 # A function that takes places (N, 2) [m], and whether it is about roads or all
 # other ground. It returns all heights one above the other: (M,) the numbers of
@@ -223,7 +225,7 @@ def _in_metres(
     """Returns vehicles and persons of a trace in degrees, in the frame W.
 
     SUMO's angles are from the north of its own projection. The angle from there
-    to the north of W is found from the vehicles, which move as they point.
+    to the north of W is found from vehicles that drive straight on.
 
     Args:
         convert: function that takes longitudes and latitudes (N, 2) [deg], and
@@ -237,11 +239,11 @@ def _in_metres(
     turns = [np.zeros(0)]
     for one in moved[0]:
         x, y = np.diff(one.xy, axis=0).T
-        middle = (one.yaw[1:] + one.yaw[:-1]) / 2
-        far = np.hypot(x, y) > _COURSE_FROM
-        turns.append(wrapped(arctan2(y[far], x[far]) - middle[far]))
-    known = np.concatenate(turns)
-    turn = float(np.median(known)) if len(known) else 0.0
+        moved_by, bend = np.hypot(x, y), np.abs(np.diff(one.yaw))
+        known = (moved_by > _COURSE_FROM) & (bend < moved_by / _STRAIGHT)
+        turns.append(wrapped(arctan2(y, x) - one.yaw[1:])[known])
+    every = np.concatenate(turns)
+    turn = float(np.median(every)) if len(every) else 0.0
     vehicles, persons = (
         tuple(replace(one, yaw=one.yaw + turn) for one in some)
         for some in moved
@@ -517,19 +519,23 @@ def play_trace(
 
 
 def _check_place(trace: FcdTrace, path: Path, levels: Levels) -> None:
-    """Checks that vehicles are on roads; without vehicles, checks persons.
+    """Checks that a trace belongs to the map.
+
+    If any vehicle is on a road, half of their places must be. Otherwise half of
+    all places must be on the ground.
 
     Raises:
-        InputError: half of the trace is beside the roads, or the ground.
+        InputError: the trace belongs to another map.
     """
     traced = trace.vehicles or trace.persons
     places = np.concatenate([road_user.xy for road_user in traced])
-    on_road = np.isfinite(_heights(levels, places, of_road=True))
-    if not trace.vehicles:
-        on_road |= np.isfinite(_heights(levels, places, of_road=False))
-    if on_road.mean() < 0.5:
+    there = np.isfinite(_heights(levels, places, of_road=True))
+    ground = "roads"
+    if not (trace.vehicles and there.any()):
+        ground = "ground"
+        there |= np.isfinite(_heights(levels, places, of_road=False))
+    if there.mean() < 0.5:
         low, high = places.min(axis=0), places.max(axis=0)
-        ground = "roads" if trace.vehicles else "ground"
         raise InputError(
             f"{path}: half of the trace is beside the map's {ground}: it is at"
             f" x {low[0]:.0f} to {high[0]:.0f}, y {low[1]:.0f} to"

@@ -42,7 +42,8 @@ def write_small_map(folder):
     """Writes a map with stages 01 and 04 and returns its folder."""
     folder.mkdir()
     source = shipped_maps()["metropolis"]
-    shutil.copy(source / "roads.yaml", folder)
+    for name in ("roads.yaml", "traffic.npz"):
+        shutil.copy(source / name, folder)
     rng = np.random.default_rng(0)
     visuals = [
         box_visual("ground/plate", (0, -36, -0.5, 0, 0, 0), (500, 500, 1))

@@ -12,7 +12,6 @@ from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.openstreetmap.area_looks import AreaLook, flat_object
 from cns_drake.imports.openstreetmap.bridges import Bridges
 from cns_drake.imports.openstreetmap.features import OsmFeatures, OsmWay, Tags
-from cns_drake.imports.openstreetmap.speed_tags import speed_limit
 from cns_drake.imports.openstreetmap.tags import has_tag
 from cns_drake.imports.openstreetmap.way_tags import (
     driven_directions,
@@ -69,7 +68,8 @@ def _street_areas(
             continue
         course = LineString(local(line))
         if width is not None:
-            _count_faults_of_street(name, tags, bridges, faults)
+            if has_tag(tags, "bridge") and name not in bridges.level:
+                faults.add("bridge, laid on the ground", name)
             half = width / 2.0
             roads[name] = course.buffer(half, quad_segs=4)
             on_left, on_right = sidewalk_sides(tags)
@@ -81,17 +81,6 @@ def _street_areas(
         elif path is not None:
             walks[name] = course.buffer(path / 2.0, quad_segs=4)
     return roads, walks
-
-
-def _count_faults_of_street(
-    name: str, tags: Tags, bridges: Bridges, faults: ImportFaults
-) -> None:
-    """Counts speed limits that cannot be read, and bridges on the ground."""
-    speed_limit(tags, True, (name, faults))
-    if "maxspeed:backward" in tags:
-        speed_limit(tags, False, (name, faults))
-    if has_tag(tags, "bridge") and name not in bridges.level:
-        faults.add("bridge, laid on the ground", name)
 
 
 def _count_left_out(bridges: Bridges, faults: ImportFaults) -> None:

@@ -113,7 +113,6 @@ NO_SIZES = ["0", "-1", "zzz", "1e9"]
         ("width", {"barrier": "hedge"}),
         ("height", {"barrier": "wall"}),
         ("lanes", {"highway": "residential"}),
-        ("maxspeed", {"highway": "residential"}),
     ],
 )
 def test_sizes_that_cannot_be_are_counted_on_each_element(

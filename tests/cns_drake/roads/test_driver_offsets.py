@@ -78,7 +78,7 @@ def test_a_driver_follows_from_seed_or_name_alone(small_map):
         return plan_drive(with_driver(scenario, **fields)).positions([8, 16])
 
     np.testing.assert_array_equal(
-        points(seed=5, follows=True, wander_length=99.0),
+        points(seed=5, wander_length=99.0),
         plan_drive(scenario).positions([8, 16]),
     )
     plain, seeded = points(wander=0.3), points(wander=0.3, seed=5)

@@ -115,7 +115,7 @@ def test_mp4_needs_ffmpeg(tmp_path, monkeypatch):
         make_film(tiny_scenario(tmp_path), tmp_path / "a.mp4", size=SIZE)
 
 
-def test_traffic_comes_where_there_is_room(tmp_path):
+def test_traffic_comes_where_it_was_recorded(tmp_path):
     shipped = load_scenario("metropolis_01")
     assert with_some_traffic(shipped).traffic.vehicles == 60
     assert with_some_traffic(shipped).traffic.walkers == 60

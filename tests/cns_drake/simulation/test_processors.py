@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 
+from helpers.recorded_traffic import write_rounds
 from helpers.small_city import ROADS
 from helpers.small_map import write_small_map
 from helpers.tiny_drive import tiny_scenario, write_scenario
@@ -25,6 +26,7 @@ def scenario(tmp_path_factory):
     folder = tmp_path_factory.mktemp("processors")
     town = write_small_map(folder / "town")
     (town / "roads.yaml").write_text(ROADS)
+    write_rounds(town / "traffic.npz")
     return tiny_scenario(
         folder,
         world=None,

@@ -1,6 +1,7 @@
 """Recordings with traffic: interrupted, cut short, exported."""
 
 from helpers.meshcat_pages import objects, read_commands, tracks
+from helpers.recorded_traffic import write_rounds
 from helpers.small_city import ROADS
 from helpers.small_map import write_small_map
 from helpers.tiny_drive import tiny_scenario
@@ -32,6 +33,7 @@ def scenario(tmp_path_factory):
     folder = tmp_path_factory.mktemp("traffic")
     town = write_small_map(folder / "town")
     (town / "roads.yaml").write_text(ROADS)
+    write_rounds(town / "traffic.npz")
     # The ids of traffic follow this one: they need more than a byte.
     with (town / "structures.csv").open("a") as table:
         table.write("300,mast,pole\n")

@@ -443,6 +443,15 @@ def _(folder):
     npz(folder / "w.npz", (f"{first_array()}.npy", data))
 
 
+@way(
+    "recorded traffic", "w.npz", "cns_drake.traffic.read_recorded",
+    use=at_door("cns_drake.traffic", "read_recorded", "w.npz"),
+)  # fmt: skip
+def _(folder):
+    data = npy_header((5, 1_000_000, 30), "<i2") + bytes(300_000_000)
+    npz(folder / "w.npz", ("vehicles.npy", data))
+
+
 @way("npz: more than declared", "w.npz", *WEIGHTS, use=weigh)
 def _(folder):
     import bz2
@@ -480,14 +489,6 @@ for _name, _text in {
         (folder / "x.json").write_text(text)
 
 
-@way(
-    "lanes", "x.json", "cns_drake.traffic.read_lanes",
-    use=at_door("cns_drake.traffic", "read_lanes", "x.json"),
-)  # fmt: skip
-def _(folder):
-    (folder / "x.json").write_text('{"lanes": [' + "{}," * 200_000 + "{}]}")
-
-
 # --- XML
 
 XML = {"cns_drake.base.read_elements": (), "cns_drake.traffic.read_fcd": ()}
@@ -499,7 +500,7 @@ def all_xml(folder):
 
     file = folder / "x.xml"
     read_elements(file)
-    return read_fcd(file)
+    return read_fcd(file, lambda: lambda places: places)
 
 
 for _name, _text in {
@@ -1243,9 +1244,7 @@ NO_FILES = {
     "cns_drake.scene.find_bus": "an object",
     "cns_drake.simulation.load_drive": "reads by load_world",
     "cns_drake.simulation.load_stage": "reads by load_world",
-    "cns_drake.simulation.load_ways": "reads by read_lanes",
     "cns_drake.studies.open_labelled": "reads by open_drive",
-    "cns_drake.traffic.find_overlaps": "objects",
     "evaluation.drives.find_data_sets": "names of files alone",
     "evaluation.localisation.read_queries": "an open drive",
     "evaluation.methods.find_method": "a name",

@@ -7,16 +7,8 @@ from pydrake.geometry import SceneGraph
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.traffic import (
-    EgoBox,
-    LaneGraph,
-    Piece,
-    fcd_traffic,
-    play_trace,
-    read_fcd,
-)
+from cns_drake.traffic import EgoBox, fcd_traffic, play_trace, read_fcd
 from cns_drake.traffic.traffic_motion import make_traffic
-from cns_drake.traffic.walkers import gait_rate
 
 # Time step of the trace [s].
 DT = 0.1
@@ -24,24 +16,22 @@ DT = 0.1
 RADIUS = 30.0
 # Angular velocity of this vehicle [rad/s].
 RATE = 0.2
-TURN = np.linspace(0.0, 2 * np.pi, 400)
 SLOPE = 0.05
-GRAPH = LaneGraph(
-    (
-        Piece(
-            np.column_stack(
-                [
-                    RADIUS * np.cos(TURN),
-                    RADIUS * np.sin(TURN),
-                    2.0 + SLOPE * RADIUS * np.cos(TURN),
-                ]
-            ),
-            13.9,
-            False,
-        ),
-    )
-)
+# Where pedestrians are [m].
+LAWN = 0.3
 EGO_BOX = EgoBox(-1.05, 3.75, 1.05)
+
+
+def road_and_lawn(xy, of_road):
+    """The heights of a sloped ring, and of the lawn in its middle."""
+    on_ring = abs(np.hypot(*xy.T) - RADIUS) < 6.0
+    if of_road:
+        return np.flatnonzero(on_ring), 2.0 + SLOPE * xy[on_ring, 0]
+    return np.flatnonzero(~on_ring), np.full((~on_ring).sum(), LAWN)
+
+
+def no_degrees():
+    raise InputError("nobody knows where the map lies")
 
 
 def far_away(times):
@@ -85,10 +75,13 @@ def write_trace(path, count=80, change=lambda text: text):
     return path
 
 
-def play(path, duration=7.0, ego=far_away, seed=1, end=7.0):
+def play(
+    path, duration=7.0, ego=far_away, seed=1, end=7.0, levels=road_and_lawn,
+    from_degrees=no_degrees,
+):  # fmt: skip
     return play_trace(
-        read_fcd(path), path, GRAPH, [], seed=seed, duration=duration,
-        end=end, ego=ego, ego_box=EGO_BOX,
+        read_fcd(path, from_degrees), path, levels, seed=seed,
+        duration=duration, end=end, ego=ego, ego_box=EGO_BOX,
     )  # fmt: skip
 
 
@@ -117,12 +110,14 @@ def test_places_and_velocities(trace):
         # Uphill is nose up, which is a turn about -y.
         assert values[0, 4] == pytest.approx(-np.radians(2.0))
         height = 2.0 + SLOPE * expected[0]
-        assert values[0, 2] == pytest.approx(height, abs=2e-2)
+        assert values[0, 2] == pytest.approx(height, abs=1e-4)
         walkers, walker_rates = plan.walkers.at(t)
         np.testing.assert_allclose(walkers[0, :2], [20 - 1.25 * t, 3.0])
         assert abs(walkers[0, 3]) == pytest.approx(np.pi)
         np.testing.assert_allclose(walker_rates[0, :2], [-1.25, 0], atol=1e-9)
-        assert walker_rates[0, 4] == pytest.approx(gait_rate(1.25))
+        assert walkers[0, 2] == LAWN
+        stride = 0.7 * 1.25 + 0.4
+        assert walker_rates[0, 4] == pytest.approx(2 * np.pi * 1.25 / stride)
 
 
 def test_velocities_are_continuous(trace):
@@ -219,8 +214,7 @@ def test_a_lidar_that_turns_sees_bodies_come_and_go_in_motion(trace):
         context.SetTime(t)
         velocity = port.Eval(context)[1].translational()
         np.testing.assert_allclose(velocity[:2], [0, 7], atol=1e-6)
-        # Heights are means of the lane's points.
-        assert abs(velocity[2]) < 0.5
+        assert abs(velocity[2]) < 1e-6
 
 
 def fault(path, **options):
@@ -264,7 +258,7 @@ def test_what_jumps_is_absent_meanwhile(tmp_path, tag, kind, fastest, dt):
         far = factor * fastest * dt
         xs = [0.0, 0.1, 0.2, 0.2 + far, 0.3 + far, 0.4 + far]
         path = write_moves(tmp_path / "a.xml", tag, kind, dt, xs)
-        trace = read_fcd(path)
+        trace = read_fcd(path, no_degrees)
         plan = play(path, duration=5 * dt, end=5 * dt)
         tracks = plan.vehicles if tag == "vehicle" else plan.walkers
         own = [0, 1][: 1 + jumps]
@@ -293,20 +287,19 @@ def test_a_trace_of_jumps_has_other_units(tmp_path, monkeypatch):
         xs = [1000.0 * k for k in range(number)]
         path = write_moves(tmp_path / "a.xml", "vehicle", "", 1.0, xs)
         if number == 4:
-            assert len(read_fcd(path).vehicles) == 4 + 1
+            assert len(read_fcd(path, no_degrees).vehicles) == 4 + 1
             continue
         fault = r"4 jumps from .* in seconds"
         with pytest.raises(InputError, match=fault):
-            read_fcd(path)
+            read_fcd(path, no_degrees)
 
 
 @pytest.mark.parametrize("tag", ["vehicle", "person"])
 @pytest.mark.parametrize(
     ("metres", "is_refused"),
-    [(1.0, False), (1.2, False), (0.3048, True), (111e3, True)],
+    [(1.0, False), (1.2, False), (0.3048, True), (1000.0, True)],
 )
 def test_speeds_tell_the_unit_of_places(tmp_path, tag, metres, is_refused):
-    """Such as degrees, of sumo --fcd-output.geo."""
     rows = "".join(
         f'<timestep time="{k * DT:.1f}"><{tag} id="a" speed="2" angle="90"'
         f' x="{9 + 2 * k * DT / metres:.9f}" y="47"/></timestep>'
@@ -316,15 +309,15 @@ def test_speeds_tell_the_unit_of_places(tmp_path, tag, metres, is_refused):
     path.write_text(f"<fcd-export>{rows}</fcd-export>")
     if is_refused:
         with pytest.raises(InputError, match=r"x\.xml: the places are not in"):
-            read_fcd(path)
+            read_fcd(path, no_degrees)
     else:
-        assert not read_fcd(path).notes
+        assert not read_fcd(path, no_degrees).notes
 
 
 def test_what_is_away_for_a_time_may_come_back_elsewhere(tmp_path):
     xs = [0.0, 3.0, None, None, 500.0, 503.0]
     path = write_moves(tmp_path / "a.xml", "vehicle", "passenger", 1.0, xs)
-    assert read_fcd(path).notes == ()
+    assert read_fcd(path, no_degrees).notes == ()
     tracks = play(path, duration=5.0, end=5.0).vehicles
     there = [bool(tracks.is_present(k + 0.5)[0]) for k in range(5)]
     assert there == [True, False, False, False, True]
@@ -340,18 +333,26 @@ def test_a_trace_that_is_too_short(trace):
     )
 
 
-def test_a_trace_of_another_map(tmp_path):
+@pytest.mark.parametrize(
+    ("offset", "ground", "place"),
+    [(12.0, "roads", r"x -1\d to 4\d"), (900.0, "ground", r"x 8\d\d to 9\d\d")],
+)
+def test_a_trace_of_another_map(tmp_path, offset, ground, place):
     def move(text):
         return re.sub(
-            r' x="([^"]+)"', lambda m: f' x="{float(m[1]) + 900}"', text
+            r' x="([^"]+)"', lambda m: f' x="{float(m[1]) + offset}"', text
         )
+
+    def levels(xy, of_road):
+        found, z = road_and_lawn(xy, of_road)
+        near = np.hypot(*xy[found].T) < 50.0
+        return found[near], z[near]
 
     path = write_trace(tmp_path / "moved.xml", change=move)
     assert re.fullmatch(
-        r"half of the trace is more than 5 m from the map's lanes: the trace "
-        r"is at x 8\d\d to 9\d\d, .* m, the lanes are at x -30 to 30, y -30 to "
-        r"30 m; give a trace of this map, without an offset",
-        fault(path),
+        rf"half of the trace is beside the map's {ground}: it is at {place}, "
+        r"y .* m; give a trace of this map, without an offset",
+        fault(path, levels=levels),
     )
 
 
@@ -412,25 +413,38 @@ def test_persons_are_not_seen_while_they_ride(tmp_path, vehicle):
     )
 
 
-LINE = np.arange(-60.0, 60.5, 0.5)
 ABOVE = 6.0
-BRIDGE = np.column_stack([0 * LINE - 1.75, LINE, 0 * LINE + ABOVE])
-BELOW = np.column_stack([LINE, 0 * LINE + 1.75, 0 * LINE])
-# A street on two levels, one above the other.
-STACKED = np.column_stack([LINE, 0 * LINE + 1.75, 0 * LINE + ABOVE])
+
+
+def bridge(xy, of_road):
+    """A bridge towards the north over a street towards the east."""
+    if not of_road:
+        return np.zeros(0, int), np.zeros(0)
+    over, under = abs(xy[:, 0] + 1.75) < 3.0, abs(xy[:, 1] - 1.75) < 3.0
+    return np.concatenate([np.flatnonzero(over), np.flatnonzero(under)]), (
+        np.repeat([ABOVE, 0.0], [over.sum(), under.sum()])
+    )
+
+
+def stacked(xy, of_road):
+    """A street on two levels, one above the other."""
+    both = np.arange(len(xy) * of_road)
+    return np.tile(both, 2), np.repeat([0.0, ABOVE], len(both))
 
 
 @pytest.mark.parametrize("zero", [None, 0.0, -40.0])
 @pytest.mark.parametrize(
-    ("ways", "starts", "heights"),
+    ("levels", "starts", "heights"),
     [
-        ((BRIDGE, BELOW), ((-1.75, -50, 0, 8), (-50, 1.75, 8, 0)), (ABOVE, 0)),
-        ((BELOW, STACKED), ((-50, 1.75, 8, 0), (50, 1.75, -8, 0)), (0, ABOVE)),
+        (bridge, ((-1.75, -50, 0, 8), (-50, 1.75, 8, 0)), (ABOVE, 0)),
+        (stacked, ((-50, 1.75, 8, 0), (50, 1.75, -8, 0)), (0, ABOVE)),
     ],
 )
-def test_vehicles_are_on_their_own_level(tmp_path, zero, ways, starts, heights):
+def test_vehicles_are_on_their_own_level(
+    tmp_path, zero, levels, starts, heights
+):
     """Over a crossing on two levels; the trace has heights, or none."""
-    if zero is None and ways[1] is STACKED:
+    if zero is None and levels is stacked:
         pytest.skip("nothing tells the level")
     steps = []
     for k in range(120):
@@ -444,11 +458,7 @@ def test_vehicles_are_on_their_own_level(tmp_path, zero, ways, starts, heights):
         steps.append("".join([*rows, "</timestep>"]))
     path = tmp_path / "trace.xml"
     path.write_text(f"<fcd-export>{''.join(steps)}</fcd-export>")
-    graph = LaneGraph(tuple(Piece(way, 13.9, False) for way in ways))
-    plan = play_trace(
-        read_fcd(path), path, graph, [], seed=1, duration=10.0, end=10.0,
-        ego=far_away, ego_box=EGO_BOX,
-    )  # fmt: skip
+    plan = play(path, duration=10.0, end=10.0, levels=levels)
     for t in np.arange(0.0, 10.0, 0.1):
         values, _ = plan.vehicles.at(t)
         np.testing.assert_allclose(values[:, 2], heights, atol=1e-6)
@@ -463,10 +473,80 @@ def test_a_walker_stays_on_the_bridge_on_which_he_came(tmp_path):
     ]
     path = tmp_path / "trace.xml"
     path.write_text(f"<fcd-export>{''.join(rows)}</fcd-export>")
-    graph = LaneGraph(tuple(Piece(way, 13.9, False) for way in (BRIDGE, BELOW)))
-    plan = play_trace(
-        read_fcd(path), path, graph, [], seed=1, duration=50.0, end=50.0,
-        ego=far_away, ego_box=EGO_BOX,
-    )  # fmt: skip
+    plan = play(path, duration=50.0, end=50.0, levels=bridge)
     heights = [plan.walkers.at(t)[0][0, 2] for t in np.arange(0.0, 50.0)]
     np.testing.assert_allclose(heights, ABOVE, atol=1e-6)
+
+
+def test_road_users_stay_at_their_height_beside_the_ground(trace):
+    """The ground ends in the east, where the bus begins."""
+
+    def cut(xy, of_road):
+        place, z = road_and_lawn(xy, of_road)
+        kept = xy[place, 0] < 20.0
+        return place[kept], z[kept]
+
+    tracks = play(trace, levels=cut).vehicles
+    # From here on the bus is on the ground.
+    first = np.flatnonzero(tracks.values[:, 0, 0] < 20.0)[0]
+    edge = 2.0 + SLOPE * tracks.values[first, 0, 0]
+    np.testing.assert_allclose(tracks.values[: first + 1, 0, 2], edge)
+    assert first > 5
+
+
+# Longitude and latitude of the map's origin [deg].
+EAST, NORTH = 13.44, 52.47
+# Metres per degree there.
+METRES = np.array([68_000.0, 111_260.0])
+
+
+def in_degrees(text, turn_deg):
+    """A trace in degrees, of a projection that is turned to the map's."""
+
+    def place(match):
+        x, y = (float(match[k]) for k in (1, 2))
+        longitude, latitude = x / METRES[0] + EAST, y / METRES[1] + NORTH
+        return f' x="{longitude:.9f}" y="{latitude:.9f}"'
+
+    def angle(match):
+        return f' angle="{float(match[1]) + turn_deg:.6f}"'
+
+    text = re.sub(r' x="(\S+)" y="(\S+)"', place, text)
+    return re.sub(r' angle="(\S+)"', angle, text)
+
+
+def test_a_trace_in_degrees(tmp_path, trace):
+    """With a person who rides in the bus, and a projection of its own."""
+
+    def with_rider(text):
+        return re.sub(
+            r'(id="b" (x="\S+" y="\S+").*?/>)',
+            r'\1<person id="r" \2 angle="0" speed="6"/>',
+            text,
+        )
+
+    metres = write_trace(tmp_path / "metres.xml", change=with_rider)
+    degrees = write_trace(
+        tmp_path / "degrees.xml",
+        change=lambda text: in_degrees(with_rider(text), 1.3),
+    )
+
+    def from_degrees():
+        return lambda places: (places - (EAST, NORTH)) * METRES
+
+    expected = play(metres)
+    found = play(degrees, from_degrees=from_degrees)
+    assert [one.name for one in found.kinds] == [
+        one.name for one in expected.kinds
+    ]
+    for one, other in (
+        (found.vehicles, expected.vehicles),
+        (found.walkers, expected.walkers),
+    ):
+        np.testing.assert_array_equal(one.present, other.present)
+        np.testing.assert_allclose(one.values, other.values, atol=5e-3)
+    assert found.notes[0].endswith("1 persons, while they ride in vehicles")
+    assert fault(degrees) == (
+        "its places are longitudes and latitudes: nobody knows where the map"
+        " lies"
+    )

@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 from cns_drake.scene import read_perception_geometry
 from cns_drake.sensors import Lidar, connect_lidar, make_beam_pattern
 from cns_drake.traffic import (
-    WALKER_SIZE,
     TrafficPlan,
     add_traffic,
     connect_traffic,
@@ -27,6 +26,7 @@ from cns_drake.traffic.traffic_motion import (
     bodies_at,
     make_traffic,
 )
+from cns_drake.traffic.traffic_plan import WALKER_SIZE
 from cns_drake.traffic.vehicle_kinds import KINDS
 
 T = 2.0
