@@ -207,7 +207,8 @@ _OPTIONS = {
     "traffic": _Option(
         int,
         _traffic,
-        "Number of moving vehicles. The same number of pedestrians is added.",
+        "Number of vehicles of the map's recorded traffic, at most 60 on a "
+        "shipped map. The same number of pedestrians is added.",
         "N",
     ),
     "transient": _Option(

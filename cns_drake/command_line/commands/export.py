@@ -113,9 +113,7 @@ def export(
     start_time: Annotated[
         float | None, typer.Option(min=0.0, metavar="S")
     ] = None,
-    traffic: Annotated[
-        int | None, typer.Option(min=0, max=2000, metavar="N")
-    ] = None,
+    traffic: Annotated[int | None, typer.Option(min=0, metavar="N")] = None,
     jobs: shared_options.Jobs = None,
     scheduler: shared_options.Scheduler = None,
     json: shared_options.Json = False,
@@ -190,10 +188,9 @@ def export(
         start_time: Time in the drive at which the filmed stretch begins [s]. By
             default, the film shows the stretch of the drive whose two ends lie
             farthest apart.
-        traffic: Number of moving vehicles in the film. The same number of
-            pedestrians is added. By default the traffic of the scenario; if the
-            scenario has no traffic, as many vehicles as the streets have room
-            for, but at most 60.
+        traffic: Number of vehicles of the map's recorded traffic in the film.
+            The same number of pedestrians is added. By default the traffic of
+            the scenario, or 60 if it has none.
 
     Example:
         cns-drake export drives/metropolis_01 \\

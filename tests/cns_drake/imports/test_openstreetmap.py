@@ -178,22 +178,6 @@ def test_why_no_building_is_usable_is_said(tmp_path, text, fault):
     assert message.endswith(", left out: 1, such as w9")
 
 
-def test_limits_that_cannot_be_read_are_noted(tmp_path):
-    osm = OsmWriter()
-    osm.box(0, 10, 10, 10, building="yes")
-    ends = [(0, 0), (50, 0)]
-    osm.way(ends, highway="tertiary", maxspeed="80")
-    osm.way(ends, highway="tertiary", maxspeed="30", maxspeed__type="sign")
-    fast = osm.way(ends, highway="tertiary", maxspeed="fast")
-    back = osm.way(ends, highway="tertiary", maxspeed__backward="999")
-    city, _ = import_osm(osm.write(tmp_path / "city.osm"))
-    told = "unreadable or implausible, the usual one taken"
-    assert city.faults.rows() == [
-        (f"maxspeed {told}", 1, f"w{fast}"),
-        (f"maxspeed:backward {told}", 1, f"w{back}"),
-    ]
-
-
 def test_half_a_country_is_refused(tmp_path):
     osm = OsmWriter()
     osm.box(0, 0, 10, 10, building="yes")

@@ -61,6 +61,7 @@ SUMO = "give a trace of SUMO instead, with traffic: {fcd: FILE}"
 
 def test_a_map_without_recorded_traffic_or_roads(town):
     scenario = scenario_of(town)
+    (town / "traffic.npz").unlink()
     assert fault(scenario, walkers=1) == (
         f"tiny_01: traffic: no recorded traffic, traffic.npz, in {town}: {SUMO}"
     )

@@ -42,7 +42,7 @@ def scenario(tmp_path_factory):
         world=None,
         map=str(town),
         stage="04",
-        traffic={"vehicles": 20, "walkers": 60, "seed": 11},
+        traffic={"vehicles": 20, "walkers": 50, "seed": 11},
         lidars={"lidar": UNIT},
         frames=FRAMES,
     )
@@ -104,7 +104,7 @@ def test_a_page_moves_vehicles_and_walkers(scenario, tmp_path):
     boxes = read_boxes(folder)
     first, last = boxes[0], boxes[-1]
     walkers = [name for name in names.values() if name.startswith("walker")]
-    assert len(walkers) == 60
+    assert len(walkers) == 50
     assert moved.keys() >= {f"/moving/{name}" for name in walkers}
     ways = []
     for number in first.keys() & last.keys():
