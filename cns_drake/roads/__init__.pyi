@@ -3,6 +3,7 @@ from cns_drake.roads.carriageway import Areas as Areas
 from cns_drake.roads.carriageway import (
     union_without_slits as union_without_slits,
 )
+from cns_drake.roads.centreline import blend as blend
 from cns_drake.roads.centreline import sample_stations as sample_stations
 from cns_drake.roads.driver_offsets import FINE_SPACING as FINE_SPACING
 from cns_drake.roads.driver_offsets import driven_path as driven_path
