@@ -103,6 +103,7 @@ from cns_drake.base.jobs.step import Steps as Steps
 from cns_drake.base.json_text import json_values as json_values
 from cns_drake.base.json_text import parse_json as parse_json
 from cns_drake.base.launch import start as start
+from cns_drake.base.npz_archives import read_npz as read_npz
 from cns_drake.base.number_format import is_number as is_number
 from cns_drake.base.number_format import number_within as number_within
 from cns_drake.base.number_format import other_separator as other_separator

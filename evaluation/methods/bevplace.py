@@ -33,11 +33,10 @@ from pydantic import computed_field
 from scipy.ndimage import correlate1d
 from scipy.special import softmax
 
-from cns_drake.base import InputError, read_bytes
+from cns_drake.base import InputError, read_bytes, read_npz
 from evaluation.clouds import count_image
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.network_weights import Weights, checked_weights
-from evaluation.methods.npz_files import read_npz
 from evaluation.methods.registry import register
 
 # Greatest size of a file of weights, and of its arrays together [bytes].

@@ -27,12 +27,12 @@ from cns_drake.base import (
     check_regular,
     note,
     poses,
+    read_npz,
     user_errors,
 )
 from evaluation.maps import extremes
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.network_weights import checked_weights
-from evaluation.methods.npz_files import read_npz
 from evaluation.methods.registry import register
 
 # Version of the layout of files of weights.

@@ -415,7 +415,7 @@ def weigh(folder):
 
 
 WEIGHTS = (
-    "evaluation.methods.npz_files.read_npz",
+    "cns_drake.base.read_npz",
     "evaluation.methods.make_method",
 )
 
@@ -1260,7 +1260,7 @@ _READER = re.compile(
 # Functions that unpack or decode a file whole -> modules that may use them.
 # Others go through these modules, which bound what is made.
 OPENERS = {
-    "zipfile.ZipFile": ("evaluation.methods.npz_files",),
+    "zipfile.ZipFile": ("cns_drake.base.npz_archives",),
     # The package's own archive of shipped cities.
     "tarfile.open": ("cns_drake.scenarios.shipped",),
     "gzip.open": (),
@@ -1268,7 +1268,7 @@ OPENERS = {
     "lzma.open": (),
     # Only its header is read.
     "np.load": ("evaluation.clouds.npy_files",),
-    "np.lib.format.read_array": ("evaluation.methods.npz_files",),
+    "np.lib.format.read_array": ("cns_drake.base.npz_archives",),
     # Films are made of the program's own pictures.
     "Image.open": ("cns_drake.base.images", "cns_drake.simulation.film"),
     "yaml.load": (),

@@ -7,7 +7,8 @@ import zipfile
 
 import numpy as np
 
-from cns_drake.base import one_line, read_bytes
+from cns_drake.base.errors import one_line
+from cns_drake.base.files import read_bytes
 
 # The compressions that `np.savez` and `np.savez_compressed` write. Of these,
 # `zipfile` unpacks no more than it is asked for.

@@ -9,8 +9,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
-from evaluation.methods.npz_files import read_npz
+from cns_drake.base import InputError, read_npz
 
 _LIMIT = 10_000
 
