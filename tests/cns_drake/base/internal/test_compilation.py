@@ -3,7 +3,6 @@
 import os
 from pathlib import Path
 import shutil
-import signal
 import subprocess
 import sys
 
@@ -208,17 +207,3 @@ def test_equal_sources_share_the_code_wherever_they_lie(tmp_path):
     assert run(tmp_path / "checkout") == "6 1\n"
     assert run(tmp_path / "installed") == "6 0\n"
     assert run(tmp_path / "changed") == "6 1\n"
-
-
-def test_an_interrupt_waits_until_a_function_is_compiled(tmp_path):
-    done = []
-
-    def compile_for(types):
-        signal.raise_signal(signal.SIGINT)
-        done.append(types)
-
-    with pytest.raises(KeyboardInterrupt):
-        compilation._compiling_once(compile_for, "one", tmp_path / "one.lock")(
-            ()
-        )
-    assert done == [()]

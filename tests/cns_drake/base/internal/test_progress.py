@@ -5,18 +5,9 @@ import itertools
 import shutil
 import sys
 
-from helpers.internal.listening import Heard
 import pytest
 
-from cns_drake.base import (
-    doing,
-    progress,
-    progress_display,
-    show_progress,
-    track,
-)
-from cns_drake.base.progress import heard_by, interlude, listener
-from cns_drake.base.progress_display import Display, shown_times
+from cns_drake.base.progress_display import Display
 
 
 class Clock:
@@ -73,70 +64,6 @@ def screen(clock, monkeypatch):
     display.width = 80
     display.lines = stream.screen
     return display
-
-
-def test_work_is_heard_by_one_listener():
-    doing("before")
-    first, second = Heard(), Heard()
-    with heard_by(first):
-        items = track("ab", "reading", 2, "scans")
-        assert next(items) == "a"
-        with heard_by(second):
-            doing("compiling")
-        assert list(items) == ["b"]
-    doing("after")
-    assert first.said == [
-        ("reading", 0, 2, "scans"),
-        ("reading", 1, 2, "scans"),
-    ]
-    assert second.said == [("compiling", 0, 0, "")]
-    with listener().jobs({"a": 1.0}, 0, "jobs") as jobs:
-        jobs.start("a")
-        jobs.doing("a", "reading")
-        jobs.end("a")
-
-
-def test_after_an_interlude_the_work_before_it_goes_on():
-    heard = Heard()
-    doing("before")
-    with heard_by(heard):
-        with interlude("loading"):
-            pass
-        doing("casting", 3, 8, "rays")
-        with pytest.raises(ValueError, match="stop"), interlude("compiling"):
-            raise ValueError("stop")
-    assert heard.said == [
-        ("loading", 0, 0, ""),
-        ("casting", 3, 8, "rays"),
-        ("compiling", 0, 0, ""),
-        ("casting", 3, 8, "rays"),
-    ]
-
-
-def test_after_an_inner_loop_the_outer_one_goes_on():
-    heard = Heard()
-    with heard_by(heard):
-        for _ in track("ab", "localising", 2, "scans"):
-            for _ in track("c", "mapping", 1, "scans"):
-                pass
-            doing("aligning")
-        # A loop that was left early is no loop around the next one.
-        for _ in track("ab", "judging", 2, "draws"):
-            break
-        for _ in track("a", "writing", 1, "files"):
-            pass
-    assert heard.said == [
-        ("localising", 0, 2, "scans"),
-        ("mapping", 0, 1, "scans"),
-        ("localising", 0, 2, "scans"),
-        ("aligning", 0, 0, ""),
-        ("localising", 1, 2, "scans"),
-        ("mapping", 0, 1, "scans"),
-        ("localising", 1, 2, "scans"),
-        ("aligning", 0, 0, ""),
-        ("judging", 0, 2, "draws"),
-        ("writing", 0, 1, "files"),
-    ]
 
 
 def test_a_log_says_what_changes_and_then_less_and_less(clock, log):
@@ -208,15 +135,6 @@ def test_jobs_in_a_log(clock, log):
     assert log.text()[-1] == "planning, elapsed 0:05"
 
 
-def test_a_log_that_takes_no_text(clock):
-    stream = io.StringIO()
-    display = Display(stream, clock)
-    display.doing("reading")
-    stream.close()
-    clock.now += 1.0
-    display.refresh()
-
-
 @pytest.mark.parametrize("width", [30, 60, 80, 200])
 def test_a_line_for_all_jobs_and_one_for_each(clock, screen, width):
     screen.width = width
@@ -263,45 +181,3 @@ def test_other_text_appears_above(clock, screen, monkeypatch):
         assert len(screen.lines()) == 3
     assert screen.lines() == ["a note", "part of a result"]
     assert sys.stdout is sys.stderr is stream
-
-
-def test_one_display_at_a_time():
-    with show_progress():
-        first = listener()
-        assert isinstance(first, Display)
-        with show_progress():
-            assert listener() is first
-        assert listener() is first
-    assert listener() is progress._NOBODY
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(16.4, "0:16"), (59.6, "1:00"), (725, "12:05"), (36_001, "10:00:01")],
-)
-def test_durations_are_labelled(seconds, text):
-    assert shown_times(seconds, None) == f"elapsed {text}"
-    assert shown_times(0.0, seconds) == f"elapsed 0:00, about {text} left"
-
-
-@pytest.mark.parametrize(
-    ("share", "full", "percent"),
-    [(0.0, 0, 0), (0.989, 19, 98), (0.9999, 19, 99), (0.1 * 3 / 0.3, 20, 100)],
-)
-def test_a_bar_is_full_only_at_the_end(share, full, percent):
-    bar = progress_display._bar(share)
-    assert bar == f"[{'#' * full}{'.' * (20 - full)}] {percent} %"
-
-
-@pytest.mark.parametrize(
-    ("name", "shown"),
-    [
-        ("place town_01 town_02 59e74dc7", "place town_01 town_02"),
-        ("describe town_01 queries 3fa9c1", "describe town_01 queries"),
-        ("features of facade", "features of facade"),
-        ("features of 20260101", "features of 20260101"),
-        ("town_59e74dc7", "town_59e74dc7"),
-    ],
-)
-def test_fingerprints_of_jobs_are_not_shown(name, shown):
-    assert progress_display.shown_name(name) == shown

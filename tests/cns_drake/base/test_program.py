@@ -11,14 +11,12 @@ import typer
 
 from cns_drake.base import InputError, program
 from cns_drake.base.commands import Command
-from cns_drake.base.errors import FailedJobsError
 
 
 @pytest.mark.parametrize(
     ("error", "status", "line"),
     [
         (InputError("FILE: fault"), 2, "error: FILE: fault"),
-        (FailedJobsError("job: fault"), 1, "error: job: fault"),
         (MemoryError(), 2, "error: not enough memory for this input"),
         (FileNotFoundError(2, "gone", "FILE"), 2, "error: FILE: gone"),
         (OSError("full"), 2, "error: standard output: full"),

@@ -8,7 +8,6 @@ from helpers.internal.signal_handlers import handlers_kept
 import pytest
 
 from cns_drake.base import interrupts_wait, uninterrupted
-from cns_drake.base.interrupts import interrupt_on_termination
 
 
 @pytest.fixture
@@ -21,17 +20,6 @@ def interrupt_and_go_on(number, done):
     with uninterrupted():
         os.kill(os.getpid(), number)
         done.append("all of it")
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interrupts_wait(handlers, number):
-    interrupt_on_termination()
-    done = []
-    with pytest.raises(KeyboardInterrupt):
-        interrupt_and_go_on(number, done)
-    assert done
-    with pytest.raises(KeyboardInterrupt):
-        os.kill(os.getpid(), number)
 
 
 def test_interrupts_wait_for_the_outermost_block(handlers):
@@ -55,33 +43,6 @@ def test_an_exception_gives_way_to_the_interrupt(handlers):
 
     with pytest.raises(KeyboardInterrupt):
         interrupt_and_fail()
-
-
-def test_a_second_termination_does_not_interrupt_the_closing(handlers):
-    interrupt_on_termination(once=True)
-    with pytest.raises(KeyboardInterrupt):
-        os.kill(os.getpid(), signal.SIGTERM)
-    os.kill(os.getpid(), signal.SIGTERM)
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupt_strikes_where_it_may(handlers, number):
-    interrupt_on_termination()
-    done = []
-
-    def work():
-        with interrupts_wait() as strike:
-            strike()
-            os.kill(os.getpid(), number)
-            done.append("goes on")
-            strike()
-            done.append("never")
-
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert done == ["goes on"]
-    with pytest.raises(KeyboardInterrupt):
-        os.kill(os.getpid(), number)
 
 
 def test_a_second_interrupt_strikes_at_once_and_a_third_does_not(handlers):

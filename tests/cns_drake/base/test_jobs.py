@@ -1,11 +1,9 @@
 """Jobs on processes of this machine: order, faults, deaths, interrupts."""
 
-import contextlib
 import os
 import pickle
 import subprocess
 import sys
-from types import SimpleNamespace
 
 from helpers import job_functions
 from helpers.documents import ROOT
@@ -26,10 +24,6 @@ from cns_drake.base import (
     run_process,
     show_progress,
 )
-from cns_drake.base.errors import FailedJobsError
-from cns_drake.base.file_locks import exclusive
-from cns_drake.base.jobs import cluster, processes
-from cns_drake.base.jobs.cluster import DaskWorkers, LostSchedulerError
 
 pytestmark = pytest.mark.slow
 
@@ -91,173 +85,6 @@ def test_a_job_checks_again_before_its_output(tmp_path):
             lambda: True,
         )
         assert output.read_text() == expected
-
-
-@pytest.mark.parametrize("words", [[], ["--traceback"]])
-def test_a_job_shows_its_traceback_on_request(monkeypatch, capsys, words):
-    monkeypatch.setattr("sys.argv", ["program", *words])
-    with pytest.raises(FailedJobsError, match="FILE: field: cannot be used"):
-        run_jobs([job("a", job_functions.refuse)], Cluster(num_workers=1))
-    assert ("in refuse\n" in capsys.readouterr().err) == bool(words)
-
-
-def test_a_fault_outside_the_job_shows_where_it_arose(monkeypatch, capsys):
-    def fail(*arguments):
-        raise AssertionError
-
-    monkeypatch.setattr(cluster, "run_process", fail)
-    with pytest.raises(FailedJobsError, match="a: AssertionError"):
-        run_jobs([job("a", job_functions.refuse)], Cluster(num_workers=1))
-    assert "in fail\n" in capsys.readouterr().err
-
-
-def test_needs_come_first_and_faults_stay_alone(tmp_path, capsys):
-    first, second, both, last = (tmp_path / name for name in "abcd")
-    process, tries, survivor = (tmp_path / name for name in "ptu")
-    jobs = [
-        # The job with the most needs comes first in the list and runs last.
-        job("last", job_functions.join, [both], last, needs=["both"]),
-        job(
-            "both",
-            job_functions.join,
-            [first, second],
-            both,
-            needs=["first", "second"],
-            output=both,
-        ),
-        job("first", job_functions.join, [], first, cost=7.0, output=first),
-        job("second", job_functions.join, [], second),
-        job("process", job_functions.note_process, process),
-        job("refused", job_functions.refuse),
-        job("stumbles", job_functions.stumble),
-        job("dies", job_functions.die, tries, output=tries),
-        job("survives", job_functions.die_first, tmp_path / "s", survivor),
-        job("orphan", job_functions.join, [], tmp_path / "o", needs=["dies"]),
-        job("orphan 2", job_functions.join, [], last, needs=["orphan"]),
-    ]
-    with pytest.raises(FailedJobsError) as raised, show_progress():
-        run_jobs(jobs, Cluster(num_workers=2))
-    assert raised.value.exit_status == 1
-    *faults, left_out = str(raised.value).split("; ")
-    assert sorted(faults) == [
-        "dies: its process was ended by SIGKILL, perhaps for lack of memory",
-        "refused: FILE: field: cannot be used",
-        "stumbles: ZeroDivisionError: over nothing",
-    ]
-    assert left_out.endswith("need failed jobs: orphan, orphan 2")
-    assert last.read_text() == both.read_text() == "a+b"
-    assert tries.read_text() == "xxx"
-    assert survivor.read_text() == "at last"
-    # No lock is left behind.
-    assert {path.name for path in tmp_path.iterdir()} == set("abcdpstu")
-    # The process has a session of its own, which Ctrl-C does not reach.
-    pid, session, *parents = map(int, process.read_text().split())
-    assert pid == session
-    assert os.getpid() in parents
-    reports = capsys.readouterr().err
-    assert "here I am" in reports
-    killed = "its process was ended by SIGKILL, perhaps for lack of memory"
-    lines = reports.splitlines()
-    assert sorted(line for line in lines if "repeated" in line) == [
-        *[f"job dies: {killed}; it is repeated"] * 2,
-        "job survives: its process ended with status 3; it is repeated",
-        "job survives: not enough memory; it is repeated",
-    ]
-    assert "ZeroDivisionError" in reports
-    assert "last: done" in reports
-
-
-class ScriptedCluster:
-    """Workers whose jobs end as a script says, one after the other.
-
-    Attributes:
-        slots: see `Cluster`.
-        names: of the submitted jobs.
-    """
-
-    def __init__(self, *errors, slots=None):
-        self._errors = iter(errors)
-        self.slots = slots
-        self.names = []
-
-    @contextlib.contextmanager
-    def connect(self, listener):
-        self._listener = listener
-        yield self
-
-    def submit(self, name, job, priority):
-        self.names.append(name)
-        self._listener("result", name, next(self._errors))
-
-
-DIED = ProcessDiedError("its worker died")
-
-
-def test_results_lost_with_a_worker_are_computed_again(capsys):
-    cluster = ScriptedCluster(DIED, DIED, None)
-    run_jobs([job("a", job_functions.refuse)], cluster)
-    assert cluster.names == ["a"] * 3
-    told = "job a: its worker died; it is repeated"
-    assert capsys.readouterr().err.splitlines() == [told] * 2
-    with pytest.raises(FailedJobsError, match=r"^a: its worker died$"):
-        run_jobs([job("a", job_functions.refuse)], ScriptedCluster(*[DIED] * 3))
-
-
-@pytest.mark.parametrize(
-    ("slots", "order"),
-    [(1, "b first; c needs b; a; d"), (None, "b first; a; d; c needs b")],
-)
-def test_a_free_worker_gets_the_most_urgent_job(slots, order):
-    """The most urgent job may have changed since its last job began."""
-    jobs = [
-        job("a", job_functions.refuse, cost=3.0),
-        job("b first", job_functions.refuse, cost=1.0),
-        job("c needs b", job_functions.refuse, needs=["b first"], cost=4.0),
-        job("d", job_functions.refuse, cost=2.0),
-    ]
-    cluster = ScriptedCluster(*[None] * 4, slots=slots)
-    run_jobs(jobs, cluster)
-    assert "; ".join(cluster.names) == order
-
-
-def test_a_fault_makes_room_for_the_next(capsys):
-    cluster = ScriptedCluster(DIED, DIED, DIED, None, slots=1)
-    jobs = [job(name, job_functions.refuse) for name in "ab"]
-    with pytest.raises(FailedJobsError, match=r"^a: its worker died$"):
-        run_jobs(jobs, cluster)
-    assert len(cluster.names) == 4
-    assert "a: failed: its worker died" in capsys.readouterr().err
-
-
-def test_a_scheduler_that_is_lost():
-    """The client reports the loss; finished keys are not fetched again."""
-    reports, keys = [], []
-    statuses = iter(["cancelled", "lost", "finished"])
-
-    def submit(function, *arguments, key, **options):
-        keys.append(key)
-        future = SimpleNamespace(status=next(statuses))
-        future.add_done_callback = lambda take: take(future)
-        return future
-
-    client = SimpleNamespace(
-        scheduler=SimpleNamespace(address="tcp://scripted:1"),
-        nthreads=dict,
-        subscribe_topic=lambda topic, handler: None,
-        submit=submit,
-    )
-    workers = DaskWorkers(client, lambda *message: reports.append(message))
-    for _ in range(3):
-        workers.submit("a", b"", 1.0)
-    note, lost, died, done = reports
-    assert note == ("note", "", "tcp://scripted:1: no workers yet, waiting")
-    assert isinstance(lost[2], LostSchedulerError)
-    assert str(lost[2]).startswith("tcp://scripted:1: the connection")
-    assert isinstance(died[2], ProcessDiedError)
-    assert done == ("result", "a", None)
-    assert len(set(keys)) == 3
-    with pytest.raises(InputError, match=r"^tcp://scripted:1: the connection"):
-        run_jobs([job("a", job_functions.refuse)], ScriptedCluster(lost[2]))
 
 
 def test_local_jobs_open_no_port(tmp_path):
@@ -326,40 +153,6 @@ def test_a_job_that_is_not_wanted_ends(tmp_path):
             is_wanted,
         )
     assert not psutil.pid_exists(reports[0])
-
-
-def test_threads_ask_for_statuses_in_turns():
-    """Otherwise, a start could take the status for which a thread waits."""
-
-    class Ending:
-        """A process that has a status when it is asked for the second time."""
-
-        def __init__(self, sentinel):
-            self.sentinel = sentinel
-            self.calls = []
-
-        def terminate(self):
-            self.calls.append("terminate")
-
-        def kill(self):
-            self.calls.append("kill")
-
-        @property
-        def exitcode(self):
-            assert processes._starting.locked()
-            self.calls.append("exitcode")
-            return -15 if self.calls.count("exitcode") > 1 else None
-
-    read_end, write_end = os.pipe()
-    try:
-        os.write(write_end, b"!")
-        process = Ending(read_end)
-        assert processes._end_process(process) == -15
-    finally:
-        os.close(read_end)
-        os.close(write_end)
-    assert process.calls == ["terminate", "exitcode", "exitcode"]
-    assert not processes._starting.locked()
 
 
 def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path):
@@ -461,36 +254,6 @@ def test_jobs_import_nothing_from_the_current_folder(tmp_path):
         check=True,
     )
     assert (here / "done").exists()
-
-
-def test_two_never_work_on_the_same(tmp_path):
-    output = tmp_path / "new" / "output"
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    script = (
-        "import sys\n"
-        "from pathlib import Path\n"
-        "from cns_drake.base.file_locks import exclusive\n"
-        "output, pipe = map(Path, sys.argv[1:])\n"
-        "with exclusive(output, lambda: pipe.write_text('waiting')):\n"
-        "    output.write_text(output.read_text() + ' second')\n"
-    )
-    with exclusive(output, lambda: pytest.fail("there is nobody else")):
-        other = subprocess.Popen([sys.executable, "-c", script, output, pipe])
-        assert pipe.read_text() == "waiting"
-        output.write_text("first")
-    assert other.wait() == 0
-    assert output.read_text() == "first second"
-    assert list(output.parent.iterdir()) == [output]
-
-
-def test_a_lock_that_cannot_be_written(tmp_path):
-    (tmp_path / "file").touch()
-    with (
-        pytest.raises(InputError, match="file"),
-        exclusive(tmp_path / "file" / "x", lambda: None),
-    ):
-        pass
 
 
 def test_progress_is_reported_now_and_then(monkeypatch):
