@@ -67,9 +67,7 @@ from cns_drake.city.geometry.models import SphereShape as SphereShape
 from cns_drake.city.geometry.models import part_mesh as part_mesh
 from cns_drake.city.geometry.models import part_triangles as part_triangles
 from cns_drake.city.geometry.models import triple as triple
-from cns_drake.city.geometry.object_models import HEADROOM as HEADROOM
 from cns_drake.city.geometry.object_models import OBJECT_MESHES as OBJECT_MESHES
-from cns_drake.city.geometry.object_models import ROOT_DEPTH as ROOT_DEPTH
 from cns_drake.city.geometry.object_models import assemble as assemble
 from cns_drake.city.geometry.object_models import bar as bar
 from cns_drake.city.geometry.object_models import block as block
@@ -99,7 +97,6 @@ from cns_drake.city.geometry.triangles import turned_up as turned_up
 from cns_drake.city.geometry.triangles import unit_normals as unit_normals
 from cns_drake.city.geometry.triangulation import triangulate as triangulate
 from cns_drake.city.geometry.upper_sides import UpperSides as UpperSides
-from cns_drake.city.ground.coverings import GROUND_TAG as GROUND_TAG
 from cns_drake.city.ground.coverings import TILE as TILE
 from cns_drake.city.ground.coverings import Covering as Covering
 from cns_drake.city.ground.markings import DASH as DASH

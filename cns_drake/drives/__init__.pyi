@@ -13,10 +13,7 @@ from cns_drake.drives.lidar_fields import LidarField as LidarField
 from cns_drake.drives.lidar_fields import lidar_field as lidar_field
 from cns_drake.drives.mcap_drive import McapDrive as McapDrive
 from cns_drake.drives.mcap_drive import holds_mcap as holds_mcap
-from cns_drake.drives.mcap_file import CHUNK_LIMIT_BYTES as CHUNK_LIMIT_BYTES
-from cns_drake.drives.mcap_file import McapFile as McapFile
 from cns_drake.drives.mcap_messages import STAMPED_RECORD as STAMPED_RECORD
-from cns_drake.drives.mcap_messages import checked_poses as checked_poses
 from cns_drake.drives.mcap_messages import read_stamp as read_stamp
 from cns_drake.drives.mulran_frames import ORIGIN as ORIGIN
 from cns_drake.drives.mulran_frames import X_BS as X_BS
@@ -49,7 +46,6 @@ from cns_drake.drives.same_world import check_same_world as check_same_world
 from cns_drake.drives.sensor_names import BASE_FRAME as BASE_FRAME
 from cns_drake.drives.sensor_names import IMU_FRAME as IMU_FRAME
 from cns_drake.drives.sensor_names import MAP_FRAME as MAP_FRAME
-from cns_drake.drives.sensor_names import RESERVED_NAMES as RESERVED_NAMES
 from cns_drake.drives.sensor_names import check_sensor_name as check_sensor_name
 from cns_drake.drives.sensor_names import (
     check_sensor_names as check_sensor_names,

@@ -16,7 +16,6 @@ from cns_drake.scenarios.provenance import digest_inputs as digest_inputs
 from cns_drake.scenarios.provenance import (
     recording_fingerprint as recording_fingerprint,
 )
-from cns_drake.scenarios.scenario import REAL_DRIVER as REAL_DRIVER
 from cns_drake.scenarios.scenario import SUMO_INSTEAD as SUMO_INSTEAD
 from cns_drake.scenarios.scenario import DriverConfig as DriverConfig
 from cns_drake.scenarios.scenario import Name as Name
@@ -46,6 +45,5 @@ from cns_drake.scenarios.shipped import recordable_maps as recordable_maps
 from cns_drake.scenarios.shipped import shipped_cities as shipped_cities
 from cns_drake.scenarios.shipped import shipped_drives as shipped_drives
 from cns_drake.scenarios.shipped import shipped_maps as shipped_maps
-from cns_drake.scenarios.shipped import suspension_file as suspension_file
 from cns_drake.scenarios.shipped import vehicle_file as vehicle_file
 from cns_drake.scenarios.shipped import worlds_folder as worlds_folder

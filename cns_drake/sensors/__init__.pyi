@@ -15,7 +15,6 @@ from cns_drake.sensors.drake_configs import OdometryConfig as OdometryConfig
 from cns_drake.sensors.imu.config import KALIBR_FILE as KALIBR_FILE
 from cns_drake.sensors.imu.config import ImuSection as ImuSection
 from cns_drake.sensors.imu.imu import Imu as Imu
-from cns_drake.sensors.imu.imu import NoisyImu as NoisyImu
 from cns_drake.sensors.imu.imu import add_imu as add_imu
 from cns_drake.sensors.imu.noise import ImuErrors as ImuErrors
 from cns_drake.sensors.imu.noise import ImuNoise as ImuNoise
@@ -63,12 +62,7 @@ from cns_drake.sensors.odometry_config import (
 from cns_drake.sensors.returns.calibrated import (
     CalibratedReturns as CalibratedReturns,
 )
-from cns_drake.sensors.returns.link_budget import HOPELESS_SNR as HOPELESS_SNR
-from cns_drake.sensors.returns.link_budget import (
-    fit_link_budget as fit_link_budget,
-)
 from cns_drake.sensors.returns.weather import Weather as Weather
-from cns_drake.sensors.sensor_config import Mount as Mount
 from cns_drake.sensors.sensor_config import Section as Section
 from cns_drake.sensors.sensor_config import SensorConfig as SensorConfig
 from cns_drake.sensors.sensor_config import Triple as Triple

@@ -8,7 +8,6 @@ from cns_drake.units.data_sheet import NoddingSheet as NoddingSheet
 from cns_drake.units.data_sheet import Response as Response
 from cns_drake.units.data_sheet import ReturnsSheet as ReturnsSheet
 from cns_drake.units.data_sheet import RosetteSheet as RosetteSheet
-from cns_drake.units.data_sheet import SheetRow as SheetRow
 from cns_drake.units.data_sheet import SpinningSheet as SpinningSheet
 from cns_drake.units.data_sheet import make_sheet as make_sheet
 from cns_drake.units.data_sheet import read_sheet as read_sheet

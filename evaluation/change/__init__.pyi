@@ -1,5 +1,4 @@
 from evaluation.change.drive_change import ChangeReport as ChangeReport
-from evaluation.change.drive_change import RegisteredChange as RegisteredChange
 from evaluation.change.drive_change import change_between as change_between
 from evaluation.change.drive_change import (
     registered_change as registered_change,
@@ -15,7 +14,6 @@ from evaluation.change.drive_maps import maps_in_one_world as maps_in_one_world
 from evaluation.change.drive_maps import open_source as open_source
 from evaluation.change.drive_maps import read_map as read_map
 from evaluation.change.tcr import COVERAGE_RADIUS as COVERAGE_RADIUS
-from evaluation.change.tcr import GRIDS as GRIDS
 from evaluation.change.tcr import TemporalChange as TemporalChange
 from evaluation.change.tcr import covered as covered
 from evaluation.change.tcr import lacks_counterpart as lacks_counterpart

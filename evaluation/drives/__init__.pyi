@@ -8,7 +8,6 @@ from evaluation.drives.drive_views import MovedDrive as MovedDrive
 from evaluation.drives.drive_views import RecentScans as RecentScans
 from evaluation.drives.helipr import read_helipr_scan as read_helipr_scan
 from evaluation.drives.joined_drive import JoinedDrive as JoinedDrive
-from evaluation.drives.mulran import MulranDrive as MulranDrive
 from evaluation.drives.nclt import read_nclt_scan as read_nclt_scan
 from evaluation.drives.opening import data_sets as data_sets
 from evaluation.drives.opening import find_data_sets as find_data_sets
@@ -26,6 +25,5 @@ from evaluation.drives.scan_clouds import within_cube as within_cube
 from evaluation.drives.scan_files import BinDrive as BinDrive
 from evaluation.drives.scan_files import FileDrive as FileDrive
 from evaluation.drives.text_tables import parse_seconds as parse_seconds
-from evaluation.drives.trajectories import StampedPoses as StampedPoses
 from evaluation.drives.trajectories import read_poses as read_poses
 from evaluation.drives.trajectories import read_quaternions as read_quaternions

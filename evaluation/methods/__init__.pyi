@@ -1,21 +1,15 @@
-from evaluation.methods.btc import align as align
 from evaluation.methods.layered_overlap import LayeredOverlap as LayeredOverlap
 from evaluation.methods.layered_overlap import (
     LayeredOverlapConfig as LayeredOverlapConfig,
 )
-from evaluation.methods.learned import CHANNELS as CHANNELS
 from evaluation.methods.learned import FEATURES as FEATURES
 from evaluation.methods.learned import FREQUENCIES as FREQUENCIES
 from evaluation.methods.learned import HEADINGS as HEADINGS
 from evaluation.methods.learned import LAYERS as LAYERS
-from evaluation.methods.learned import RINGS as RINGS
 from evaluation.methods.learned import SECTORS as SECTORS
 from evaluation.methods.learned import SEEN_SHARES as SEEN_SHARES
 from evaluation.methods.learned import TURNS as TURNS
 from evaluation.methods.learned import WEIGHTS_VERSION as WEIGHTS_VERSION
-from evaluation.methods.learned import Learned as Learned
-from evaluation.methods.learned import LearnedConfig as LearnedConfig
-from evaluation.methods.learned import LearnedScan as LearnedScan
 from evaluation.methods.learned import polar_image as polar_image
 from evaluation.methods.method import Method as Method
 from evaluation.methods.method import MethodConfig as MethodConfig
@@ -36,4 +30,3 @@ from evaluation.methods.registry import optional_methods as optional_methods
 from evaluation.methods.registry import register as register
 from evaluation.methods.registry import shipped_methods as shipped_methods
 from evaluation.methods.scan_context import ScanContext as ScanContext
-from evaluation.methods.solid import SolidMethod as SolidMethod

@@ -4,14 +4,12 @@ They are oracles for the engine's tables: each is a plain sequence of the steps
 that `docs/explanation/structure.md` names.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from cns_drake.drives import Drive
 from evaluation.change import (
-    GRIDS,
     ChangeReport,
     DriveMap,
     change_between,
@@ -75,7 +73,6 @@ def compare_maps(
     source: DriveMap,
     target: DriveMap,
     control: DriveMap | None = None,
-    grids: Sequence[tuple[float, float, float]] = GRIDS,
 ) -> ChangeReport:
     """Returns the change between two maps A and B.
 
@@ -84,11 +81,10 @@ def compare_maps(
         target: the map B.
         control: map of a third drive, which follows the route of A in the stage
             of B, or the route of B in the stage of A; None for no control.
-        grids: shifts of the voxel grid [m], for the report's `spread`.
     """
     report = change_between(source, target)
     if control is not None:
         both = control, same_stage_partner(source, target, control)
         report = report.beside(change_between(*both))
-    spread = spread_over_grids(source, target, report.change, grids)
+    spread = spread_over_grids(source, target, report.change)
     return replace(report, spread=spread)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.city import GROUND_TAG, part_triangles
+from cns_drake.city import part_triangles
 
 pytestmark = [pytest.mark.slow, pytest.mark.night]
 
@@ -65,7 +65,7 @@ def ground():
         [
             name
             for name, s in structures().items()
-            if GROUND_TAG in s.tags and name != "markings"
+            if "ground" in s.tags and name != "markings"
         ]
     )
 
@@ -133,7 +133,7 @@ def test_small_things_stand_on_the_ground():
     things = [
         s
         for s in structures().values()
-        if GROUND_TAG not in s.tags and s.semantic_class != "building"
+        if "ground" not in s.tags and s.semantic_class != "building"
     ]
     p = np.array([s.xyz for s in things])
     gap = p[:, 2] - ground().heights(p[:, :2])

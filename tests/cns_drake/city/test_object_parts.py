@@ -1,16 +1,9 @@
+from helpers.city_checks import HEADROOM
 from helpers.mesh_checks import rotation_matrix
 import numpy as np
 import pytest
 
-from cns_drake.city import (
-    HEADROOM,
-    OBJECTS,
-    ROOT_DEPTH,
-    assemble,
-    bar,
-    block,
-    post,
-)
+from cns_drake.city import OBJECTS, assemble, bar, block, post
 
 
 def test_post_spans_from_the_root_to_its_height():
@@ -18,7 +11,7 @@ def test_post_spans_from_the_root_to_its_height():
     half = part.shape.length / 2
     assert part.xyz[:2] == (1.0, -2.0)
     assert part.xyz[2] + half == pytest.approx(6.0)
-    assert part.xyz[2] - half == pytest.approx(-ROOT_DEPTH)
+    assert part.xyz[2] - half == pytest.approx(-0.3)
 
 
 def test_bar_ends_at_its_two_points():

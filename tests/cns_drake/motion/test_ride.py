@@ -23,7 +23,7 @@ from cns_drake.motion import (
     ride_on_springs,
 )
 from cns_drake.roads import Speeds
-from cns_drake.scenarios import suspension_file, vehicle_file
+from cns_drake.scenarios import vehicle_file
 
 
 class Level:
@@ -37,7 +37,7 @@ class Level:
 def car():
     return Suspension(
         load_car_masses(vehicle_file()),
-        load_suspension_rates(suspension_file()),
+        load_suspension_rates(vehicle_file().with_name("suspension.yaml")),
     )
 
 

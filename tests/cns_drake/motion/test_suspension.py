@@ -5,7 +5,7 @@ import pytest
 
 from cns_drake.base import InputError
 from cns_drake.motion import Suspension, load_car_masses, load_suspension_rates
-from cns_drake.scenarios import suspension_file, vehicle_file
+from cns_drake.scenarios import vehicle_file
 
 GRAVITY = 9.81
 
@@ -13,7 +13,7 @@ GRAVITY = 9.81
 def test_rates_and_accelerations_are_derivatives_from_rest_on():
     car = Suspension(
         load_car_masses(vehicle_file()),
-        load_suspension_rates(suspension_file()),
+        load_suspension_rates(vehicle_file().with_name("suspension.yaml")),
     )
     step = 0.001
     t = np.arange(0.0, 3.0, step)
@@ -45,7 +45,10 @@ def test_the_shipped_car_is_a_family_car():
     # Strut and wheel; in front a knuckle, too.
     front = masses.p_BWset[:, 0] > 1.0
     np.testing.assert_array_equal(masses.wheels, np.where(front, 44.0, 32.0))
-    car = Suspension(masses, load_suspension_rates(suspension_file()))
+    car = Suspension(
+        masses,
+        load_suspension_rates(vehicle_file().with_name("suspension.yaml")),
+    )
     one_g = GRAVITY * np.eye(7)
     assert np.degrees(car.at_rest(one_g[5])[1]) == pytest.approx(5.7, abs=0.05)
     assert np.degrees(car.at_rest(-one_g[4])[2]) == pytest.approx(3.1, abs=0.05)

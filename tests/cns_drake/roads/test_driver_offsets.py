@@ -15,7 +15,6 @@ from cns_drake.roads import (
     load_road_network,
 )
 from cns_drake.scenarios import (
-    REAL_DRIVER,
     DriverConfig,
     load_scenario,
     make_scenario,
@@ -92,14 +91,19 @@ def test_a_driver_follows_from_seed_or_name_alone(small_map):
 
 
 @pytest.mark.slow
+def real_driver(scenario, seed):
+    """The scenario with a real driver."""
+    seeded = scenario.with_fields({"driver": {"seed": seed}}, "test")
+    return seeded.with_driver("real")
+
+
 @pytest.mark.parametrize(
     ("name", "seed"), [("downtown_03", 1), ("riverside_01", 2)]
 )
 def test_drivers_keep_clear_of_kerbs(name, seed):
     scenario = load_scenario(name)
     network = load_road_network(scenario.folder.roads)
-    real = REAL_DRIVER.model_copy(update={"seed": seed})
-    trajectory = plan_drive(scenario.model_copy(update={"driver": real}))
+    trajectory = plan_drive(real_driver(scenario, seed))
     p, along = positions(trajectory, 1.0)
     along /= np.linalg.norm(along, axis=1)[:, None]
     left = np.column_stack([-along[:, 1], along[:, 0]])
@@ -123,15 +127,7 @@ def test_pairs_of_drives_differ_as_real_ones_do():
     for seed in range(0, 10, 2):
         drives = [
             positions(
-                plan_drive(
-                    scenario.model_copy(
-                        update={
-                            "driver": REAL_DRIVER.model_copy(
-                                update={"seed": one}
-                            )
-                        }
-                    )
-                ),
+                plan_drive(real_driver(scenario, one)),
                 spacing,
             )
             for one, spacing in ((seed, 5.0), (seed + 1, 0.25))

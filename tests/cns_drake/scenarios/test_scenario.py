@@ -18,7 +18,6 @@ from cns_drake.scenarios import (
 )
 from cns_drake.sensors import (
     LidarSection,
-    Mount,
     WeatherConfig,
     make_pattern,
     sensor_pose,
@@ -69,7 +68,7 @@ def test_map_folder_is_relative_to_the_scenario_file(small_map):
 
 
 def test_mount_angles_are_roll_pitch_yaw_in_degrees():
-    mount = Mount(xyz=(1, 2, 3), rpy_deg=(10, 20, 30))
+    mount = LidarSection(xyz=(1, 2, 3), rpy_deg=(10, 20, 30))
     expected = RigidTransform(
         RollPitchYaw(np.deg2rad([10.0, 20.0, 30.0])), [1, 2, 3]
     )

@@ -1,6 +1,7 @@
 """Noise, losses and motion distortion of LiDARs on a driving vehicle."""
 
 from helpers.drives import spatial_velocity
+from helpers.internal.link_budgets import reach_of
 from helpers.small_map import scenario_values
 import numpy as np
 from pydrake.math import RigidTransform
@@ -11,13 +12,7 @@ from cns_drake.drives import deskew
 from cns_drake.recording import FRAME_PERIOD
 from cns_drake.scenarios import DrivePlan, make_scenario, plan_drive
 from cns_drake.scene import CLASS_IDS
-from cns_drake.sensors import (
-    HOPELESS_SNR,
-    WeatherConfig,
-    fit_link_budget,
-    make_pattern,
-    sensor_pose,
-)
+from cns_drake.sensors import WeatherConfig, make_pattern, sensor_pose
 from cns_drake.simulation import load_drive, make_station, simulate
 from cns_drake.units import LIDAR_PRESETS
 from evaluation.drives import open_drive
@@ -280,11 +275,7 @@ def test_all_lidars_feel_the_same_weather(small_map):
     scattered = CLASS_IDS["outlier"]
     alpha = np.log(20.0) / visibility
     for name, unit in units.items():
-        # Range of a white target that faces the unit in clear air, where even
-        # the least part of an echo suffices.
-        sheet = LIDAR_PRESETS[unit["preset"]]
-        budget = fit_link_budget(sheet.returns)
-        reach = np.sqrt(budget.scale / HOPELESS_SNR)
+        reach = reach_of(LIDAR_PRESETS[unit["preset"]].returns)
         farthest = lambertw(alpha * reach).real / alpha
         r_clear, r_foggy = (
             np.linalg.norm(positions(scans[name]), axis=1)

@@ -12,8 +12,6 @@ from helpers.transient_town import (
 import numpy as np
 import pytest
 
-from cns_drake.city import ROOT_DEPTH
-
 
 def test_every_front_along_the_drive_has_a_scaffold_at_one(changed):
     """The town's houses are boxes 15 m wide and 8 m high, fronts at y = 20."""
@@ -38,7 +36,7 @@ def test_a_scaffold_stands_on_the_lowest_ground_below_it(tmp_path):
     assert fresh
     for scaffold in fresh.values():
         p_TPs = in_town(scaffold.p_WPs)
-        foot = slope_height(p_TPs[:, 1].min()) - ROOT_DEPTH
+        foot = slope_height(p_TPs[:, 1].min()) - 0.3
         assert p_TPs[:, 2].min() == pytest.approx(foot, abs=0.02)
 
 

@@ -26,7 +26,7 @@ from cns_drake.base import InputError, poses, xyz
 from cns_drake.drives import Drive
 from evaluation.alignment import in_one_world
 from evaluation.change import maps_in_one_world, temporal_change
-from evaluation.drives import MulranDrive
+from evaluation.drives import open_drive
 from evaluation.maps import map_drive
 
 pytestmark = pytest.mark.slow
@@ -303,7 +303,7 @@ def test_mulran_and_helipr(capsys, tmp_path, drives, truth):
         stamps_ns,
         rigid(UTM, 0.0)[None].repeat(50, 0),
     )
-    X_WS = MulranDrive(mulran).X_WS[0]
+    X_WS = open_drive(mulran).X_WS[0]
     X_BS = rigid([0, 0, 0], 0)
     X_BS[:3, :3] = X_WS[:3, :3]
     X_BS[:3, 3] = X_WS[:3, 3] - (UTM - [350_000, 4_020_000, 0])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.methods import SolidMethod, make_method
+from evaluation.methods import Method, make_method
 
 
-def solid(**parameters) -> SolidMethod:
+def solid(**parameters) -> Method:
     return make_method("solid", parameters)
 
 

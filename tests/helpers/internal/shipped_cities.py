@@ -16,14 +16,9 @@ from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
 from cns_drake.base import code_digest, fingerprint
-from cns_drake.city import (
-    GROUND_TAG,
-    City,
-    Structure,
-    make_city,
-    part_triangles,
-)
+from cns_drake.city import City, Structure, make_city, part_triangles
 from cns_drake.city.generation import rendering
+from cns_drake.city.ground.coverings import GROUND_TAG
 from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.roads import RoadNetwork, load_road_network
 from cns_drake.scenarios import worlds_folder

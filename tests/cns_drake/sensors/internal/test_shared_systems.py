@@ -13,7 +13,8 @@ import pytest
 
 from cns_drake.motion import Trajectory, VehicleMotion
 from cns_drake.scenarios import vehicle_file
-from cns_drake.sensors import ImuErrors, ImuNoise, NoisyImu
+from cns_drake.sensors import ImuErrors, ImuNoise
+from cns_drake.sensors.imu.imu import NoisyImu
 from cns_drake.sensors.imu.vehicle_imu import VehicleImu
 
 FILES = ("/vehicle_motion.py", "/imu.py", "/noise.py")

@@ -20,8 +20,9 @@ from cns_drake.motion import (
     load_suspension_rates,
     ride_on_springs,
 )
-from cns_drake.scenarios import suspension_file, vehicle_file
+from cns_drake.scenarios import vehicle_file
 from cns_drake.sensors import ImuErrors, ImuNoise, add_imu
+from cns_drake.sensors.imu.imu import NoisyImu
 from cns_drake.sensors.imu.vehicle_imu import VehicleImu
 
 X_BI = RigidTransform(RollPitchYaw(0.3, -0.2, 1.1), [-1.0, 0.4, 1.6])
@@ -36,7 +37,7 @@ def drive(riding):
         return trajectory
     car = Suspension(
         load_car_masses(vehicle_file()),
-        load_suspension_rates(suspension_file()),
+        load_suspension_rates(vehicle_file().with_name("suspension.yaml")),
     )
     return ride_on_springs(trajectory, car, RoadProfile("C", 5))
 
@@ -104,3 +105,10 @@ def test_integration_is_ten_times_better_with_many_samples(riding):
     many = error_of_integration(drive(riding), 400)
     assert many < few / 10.0
     assert many < 0.02
+
+
+def test_errors_need_a_connected_imu():
+    system = NoisyImu(ImuNoise(), 100)
+    context = system.CreateDefaultContext()
+    with pytest.raises(RuntimeError, match=r"specific_force.* not connected"):
+        system.GetOutputPort("specific_force").Eval(context)

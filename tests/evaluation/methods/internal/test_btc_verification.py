@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import poses
-from evaluation.methods import align
-from evaluation.methods.btc import find_motion, plane_overlap
+from evaluation.methods.btc import align, find_motion, plane_overlap
 from evaluation.methods.btc_planes import Planes
 
 

@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from evaluation.methods import (
-    FEATURES,
-    LAYERS,
-    RINGS,
-    SECTORS,
-    TURNS,
-)
-from evaluation.methods.learned import _feature_map
+from evaluation.methods import FEATURES, LAYERS, SECTORS, TURNS
+from evaluation.methods.learned import RINGS, _feature_map
 
 RNG = np.random.default_rng(7)
 

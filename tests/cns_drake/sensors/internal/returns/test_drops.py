@@ -7,7 +7,8 @@ import pytest
 from scipy import integrate
 
 from cns_drake.scene import CLASS_IDS
-from cns_drake.sensors import Weather, fit_link_budget
+from cns_drake.sensors import Weather
+from cns_drake.sensors.returns.link_budget import fit_link_budget
 from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
 from cns_drake.sensors.returns.weather import (
     tabulate_scattering,

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from cns_drake.sensors import Echoes, fit_link_budget
+from cns_drake.sensors import Echoes
 from cns_drake.sensors.returns.echoes import Receiver, report_echoes
 from cns_drake.sensors.returns.light import Light
+from cns_drake.sensors.returns.link_budget import fit_link_budget
 from cns_drake.sensors.returns.random_numbers import frame_key
 from cns_drake.units import LIDAR_PRESETS, Response
 

@@ -4,9 +4,9 @@ from helpers.plates import ahead, facing, plate, scan, unit
 import numpy as np
 import pytest
 
-from cns_drake.sensors import fit_link_budget
 from cns_drake.sensors.returns.link_budget import (
     detection_probability,
+    fit_link_budget,
     target_snr,
 )
 from cns_drake.units import LIDAR_PRESETS, ReturnsSheet

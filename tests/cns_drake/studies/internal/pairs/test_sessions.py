@@ -15,7 +15,7 @@ from cns_drake.studies import (
 from cns_drake.studies import study as study_module
 from cns_drake.studies.pairs.comparisons import PairMaker
 from cns_drake.studies.study import plan_study
-from evaluation.methods import SolidMethod
+from evaluation.methods.solid import SolidMethod
 from evaluation.results import Results
 from evaluation.study import OPENING_COST, USUAL_LENGTH, engine
 

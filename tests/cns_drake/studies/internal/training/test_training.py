@@ -20,10 +20,10 @@ from cns_drake.studies.training.network import (
 )
 from cns_drake.studies.training.sampled_city import SampledCity, draw_streets
 from cns_drake.studies.training.weights import MAPS, write_weights
-from evaluation.methods import (
+from evaluation.methods import SECTORS
+from evaluation.methods.learned import (
     CHANNELS,
     RINGS,
-    SECTORS,
     Learned,
     LearnedConfig,
     LearnedScan,

@@ -12,7 +12,7 @@ import pytest
 import zstandard
 
 from cns_drake.base import InputError
-from cns_drake.drives import CHUNK_LIMIT_BYTES, McapFile
+from cns_drake.drives.mcap_file import CHUNK_LIMIT_BYTES, McapFile
 
 # Behind the magic bytes and the header.
 START = len(MCAP0_MAGIC) + 9 + 4 + 4 + len("test")
