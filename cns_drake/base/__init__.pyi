@@ -84,10 +84,8 @@ from cns_drake.base.interrupts import interrupts_wait as interrupts_wait
 from cns_drake.base.interrupts import uninterrupted as uninterrupted
 from cns_drake.base.jobs.cluster import Cluster as Cluster
 from cns_drake.base.jobs.cluster import choose_cluster as choose_cluster
-from cns_drake.base.jobs.file_digests import file_digests as file_digests
-from cns_drake.base.jobs.fingerprint import code_digest as code_digest
-from cns_drake.base.jobs.fingerprint import fingerprint as fingerprint
-from cns_drake.base.jobs.fingerprint import script_digest as script_digest
+from cns_drake.base.jobs.digests import file_digests as file_digests
+from cns_drake.base.jobs.digests import fingerprint as fingerprint
 from cns_drake.base.jobs.forecast import Space as Space
 from cns_drake.base.jobs.forecast import forecast as forecast
 from cns_drake.base.jobs.processes import ALLOCATION as ALLOCATION

@@ -7,6 +7,9 @@ from cns_drake.scenarios.planning import count_frames as count_frames
 from cns_drake.scenarios.planning import ground_notes as ground_notes
 from cns_drake.scenarios.planning import plan_drive as plan_drive
 from cns_drake.scenarios.provenance import INPUTS_KEY as INPUTS_KEY
+from cns_drake.scenarios.provenance import (
+    SIMULATION_VERSION as SIMULATION_VERSION,
+)
 from cns_drake.scenarios.provenance import combined_digest as combined_digest
 from cns_drake.scenarios.provenance import (
     dependency_versions as dependency_versions,

@@ -1,4 +1,4 @@
-"""All inputs of a recording except its scenario: files, code, libraries."""
+"""All inputs of a recording except its scenario: files and versions."""
 
 from collections.abc import Sequence
 import hashlib
@@ -9,7 +9,6 @@ import platform
 from cns_drake.base import (
     __version__,
     check_regular,
-    code_digest,
     fingerprint,
     installed_versions,
     is_there,
@@ -26,6 +25,9 @@ _PACKAGES = (
     "rosbags", "zstandard",
 )  # fmt: skip
 _BLOCK_BYTES = 1 << 20
+# Counts the changes of what is simulated or recorded of the same scenario and
+# files. Raise it with each such change.
+SIMULATION_VERSION = 1
 # The key of the inputs' combined digest in a recording's metadata.
 INPUTS_KEY = "inputs_sha256"
 
@@ -112,8 +114,7 @@ def combined_digest(inputs: dict[str, str]) -> str:
 def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
     """Returns a hash of everything that determines a scenario's recording.
 
-    The hash depends neither on the folders of the files nor on the code that
-    makes pictures and web pages.
+    The hash does not depend on the folders of the files.
 
     Args:
         scenario: the scenario.
@@ -137,17 +138,8 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
             # LiDARs become one text, because their order matters.
             "scenario": scenario.replaced(**places).model_dump_json(),
             "inputs": inputs,
-            "code": recording_code(),
+            "version": [__version__, SIMULATION_VERSION],
         }
-    )
-
-
-def recording_code() -> str:
-    """Returns a digest of all code that affects a recording."""
-    return code_digest(
-        "cns_drake.simulation.simulation",
-        "cns_drake.transient.*",
-        without=("cns_drake.pictures",),
     )
 
 

@@ -16,12 +16,13 @@ from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context
 
-from cns_drake.base import code_digest, doing, poses
+from cns_drake.base import doing, poses
 from cns_drake.drives import MAP_FRAME, Drive, index_instances
 from cns_drake.motion import pose_at
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.recording import frame_stamp_ns, to_quat_xyzw
 from cns_drake.scenarios import (
+    SIMULATION_VERSION,
     DrivePlan,
     Scenario,
     describe_scenario,
@@ -52,17 +53,13 @@ class SimulationSource:
     def identity(self) -> dict:
         """Returns everything on which the simulated scans depend, for JSON.
 
-        The result contains the scenario, and the digests of its files and of
-        the code. Equal results mean equal scans.
+        The result contains the scenario, the digests of its files and the
+        version of the simulation. Equal results mean equal scans.
         """
         return {
             "simulated": self.scenario.model_dump(mode="json"),
             "inputs": digest_inputs(self.scenario),
-            "code": code_digest(
-                __name__,
-                "cns_drake.transient.*",
-                without=("cns_drake.pictures",),
-            ),
+            "version": SIMULATION_VERSION,
         }
 
 

@@ -262,7 +262,7 @@ def _plan_pictures(folder: Path, pictures: Path) -> list[Job]:
                     Part(pictures / "parts" / f"{name}.data"),
                     draw,
                     (shown, picture),
-                    (picture,),
+                    figures=(picture,),
                 ),
                 cost=_STAGE_COST * len(shown),
             )

@@ -70,6 +70,9 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         style: colour (`#RRGGBB`), line style and marker in charts, in the terms
             of Matplotlib; by default one of several that no other method has.
         source: publication of the method; empty for one that is not published.
+        version: counts the changes of the method's results for the same clouds
+            and parameters. Raise it with each such change: a study then
+            measures the method again.
         standard: whether a shipped method runs by default.
         order: place of the method in tables, counted upwards; methods with the
             same number are sorted by name.
@@ -113,6 +116,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     title: ClassVar[str] = ""
     style: ClassVar[tuple[str, str, str] | None] = None
     source: ClassVar[str] = ""
+    version: ClassVar[int] = 1
     standard: ClassVar[bool] = False
     order: ClassVar[int] = 100
     Config: ClassVar[type[MethodConfig]] = MethodConfig

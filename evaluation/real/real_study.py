@@ -382,7 +382,8 @@ class _JudgeTask(Task):
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         part = jobs.files.part("judge", pair.key)
         made = tuple(drive.source for drive in jobs.distractors)
-        return (jobs.add(part, judge_scans, (pair.query.source, made)),)
+        arguments = pair.query.source, made
+        return (jobs.add(part, judge_scans, arguments, version=self.version),)
 
     def numbers(
         self, found: dict[str, Any] | None, before: Any | None

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-import inspect
 import os
 from pathlib import Path
 
 from cns_drake.base import (
     InputError,
-    code_digest,
     did_you_mean,
     file_digests,
     repeated,
-    script_digest,
 )
 from evaluation.methods import (
     Method,
@@ -92,22 +89,21 @@ class MethodChoice:
     def identity(self) -> dict:
         """Returns everything on which the method's results depend, for JSON.
 
+        The code of a method is known by its version. A user's own file counts
+        by its content, too.
+
         Raises:
             InputError: if the method's file cannot be used.
         """
         method = self.make()
-        module = type(method).__module__
         config = method.config
-        values: dict = {
+        return {
             "name": self.name,
             "parameters": config.model_dump(mode="json"),
             "files": dict(_digests(config.model_dump())),
+            "version": method.version,
+            "file": file_digests([self.file] if self.file else []),
         }
-        if module.startswith("evaluation."):
-            values["code"] = code_digest(module)
-        elif module != "__main__":
-            values["code"] = script_digest(Path(inspect.getfile(type(method))))
-        return values
 
 
 def _digests(value: object) -> Iterator[tuple[str, list[str]]]:

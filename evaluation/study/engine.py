@@ -315,14 +315,22 @@ def _renew_removed_descriptors(jobs: Collection[Job]) -> None:
         for one in jobs
     ):
         return
-    names = {job.name for job in jobs}
+    # A drive that is recorded anew can have other scans.
+    recorded = {need for one in jobs for need in one.needs}
+    changed = {
+        one.name
+        for one in jobs
+        if one.name in recorded
+        and not isinstance(one.step, FeatureExtraction | MakePart | Steps)
+        and not nothing_left(one.step)
+    }
     # Files that will be written, and folders of features of new recordings.
     stale: set[Path] = set()
     needed: list[Part] = []
     for job in jobs:
         if isinstance(job.step, FeatureExtraction):
             stale.update(part.path for part in job.step.missing())
-            if not names.issuperset(job.needs):
+            if not changed.isdisjoint(job.needs):
                 stale.add(job.step.files.folder)
             continue
         steps = job.step.steps if isinstance(job.step, Steps) else [job.step]

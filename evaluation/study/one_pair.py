@@ -75,6 +75,7 @@ class JobsAtOnce(Jobs):
         arguments: tuple[object, ...],
         needs: Iterable[str] = (),
         cost: float = 0.0,
+        version: int = 1,
     ) -> Result:
         name = job_name(part)
         if name not in self._done:

@@ -40,7 +40,6 @@ from cns_drake.base import (
     Reporter,
     Step,
     check_regular,
-    code_digest,
     completing,
     fingerprint,
     make_folder,
@@ -490,12 +489,13 @@ class MakePart(Step):
 
     Attributes:
         function: function whose result is written. The first parameter of this
-            function is a `Reporter`; the arguments follow. If its code changes,
-            the file is made again.
+            function is a `Reporter`; the arguments follow.
         arguments: arguments of the function. If one changes, the file is made
             again. An argument is a plain value, a dataclass of plain values, a
             path (of which only the name counts), an object with a method
             `identity` that returns what counts, or a tuple of such values.
+        version: counts the changes of what the function returns for the same
+            arguments.
         figures: further files that the function writes.
         part: the file that is written, with the digest of its inputs.
     """
@@ -503,6 +503,7 @@ class MakePart(Step):
     part: Part
     function: Callable[..., object]
     arguments: tuple[object, ...]
+    version: int = 1
     figures: tuple[Path, ...] = ()
 
     @property
@@ -534,11 +535,12 @@ class MakePart(Step):
         Raises:
             InputError: an input cannot be read.
         """
-        return {
-            "function": self.function.__name__,
-            "arguments": _identity(self.arguments),
-            "code": code_digest(self.function.__module__),
-        }
+        return self.made_of(
+            {
+                "function": self.function.__name__,
+                "arguments": _identity(self.arguments),
+            }
+        )
 
 
 def _parts_in(argument: object) -> Iterator[Part]:

@@ -318,7 +318,7 @@ def _draw_changes(
                 (first.drive, last.drive),
                 (first.fine, last.fine),
             ),
-            picture.files,
+            figures=picture.files,
         )
         name = f"draw {city.name} {stages[0]} > {stages[1]}"
         jobs[name] = Job(name, step, (), _COST)

@@ -67,7 +67,12 @@ from evaluation.study.recordings.recorded_pairs import (
 from evaluation.study.sources import DriveSource
 from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.change import ChangeTask
-from evaluation.study.tasks.place import PlaceTask, PoseTask, measure_costs
+from evaluation.study.tasks.place import (
+    CostTask,
+    PlaceTask,
+    PoseTask,
+    measure_costs,
+)
 from evaluation.study.tasks.task import Task
 
 # The seed of the experiment.
@@ -336,6 +341,7 @@ def _cost_job(
         files.part("costs", "costs"),
         measure_method_costs,
         (pair[1].source, queries.drive, compared),
+        CostTask.version,
     )
     return Job("costs of the methods", step, tuple(engine.jobs), _COSTS_COST)
 

@@ -32,7 +32,6 @@ from cns_drake.base import errors, interrupts, system_libraries
 from cns_drake.base.errors import InputError
 from cns_drake.base.families import plugin_fault
 from cns_drake.base.file_locks import exclusive, remove_lock
-from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.process import ONE_CORE, collect_garbage_seldom
 from cns_drake.base.progress import heard_by
@@ -319,8 +318,6 @@ def _preload_modules(modules: Iterable[str]) -> None:
         # The process of a job reports what fails.
         with contextlib.suppress(Exception):
             importlib.import_module(name)
-    with contextlib.suppress(Exception):
-        code_digest(*modules)
     if compiling := sys.modules.get("cns_drake.base.compilation"):
         compiling.start_compiler()
     # Garbage collection would write to memory that the processes share.

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 import time
 
-from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.progress import Listener
+from cns_drake.base.version import __version__
 
 # How often a step reports its progress at most [s].
 _REPORT_INTERVAL = 0.5
@@ -55,7 +55,13 @@ class Step(abc.ABC):
     Each subclass is a frozen dataclass, defined at the top level of a module,
     so that any process can unpickle and run a step. Paths in a step are
     absolute.
+
+    Attributes:
+        version: number that counts the changes of what the step writes from the
+            same inputs. Raise it with each such change.
     """
+
+    version: int = 1
 
     @property
     @abc.abstractmethod
@@ -86,12 +92,12 @@ class Step(abc.ABC):
         """
 
     def made_of(self, inputs: Mapping[str, object]) -> dict[str, object]:
-        """Returns the inputs, with the digest of the step's code as `code`.
+        """Returns the inputs, with the versions of program and step.
 
         The step's files are up to date if they carry the fingerprint of this
-        dictionary; see `cns_drake.base.jobs.fingerprint`.
+        dictionary.
         """
-        return {**inputs, "code": code_digest(type(self).__module__)}
+        return {**inputs, "version": [__version__, self.version]}
 
 
 @dataclass(frozen=True)

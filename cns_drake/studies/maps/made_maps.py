@@ -17,7 +17,6 @@ from cns_drake.base import (
     Cluster,
     InputError,
     Reporter,
-    code_digest,
     errors_at,
     fingerprint,
     read_bytes,
@@ -69,7 +68,6 @@ class AgeCity(MakeMap):
             "years": list(self.years),
             "seed": self.seed,
             "rates": dict(self.rates),
-            "code": code_digest("cns_drake.ageing.aged_map"),
         }
 
 
@@ -97,7 +95,6 @@ class ImportCity(MakeMap):
         return {
             "file": digest_file(self.source),
             "options": repr(self.options),
-            "code": code_digest("cns_drake.imports.*"),
         }
 
 

@@ -44,10 +44,12 @@ class MakeMap(Step):
 
     def is_done(self) -> bool:
         # A folder that has its final name is complete.
-        return Part(self.folder / _PART).is_current(self.sources())
+        return Part(self.folder / _PART).is_current(
+            self.made_of(self.sources())
+        )
 
     def run(self, reporter: Reporter) -> None:
-        made_of = self.sources()
+        made_of = self.made_of(self.sources())
         if is_older := self.check():
             remove_folder(self.folder)
         self.make(
@@ -86,7 +88,7 @@ class MakeMap(Step):
 
     @abc.abstractmethod
     def sources(self) -> dict[str, object]:
-        """Returns everything on which the map depends, ready for JSON."""
+        """Returns all inputs of the map, ready for JSON."""
 
 
 def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:

@@ -16,7 +16,6 @@ from cns_drake.base import (
     Cluster,
     Reporter,
     __version__,
-    code_digest,
     draft_folder,
     errors_at,
     read_yaml,
@@ -110,13 +109,12 @@ class RedrawCity(MakeMap):
         """
 
     def sources(self) -> dict[str, object]:
-        """Returns everything on which the city depends, ready for JSON."""
+        """Returns all inputs of the city, ready for JSON."""
         return {
             **{
                 name: content.decode()
                 for name, content in self.inputs().items()
             },
-            "code": code_digest("cns_drake.city.*"),
         }
 
 

@@ -13,7 +13,11 @@ from cns_drake.studies.experiments.protocol_fields import condition_protocol
 from cns_drake.studies.maps.experiment_maps import ExperimentRun, MapPairs
 from cns_drake.studies.maps.made_maps import MadeMaps
 from cns_drake.studies.pairs.comparisons import ComparedDrives, PairMaker
-from cns_drake.studies.pairs.map_upkeep import UpkeptSource, update_maps
+from cns_drake.studies.pairs.map_upkeep import (
+    UPKEEP_VERSION,
+    UpkeptSource,
+    update_maps,
+)
 from cns_drake.studies.recording import is_recorded
 from evaluation.map_update import NOT_MAINTAINED
 from evaluation.recognition import RetrievalProtocol
@@ -198,7 +202,7 @@ class SimulatedPairs:
         )
         job = Job(
             job_name(part),
-            MakePart(part, update_maps, (sources, maintain)),
+            MakePart(part, update_maps, (sources, maintain), UPKEEP_VERSION),
             tuple(need for one in drives for need in one.needs),
             sum(OPENING_COST + _UPKEEP_COST * one.share for one in drives),
         )

@@ -42,7 +42,10 @@ class DrivenMapTask(MapTask):
             float(self.settings["spacing"]),
         )
         part = jobs.files.part("map", pair.key)
-        return (jobs.add(part, measure_maps, arguments, cost=_COST),)
+        found = jobs.add(
+            part, measure_maps, arguments, cost=_COST, version=self.version
+        )
+        return (found,)
 
 
 def measure_maps(

@@ -156,9 +156,15 @@ class SeenTask(Task):
             # The drive is simulated in two cities.
             scans = drive.length / arguments[2]
             cost = 2.0 * (OPENING_COST + SCAN_COST * scans)
-            parts.append(jobs.add(part, sight_structures, arguments, (), cost))
+            found = jobs.add(
+                part, sight_structures, arguments, (), cost, self.version
+            )
+            parts.append(found)
         part = jobs.files.part("changes", pair.key)
-        parts.append(jobs.add(part, changes_until, (sources[-1],), (), 1.0))
+        found = jobs.add(
+            part, changes_until, (sources[-1],), (), 1.0, self.version
+        )
+        parts.append(found)
         return tuple(parts)
 
     def found(self, pair: Pair) -> Any:

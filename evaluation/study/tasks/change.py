@@ -38,7 +38,8 @@ class ChangeTask(Task):
         )
         # The change does not depend on the protocol.
         part = jobs.files.part("change", pair.way.name, pair.query.name)
-        return (jobs.add(part, measure_change, maps, needs, 2.0),)
+        found = jobs.add(part, measure_change, maps, needs, 2.0, self.version)
+        return (found,)
 
     def numbers(
         self, found: ChangeReport, before: Any | None

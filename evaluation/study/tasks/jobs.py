@@ -213,6 +213,7 @@ class Jobs:
         arguments: tuple[object, ...],
         needs: Iterable[str] = (),
         cost: float = _OTHER_COST,
+        version: int = 1,
     ) -> Result:
         """Adds a job that writes a file of results; returns the file.
 
@@ -225,9 +226,10 @@ class Jobs:
             arguments: further arguments of the function.
             needs: names of jobs that must be finished before.
             cost: approximate cost of the job [s].
+            version: see `MakePart`; tasks give their own.
         """
         name = job_name(part)
-        step = MakePart(part, function, arguments)
+        step = MakePart(part, function, arguments, version)
         self.jobs[name] = Job(name, step, tuple(needs), cost)
         return part
 

@@ -136,7 +136,14 @@ class LocaliseTask(Task):
         part = jobs.files.part("localise", pair.key)
         if pair.leaves_out_itself:
             only = pair.database.source, named, texts, starts
-            return (jobs.add(part, localise_among_others, only, cost=_COST),)
+            found = jobs.add(
+                part,
+                localise_among_others,
+                only,
+                cost=_COST,
+                version=self.version,
+            )
+            return (found,)
         spacing = self.settings["spacing"] or pair.protocol.query_spacing
         drives = pair.database, *pair.beside
         database = pair.database.source
@@ -160,7 +167,9 @@ class LocaliseTask(Task):
         cost = openings * OPENING_COST + _QUERIES_COST * pair.query.share
         cost += sum(_MAP_COST * one.share for one in drives)
         needs = [need for one in (*drives, pair.query) for need in one.needs]
-        found = jobs.add(part, measure_localisation, arguments, needs, cost)
+        found = jobs.add(
+            part, measure_localisation, arguments, needs, cost, self.version
+        )
         return (found,)
 
     def _named_results(

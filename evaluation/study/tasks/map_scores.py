@@ -107,7 +107,9 @@ class LabelledMapTask(MapTask):
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         part = jobs.files.part("map", pair.key)
-        return (jobs.add(part, score_methods, self._arguments),)
+        arguments = self._arguments
+        found = jobs.add(part, score_methods, arguments, version=self.version)
+        return (found,)
 
 
 def score_methods(

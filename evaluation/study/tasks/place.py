@@ -62,16 +62,30 @@ class PoseTask(Task):
                     cost += jobs.reading_cost(drive, role, pair.protocol)
                     cost += jobs.description_cost(drive, role, pair.protocol)
             part = jobs.files.part("place", pair.key)
-            return (jobs.add(part, measure_places, (compared,), needs, cost),)
+            found = jobs.add(
+                part,
+                measure_places,
+                (compared,),
+                needs,
+                cost,
+                PlaceTask.version,
+            )
+            return (found,)
         # Each method has a file, so that another method leaves it as it is.
         part = jobs.files.part("overlaps", pair.key)
-        shown = MakePart(part, shown_overlaps, (compared.by_method(0),))
+        shown = MakePart(
+            part,
+            shown_overlaps,
+            (compared.by_method(0),),
+            PlaceTask.version,
+        )
         compared = compared._replace(overlaps=part)
         steps = [
             MakePart(
                 jobs.files.part("place", pair.key, choice.key),
                 measure_places,
                 (compared.by_method(k),),
+                PlaceTask.version,
             )
             for k, choice in enumerate(compared.methods)
         ]
@@ -118,7 +132,10 @@ class CostTask(Task):
         compared = _comparison(pair, jobs, needs, kept=True)
         part = jobs.files.part("cost", pair.key)
         cost = _search_cost(pair, jobs, NUM_TRIALS)
-        return (jobs.add(part, measure_costs, (compared,), needs, cost),)
+        found = jobs.add(
+            part, measure_costs, (compared,), needs, cost, self.version
+        )
+        return (found,)
 
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         for method, cost in found.items():

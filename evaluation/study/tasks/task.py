@@ -22,6 +22,9 @@ class Task(abc.ABC):
 
     Attributes:
         name: name of the task in files and on the command line.
+        version: counts the changes of the task's results for the same inputs.
+            Raise it with each such change: results of other versions are
+            computed again.
         asks: whether the results depend on the protocol of the queries and on
             the places of the database. Otherwise they depend only on the
             drives.
@@ -30,6 +33,7 @@ class Task(abc.ABC):
     """
 
     name: ClassVar[str]
+    version: ClassVar[int] = 1
     asks: ClassVar[bool] = False
     defaults: ClassVar[Mapping[str, Any]] = {}
 

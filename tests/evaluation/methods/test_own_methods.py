@@ -311,9 +311,9 @@ def test_a_file_in_a_setting_counts_by_its_content(tmp_path):
     path = tmp_path / "own.py"
     path.write_text(f"from pathlib import Path\n{text}")
     files = [tmp_path / name for name in ("beside.npy", "b.npy", "c.npy")]
-    files.append(tmp_path / "net" / "layers" / "d.npy")
+    files += [tmp_path / "net" / "layers" / "d.npy", path]
     files[3].parent.mkdir(parents=True)
-    for file in files:
+    for file in files[:-1]:
         file.write_bytes(b"weights")
     settings = [
         f"own_weights.more={files[1]},{tmp_path / 'net'}",
@@ -323,6 +323,6 @@ def test_a_file_in_a_setting_counts_by_its_content(tmp_path):
     known = [chosen.identity()]
     assert known[0] == chosen.identity()
     for file in files:
-        file.write_bytes(b"trained")
+        file.write_bytes(file.read_bytes() + b"\n# Trained.")
         known.append(chosen.identity())
         assert known[-1] not in known[:-1]

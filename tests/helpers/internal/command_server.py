@@ -30,7 +30,7 @@ import tempfile
 from _pytest.monkeypatch import MonkeyPatch
 
 import cns_drake
-from cns_drake.base import ALLOCATION, code_digest, collect_garbage_seldom
+from cns_drake.base import ALLOCATION, collect_garbage_seldom
 from cns_drake.base.compilation import start_compiler
 from cns_drake.base.jobs import processes
 from cns_drake.simulation import simulate
@@ -141,7 +141,6 @@ def _serve(listener: socket.socket) -> None:
     # Forks need not load the compiled loops of each recording.
     with tempfile.TemporaryDirectory() as folder:
         simulate(tiny_scenario(Path(folder), frames=2), folder)
-    code_digest("cns_drake.*", "evaluation.*")
     measure_in_no_time(MonkeyPatch())
     # Jobs are forks, too: else each command would import all modules again.
     processes._context = multiprocessing.get_context("fork")

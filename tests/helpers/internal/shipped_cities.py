@@ -15,7 +15,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
-from cns_drake.base import code_digest, fingerprint
+from cns_drake.base import fingerprint
 from cns_drake.city import City, Structure, make_city, part_triangles
 from cns_drake.city.generation import rendering
 from cns_drake.city.ground.coverings import GROUND_TAG
@@ -97,6 +97,8 @@ class _Kept(GrowingCity):
 
 
 _grown: list[_Kept] = []
+# The packages whose code draws cities.
+_DRAWN_BY = ("base", "city", "roads", "scene")
 
 
 def _draw(name: str) -> Drawn:
@@ -123,7 +125,11 @@ def drawn(name: str) -> Drawn:
         path.name: hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(world_of(name).glob("*.yaml"))
     }
-    inputs["code"] = code_digest(rendering.__name__)
+    code = Path(rendering.__file__).parents[2]
+    for path in sorted(code.rglob("*.*")):
+        package = path.relative_to(code).parts[0]
+        if package in _DRAWN_BY and path.suffix in (".py", ".yaml", ".obj"):
+            inputs[str(path)] = hashlib.sha256(path.read_bytes()).hexdigest()
     folder = Path(os.environ["CNS_DRAKE_TEST_CITIES"])
     file = folder / f"{name}_{fingerprint(inputs)}.pickle"
     for other in folder.glob(f"{name}_*.pickle"):

@@ -21,7 +21,7 @@ from cns_drake.city import (
 from cns_drake.city.generation import generate
 from cns_drake.roads import load_road_network
 from cns_drake.scene import load_world, structures_in
-from cns_drake.studies.maps import map_step, redrawing
+from cns_drake.studies.maps import map_step
 from cns_drake.studies.maps.redrawing import (
     RedrawCity,
     redraw_cities,
@@ -189,7 +189,7 @@ def test_what_was_drawn_of_something_else_is_replaced(
     folder = copied(drawn, tmp_path / "cities")
     (folder / "meshes" / "old.obj").touch()
     if change == "program":
-        monkeypatch.setattr(redrawing, "code_digest", lambda *_: "another")
+        monkeypatch.setattr(RedrawCity, "version", 2)
     else:
         file = town / {"plan": "city.yaml", "roads": "roads.yaml"}[change]
         text = file.read_text()
