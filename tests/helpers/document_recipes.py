@@ -294,7 +294,7 @@ RECIPES = {
             ("metropolis_01", "town/sequence_01.yaml --size 64x36"),
             (" film.webp", " film.webp --seconds 1 --traffic 0"),
             ("metropolis_04", "town/sequence_02.yaml --size 64x36"),
-            ("71 --seconds 8", "1 --seconds 1 --traffic 2"),
+            ("71 --seconds 8", "1 --seconds 1 --traffic 0"),
             ("docs/pictures/drive.webp", "drive.webp"),
         ),
         after=("own city",),
@@ -1062,8 +1062,9 @@ NOT_RUN = {
     ".venv/bin/cns-drake study fresh": "draws shipped cities and drives "
     "through them, for many minutes; test_fresh_cities draws a small one",
     "cns-drake study levels": "takes hours",
-    "cns-drake simulate metropolis_04 --traffic 60 --frames 80": "needs a "
-    "script of another project; test_traffic_recording records traffic",
+    "netconvert --osm-files": "SUMO, and a file that is not shipped",
+    ".venv/bin/cns-drake simulate neukolln": "needs the trace; "
+    "test_scenario_traffic has one in degrees",
     ".venv/bin/cns-drake study stages --method heights.py": "drives through "
     "shipped cities, for an hour",
     "method           auc, mean": "is what the recipe compare prints",

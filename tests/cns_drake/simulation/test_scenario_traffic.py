@@ -100,9 +100,10 @@ def test_a_drive_that_is_longer_than_the_recording(town):
     assert plan.walkers.duration == 1.0
 
 
-# Height of the street in a city that lies in Berlin [m].
+# Height of the street [m], and where its city lies [deg].
 STREET = 0.25
-NORTH, EAST = 52.5, 13.4
+NORTH = 52.5
+EAST = 13.4
 
 
 def write_street(folder):

@@ -495,7 +495,8 @@ def test_road_users_stay_at_their_height_beside_the_ground(trace):
 
 
 # Longitude and latitude of the map's origin [deg].
-EAST, NORTH = 13.44, 52.47
+EAST = 13.44
+NORTH = 52.47
 # Metres per degree there.
 METRES = np.array([68_000.0, 111_260.0])
 
