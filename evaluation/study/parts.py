@@ -28,8 +28,7 @@ import struct
 import sys
 import tempfile
 import tokenize
-from types import NoneType, UnionType
-from typing import Any, BinaryIO, Union, get_args, get_origin, get_type_hints
+from typing import Any, BinaryIO
 import weakref
 
 import numpy as np
@@ -46,16 +45,12 @@ from cns_drake.base import (
     user_errors,
 )
 
-_MAGIC = b"cns-eval part 2\n"
+_MAGIC = b"cns-eval part 3\n"
 _LEVEL = 1
 # Field of the header of a part whose value was removed.
 _REMOVED = "spent"
 # Greatest size of a line of inputs [bytes].
 _MOST_INPUTS = 1 << 24
-# Limit of the uncompressed size, as a multiple of the compressed bytes.
-_MOST_RATIO = 200
-# This uncompressed size is always allowed [bytes].
-_ALWAYS_BYTES = 1 << 27
 # A `LongList` keeps at most this number of its last items in memory.
 _MOST_HELD = 512
 # Number of items of a `LongList` that are written and read together.
@@ -184,7 +179,7 @@ class LongList(_Joined):
     def _write(self, number: int) -> None:
         """Writes the next items to the file as one block."""
         plain = encode(self._recent[:number])
-        data, _ = _compressed(plain)
+        data = _compressed(plain)
         with user_errors(self._where):
             if self._stream is None:
                 self._stream = tempfile.TemporaryFile(dir=self._path)  # noqa: SIM115
@@ -200,11 +195,7 @@ class LongList(_Joined):
         """Returns the items of a block."""
         data = self._bytes(number)
         with _damage_named(self._where):
-            # Lengths at the start of stored values are far smaller.
-            if data.startswith(zstandard.FRAME_HEADER):
-                _check_size(data, len(data))
-                data = zstandard.ZstdDecompressor().decompress(data)
-            return decode(data)
+            return decode(zstandard.ZstdDecompressor().decompress(data))
 
     def _bytes(self, number: int) -> bytes:
         """Returns a block as it is in the file."""
@@ -256,26 +247,6 @@ class _Stretch(_Joined):
         return self._of[self._rows[index]]
 
 
-def _uncompressed_size(size: int) -> int:
-    """Returns the greatest uncompressed size of some compressed bytes."""
-    return max(_MOST_RATIO * size, _ALWAYS_BYTES)
-
-
-def _check_size(start: bytes, size: int) -> None:
-    """Refuses a compressed value that may be larger than the memory.
-
-    Args:
-        start: the first bytes of the value.
-        size: size of the whole value [bytes].
-
-    Raises:
-        ValueError: the uncompressed value would be too large.
-    """
-    claimed = zstandard.frame_content_size(start)
-    if not 0 <= claimed <= _uncompressed_size(size):
-        raise ValueError(f"{size} bytes stand for {claimed}")
-
-
 def _check_lists(lists: Sequence[Mapping[str, Any]]) -> None:
     """Refuses damaged results of `LongList._stored` in a header.
 
@@ -295,13 +266,9 @@ def _check_lists(lists: Sequence[Mapping[str, Any]]) -> None:
             raise ValueError("a list has another length")
 
 
-def _compressed(plain: bytes) -> tuple[bytes, bool]:
-    """Returns the bytes to store, and whether they are not compressed."""
+def _compressed(plain: bytes) -> bytes:
     compressor = zstandard.ZstdCompressor(level=_LEVEL, write_checksum=True)
-    data = compressor.compress(plain)
-    if len(plain) > _uncompressed_size(len(data)):
-        return plain, True
-    return data, False
+    return compressor.compress(plain)
 
 
 @dataclass(frozen=True)
@@ -329,12 +296,11 @@ class Part:
             stored = [one._stored() for one in lists]
         except TypeError as error:
             raise InputError(f"{self.path}: {error}") from error
-        data, is_stored = _compressed(plain)
+        data = _compressed(plain)
         header = {
             "digest": fingerprint(inputs),
             "bytes": len(data),
             "inputs": inputs,
-            **({"stored": True} if is_stored else {}),
             **({"lists": stored} if stored else {}),
         }
         make_folder(self.path.parent)
@@ -407,8 +373,7 @@ class Part:
             if _REMOVED in header:
                 raise InputError(f"{self.path}: its value was removed")
             data = stream.read(header["bytes"])
-            if "stored" not in header:
-                data = zstandard.ZstdDecompressor().decompress(data)
+            data = zstandard.ZstdDecompressor().decompress(data)
             lists = []
             start = stream.tell()
             for stored in header.get("lists", []):
@@ -426,29 +391,9 @@ class Part:
         """
         with self._opened() as (header, stream):
             in_lists = sum(one["plain"] for one in header.get("lists", []))
-            if {"stored", _REMOVED} & header.keys():
-                return header["bytes"] + in_lists
+            if _REMOVED in header:
+                return 0
             return zstandard.frame_content_size(stream.read(18)) + in_lists
-
-    def fits(self, hint: object) -> bool:
-        """Returns whether the value in the file can be of a given type.
-
-        Only the beginning of the file is read. The result is false if the file
-        cannot be read.
-
-        Args:
-            hint: the type, as in an annotation.
-        """
-        with (
-            contextlib.suppress(InputError),
-            self._opened() as (header, stream),
-        ):
-            source: Any = stream
-            if "stored" not in header:
-                source = zstandard.ZstdDecompressor().stream_reader(stream)
-            most = _uncompressed_size(header["bytes"])
-            return _fits_type(_read_tree(source, most), hint)
-        return False
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[tuple[dict, BinaryIO]]:
@@ -466,9 +411,6 @@ class Part:
             if stream.seek(0, 2) - start != size + in_lists:
                 raise ValueError("cut off")
             stream.seek(start)
-            if not {"stored", _REMOVED} & header.keys():
-                _check_size(stream.read(18), size)
-                stream.seek(start)
             yield header, stream
 
 
@@ -511,12 +453,10 @@ class MakePart(Step):
         return self.part.path
 
     def is_done(self) -> bool:
-        hint = _annotations(self.function).get("return", Any)
         return (
             self.part.path.is_file()
             and self.part.is_current(self._inputs())
             and all(file.is_file() for file in self.figures)
-            and self.part.fits(hint)
         )
 
     def run(self, reporter: Reporter) -> None:
@@ -566,8 +506,6 @@ def _identity(argument: Any) -> object:
 _LENGTH = struct.Struct("<Q")
 # Greatest length of the header of an array, as in NumPy.
 _MOST_HEADER = 10_000
-# Types in these modules belong to methods and are not checked.
-_METHODS = "evaluation.methods"
 _OWN_MODULE = re.compile(r"evaluation(\.[a-z]\w*)+")
 # Errors for a tree of another form or with other fields, and for headers of
 # arrays that NumPy cannot parse.
@@ -584,14 +522,6 @@ _DECODING_ERRORS = (
     struct.error,
     tokenize.TokenError,
 )
-# The form of a tree -> the type of its value; see `_Encoder`.
-_FORMS: dict[str, type] = {
-    "long": list,
-    "tuple": tuple,
-    "dict": dict,
-    "array": np.ndarray,
-    "bytes": bytes,
-}
 
 
 def encode(value: object, lists: list[LongList] | None = None) -> bytes:
@@ -695,7 +625,10 @@ class _Encoder:
 
 
 def _read_arrays(data: bytes, start: int) -> list[np.ndarray]:
-    """Returns the arrays that are stored from an offset onwards."""
+    """Returns the arrays that are stored from an offset onwards.
+
+    For 20,000 short arrays this takes 0.06 s, `numpy.load` 0.66 s.
+    """
     stream = io.BytesIO(data)
     stream.seek(start)
     arrays = []
@@ -794,63 +727,3 @@ def _find_type(module: str, name: str) -> Any:
     if not isinstance(found, type):
         raise TypeError(f"{name} is no type")
     return found
-
-
-def _read_tree(stream: BinaryIO, most: int) -> Any:
-    """Returns the tree of an encoded value, without its arrays.
-
-    Args:
-        stream: the encoded value, from its beginning.
-        most: greatest number of bytes of the tree that are read.
-    """
-    (length,) = _LENGTH.unpack(stream.read(_LENGTH.size))
-    return json.loads(stream.read(min(length, most)))
-
-
-def _fits_type(tree: Any, hint: Any) -> bool:
-    """Returns whether an encoded value may be of a type.
-
-    Arrays may hold anything.
-
-    Args:
-        tree: the tree of the value, from `_read_tree`.
-        hint: the type, as in an annotation.
-    """
-    kind = get_origin(hint) or hint
-    inner = get_args(hint)
-    if kind in (Union, UnionType):
-        return any(_fits_type(tree, one) for one in inner)
-    kind = NoneType if kind is None else kind
-    is_open = kind is Any or not isinstance(kind, type)
-    if is_open or (isinstance(tree, dict) and "scalar" in tree):
-        return True
-    found = type(tree)
-    if isinstance(tree, dict):
-        name = tree.get("dataclass") or tree.get("named")
-        forms = [one for form, one in _FORMS.items() if form in tree]
-        found = _find_type(*name) if name else forms[0]
-    if not issubclass(found, (kind, int) if kind is float else kind):
-        return False
-    if is_dataclass(found) and not found.__module__.startswith(_METHODS):
-        hints = _annotations(found)
-        return all(
-            _fits_type(tree["fields"][one.name], hints.get(one.name, Any))
-            for one in fields(found)
-        )
-    is_long = isinstance(tree, dict) and "long" in tree
-    if found not in (list, tuple, dict) or not inner or is_long:
-        return True
-    items = tree if found is list else tree[found.__name__]
-    if found is dict:
-        items = [one for _, one in items]
-    elif kind is tuple and inner[1:] != (...,):
-        return len(items) == len(inner) and all(map(_fits_type, items, inner))
-    return all(_fits_type(one, inner[found is dict]) for one in items)
-
-
-def _annotations(kind: Any) -> dict[str, Any]:
-    """Returns the annotations of a class or function, if they can be found."""
-    try:
-        return get_type_hints(kind)
-    except NameError:  # A type is imported for type checkers alone.
-        return {}

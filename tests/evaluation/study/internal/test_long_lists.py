@@ -139,25 +139,12 @@ def test_several_lists_and_other_values_share_a_file(tmp_path):
     assert [one["number"] for one in others["short"]] == [0, 1, 2]
     assert_equal(first[599], item(599))
     assert_equal(last[529], item(529))
-    assert part.fits(list)
-    assert not part.fits(dict)
     # The clouds alone have 24 bytes a point.
     assert part.size() > 24 * 3 * (600 + 530)
     # Written again from the file, the part is the same.
     again = Part(tmp_path / "again.data")
     again.write({"a": 1}, part.read())
     assert again.path.read_bytes() == part.path.read_bytes()
-
-
-def test_items_that_hardly_take_room_are_stored_as_they_are(
-    tmp_path, monkeypatch
-):
-    monkeypatch.setattr(parts, "_ALWAYS_BYTES", 1 << 12)
-    part = Part(tmp_path / "list.data")
-    part.write({}, LongList.of(np.zeros(4000) for _ in range(600)))
-    found = part.read()
-    assert len(found) == 600
-    assert (found[599] == np.zeros(4000)).all()
 
 
 def test_a_damaged_list_is_named(tmp_path):
