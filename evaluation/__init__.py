@@ -1,7 +1,9 @@
 """Structural change and place recognition on LiDAR drives.
 
-Independent of the simulator: this package imports neither Drake nor any part of
-`cns_drake` except `cns_drake.base`.
+`recognise`, `change_between`, `localise` and `update_map` measure two drives or
+maps; the commands of `cns-eval` print what they return. The package imports
+neither Drake nor anything of `cns_drake` but `cns_drake.base` and
+`cns_drake.drives`.
 
 `__all__` lists the public names. Each is imported when it is first used, from
 the module that `__init__.pyi` names. `evaluation.drives` and

@@ -34,3 +34,7 @@ from evaluation.recognition import route_blocks as route_blocks
 from evaluation.results import QueryRows as QueryRows
 from evaluation.results import Results as Results
 from evaluation.results import means as means
+from evaluation.verbs import change_between as change_between
+from evaluation.verbs import localise as localise
+from evaluation.verbs import recognise as recognise
+from evaluation.verbs import update_map as update_map

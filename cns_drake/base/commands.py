@@ -1,6 +1,6 @@
 """Commands made from functions, with help from their docstrings."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 import functools
 import inspect
 import math
@@ -96,31 +96,6 @@ def given_options(context: typer.Context) -> list[str]:
         for name, source in sources.items()
         if source is not None and source.name == "COMMANDLINE"
     ]
-
-
-def check_only_with(
-    context: typer.Context, chosen: str, allowed: Collection[str]
-) -> None:
-    """Refuses options that have no effect together with a chosen option.
-
-    Args:
-        context: context of the command that runs.
-        chosen: name of the chosen option's parameter.
-        allowed: names of all parameters that have an effect together with the
-            chosen option.
-
-    Raises:
-        InputError: another option was given; the message names both.
-    """
-    for name in given_options(context):
-        if name not in (chosen, *allowed):
-            (one,) = (p for p in context.command.params if p.name == name)
-            shown = max(one.opts, key=len)
-            if one.param_type_name == "argument":
-                shown = one.make_metavar(context).strip("[]")
-            raise InputError(
-                f"{shown}: not together with --{chosen.replace('_', '-')}"
-            )
 
 
 def with_options(

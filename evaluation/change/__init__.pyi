@@ -1,5 +1,5 @@
 from evaluation.change.drive_change import ChangeReport as ChangeReport
-from evaluation.change.drive_change import change_between as change_between
+from evaluation.change.drive_change import change_of_maps as change_of_maps
 from evaluation.change.drive_change import (
     registered_change as registered_change,
 )

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base import InputError, json_values
+from cns_drake.base import InputError
 from cns_drake.drives import check_same_world
 from evaluation.change.drive_maps import DriveMap
 from evaluation.change.tcr import (
@@ -68,6 +68,13 @@ class RegisteredChange:
         return x, y, z
 
 
+class Spread(NamedTuple):
+    """The least and the greatest TCR_sym over positions of the voxel grid."""
+
+    least: float
+    greatest: float
+
+
 @dataclass(frozen=True)
 class ChangeReport:
     """The change between two maps A and B.
@@ -77,7 +84,7 @@ class ChangeReport:
         target: name of B.
         change: change over the whole maps.
         spread: least and greatest TCR_sym over several positions of the grid of
-            voxels.
+            voxels; None if it was not measured.
         masked: change over the parts that both drives passed within the
             coverage radius; None if a map has no drive.
         control: apparent change between two drives in the same stage, one on
@@ -91,8 +98,8 @@ class ChangeReport:
     source: str
     target: str
     change: TemporalChange
-    spread: tuple[float, float]
-    masked: TemporalChange | None
+    spread: Spread | None = None
+    masked: TemporalChange | None = None
     control: TemporalChange | None = None
     control_names: tuple[str, str] | None = None
     alignment: AlignmentReport | None = None
@@ -120,29 +127,14 @@ class ChangeReport:
             control_names=(control.source, control.target),
         )
 
-    def to_json(self) -> dict:
-        """Returns all numbers as a dictionary for JSON.
-
-        NaN becomes None, with a reason in words.
-        """
+    def to_json(self) -> dict[str, Any]:
+        """Returns what the metrics of the change leave out, for JSON."""
         change = self.change
         sides = {
             "source": change.source_to_target,
             "target": change.target_to_source,
         }
-        values: dict[str, object] = {
-            "source": self.source,
-            "target": self.target,
-            "tcr_sym": change.symmetric,
-            "tcr_sym_least": self.spread[0],
-            "tcr_sym_greatest": self.spread[1],
-            "tcr_sym_registered": None,
-            "registration_yaw_deg": None,
-            "registration_xyz_m": None,
-            "tcr_source_to_target": sides["source"].ratio,
-            "tcr_target_to_source": sides["target"].ratio,
-            "in_hull": change.num_in_hull,
-            "unchanged": change.num_unchanged,
+        values: dict[str, Any] = {
             "voxels": {k: len(side.in_hull) for k, side in sides.items()},
             "in_hull_of": {k: side.num_in_hull for k, side in sides.items()},
             "unchanged_of": {
@@ -154,7 +146,9 @@ class ChangeReport:
             "hull_margin": HULL_MARGIN,
             "coverage_masked": None,
             "no_change": None,
-            "alignment": None,
+            "alignment": self.alignment and self.alignment.to_json(),
+            "registration_xyz_m": self.registered
+            and list(self.registered.offset),
         }
         if change.undefined_because:
             values["reason"] = change.undefined_because
@@ -166,19 +160,11 @@ class ChangeReport:
             values["no_change"] = _numbers_of_change(self.control) | {
                 "between": names
             }
-        if self.registered is not None:
-            values["tcr_sym_registered"] = self.registered.symmetric
-            values["registration_yaw_deg"] = self.registered.yaw_deg
-            values["registration_xyz_m"] = list(self.registered.offset)
-        if self.alignment is not None:
-            values["alignment"] = self.alignment.to_json()
-        return json_values(values)
+        return values
 
 
-def change_between(source: DriveMap, target: DriveMap) -> ChangeReport:
-    """Returns the change between two maps, without control and spread.
-
-    Both limits of `spread` are TCR_sym on the unshifted grid.
+def change_of_maps(source: DriveMap, target: DriveMap) -> ChangeReport:
+    """Returns the change between two maps, without its context.
 
     Raises:
         InputError: the maps are not in one world.
@@ -190,8 +176,7 @@ def change_between(source: DriveMap, target: DriveMap) -> ChangeReport:
     if source.positions is not None and target.positions is not None:
         both = (source.positions, target.positions)
         masked = change.restricted(*(covered(cloud, both) for cloud in clouds))
-    spread = change.symmetric, change.symmetric
-    return ChangeReport(source.name, target.name, change, spread, masked)
+    return ChangeReport(source.name, target.name, change, masked=masked)
 
 
 def spread_over_grids(
@@ -199,7 +184,7 @@ def spread_over_grids(
     target: DriveMap,
     change: TemporalChange,
     grids: Sequence[tuple[float, float, float]] = GRIDS,
-) -> tuple[float, float]:
+) -> Spread:
     """Returns the least and the greatest TCR_sym over positions of the grid.
 
     The positions are the unshifted grid and each of the shifts.
@@ -211,7 +196,7 @@ def spread_over_grids(
     """
     values = [change.symmetric]
     values += [_change_on_grid(source, target, at)[0].symmetric for at in grids]
-    return float(np.min(values)), float(np.max(values))
+    return Spread(float(np.min(values)), float(np.max(values)))
 
 
 def registered_change(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -49,7 +50,7 @@ def read_map(path: Path) -> DriveMap:
 
 
 def maps_in_one_world(
-    paths: list[Path],
+    given: Sequence[Drive | Path | str],
     when: When,
     lidar: str | None = None,
     columns: int | None = None,
@@ -57,8 +58,8 @@ def maps_in_one_world(
     """Returns the maps of drives or map files, all in one world.
 
     Args:
-        paths: paths of drives or map files; map files must be in the common
-            world.
+        given: drives, open or as paths, or paths of map files, which must be in
+            the common world.
         when: when all other drives are aligned with the first drive: `auto`
             (only if their world frames differ), `always` or `never`.
         lidar: name of the LiDAR, for recordings with several LiDARs.
@@ -66,12 +67,15 @@ def maps_in_one_world(
             values.
 
     Returns:
-        The maps, in the order of the paths; and reports on alignments.
+        The maps, in the given order; and reports on alignments.
 
     Raises:
         InputError: if a path cannot be read, or a drive cannot be aligned.
     """
-    opened = [open_source(path, lidar, columns) for path in paths]
+    opened = [
+        one if isinstance(one, Drive) else open_source(one, lidar, columns)
+        for one in given
+    ]
     drives = {
         i: source
         for i, source in enumerate(opened)
@@ -104,7 +108,7 @@ def maps_in_one_world(
 
 
 def open_source(
-    path: Path, lidar: str | None = None, columns: int | None = None
+    path: Path | str, lidar: str | None = None, columns: int | None = None
 ) -> Drive | Path:
     """Returns an opened drive, or the path of a point cloud.
 

@@ -13,6 +13,7 @@ app = program.make_program(
     commands="evaluation.command_line.commands",
     groups=("Measure change", "Recognise places", "Localise, and keep maps"),
     gone={
+        "pr --scores": "cns-eval scores",
         "tcr --paths": "cns-drake export --format tum, and evo_traj of evo",
         "localise --estimate": (
             "cns-drake export --format tum, and evo_ape and evo_rpe of evo"

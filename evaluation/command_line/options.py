@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -12,8 +11,7 @@ import typer
 from cns_drake.base import InputError, terminal
 
 if TYPE_CHECKING:
-    from cns_drake.drives import Drive
-    from evaluation.study import Engine
+    from evaluation.verbs import Measured
 
 # Option: when drives are aligned to one world.
 When = Literal["auto", "always", "never"]
@@ -45,46 +43,12 @@ SensorHeight = Annotated[
 ]
 
 
-def open_noted(
-    *paths: Path, lidar: str | None, columns: int | None = None
-) -> list[Drive]:
-    """Opens drives, and shows the notes on how they were read."""
-    from evaluation.drives import open_drive
+def write_tables(found: Measured, output: Path) -> None:
+    """Writes both tables of what was measured, and shows a note on them."""
+    from evaluation import results
 
-    drives = [open_drive(path, lidar, columns) for path in paths]
-    for drive in drives:
-        for note in drive.notes:
-            terminal.note(note)
-    return drives
-
-
-def write_tables(engine: Engine) -> None:
-    """Writes both tables of an engine, and shows a note on them."""
-    from evaluation.results import QUERIES, RESULTS
-
-    engine.write_tables()
-    terminal.note(f"wrote {engine.output / RESULTS} and {QUERIES}")
-
-
-def aligned(
-    drives: Sequence[Drive], when: When, *, across_maps: bool = False
-) -> tuple[Drive, Drive]:
-    """Returns two drives in one world; shows a note if a drive was moved.
-
-    Args:
-        drives: the two drives.
-        when: whether to align them: `auto` (if their world frames differ),
-            `always` or `never`.
-        across_maps: whether the drives may be from maps with different names.
-    """
-    from evaluation.alignment import in_one_world
-
-    first, second = drives
-    alignment = in_one_world(first, second, when, across_maps=across_maps)
-    if alignment is None:
-        return first, second
-    terminal.note(alignment.report.to_text())
-    return alignment.first, alignment.second
+    results.write_tables(output, found.results, found.queries)
+    terminal.note(f"wrote {output / results.RESULTS} and {results.QUERIES}")
 
 
 def overlap_of(truth: str) -> float | None:

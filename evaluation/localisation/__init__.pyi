@@ -24,15 +24,9 @@ from evaluation.localisation.results import QUERY as QUERY
 from evaluation.localisation.results import (
     RIGHT_TRANSLATION as RIGHT_TRANSLATION,
 )
-from evaluation.localisation.results import is_right as is_right
+from evaluation.localisation.results import Localised as Localised
 from evaluation.localisation.results import (
     localisation_columns as localisation_columns,
-)
-from evaluation.localisation.results import (
-    localisation_numbers as localisation_numbers,
-)
-from evaluation.localisation.results import (
-    localisation_summary as localisation_summary,
 )
 from evaluation.localisation.results import note_sparse as note_sparse
 from evaluation.localisation.results import write_rows as write_rows
@@ -43,10 +37,6 @@ from evaluation.localisation.settings import (
     default_settings as default_settings,
 )
 from evaluation.localisation.tracking import LOST as LOST
+from evaluation.localisation.tracking import Tracked as Tracked
+from evaluation.localisation.tracking import localised as localised
 from evaluation.localisation.tracking import track_drive as track_drive
-from evaluation.localisation.tracking import (
-    tracking_numbers as tracking_numbers,
-)
-from evaluation.localisation.tracking import (
-    tracking_summary as tracking_summary,
-)

@@ -1,45 +1,20 @@
-"""Results of localised scans: a record for each, a summary, and tables."""
+"""Results of localised scans: a record for each, their metrics, and tables."""
 
-from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 import math
 from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import json_values, write_csv
+from cns_drake.base import write_csv
 from evaluation.clouds import OnNote
 from evaluation.localisation.localisation_map import FEWEST_POINTS
-from evaluation.recognition import (
-    SUCCESS_ROTATION_DEG,
-    SUCCESS_TRANSLATION,
-    Number,
-    auroc,
-)
+from evaluation.recognition import auroc
 
 # Results with errors of at most these are right [m, deg].
 RIGHT_TRANSLATION = 0.3
 RIGHT_ROTATION_DEG = 1.0
-# Numbers of the summary that go into a table of results.
-_SHOWN = (
-    "success_03m_1deg",
-    "success_2m_5deg",
-    "translation_median",
-    "translation_95",
-    "rotation_median_deg",
-    "auroc_own_score",
-)
-# Success rate -> greatest errors of a success [m, deg].
-_SUCCESSES = {
-    "success_03m_1deg": (RIGHT_TRANSLATION, RIGHT_ROTATION_DEG),
-    "success_2m_5deg": (SUCCESS_TRANSLATION, SUCCESS_ROTATION_DEG),
-}
-# Quantile of errors -> field of `QUERY`, and share of smaller errors.
-_QUANTILES = {
-    "translation_median": ("translation_error", 0.5),
-    "translation_95": ("translation_error", 0.95),
-    "rotation_median_deg": ("rotation_error_deg", 0.5),
-    "rotation_95_deg": ("rotation_error_deg", 0.95),
-}
 # Directions of the car, in which errors are measured.
 _DIRECTIONS = ("along", "across", "up")
 # Share of the right results whose scores pass the suggested threshold.
@@ -111,119 +86,90 @@ def note_sparse(name: str, rows: np.ndarray, on_note: OnNote) -> None:
         )
 
 
-def localisation_summary(rows: np.ndarray) -> dict[str, float | int | None]:
-    """Returns a summary of localised scans, for JSON.
+@dataclass(frozen=True, eq=False)
+class Localised:
+    """Localised scans, from which the metrics of the task `localise` follow.
 
-    Success rates count all queries; quantiles count only queries with a pose.
+    Success rates count all queries; errors are those of queries with a pose.
 
-    Args:
-        rows: (K,) results, records of `QUERY`.
-
-    Returns:
-        Name -> number; None for a number that is undefined:
-
-        - `queries`, `without_pose`: numbers of queries, and of those without a
-          pose.
-        - `success_...`: shares of queries within the errors in the name.
-        - `translation_...` [m], `rotation_...` [deg]: quantiles of the errors.
-        - `along_median`, `std_along_median`: median error along the car, and
-          median of the standard deviation that the estimator states [m]; the
-          same `across` the car and `up`.
-        - `auroc_...`: how well a score tells right from wrong results.
-        - `believed_from`: threshold of trust, which most right results reach.
-        - `confident_wrong`, `confident_of_wrong`: wrong results with a score of
-          at least this threshold, as a share of all and of the wrong results.
-        - `unmapped_mean`: mean share of a scan that the map lacks.
-        - `seconds_mean`: mean CPU time [s].
-    """
-    is_posed = ~np.isnan(rows["translation_error"])
-    found: dict[str, float | int | None] = {
-        "queries": len(rows),
-        "without_pose": len(rows) - int(is_posed.sum()),
-    }
-    for name, limits in _SUCCESSES.items():
-        found[name] = float(is_right(rows, *limits).mean())
-    found |= _error_quantiles(rows[is_posed])
-    found |= _score_aurocs(rows)
-    found |= _confidence(rows)
-    known = rows["unmapped"][~np.isnan(rows["unmapped"])]
-    found["unmapped_mean"] = float(known.mean()) if len(known) else None
-    found["seconds_mean"] = float(rows["seconds"].mean())
-    return json_values(found)
-
-
-def _error_quantiles(posed: np.ndarray) -> dict[str, float | None]:
-    """Returns the quantiles of errors in `localisation_summary`.
-
-    Args:
-        posed: (K,) results with a pose, records of `QUERY`.
-    """
-
-    def quantile(name: str, part: float) -> float | None:
-        values = np.abs(posed[name])
-        return float(np.quantile(values, part)) if len(values) else None
-
-    found = {name: quantile(*of) for name, of in _QUANTILES.items()}
-    for name in _DIRECTIONS:
-        found[f"{name}_median"] = quantile(name, 0.5)
-        found[f"std_{name}_median"] = quantile(f"std_{name}", 0.5)
-    return found
-
-
-def _score_aurocs(rows: np.ndarray) -> dict[str, float]:
-    """Returns how well each score tells right from wrong results (AUROC).
-
-    Args:
+    Attributes:
         rows: (K,) results, records of `QUERY`.
     """
-    right = is_right(rows)
-    # A small residual, or a small deviation, is a high score.
-    deviation = np.max([rows[f"std_{name}"] for name in _DIRECTIONS], axis=0)
-    scores = {
-        "own_score": rows["own_score"],
-        "fit": rows["fit"],
-        "residual": -rows["residual"],
-        "hessian": -deviation,
-    }
-    return {f"auroc_{name}": auroc(s, right) for name, s in scores.items()}
 
+    rows: np.ndarray
 
-def _confidence(rows: np.ndarray) -> dict[str, float | None]:
-    """Returns the threshold of confident results, and how many are wrong.
+    def __len__(self) -> int:
+        return len(self.rows)
 
-    The threshold is the score that a share `_BELIEVED` of the right results
-    reaches. Without a right result, it and the shares of wrong results are NaN.
+    @property
+    def without_pose(self) -> int:
+        """Number of queries without a pose."""
+        return int(np.isnan(self.rows["translation_error"]).sum())
 
-    Args:
-        rows: (K,) results, records of `QUERY`.
-    """
-    right = is_right(rows)
-    wrong = int((~right).sum())
-    least = harmful = math.nan
-    if right.any():
-        scores = rows["own_score"]
-        least = float(
-            np.quantile(scores[right], 1.0 - _BELIEVED, method="lower")
-        )
-        harmful = float(((scores >= least) & ~right).sum())
-    return {
-        "believed_from": least,
-        "confident_wrong": harmful / len(rows),
-        "confident_of_wrong": harmful / wrong if wrong else None,
-    }
+    def share_within(self, translation: float, rotation_deg: float) -> float:
+        """Returns the share of the queries with errors of at most these."""
+        return float(is_right(self.rows, translation, rotation_deg).mean())
 
+    @property
+    def success(self) -> float:
+        """Share of the queries whose pose is right."""
+        return self.share_within(RIGHT_TRANSLATION, RIGHT_ROTATION_DEG)
 
-def localisation_numbers(rows: np.ndarray, method: str) -> Iterator[Number]:
-    """Yields a method's results for `results.csv`, a `Number` for each metric.
+    def pose_errors(self, name: str) -> np.ndarray:
+        """Returns the absolute values of a field of the queries with a pose."""
+        is_posed = ~np.isnan(self.rows["translation_error"])
+        return np.abs(self.rows[name][is_posed])
 
-    Args:
-        rows: (K,) results, records of `QUERY`.
-        method: name of the method.
-    """
-    found = localisation_summary(rows)
-    for name in _SHOWN:
-        if (value := found[name]) is not None:
-            yield Number(method, False, name, float(value), n=len(rows))
+    def auroc(self, name: str) -> float:
+        """Returns how well a score tells right from wrong results (AUROC).
+
+        Args:
+            name: `own_score`, `fit`, `residual`, or `hessian`, which is the
+                deviation that the estimator states. A small residual, or a
+                small deviation, is a high score.
+        """
+        if name == "hessian":
+            stated = [self.rows[f"std_{way}"] for way in _DIRECTIONS]
+            scores = -np.max(stated, axis=0)
+        else:
+            scores = self.rows[name] * (-1.0 if name == "residual" else 1.0)
+        return auroc(scores, is_right(self.rows))
+
+    @cached_property
+    def believed_from(self) -> float:
+        """Score that a share `_BELIEVED` of the right results reaches.
+
+        It is NaN without a right result.
+        """
+        scores = self.rows["own_score"][is_right(self.rows)]
+        if not len(scores):
+            return math.nan
+        return float(np.quantile(scores, 1.0 - _BELIEVED, method="lower"))
+
+    @property
+    def _num_confident_wrong(self) -> float:
+        """Number of wrong results that pass the threshold; NaN without one."""
+        if math.isnan(self.believed_from):
+            return math.nan
+        passes = self.rows["own_score"] >= self.believed_from
+        return float((passes & ~is_right(self.rows)).sum())
+
+    @property
+    def confident_wrong(self) -> float:
+        """Wrong results that pass the threshold, as a share of all results."""
+        return self._num_confident_wrong / len(self)
+
+    @property
+    def confident_of_wrong(self) -> float:
+        """Wrong results that pass the threshold, as a share of the wrong."""
+        num_wrong = int((~is_right(self.rows)).sum())
+        return self._num_confident_wrong / num_wrong if num_wrong else math.nan
+
+    @property
+    def unmapped_mean(self) -> float:
+        """Mean share of a scan that the map lacks."""
+        known = self.rows["unmapped"][~np.isnan(self.rows["unmapped"])]
+        return float(known.mean()) if len(known) else math.nan
 
 
 def localisation_columns(rows: np.ndarray) -> dict[str, np.ndarray]:

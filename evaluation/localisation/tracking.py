@@ -1,6 +1,8 @@
 """Tracks a drive in a map: each scan is registered from the last estimate."""
 
-from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+import math
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -10,8 +12,12 @@ from cns_drake.drives import Drive
 from evaluation.drives import sample_frames, travelled
 from evaluation.localisation.initial_poses import InitialPose, Starts
 from evaluation.localisation.localiser import Localiser, Query, path_axes
-from evaluation.localisation.results import COLUMNS, QUERY, RIGHT_TRANSLATION
-from evaluation.recognition import Number
+from evaluation.localisation.results import (
+    COLUMNS,
+    QUERY,
+    RIGHT_TRANSLATION,
+    Localised,
+)
 
 # Distance driven between two aligned scans [m].
 SPACING = 2.0
@@ -155,65 +161,74 @@ def _untracked_rows(
     return rows
 
 
-def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:
-    """Returns over which length of path the track was lost, for each loss.
+@dataclass(frozen=True, eq=False)
+class Tracked(Localised):
+    """A tracked drive, which has further metrics.
 
-    The track is lost while the position is off by more than `LOST`.
+    Attributes:
+        rows: (K,) records of `TRACKED`.
+    """
 
-    Args:
-        tracked: records of `TRACKED`.
+    @property
+    def way(self) -> float:
+        """Length of the path in the map [m]."""
+        return float(self.rows["step"].sum())
 
-    Returns:
-        For each loss, the length [m], and whether the track was found again. A
-        track that is not found again counts as lost up to the end of the mapped
+    @property
+    def stretches(self) -> int:
+        """Number of sections of the path in the map."""
+        return int(self.rows["stretch"][-1]) + 1
+
+    @property
+    def within_03m(self) -> float:
+        """Share of the path on which the position is right."""
+        is_near = self.rows["track_error"] <= RIGHT_TRANSLATION
+        near = float(self.rows["step"][is_near].sum())
+        return near / self.way if self.way else math.nan
+
+    @cached_property
+    def lost(self) -> list[tuple[float, bool]]:
+        """Over which length of path the track was lost, for each loss.
+
+        The track is lost while the position is off by more than `LOST`. Each
+        loss is its length [m], and whether the track was found again. A track
+        that is not found again counts as lost up to the end of the mapped
         section.
-    """
-    found = []
-    for stretch in np.unique(tracked["stretch"]):
-        rows = tracked[tracked["stretch"] == stretch]
-        lost = rows["track_error"] > LOST
-        begins = np.flatnonzero(np.diff(lost.astype(int), prepend=0) == 1)
-        for begin in begins.tolist():
-            back = np.flatnonzero(~lost[begin:])
-            end = begin + int(back[0]) if len(back) else len(rows) - 1
-            way = float(rows["way"][end] - rows["way"][begin])
-            found.append((way, bool(len(back))))
-    return found
+        """
+        found = []
+        for stretch in np.unique(self.rows["stretch"]):
+            rows = self.rows[self.rows["stretch"] == stretch]
+            lost = rows["track_error"] > LOST
+            begins = np.flatnonzero(np.diff(lost.astype(int), prepend=0) == 1)
+            for begin in begins.tolist():
+                back = np.flatnonzero(~lost[begin:])
+                end = begin + int(back[0]) if len(back) else len(rows) - 1
+                way = float(rows["way"][end] - rows["way"][begin])
+                found.append((way, bool(len(back))))
+        return found
+
+    @property
+    def losses(self) -> int:
+        """Number of losses."""
+        return len(self.lost)
+
+    @property
+    def lost_per_km(self) -> float:
+        """Number of losses per kilometre of path."""
+        return 1000.0 * self.losses / self.way if self.way else math.nan
+
+    @property
+    def lost_for_good(self) -> int:
+        """Number of losses after which the track is not found again."""
+        return sum(not is_back for _, is_back in self.lost)
+
+    @property
+    def back_after_median(self) -> float:
+        """Median length of path until the track is found again [m]."""
+        back = [length for length, is_back in self.lost if is_back]
+        return float(np.median(back)) if back else math.nan
 
 
-def tracking_numbers(tracked: np.ndarray, method: str) -> Iterator[Number]:
-    """Yields the results for `results.csv` that only a tracked drive has.
-
-    Args:
-        tracked: records of `TRACKED`.
-        method: name of the method.
-    """
-    found = tracking_summary(tracked)
-    for name in ("within_03m", "lost_per_km"):
-        if (value := found[name]) is not None:
-            yield Number(method, False, name, float(value), n=len(tracked))
-
-
-def tracking_summary(tracked: np.ndarray) -> dict[str, float | int | None]:
-    """Returns a summary of a tracked drive, for JSON.
-
-    Shares of the drive are shares of its length.
-
-    Args:
-        tracked: records of `TRACKED`.
-    """
-    way = float(tracked["step"].sum())
-    within = tracked["track_error"] <= RIGHT_TRANSLATION
-    found = losses(tracked)
-    back = [length for length, is_back in found if is_back]
-    return {
-        "way": way,
-        "stretches": int(tracked["stretch"][-1]) + 1,
-        "within_03m": (
-            float(tracked["step"][within].sum()) / way if way else None
-        ),
-        "lost": len(found),
-        "lost_per_km": 1000.0 * len(found) / way if way else None,
-        "lost_for_good": len(found) - len(back),
-        "back_after_median": float(np.median(back)) if back else None,
-    }
+def localised(rows: np.ndarray) -> Localised:
+    """Returns localised scans, or a tracked drive, from their records."""
+    return (Tracked if rows.dtype == TRACKED else Localised)(rows)

@@ -14,10 +14,14 @@ from evaluation.recognition.descriptors import (
 from evaluation.recognition.descriptors import joined_scans as joined_scans
 from evaluation.recognition.faults import FAULTS as FAULTS
 from evaluation.recognition.metrics import METRICS as METRICS
+from evaluation.recognition.metrics import MODES as MODES
 from evaluation.recognition.metrics import Metric as Metric
+from evaluation.recognition.metrics import Mode as Mode
 from evaluation.recognition.metrics import choose_metrics as choose_metrics
+from evaluation.recognition.metrics import kept_share as kept_share
 from evaluation.recognition.metrics import load_metrics as load_metrics
 from evaluation.recognition.metrics import metric_named as metric_named
+from evaluation.recognition.metrics import numbers_of as numbers_of
 from evaluation.recognition.metrics import register_metric as register_metric
 from evaluation.recognition.overlap_truth import (
     compared_frames as compared_frames,
@@ -32,15 +36,10 @@ from evaluation.recognition.overlap_truth import read_overlaps as read_overlaps
 from evaluation.recognition.overlap_truth import (
     write_overlaps as write_overlaps,
 )
-from evaluation.recognition.pair_scores import MODES as MODES
-from evaluation.recognition.pair_scores import Mode as Mode
 from evaluation.recognition.pair_scores import (
     PlaceRecognitionMetrics as PlaceRecognitionMetrics,
 )
 from evaluation.recognition.pair_scores import evaluate as evaluate
-from evaluation.recognition.place_metrics import kept_share as kept_share
-from evaluation.recognition.place_metrics import place_numbers as place_numbers
-from evaluation.recognition.place_metrics import pose_numbers as pose_numbers
 from evaluation.recognition.place_outcome import PlaceOutcome as PlaceOutcome
 from evaluation.recognition.place_outcome import QueryDrive as QueryDrive
 from evaluation.recognition.place_outcome import (
@@ -56,7 +55,6 @@ from evaluation.recognition.pose_errors import (
     SUCCESS_TRANSLATION as SUCCESS_TRANSLATION,
 )
 from evaluation.recognition.pose_errors import PoseErrors as PoseErrors
-from evaluation.recognition.pose_errors import PoseMetrics as PoseMetrics
 from evaluation.recognition.pose_errors import pose_error as pose_error
 from evaluation.recognition.precision_recall import pr_curve as pr_curve
 from evaluation.recognition.precision_recall import (

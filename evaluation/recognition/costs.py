@@ -37,6 +37,16 @@ class QueryCost:
     build_ms: float
     query_ms: float
 
+    @property
+    def build_time(self) -> float:
+        """CPU time to build the database from descriptors [s]."""
+        return 1e-3 * self.build_ms
+
+    @property
+    def query_time(self) -> float:
+        """Median CPU time to compare a query with all places [s]."""
+        return 1e-3 * self.query_ms
+
 
 @dataclass(frozen=True)
 class Cost:

@@ -1,7 +1,9 @@
 """Metrics, a family: what each number in a table of results is.
 
-A metric is one entry of this file, or of a file of a user. Tables, rankings,
-charts, pages and documents ask it for its words, its range and its direction.
+A metric is one entry of this file, or of a file of a user. It names the tasks
+that have it, and computes its value from the outcomes of such a task. What is
+printed, `--json`, tables, rankings, charts, pages and documents ask it for its
+value, its words, its range and its direction.
 """
 
 from __future__ import annotations
@@ -17,12 +19,13 @@ import numpy as np
 
 from cns_drake.base import Family, InputError, did_you_mean, errors_at
 from evaluation.methods import as_users_code, run_module
+from evaluation.recognition.faults import FAULTS
 from evaluation.recognition.precision_recall import (
     WeightedMetrics,
-    pr_curve,
     weighted_metrics,
 )
 from evaluation.recognition.query_outcomes import QueryOutcomes
+from evaluation.recognition.result_number import Number
 from evaluation.recognition.sign_flips import (
     UNKNOWN,
     Interval,
@@ -30,8 +33,15 @@ from evaluation.recognition.sign_flips import (
     leave_one_out,
 )
 
+# Which queries count in the precision-recall curve.
+Mode = Literal["all", "filtered"]
+MODES: tuple[Mode, ...] = ("all", "filtered")
 # Sums and quotients of floating-point numbers leave a range by this at most.
 _ROUNDING = 1e-9
+# Overlap below which two scans show different surroundings.
+_ENOUGH_OVERLAP = 0.5
+# Further radii of a match for which AUC is computed [m].
+_RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)
 
 
 @dataclass(frozen=True)
@@ -57,8 +67,16 @@ class Metric:
         grows: whether the values grow with the places of a database. Charts
             then have a logarithmic axis, and summaries contain the exponent of
             the growth.
-        compute: returns the value from the outcomes of queries; None if a task
-            computes it from something else.
+        tasks: tasks that have the metric.
+        compute: returns the value from a task's outcomes: `QueryOutcomes` of
+            `place` and `pose`, and the object that any other task describes.
+            The value is NaN if it is undefined, and None if the outcomes have
+            no such number. Of metrics of other programs, None.
+        is_compared: whether `compute` also takes the outcomes of the baseline.
+        count: returns from the outcomes the number of queries, points or other
+            items from which the value is computed.
+        by_mode: whether the mode `filtered` leaves out the queries without a
+            match.
         has_interval: whether blocks of street give the computed values an
             interval. A metric without a least or a greatest value has none.
         file: the user's file that defines the metric; None for a metric of this
@@ -82,7 +100,11 @@ class Metric:
     share_of: str = ""
     main_in: Collection[str] = ()
     grows: bool = False
-    compute: Callable[[QueryOutcomes], float] | None = None
+    tasks: Collection[str] = ("place",)
+    compute: Callable[..., float | None] | None = None
+    is_compared: bool = False
+    count: Callable[[Any], int] = len
+    by_mode: bool = False
     has_interval: bool = True
     file: Path | None = None
 
@@ -126,28 +148,54 @@ class Metric:
     @property
     def is_resampled(self) -> bool:
         """Whether blocks of street give the values an interval."""
-        return self.compute is not None and self.has_interval
+        return (
+            self.has_interval
+            and self.compute is not None
+            and not self.is_compared
+            and "place" in self.tasks
+        )
 
-    def of(self, outcomes: QueryOutcomes) -> float:
-        """Returns the value of the outcomes of queries.
+    def of(self, outcomes: Any, before: Any = None) -> float:
+        """Returns the value of a task's outcomes; NaN if there is none.
+
+        The arguments and errors are those of `value`.
+        """
+        value = self.value(outcomes, before)
+        return math.nan if value is None else value
+
+    def value(self, outcomes: Any, before: Any = None) -> float | None:
+        """Returns the value of a task's outcomes.
+
+        Args:
+            outcomes: the outcomes.
+            before: the outcomes of the baseline, if the metric `is_compared`.
+
+        Returns:
+            The value; NaN if it is undefined, and None if the outcomes have no
+            such number.
 
         Raises:
             InputError: a user's file computes something else than a number
                 that the metric can have.
         """
-        value = self._computed(outcomes)
-        if self.file is not None and math.isnan(value) and not self.undefined:
+        value = self._computed(outcomes, before)
+        if (
+            self.file is not None
+            and not self.undefined
+            and (value is None or math.isnan(value))
+        ):
             raise InputError(
                 f"{self.file}: {self.name}: the value is undefined (NaN); say"
                 " when that is in `undefined`"
             )
         return value
 
-    def _computed(self, outcomes: QueryOutcomes) -> float:
-        """Returns the value of all queries, or of a sample of them."""
+    def _computed(self, outcomes: Any, before: Any = None) -> float | None:
+        """Returns the value of all outcomes, or of a sample of them."""
         assert self.compute is not None
         if self.file is None:
-            return self.compute(outcomes)
+            given = (outcomes, before) if self.is_compared else (outcomes,)
+            return self.compute(*given)
         value = self.compute(outcomes.read_only())
         with errors_at(str(self.file)):
             array = np.asarray(value)
@@ -171,12 +219,11 @@ class Metric:
         if self.name in WeightedMetrics._fields:
             return getattr(weighted_metrics(outcomes, weights), self.name)
         every = np.arange(len(outcomes))
-        return np.array(
-            [
-                self._computed(outcomes.subset(np.repeat(every, n)))
-                for n in weights.astype(np.int64)
-            ]
-        )
+        values = [
+            self._computed(outcomes.subset(np.repeat(every, n)))
+            for n in weights.astype(np.int64)
+        ]
+        return np.array(values, dtype=float)  # None becomes NaN.
 
     def without_blocks(
         self, outcomes: QueryOutcomes
@@ -194,11 +241,20 @@ class Metric:
             counts = outcomes.has_match
         return values, (1.0 - left) @ counts
 
-    def interval(self, outcomes: QueryOutcomes) -> Interval:
+    def interval(
+        self, outcomes: QueryOutcomes, before: QueryOutcomes | None = None
+    ) -> Interval:
         """Returns the 95 % interval of the value, see `jackknife_interval`.
 
-        It is unknown if the metric has no least or no greatest value.
+        It is unknown if the metric has no least or no greatest value. The
+        interval of a retained share is unknown if the queries of the baseline,
+        `before`, are others, or the outcomes are the baseline themselves.
         """
+        if self.is_compared:
+            # A baseline beside itself has nothing to tell.
+            if not self.has_interval or before is None or before is outcomes:
+                return UNKNOWN
+            return _kept_interval(METRICS[self.share_of], outcomes, before)
         ends = self.least, self.greatest
         if not self.is_resampled or not np.isfinite(ends).all():
             return UNKNOWN
@@ -206,25 +262,142 @@ class Metric:
         return jackknife_interval(self.of(outcomes), values, weights, ends)
 
 
-def _metric(name: str, title: str, unit: str = "", **fields: Any) -> Metric:
-    return Metric(name, title, unit, **fields)
+def _kept_interval(
+    metric: Metric, now: QueryOutcomes, before: QueryOutcomes
+) -> Interval:
+    """Returns the 95 % interval of a retained share of a metric.
+
+    Without a block, a retained share has the block neither in the condition nor
+    in the baseline, in which nothing differs between the drives. The two
+    imaginary blocks of `jackknife_interval` are one in which nothing is
+    retained, and one in which the metric rises from 0 to 1.
+    """
+    unchanged = metric.of(before)
+    if len(before) != len(now) or not unchanged > 0.0:
+        return UNKNOWN
+    share = metric.of(now) / unchanged
+    values, weights = metric.without_blocks(now)
+    then, _ = metric.without_blocks(replace(before, blocks=now.own_blocks))
+    ends = 0.0, share + 1.0 / unchanged
+    return jackknife_interval(share, kept_share(values, then), weights, ends)
 
 
-def _share(name: str, title: str, **fields: Any) -> Metric:
+def kept_share(
+    changed: np.ndarray | float, unchanged: np.ndarray | float
+) -> np.ndarray:
+    """Returns `changed` / `unchanged`, NaN where `unchanged` is 0 or NaN.
+
+    If `changed` is a result under a change, and `unchanged` the same result
+    without the change, the quotient is the retained share.
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.divide(changed, unchanged)
+    return np.where(np.asarray(unchanged) > 0.0, share, math.nan)
+
+
+def numbers_of(
+    task: str,
+    now: Any,
+    before: Any = None,
+    *,
+    method: str = "",
+    verified: bool = False,
+    mode: Mode = "all",
+) -> Iterator[Number]:
+    """Yields the numbers of a task's outcomes, in the order of `METRICS`.
+
+    Args:
+        task: name of the task.
+        now: its outcomes in a condition, see `Metric.compute`.
+        before: its outcomes in the baseline, which can be `now` itself; None to
+            leave out the metrics that compare the condition with the baseline.
+        method: method, estimator or baseline; "" if there is none.
+        verified: whether geometric verification was used.
+        mode: `filtered` to leave the queries without a match out of metrics
+            that have `by_mode`.
+
+    Raises:
+        InputError: a user's metric fails.
+    """
+    every = now
+    if mode == "filtered":
+        matched = now.subset(now.has_match)
+    for metric in METRICS.values():
+        if task not in metric.tasks or (metric.is_compared and before is None):
+            continue
+        now = matched if mode == "filtered" and metric.by_mode else every
+        value = metric.value(now, before)
+        if value is None:
+            continue
+        yield Number(
+            method,
+            verified,
+            metric.name,
+            float(value),
+            metric.interval(now, before),
+            metric.count(now),
+        )
+
+
+def _metric(
+    name: str,
+    title: str,
+    over: str,
+    undefined: str = "",
+    value: str = "",
+    number: str = "",
+    **fields: Any,
+) -> Metric:
+    """Returns a metric of this package.
+
+    Args:
+        name, title: see `Metric`.
+        over: its `over_queries`.
+        undefined: see `Metric`.
+        value: path of the attribute of a task's outcomes that is the value; by
+            default the attribute with the metric's name.
+        number: path of the attribute that is the number of items; by default
+            the outcomes have a length.
+        fields: further attributes of the metric.
+    """
+    usual: dict[str, Any] = {
+        "compute": _attribute(value or name),
+        "count": _attribute(number) if number else len,
+        "has_interval": False,
+    }
+    words = {"over_queries": over, "undefined": undefined}
+    return Metric(name, title, **usual | words | fields)
+
+
+def _attribute(path: str) -> Callable[[Any], Any]:
+    """Returns a function that returns an attribute of an attribute.
+
+    It is None if there is none on the way.
+    """
+
+    def get(found: Any) -> Any:
+        for name in path.split("."):
+            found = getattr(found, name, None)
+        return found
+
+    return get
+
+
+def _share(*words: str, **fields: Any) -> Metric:
     """Returns a metric from 0 to 1, of which more is better."""
     usual: dict[str, Any] = {"least": 0.0, "greatest": 1.0, "better": "more"}
-    return _metric(name, title, **usual | fields)
+    return _metric(*words, **usual | fields)
 
 
-def _count(name: str, title: str, **fields: Any) -> Metric:
+def _count(*words: str, **fields: Any) -> Metric:
     usual: dict[str, Any] = {"least": 0.0, "is_whole": True}
-    return _metric(name, title, **usual | fields)
+    return _metric(*words, **usual | fields)
 
 
-def _amount(name: str, title: str, unit: str, **fields: Any) -> Metric:
+def _amount(*words: str, **fields: Any) -> Metric:
     """Returns a metric from 0 on, of which less is better."""
     usual: dict[str, Any] = {"least": 0.0, "better": "less"}
-    return _metric(name, title, unit, **usual | fields)
+    return _metric(*words, **usual | fields)
 
 
 def _retained(name: str, of: str, title: str, **fields: Any) -> Metric:
@@ -233,272 +406,697 @@ def _retained(name: str, of: str, title: str, **fields: Any) -> Metric:
         "least": 0.0,
         "better": "more",
         "share_of": of,
-        "over_queries": "the value, divided by its value in the baseline",
-        "undefined": "in the baseline, the value is 0 or undefined",
+        "compute": lambda *both: _kept(METRICS[of].of, *both),
+        "is_compared": True,
     }
-    return _metric(name, title, **usual | fields)
+    return _metric(
+        name,
+        title,
+        "the value, divided by its value in the baseline",
+        "in the baseline, the value is 0 or undefined",
+        **usual | fields,
+    )
+
+
+def _kept(value_of: Callable[[Any], float], now: Any, before: Any) -> float:
+    return float(kept_share(value_of(now), value_of(before)))
+
+
+def _auc_within(outcomes: QueryOutcomes, radius: float) -> float | None:
+    """Returns the AUC if a match lies within another radius [m]."""
+    if not {"distance", "nearest"} <= outcomes.columns.keys():
+        return None
+    found = outcomes.within(radius)
+    return found.curve.auc if found.has_match.any() else math.nan
+
+
+def _num_wrong_by(outcomes: QueryOutcomes, fault: str) -> float | None:
+    """Returns the number of queries that are wrong for a reason."""
+    why = outcomes.columns.get("why")
+    return None if why is None else float(np.sum(why == fault))
+
+
+def _num_hidden(outcomes: QueryOutcomes) -> float | None:
+    shown = outcomes.columns.get("overlap")
+    if shown is None:
+        return None
+    return float(((shown < _ENOUGH_OVERLAP) & ~outcomes.is_right).sum())
+
+
+def _visible_change(outcomes: QueryOutcomes) -> float | None:
+    """Returns the mean share of a scan that the best match does not show."""
+    shown = outcomes.columns.get("overlap")
+    return None if shown is None else 1.0 - _mean_of_known(shown)
+
+
+def _visible_change_added(
+    now: QueryOutcomes, before: QueryOutcomes
+) -> float | None:
+    """Returns the mean visible change minus the mean in a baseline.
+
+    The visible change also contains parts of a scan that are occluded only
+    because the viewpoints differ (parallax). Subtracting the baseline removes
+    these parts.
+    """
+    shown, whole = (one.columns.get("overlap") for one in (now, before))
+    if shown is None or whole is None or len(before) != len(now):
+        return None
+    return _mean_of_known(whole - shown)
+
+
+def _mean_of_known(values: np.ndarray) -> float:
+    """Returns the mean of the values that are numbers; NaN without one."""
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else math.nan
+
+
+def _num_right_only_in(
+    these: QueryOutcomes, those: QueryOutcomes
+) -> float | None:
+    """Returns how many queries some outcomes have right, and others wrong."""
+    if len(these) != len(those):
+        return None
+    return float((these.is_right & ~those.is_right).sum())
+
+
+def _success(found: Any) -> float | None:
+    """Returns the share of right poses, of queries or in a map."""
+    if isinstance(found, QueryOutcomes) and not found.estimates_poses:
+        return None
+    return found.success
+
+
+def _success_kept(now: Any, before: Any) -> float | None:
+    value, was = _success(now), _success(before)
+    if value is None:
+        return None
+    return float(kept_share(value, math.nan if was is None else was))
+
+
+def _num_successes(found: Any) -> int:
+    """Returns the number of queries that count as successes or failures."""
+    if isinstance(found, QueryOutcomes):
+        return int(found.has_match.sum())
+    return len(found)
+
+
+def _pose_error(name: str, part: float) -> Callable[[Any], float | None]:
+    """Returns a function that returns a quantile of the errors of poses."""
+
+    def compute(found: Any) -> float | None:
+        if isinstance(found, QueryOutcomes) and not found.estimates_poses:
+            return None
+        errors = found.pose_errors(name)
+        return float(np.quantile(errors, part)) if len(errors) else math.nan
+
+    return compute
+
+
+def _num_poses(found: Any) -> int:
+    if isinstance(found, QueryOutcomes):
+        return len(found.pose_errors("translation_error"))
+    return len(found)
 
 
 _NO_MATCH = "no query has a match"
-_NO_POSE = "the method estimates no pose"
-_MAIN_PLACE = ("place",)
+_NO_POSE = "there is no pose"
+_NO_RIGHT = "no pose is right"
+_NO_LENGTH = "the drive has no length"
 
 
-def _shipped() -> Iterator[Metric]:
-    """Yields the metrics of this package, in the order of pages."""
-    # Place recognition.
+def _of_answers() -> Iterator[Metric]:
+    """Yields the metrics of place recognition."""
+    place: dict[str, Any] = {"main_in": ("place",)}
+    resampled: dict[str, Any] = {"by_mode": True, "has_interval": True}
     yield _share(
         "auc",
         "AUC",
-        over_queries="area under the precision-recall curve",
-        main_in=_MAIN_PLACE,
-        compute=lambda outcomes: pr_curve(outcomes).auc,
+        "area under the precision-recall curve",
+        value="curve.auc",
+        **place | resampled,
     )
     yield _share(
         "auc_strict",
         "AUC strict",
-        over_queries="area under the curve in which every query with a match"
-        " counts",
-        main_in=_MAIN_PLACE,
-        compute=lambda outcomes: pr_curve(outcomes).strict_auc(
+        "area under the curve in which every query with a match counts",
+        compute=lambda outcomes: outcomes.curve.strict_auc(
             int(outcomes.has_match.sum())
         ),
+        **place | resampled,
     )
     yield _share(
         "r1",
         "R@1",
-        over_queries="share of the queries with a match",
-        undefined=_NO_MATCH,
-        main_in=_MAIN_PLACE,
+        "share of the queries with a match",
+        _NO_MATCH,
         compute=lambda outcomes: outcomes.recall_at(1),
+        **place | resampled,
     )
-    # Shares of right poses, and what is left of all of these.
-    yield _share(
-        "pose_success",
-        "pose success",
-        over_queries="share of the queries with a match whose pose is within"
-        " 2 m and 5 deg",
-        undefined=f"{_NO_MATCH}, or {_NO_POSE}",
-        main_in=("pose",),
-    )
-    for name, title in (
-        ("success_03m_1deg", "success within 0.3 m and 1 deg"),
-        ("success_2m_5deg", "success within 2 m and 5 deg"),
-    ):
+    for rank in (5, 10, 25):
         yield _share(
-            name,
-            title,
-            over_queries="share of the queries whose pose is so accurate",
-            main_in=("localise",),
+            f"r{rank}",
+            f"R@{rank}",
+            f"share of the queries with a match among the best {rank} places",
+            _NO_MATCH,
+            compute=lambda outcomes, rank=rank: outcomes.recall_at(rank),
+            **resampled,
         )
-    yield _retained("relative_auc", "auc", "relative AUC", main_in=_MAIN_PLACE)
-    yield _retained(
-        "relative_auc_strict",
-        "auc_strict",
-        "relative AUC strict",
-        main_in=_MAIN_PLACE,
-    )
-    yield _retained("relative_r1", "r1", "relative R@1")
-    yield _retained(
-        "relative_success",
-        "pose_success",
-        "relative success rate",
-        main_in=("pose", "localise"),
-    )
-    yield _count(
-        "lost",
-        "answers lost",
-        better="less",
-        over_queries="number of queries that are right in the baseline and"
-        " wrong in the condition",
-    )
-    yield _count(
-        "found",
-        "answers gained",
-        better="more",
-        over_queries="number of queries that are wrong in the baseline and"
-        " right in the condition",
-    )
-    yield _count(
-        "with_match",
-        "queries with a match",
-        over_queries="number of queries that have a true match",
-        compute=lambda outcomes: float(outcomes.has_match.sum()),
-        has_interval=False,
-    )
-    yield _count(
-        "places",
-        "places",
-        over_queries="number of places in the database",
+    yield _share(
+        "r1_percent",
+        "R@1%",
+        "share of the queries with a match among the best hundredth of the"
+        " places",
+        _NO_MATCH,
         # 0 stands for unknown, where only the answers are known.
-        compute=lambda outcomes: float(outcomes.num_places or math.nan),
-        has_interval=False,
+        compute=lambda outcomes: (
+            outcomes.recall_at(outcomes.one_percent_rank)
+            if outcomes.num_places
+            else None
+        ),
+        **resampled,
+    )
+    yield _share(
+        "mrr",
+        "mean reciprocal rank",
+        "mean of 1 / rank of the best match, over the queries with a match",
+        _NO_MATCH,
+        value="mean_reciprocal_rank",
+        **resampled,
+    )
+    yield _share(
+        "f1_max",
+        "F1max",
+        "greatest F1 on the precision-recall curve",
+        value="curve.f1_max",
+        by_mode=True,
     )
     yield _share(
         "recall_at_full_precision",
         "recall at full precision",
-        over_queries="greatest recall at which no accepted place is wrong",
-        compute=lambda outcomes: pr_curve(outcomes).recall_at_full_precision,
-        has_interval=False,
+        "greatest recall at which no accepted place is wrong",
+        value="curve.recall_at_full_precision",
+        by_mode=True,
     )
-    for name, title in (
-        ("no_place", "queries without a match"),
-        ("no_candidate", "queries without a candidate"),
-        ("other_city", "answers in another city"),
-        ("near_miss", "answers just too far"),
-        ("elsewhere", "answers elsewhere"),
+    yield _share(
+        "match_auroc",
+        "match AUROC",
+        "probability that a query with a match has a better best score than a"
+        " query without a match",
+        "all queries have a match, or none",
+    )
+    for radius in (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0):
+        yield _share(
+            f"auc_{radius:g}m",
+            f"AUC within {radius:g} m",
+            f"AUC if a place is a match within {radius:g} m",
+            _NO_MATCH,
+            compute=lambda one, radius=radius: _auc_within(one, radius),
+        )
+    yield _retained("relative_auc", "auc", "relative AUC", **place | resampled)
+    yield _retained(
+        "relative_auc_strict",
+        "auc_strict",
+        "relative AUC strict",
+        **place | resampled,
+    )
+    yield _retained("relative_r1", "r1", "relative R@1", **resampled)
+    yield _count(
+        "lost",
+        "answers lost",
+        "number of queries that are right in the baseline and wrong in the"
+        " condition",
+        better="less",
+        compute=lambda now, before: _num_right_only_in(before, now),
+        is_compared=True,
+    )
+    yield _count(
+        "found",
+        "answers gained",
+        "number of queries that are wrong in the baseline and right in the"
+        " condition",
+        better="more",
+        compute=_num_right_only_in,
+        is_compared=True,
+    )
+    for name, title, which, compute, by_mode in (
+        ("queries", "queries", "", len, False),
+        (
+            "with_match",
+            "queries with a match",
+            " that have a true match",
+            lambda outcomes: outcomes.has_match.sum(),
+            False,
+        ),
+        (
+            "true_positives",
+            "right answers (TP)",
+            " whose top-ranked place is a match",
+            lambda outcomes: outcomes.is_right.sum(),
+            False,
+        ),
+        (
+            "f1_max_true_positives",
+            "TP at F1max",
+            " whose answer is accepted and right",
+            lambda outcomes: outcomes.is_accepted.sum(),
+            True,
+        ),
+        (
+            "f1_max_counted",
+            "TP + FP + FN at F1max",
+            " that are no true negatives",
+            lambda outcomes: outcomes.curve.f1_max_counted,
+            True,
+        ),
     ):
         yield _count(
             name,
             title,
+            f"number of queries{which}",
+            compute=compute,
+            by_mode=by_mode,
+            tasks=("place", "localise") if name == "queries" else ("place",),
+        )
+    yield _count(
+        "places",
+        "places",
+        "number of places in the database",
+        compute=lambda outcomes: outcomes.num_places or None,
+    )
+    for name, title in zip(
+        FAULTS,
+        (
+            "queries without a match",
+            "queries without a candidate",
+            "answers in another city",
+            "answers just too far",
+            "answers elsewhere",
+        ),
+        strict=True,
+    ):
+        yield _count(
+            name,
+            title,
+            "number of queries whose top-ranked place is wrong for this reason",
             better="less",
-            over_queries="number of queries whose top-ranked place is wrong for"
-            " this reason",
+            compute=lambda outcomes, name=name: _num_wrong_by(outcomes, name),
         )
     yield _count(
         "hidden",
         "wrong answers with little overlap",
-        over_queries="number of wrong answers where no match shows half of the"
-        " query's scan",
+        "number of wrong answers where no match shows half of the query's scan",
+        compute=_num_hidden,
     )
-    for name, title, shown in (
-        ("visible_change", "visible change", ""),
+    for name, title, value_of, more in (
+        ("visible_change", "visible change", _visible_change, ""),
         (
             "visible_change_added",
             "visible change without parallax",
+            _visible_change_added,
             ", minus the mean in the baseline",
         ),
     ):
         yield _metric(
             name,
             title,
+            "mean share of a query's scan that the best of its matches does not"
+            f" show{more}",
+            _NO_MATCH,
             least=-1.0,
             greatest=1.0,
-            over_queries="mean share of a query's scan that the best of its"
-            f" matches does not show{shown}",
-            undefined=_NO_MATCH,
+            compute=value_of,
+            is_compared=bool(more),
         )
-    # Poses.
-    yield _amount(
-        "translation_median",
-        "median error of the position",
-        "m",
-        over_queries="median over the poses; in the task `pose`, over the right"
-        " answers that F1max counts",
-        undefined="there is no pose",
-        main_in=("pose",),
-    )
-    yield _amount(
-        "translation_95",
-        "95 % quantile of the error of the position",
-        "m",
-        over_queries="95 % quantile over the poses",
-        undefined="there is no pose",
-    )
-    yield _amount(
-        "rotation_median_deg",
-        "median error of the orientation",
-        "deg",
-        over_queries="median over the poses; in the task `pose`, over the right"
-        " answers that F1max counts",
-        undefined="there is no pose",
-    )
-    # Localisation.
+
+
+def _of_poses() -> Iterator[Metric]:
+    """Yields the metrics of poses, at places and in maps."""
+    pose: dict[str, Any] = {"tasks": ("pose",), "main_in": ("pose",)}
+    localise: dict[str, Any] = {
+        "tasks": ("localise",),
+        "main_in": ("localise",),
+    }
     yield _share(
-        "auroc_own_score",
-        "AUROC of the estimator's score",
-        over_queries="probability that a right pose scores above a wrong one",
-        undefined="all poses are right, or all wrong",
+        "pose_success",
+        "pose success",
+        "share of the queries with a match whose pose is within 2 m and 5 deg",
+        f"{_NO_MATCH}, or the method estimates no pose",
+        compute=_success,
+        count=_num_successes,
+        **pose,
+    )
+    for name, title, limits in (
+        ("success_03m_1deg", "success within 0.3 m and 1 deg", (0.3, 1.0)),
+        ("success_2m_5deg", "success within 2 m and 5 deg", (2.0, 5.0)),
+    ):
+        yield _share(
+            name,
+            title,
+            "share of the queries whose pose is so accurate",
+            compute=lambda found, limits=limits: found.share_within(*limits),
+            **localise,
+        )
+    yield _retained(
+        "relative_success",
+        "pose_success",
+        "relative success rate",
+        compute=_success_kept,
+        count=_num_successes,
+        tasks=("pose", "localise"),
+        main_in=("pose", "localise"),
+    )
+    for kind, title, unit, end in (
+        ("translation", "error of the position", "m", ""),
+        ("rotation", "error of the orientation", "deg", "_deg"),
+    ):
+        column = f"{kind}_error{end}"
+        yield _amount(
+            f"{kind}_median{end}",
+            f"median {title}",
+            "median over the poses; in the task `pose`, over the right answers"
+            " that F1max counts",
+            _NO_POSE,
+            unit=unit,
+            main_in=("pose",) if unit == "m" else (),
+            tasks=("pose", "localise"),
+            compute=_pose_error(column, 0.5),
+            count=_num_poses,
+        )
+        for part, task, over in (
+            (90, "pose", "right answers that F1max counts"),
+            (95, "localise", "poses"),
+        ):
+            yield _amount(
+                f"{kind}_{part}{end}",
+                f"{part} % quantile of the {title}",
+                f"{part} % quantile over the {over}",
+                _NO_POSE,
+                unit=unit,
+                tasks=(task,),
+                compute=_pose_error(column, part / 100.0),
+                count=_num_poses,
+            )
+
+
+def _of_localisation() -> Iterator[Metric]:
+    """Yields further metrics of scans in a map, and of a tracked drive."""
+    localise: dict[str, Any] = {"tasks": ("localise",)}
+    for name, way in (
+        ("along", "along the car"),
+        ("across", "across the car"),
+        ("up", "of the height"),
+    ):
+        for column, title in (
+            (name, f"median error {way}"),
+            (f"std_{name}", f"median stated deviation {way}"),
+        ):
+            yield _amount(
+                f"{column}_median",
+                title,
+                "median over the poses",
+                _NO_POSE,
+                unit="m",
+                compute=_pose_error(column, 0.5),
+                **localise,
+            )
+    for name, title in (
+        ("own_score", "the estimator's score"),
+        ("fit", "the fit"),
+        ("residual", "the residual"),
+        ("hessian", "the stated deviation"),
+    ):
+        yield _share(
+            f"auroc_{name}",
+            f"AUROC of {title}",
+            "probability that a right pose scores above a wrong one",
+            "all poses are right, or all wrong",
+            compute=lambda found, name=name: found.auroc(name),
+            **localise,
+        )
+    yield _metric(
+        "believed_from",
+        "threshold of trust",
+        "score that 95 % of the right poses reach",
+        _NO_RIGHT,
+        **localise,
+    )
+    yield _share(
+        "confident_wrong",
+        "wrong, but confident",
+        "share of the queries that are wrong and reach the threshold of trust",
+        _NO_RIGHT,
+        better="less",
+        **localise,
+    )
+    yield _share(
+        "confident_of_wrong",
+        "wrong poses that are confident",
+        "share of the wrong poses that reach the threshold of trust",
+        f"{_NO_RIGHT}, or none is wrong",
+        better="less",
+        **localise,
+    )
+    yield _share(
+        "unmapped_mean",
+        "share of a scan that the map lacks",
+        "mean over the scans with enough points",
+        "no scan has enough points",
+        better="",
+        **localise,
+    )
+    yield _count(
+        "without_pose",
+        "scans without a pose",
+        "number of queries",
+        better="less",
+        **localise,
     )
     yield _share(
         "within_03m",
         "share of the way within 0.3 m",
-        over_queries="share of the length of the drive",
-        undefined="the drive has no length",
+        "share of the length of the drive",
+        _NO_LENGTH,
+        **localise,
     )
     yield _amount(
         "lost_per_km",
         "losses of the track",
-        "1/km",
-        over_queries="number, divided by the length of the drive",
-        undefined="the drive has no length",
+        "number, divided by the length of the drive",
+        _NO_LENGTH,
+        unit="1/km",
+        **localise,
     )
-    # Map update.
-    yield _share(
-        "miou",
-        "mean IoU",
-        over_queries="mean over the labels that occur",
-        undefined="no label occurs",
-        main_in=("map",),
+    for name, title, better in (
+        ("losses", "number of losses of the track", "less"),
+        ("lost_for_good", "losses without a recovery", "less"),
+        ("stretches", "sections of the drive in the map", ""),
+    ):
+        yield _count(name, title, "number", better=better, **localise)
+    yield _amount(
+        "back_after_median",
+        "way until a recovery",
+        "median over the losses with a recovery",
+        "there is none",
+        unit="m",
+        **localise,
     )
+    yield _amount(
+        "way",
+        "way in the map",
+        "length of the drive in the map",
+        unit="m",
+        better="",
+        **localise,
+    )
+
+
+def _of_maps() -> Iterator[Metric]:
+    """Yields the metrics of a change detector's labels."""
+
+    def at(*keys: str) -> dict[str, Any]:
+        return {
+            "compute": lambda found: found.score(*keys),
+            "number": "num_changed",
+            "tasks": ("map",),
+        }
+
+    main: dict[str, Any] = {"main_in": ("map",)}
+    over_labels = "mean over the labels that occur", "no label occurs"
+    yield _share("miou", "mean IoU", *over_labels, **at("miou") | main)
     for name in ("kept", "gone", "new", "unobserved"):
         yield _share(
             f"iou_{name}",
             f"IoU of {name}",
-            over_queries="intersection over union of points",
-            undefined="no point has the label",
+            "intersection over union of points",
+            "no point has the label",
+            **at(f"iou_{name}"),
         )
-    for name in ("gone", "new"):
-        for kind in ("precision", "recall"):
-            yield _share(
-                f"{kind}_{name}",
-                f"{kind} of {name}",
-                over_queries="share of points",
-                undefined="there is no such point",
-            )
+    for keys, end, title, of in (
+        ((), "", "", "points"),
+        (("within_02m",), "_within_02m", " within 0.2 m", "points"),
+        (("within_05m",), "_within_05m", " within 0.5 m", "points"),
+        (("by_structure",), "_by_structure", " by structure", "structures"),
+    ):
+        for label in ("gone", "new"):
+            for kind in ("precision", "recall"):
+                yield _share(
+                    f"{kind}_{label}{end}",
+                    f"{kind} of {label}{title}",
+                    f"share of {of}",
+                    f"there is no such {of.removesuffix('s')}",
+                    **at(*keys, f"{kind}_{label}"),
+                )
     yield _share(
         "right_structures",
         "structures with the right verdict",
-        over_queries="share of the observed structures that get the right label"
-        " (kept, gone or new)",
-        undefined="no structure changed",
-        main_in=("map",),
+        "share of the observed structures that get the right label (kept, gone"
+        " or new)",
+        "no structure changed",
+        **at("right_structures") | main,
     )
-    for name, title, of in (
-        ("called_structures", "structures called changed", "structures"),
-        ("called_points", "points called changed", "points"),
-    ):
+    for of, more in (("structures", main), ("points", {})):
+        yield _share(
+            f"called_{of}",
+            f"{of} called changed",
+            f"share of the {of} that are called gone or new",
+            f"there are no {of}",
+            better="",
+            **at(f"called_{of}") | more,
+        )
+    yield _share(
+        "miou_static",
+        "mean IoU without vehicles and people",
+        *over_labels,
+        **at("without_vehicles_and_people", "miou"),
+    )
+    for name in ("completeness", "accuracy"):
         yield _share(
             name,
-            title,
-            better="",
-            over_queries=f"share of the {of} that are called gone or new",
-            undefined=f"there are no {of}",
-            main_in=("map",) if of == "structures" else (),
+            f"{name} of the updated map",
+            "share of the points within 0.2 m of the other map",
+            "a map has no point to compare",
+            **at("updated_map", name),
         )
+    yield _amount(
+        "chamfer",
+        "Chamfer distance of the updated map",
+        "mean of the mean distances between the maps",
+        "a map has no point to compare",
+        unit="m",
+        **at("updated_map", "chamfer"),
+    )
     for name in ("gone", "new"):
         yield _count(
-            name, f"points that are {name}", over_queries="number of points"
+            name,
+            f"points that are {name}",
+            "number of points",
+            number="num_changed",
+            tasks=("map",),
         )
-    # Structural change.
-    for name, title, main in (
-        ("tcr_sym", "TCR_sym", True),
-        ("tcr_sym_masked", "TCR_sym where both drove", True),
-        ("tcr_source_to_target", "TCR from first to second", False),
-        ("tcr_target_to_source", "TCR from second to first", False),
+
+
+def _of_change() -> Iterator[Metric]:
+    """Yields the metrics of structural change."""
+    for name, title, value, main in (
+        ("tcr_sym", "TCR_sym", "change.symmetric", ("change",)),
+        (
+            "tcr_sym_masked",
+            "TCR_sym where both drove",
+            "masked.symmetric",
+            ("change",),
+        ),
+        (
+            "tcr_source_to_target",
+            "TCR from first to second",
+            "change.source_to_target.ratio",
+            (),
+        ),
+        (
+            "tcr_target_to_source",
+            "TCR from second to first",
+            "change.target_to_source.ratio",
+            (),
+        ),
+        (
+            "tcr_sym_no_change",
+            "TCR_sym of only the routes",
+            "control.symmetric",
+            (),
+        ),
     ):
+        part = value.rpartition(".")[0]
         yield _share(
             name,
             title,
+            "share of voxels",
+            "no voxel lies in the hulls of both maps",
             better="",
-            over_queries="share of voxels",
-            undefined="no voxel lies in the hulls of both maps",
-            main_in=("change",) if main else (),
+            value=value,
+            number=f"{part}.num_in_hull",
+            main_in=main,
+            tasks=("change",),
         )
-    # Changes that a map of several drives notices.
+    for name, title, value in (
+        ("registered", "TCR_sym after registration", "registered.symmetric"),
+        ("least", "least TCR_sym over shifted grids", "spread.least"),
+        ("greatest", "greatest TCR_sym over shifted grids", "spread.greatest"),
+    ):
+        yield _share(
+            f"tcr_sym_{name}",
+            title,
+            "share of voxels",
+            "no voxel lies in the hulls of both maps",
+            better="",
+            value=value,
+            number="change.num_in_hull",
+            tasks=("change",),
+        )
+    yield _metric(
+        "registration_yaw_deg",
+        "yaw of the registration",
+        "of the frame of the second map in that of the first",
+        unit="deg",
+        value="registered.yaw_deg",
+        number="change.num_in_hull",
+        tasks=("change",),
+    )
+    for name, title in (
+        ("in_hull", "voxels in the other map's hull"),
+        ("unchanged", "voxels with a counterpart"),
+    ):
+        yield _count(
+            name,
+            title,
+            "number of voxels of both maps",
+            value=f"change.num_{name}",
+            number="change.num_in_hull",
+            tasks=("change",),
+        )
+
+
+def _of_sightings() -> Iterator[Metric]:
+    """Yields the metrics of changes that a map of several drives notices."""
     for end, where in (("", ""), ("_here", ", of those that the query sees")):
+        of: dict[str, Any] = {"tasks": ("seen",)}
+        part = "by_query" if end else "all"
         yield _count(
             f"changed{end}",
             f"changed structures{where}",
-            over_queries="number of structures that were added or removed"
-            " between the first drive and the query",
+            "number of structures that were added or removed between the first"
+            " drive and the query",
+            value=f"{part}.changed",
+            number=f"{part}.changed",
+            **of,
         )
         yield _share(
             f"seen{end}",
             f"changes noticed{where}",
-            over_queries="share of the changed structures that a drive of the"
-            " database notices",
-            undefined="no structure changed",
+            "share of the changed structures that a drive of the database"
+            " notices",
+            "no structure changed",
+            value=f"{part}.seen",
+            number=f"{part}.changed",
+            **of,
         )
         for name, title in (
             ("delay_median", "median delay of a change"),
@@ -507,39 +1105,63 @@ def _shipped() -> Iterator[Metric]:
             yield _amount(
                 f"{name}{end}",
                 f"{title}{where}",
-                "years",
-                over_queries="quantile of the time to the drive that notices a"
-                " change",
-                undefined="no change is noticed",
+                "quantile of the time to the drive that notices a change",
+                "no change is noticed",
+                unit="years",
+                value=f"{part}.{name}",
+                number=f"{part}.num_delays",
+                **of,
             )
-    # Costs.
-    for name, title, unit in (
-        ("query_time", "time of a query", "s"),
-        ("build_time", "time to build the database", "s"),
-        ("memory", "memory of the descriptors", "bytes"),
+
+
+def _others() -> Iterator[Metric]:
+    """Yields the metrics of costs, and of real beside simulated scans."""
+    for name, title, unit, over in (
+        ("query_time", "time of a query", "s", "median over the queries"),
+        (
+            "build_time",
+            "time to build the database",
+            "s",
+            "of the whole database",
+        ),
+        (
+            "memory",
+            "memory of the descriptors",
+            "bytes",
+            "of the whole database",
+        ),
     ):
         yield _amount(
             name,
             title,
-            unit,
+            over,
+            unit=unit,
             grows=True,
-            over_queries="median over the queries"
-            if name == "query_time"
-            else "of the whole database",
+            number="places",
+            tasks=("cost",),
             main_in=("cost",),
         )
-    # Real beside simulated scans.
     yield _share(
         "auc_control",
         "AUC of the control",
+        "area under the curve of a classifier",
         better="",
-        over_queries="area under the curve of a classifier",
+        tasks=("judge",),
     )
 
 
 METRICS: Family[Metric] = Family("metric")
-for _one in _shipped():
-    METRICS.add(_one.name, _one, __name__)
+for _family in (
+    _of_answers,
+    _of_poses,
+    _of_localisation,
+    _of_maps,
+    _of_change,
+    _of_sightings,
+    _others,
+):
+    for _one in _family():
+        METRICS.add(_one.name, _one, __name__)
 
 
 def metric_named(name: str) -> Metric:
@@ -558,7 +1180,8 @@ def register_metric(
     """Returns a decorator that makes a function a metric of place recognition.
 
     The function gets the outcomes of the queries of a condition, and returns
-    the value, or NaN if it is undefined.
+    the value, or NaN if it is undefined. From then on the metric is printed,
+    and is in tables, rankings and charts.
 
     Args:
         name: name of the metric in tables.
@@ -659,6 +1282,15 @@ def _try(metric: Metric) -> None:
         first_right_ranks=np.where(right, 1.0, np.arange(24) + 2.0),
         num_places=30,
         blocks=np.arange(24) // 4,
+        columns={
+            "query_frame": 10 * np.arange(24),
+            "why": np.where(right, "", FAULTS[-1]),
+            "distance": np.linspace(1.0, 30.0, 24),
+            "nearest": np.ones(24),
+            "translation_error": np.linspace(0.0, 5.0, 24),
+            "rotation_error_deg": np.linspace(0.0, 10.0, 24),
+            "overlap": np.linspace(0.9, 0.1, 24),
+        },
     )
     first, second = metric.of(outcomes), metric.of(outcomes)
     if not np.array_equal(first, second, equal_nan=True):

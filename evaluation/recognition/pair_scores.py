@@ -24,20 +24,13 @@ among their N top-ranked places.
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from evaluation.recognition.metrics import METRICS
-from evaluation.recognition.precision_recall import (
-    PrCurve,
-    pr_curve,
-)
+from evaluation.recognition.metrics import METRICS, Mode
+from evaluation.recognition.precision_recall import PrCurve
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.sign_flips import Interval
-
-Mode = Literal["all", "filtered"]
-MODES: tuple[Mode, ...] = ("all", "filtered")
 
 # Greatest N of R@N.
 MAX_RANK = 25
@@ -112,16 +105,15 @@ def evaluate(
     counted = outcomes
     if mode == "filtered":
         counted = outcomes.subset(outcomes.has_match)
-    curve = pr_curve(counted)
+    curve = counted.curve
     num_with_match = int(outcomes.has_match.sum())
-    best = int(curve.f1.argmax()) if len(curve.thresholds) else None
     return PlaceRecognitionMetrics(
         mode=mode,
         curve=curve,
         auc=curve.auc,
         auc_strict=curve.strict_auc(int(counted.has_match.sum())),
-        f1_max=0.0 if best is None else float(curve.f1[best]),
-        f1_max_index=best,
+        f1_max=curve.f1_max,
+        f1_max_index=curve.f1_max_index,
         recall_at_n=np.array(
             [outcomes.recall_at(rank) for rank in range(1, MAX_RANK + 1)]
         ),

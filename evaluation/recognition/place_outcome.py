@@ -2,41 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import InputError, json_values
+from cns_drake.base import InputError
 from evaluation.methods import Method
 from evaluation.recognition.faults import faults
-from evaluation.recognition.pair_scores import (
-    MODES,
-    Mode,
-    PlaceRecognitionMetrics,
-    evaluate,
-)
-from evaluation.recognition.pose_errors import (
-    PoseErrors,
-    PoseMetrics,
-    pose_metrics,
-)
-from evaluation.recognition.precision_recall import pr_curve
+from evaluation.recognition.metrics import Mode, numbers_of
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.ranking import ranked_places
 from evaluation.recognition.result_number import Number
 from evaluation.recognition.retrieval import Retrieval
-from evaluation.recognition.sign_flips import (
-    UNKNOWN,
-    Interval,
-)
 
-# Further radii of a match for which AUC is computed [m].
-RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)
 # Number of top-ranked places that are kept for each query.
 NUM_BEST = 5
 
@@ -71,10 +53,9 @@ class PlaceOutcome:
             geometric verification of this protocol apply to the outcome.
         protocol_name: name of the protocol in tables, see
             `RetrievalProtocol.name_with`.
-        outcomes: outcomes of Q queries.
-        columns: name of a column of `queries.csv` -> (Q,) values. An unknown
-            value is -1 for a frame, infinite for a rank, and NaN for other
-            numbers.
+        outcomes: outcomes of Q queries, with all columns of `queries.csv`. An
+            unknown value is -1 for a frame, infinite for a rank, and NaN for
+            other numbers.
         place_frames: (D,) frame of each place in its drive.
         best_places: (Q, K) int32, the top-ranked places of each query, best
             first; -1 where a query has fewer than K candidates.
@@ -82,8 +63,6 @@ class PlaceOutcome:
             candidate.
         matches: (M, 2) int32, each pair of a query and a place that is a true
             match.
-        nearest: (Q,) distance of each query to the nearest place that is
-            allowed as an answer [m]; infinite if there is none.
     """
 
     method: str
@@ -92,12 +71,10 @@ class PlaceOutcome:
     protocol: RetrievalProtocol
     protocol_name: str
     outcomes: QueryOutcomes
-    columns: Mapping[str, np.ndarray]
     place_frames: np.ndarray
     best_places: np.ndarray
     best_scores: np.ndarray
     matches: np.ndarray
-    nearest: np.ndarray
 
     @classmethod
     def of(
@@ -150,21 +127,21 @@ class PlaceOutcome:
             ),
             "overlap": overlaps,
             "visible_change": 1.0 - overlaps,
+            "nearest": np.where(
+                retrieval.is_known, retrieval.distances, math.inf
+            ).min(axis=1, initial=math.inf),
         }
-        allowed = np.where(retrieval.is_known, retrieval.distances, math.inf)
         return cls(
             method=name,
             database=drives[0],
             query=query.name,
             protocol=protocol.of(method),
             protocol_name=protocol.name_with(method),
-            outcomes=outcomes,
-            columns=columns,
+            outcomes=replace(outcomes, columns=columns),
             place_frames=retrieval.database_frames,
             best_places=best_places,
             best_scores=best_scores,
             matches=np.argwhere(retrieval.matches).astype(np.int32),
-            nearest=allowed.min(axis=1, initial=math.inf),
         )
 
     @classmethod
@@ -173,15 +150,11 @@ class PlaceOutcome:
         if len(batches) == 1:
             return batches[0]
         outcomes = QueryOutcomes.joined([one.outcomes for one in batches])
-        columns = {
-            name: np.concatenate([one.columns[name] for one in batches])
-            for name in batches[0].columns
-        }
+        columns = {**outcomes.columns, "block": outcomes.own_blocks}
         firsts = np.cumsum([0, *(len(one.outcomes) for one in batches)])
         return replace(
             batches[0],
-            outcomes=outcomes,
-            columns=columns | {"block": outcomes.own_blocks},
+            outcomes=replace(outcomes, columns=columns),
             best_places=np.concatenate([one.best_places for one in batches]),
             best_scores=np.concatenate([one.best_scores for one in batches]),
             matches=np.concatenate(
@@ -190,7 +163,6 @@ class PlaceOutcome:
                     for first, one in zip(firsts, batches, strict=False)
                 ]
             ),
-            nearest=np.concatenate([one.nearest for one in batches]),
         )
 
     @property
@@ -208,105 +180,31 @@ class PlaceOutcome:
         return self.protocol.radius
 
     @property
-    def pose_errors(self) -> PoseErrors:
-        """Errors of the poses at the top-ranked places."""
-        return PoseErrors(
-            self.columns["translation_error"],
-            self.columns["rotation_error_deg"],
-        )
+    def columns(self) -> Mapping[str, np.ndarray]:
+        """The columns of `queries.csv`."""
+        return self.outcomes.columns
 
-    @cached_property
-    def by_mode(self) -> Mapping[Mode, PlaceRecognitionMetrics]:
-        """Metrics by mode: of all queries, or of the queries with a match."""
-        return {mode: evaluate(self.outcomes, mode) for mode in MODES}
-
-    @cached_property
-    def pose(self) -> PoseMetrics:
-        """Errors of the estimated poses."""
-        return pose_metrics(self.pose_errors, self.outcomes)
-
-    def auc_over_radius(self) -> dict[float, float]:
-        """Returns a mapping from the radius of a match [m] to the AUC.
-
-        The mapping contains several radii. All queries count. The AUC is NaN if
-        no query has a match within the radius.
-        """
-        found = {}
-        for radius in RADII:
-            has_match = self.nearest <= radius
-            outcomes = replace(
-                self.outcomes,
-                is_right=self.columns["distance"] <= radius,
-                has_match=has_match,
-            )
-            found[radius] = math.nan
-            if has_match.any():
-                found[radius] = pr_curve(outcomes).auc
-        return found
-
-    def to_json(self, mode: Mode = "all") -> dict:
-        """Returns all numbers as a dictionary for JSON; NaN becomes None.
-
-        Args:
-            mode: which queries count: `all`, or only queries with a match
-                (`filtered`).
-        """
-        metrics = self.by_mode[mode]
-        true_positives = counted = 0
-        if metrics.f1_max_index is not None:
-            true_positives = metrics.curve.true_positives[metrics.f1_max_index]
-            counted = metrics.curve.counted[metrics.f1_max_index]
-        values = {
-            "method": self.method,
-            "mode": metrics.mode,
-            "database": self.database,
-            "query": self.query,
-            "auc": metrics.auc,
-            "auc_strict": metrics.auc_strict,
-            "auc_interval_95": metrics.auc_interval.to_json(),
-            "recall_at_1": metrics.recall_at_1,
-            "r1": metrics.recall_at_1,  # Its name in tables of results.
-            "recall_at_1_interval_95": metrics.recall_at_1_interval.to_json(),
-            "recall_at_n": metrics.recall_at_n.tolist(),
-            "recall_at_1_percent": metrics.recall_at_1_percent,
-            "f1_max": metrics.f1_max,
-            "f1_max_true_positives": int(true_positives),
-            "f1_max_counted": int(counted),
-            "queries": metrics.num_queries,
-            "queries_with_match": metrics.num_with_match,
-            "true_positives": metrics.num_right,
-            "places": self.outcomes.num_places,
-            "recall_at_full_precision": metrics.curve.recall_at_full_precision,
-            "mean_reciprocal_rank": self.outcomes.mean_reciprocal_rank,
-            "match_auroc": self.outcomes.match_auroc,
-            "auc_over_radius": {
-                f"{radius:g}": auc
-                for radius, auc in self.auc_over_radius().items()
-            },
-            "pose": asdict(self.pose),
-            "protocol": self.protocol.to_json(),
-        }
-        return json_values(values)
-
-    def number(
+    def numbers(
         self,
-        metric: str,
-        value: float,
-        interval: Interval = UNKNOWN,
-        n: int | None = None,
-    ) -> Number:
-        """Returns a `Number` of this outcome: a metric with its value.
+        task: str = "place",
+        before: PlaceOutcome | None = None,
+        mode: Mode = "all",
+    ) -> Iterator[Number]:
+        """Yields the numbers of a task, see `numbers_of`.
 
         Args:
-            metric: name of the metric.
-            value: value of the metric.
-            interval: its 95 % interval.
-            n: number of queries from which the value is computed; by default
-                all.
+            task: `place` or `pose`.
+            before: outcome of the method in the baseline; None to leave out the
+                results that compare the condition with the baseline.
+            mode: which queries the precision-recall curve counts.
         """
-        count = len(self.outcomes) if n is None else n
-        return Number(
-            self.method, self.is_verified, metric, value, interval, count
+        return numbers_of(
+            task,
+            self.outcomes,
+            None if before is None else before.outcomes,
+            method=self.method,
+            verified=self.is_verified,
+            mode=mode,
         )
 
 
@@ -363,7 +261,8 @@ def check_has_match(outcome: PlaceOutcome) -> None:
             f"{outcome.query}: no place of {database} shows"
             f" {protocol.overlap:.0%} of a query's scan"
         )
+    nearest = outcome.columns["nearest"].min()
     raise InputError(
         f"{outcome.query}: no query lies within {protocol.radius:g} m of a"
-        f" place of {database} (the nearest at {outcome.nearest.min():.1f} m)"
+        f" place of {database} (the nearest at {nearest:.1f} m)"
     )

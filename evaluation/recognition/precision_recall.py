@@ -1,11 +1,14 @@
 """The precision-recall curve of place recognition, and the area under it."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from evaluation.recognition.query_outcomes import QueryOutcomes
+if TYPE_CHECKING:
+    from evaluation.recognition.query_outcomes import QueryOutcomes
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,22 @@ class PrCurve:
             self.true_positives, num_with_match - self.true_positives
         )
         return float(areas_under(self.precision[None], recall[None])[0])
+
+    @property
+    def f1_max_index(self) -> int | None:
+        """Index of the point with the greatest F1; None without a point."""
+        return int(self.f1.argmax()) if len(self.thresholds) else None
+
+    @property
+    def f1_max(self) -> float:
+        """Greatest F1; 0 if nothing is accepted."""
+        return float(self.f1.max(initial=0.0))
+
+    @property
+    def f1_max_counted(self) -> int:
+        """TP + FP + FN at the greatest F1; 0 if nothing is accepted."""
+        best = self.f1_max_index
+        return 0 if best is None else int(self.counted[best])
 
     @property
     def recall_at_full_precision(self) -> float:

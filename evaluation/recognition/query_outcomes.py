@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 import math
 
 import numpy as np
 
 from cns_drake.base import read_only
+from evaluation.recognition.pose_errors import (
+    SUCCESS_ROTATION_DEG,
+    SUCCESS_TRANSLATION,
+)
+from evaluation.recognition.precision_recall import PrCurve, pr_curve
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +32,10 @@ class QueryOutcomes:
         blocks: (Q,) block of the route in which each query lies, see
             `evaluation.recognition.sign_flips.route_blocks`; None if each query
             is a block of its own.
+        columns: name -> (Q,) values: what else is known of the queries, as far
+            as it is. The names are those of `queries.csv`, and `nearest`, the
+            distance to the nearest place that is allowed as an answer [m];
+            infinite if there is none.
 
     Example:
         from evaluation import judge
@@ -39,6 +49,7 @@ class QueryOutcomes:
     first_right_ranks: np.ndarray
     num_places: int
     blocks: np.ndarray | None = None
+    columns: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.best_scores)
@@ -54,6 +65,10 @@ class QueryOutcomes:
             np.concatenate([one.first_right_ranks for one in parts]),
             parts[0].num_places,
             np.concatenate(blocks) if blocks else None,
+            {
+                name: np.concatenate([one.columns[name] for one in parts])
+                for name in parts[0].columns
+            },
         )
 
     def subset(self, kept: np.ndarray) -> QueryOutcomes:
@@ -65,17 +80,17 @@ class QueryOutcomes:
             self.first_right_ranks[kept],
             self.num_places,
             None if self.blocks is None else self.blocks[kept],
+            {name: values[kept] for name, values in self.columns.items()},
         )
 
     def read_only(self) -> QueryOutcomes:
         """Returns the same outcomes, whose arrays cannot be changed."""
-        views = {}
-        for one in fields(self):
-            value = getattr(self, one.name)
+        views = {one.name: getattr(self, one.name) for one in fields(self)}
+        for name, value in views.items():
             if isinstance(value, np.ndarray):
-                value = read_only(value)
-            views[one.name] = value
-        return QueryOutcomes(**views)
+                views[name] = read_only(value)
+        columns = {n: read_only(column) for n, column in self.columns.items()}
+        return QueryOutcomes(**views | {"columns": columns})
 
     @property
     def own_blocks(self) -> np.ndarray:
@@ -89,12 +104,20 @@ class QueryOutcomes:
             int(r) if np.isfinite(r) else None for r in self.first_right_ranks
         ]
 
+    @cached_property
+    def curve(self) -> PrCurve:
+        """The exact precision-recall curve of all queries."""
+        return pr_curve(self)
+
     def recall_at(self, rank: int) -> float:
         """Returns the recall R@N for N = `rank`.
 
-        It is NaN if no query has a match.
+        It is NaN if no query has a match, or the ranks are unknown (NaN).
         """
-        return _mean_or_nan(self.first_right_ranks[self.has_match] <= rank)
+        ranks = self.first_right_ranks[self.has_match]
+        if rank > 1 and np.isnan(ranks).any():
+            return math.nan
+        return _mean_or_nan(ranks <= rank)
 
     @property
     def mean_reciprocal_rank(self) -> float:
@@ -121,6 +144,64 @@ class QueryOutcomes:
     def one_percent_rank(self) -> int:
         """The N of R@1%: a hundredth of the number of places, at least 1."""
         return max(1, round(0.01 * self.num_places))
+
+    def within(self, radius: float) -> QueryOutcomes:
+        """Returns the outcomes if a match lies within another radius [m].
+
+        The columns `distance` and `nearest` must be known. The ranks of right
+        places stay those of the protocol.
+        """
+        return replace(
+            self,
+            is_right=self.columns["distance"] <= radius,
+            has_match=self.columns["nearest"] <= radius,
+        )
+
+    @property
+    def is_accepted(self) -> np.ndarray:
+        """(Q,) bool, which queries are accepted matches.
+
+        These are the queries whose top-ranked place is a match, and whose score
+        reaches the threshold with the greatest F1. This F1 counts all queries,
+        including queries without a match.
+        """
+        best = self.curve.f1_max_index
+        if best is None:
+            return np.zeros(len(self), dtype=bool)
+        # A comparison with NaN is false.
+        return self.is_right & (self.best_scores >= self.curve.thresholds[best])
+
+    @property
+    def estimates_poses(self) -> bool:
+        """Whether the method estimates poses.
+
+        A method that finds no place localises no query.
+        """
+        if "translation_error" not in self.columns:
+            return False
+        is_known = ~np.isnan(self.columns["translation_error"])
+        return bool(is_known.any() or np.isnan(self.best_scores).all())
+
+    def pose_errors(self, name: str) -> np.ndarray:
+        """Returns the errors of the poses of accepted matches, (K,).
+
+        Args:
+            name: `translation_error` [m] or `rotation_error_deg`.
+        """
+        is_known = ~np.isnan(self.columns["translation_error"])
+        return self.columns[name][self.is_accepted & is_known]
+
+    @property
+    def success(self) -> float:
+        """Share of the queries with a match whose pose is a success.
+
+        A pose is a success within 2 m and 5 deg of the ground truth. Queries of
+        every score count. NaN if no query has a match.
+        """
+        is_near = (self.columns["translation_error"] <= SUCCESS_TRANSLATION) & (
+            self.columns["rotation_error_deg"] <= SUCCESS_ROTATION_DEG
+        )
+        return _mean_or_nan(is_near[self.has_match])
 
 
 def common_blocks(outcomes: Sequence[QueryOutcomes]) -> np.ndarray:

@@ -20,6 +20,7 @@ from evaluation.results.method_names import title as title
 from evaluation.results.output_files import check_output as check_output
 from evaluation.results.output_files import make_output as make_output
 from evaluation.results.output_files import remove_earlier as remove_earlier
+from evaluation.results.output_files import write_tables as write_tables
 from evaluation.results.page import write_page as write_page
 from evaluation.results.page_frame import PageSection as PageSection
 from evaluation.results.page_frame import page_section as page_section

@@ -123,7 +123,11 @@ def _check_answers(
         (*row.identity, row.metric): row
         for row in results.where(task="place").rows
     }
-    computed = [one for one in METRICS.values() if one.compute is not None]
+    computed = [
+        one
+        for one in METRICS.values()
+        if "place" in one.tasks and not one.is_compared
+    ]
     for answer, metric in itertools.product(answers, computed):
         name, number = metric.name, len(answer.outcomes)
         row = known.get((*answer.identity, name))

@@ -12,7 +12,7 @@ import re
 from typing import NamedTuple
 
 from cns_drake.base import InputError, check_writable, make_folder, user_errors
-from evaluation.results.table import QUERIES, RESULTS
+from evaluation.results.table import QUERIES, RESULTS, QueryRows, Results
 
 
 class _Group(NamedTuple):
@@ -115,6 +115,17 @@ def remove_earlier(folder: Path) -> None:
     for path in earlier:
         with user_errors(path):
             path.unlink()
+
+
+def write_tables(folder: Path, results: Results, queries: QueryRows) -> None:
+    """Writes both tables to a folder, in place of those of an earlier run.
+
+    Raises:
+        InputError: a file cannot be written or removed.
+    """
+    remove_earlier(folder)
+    results.write_csv(folder / RESULTS)
+    queries.write_csv(folder / QUERIES)
 
 
 def _found(folder: Path, group: _Group) -> list[Path]:

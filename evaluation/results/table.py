@@ -116,10 +116,13 @@ class Answers(Key):
 
     @cached_property
     def outcomes(self) -> QueryOutcomes:
-        """Outcome of each query, with `num_places` 0, since it is unknown."""
+        """Outcome of each query, with `num_places` 0, since it is unknown.
+
+        Without a column `first_right_rank`, the ranks of wrong answers are NaN.
+        """
         columns = self.columns
         is_right = np.asarray(columns["correct"], dtype=bool)
-        ranks = np.full(len(is_right), math.inf)
+        ranks = np.full(len(is_right), math.nan)
         if "first_right_rank" in columns:
             known = np.asarray(columns["first_right_rank"], dtype=float)
             ranks = np.where(known >= 1.0, known, math.inf)
@@ -131,6 +134,7 @@ class Answers(Key):
             np.where(is_right, 1.0, ranks),
             0,
             None if blocks is None or (blocks < 0).all() else blocks,
+            columns,
         )
 
 
@@ -270,6 +274,19 @@ class QueryRows:
 
     factors: tuple[str, ...]
     answers: tuple[Answers, ...]
+
+    def __len__(self) -> int:
+        """Returns the number of rows."""
+        return sum(len(one.columns["correct"]) for one in self.answers)
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Yields the rows: name of a column -> value, see `Answers`."""
+        for one in self.answers:
+            key = {name: one[name] for name in key_columns(self.factors)}
+            known = [name for name in _ANSWERS if name in one.columns]
+            columns = [one.columns[name].tolist() for name in known]
+            for values in zip(*columns, strict=True):
+                yield key | dict(zip(known, values, strict=True))
 
     @classmethod
     def of(cls, answers: Iterable[Answers]) -> QueryRows:

@@ -649,8 +649,8 @@ def _common_conditions(
 ) -> tuple[list[Condition], list[str]]:
     """Returns the conditions that all tables have, and notes for the user.
 
-    If the shipped table has none of the conditions that two or more tables of
-    the user have in common, only the user's tables count.
+    If the shipped table has none of the conditions that the tables of the user
+    have in common, only the user's tables count.
 
     Args:
         own: the user's tables.
@@ -675,17 +675,16 @@ def _common_conditions(
     if with_shipped:
         others = (*own, shipped)
         return with_shipped, _notes_on_left_out(own, others, with_shipped)
-    if len(own) > 1 and common:
+    if common:
         notes = _notes_on_left_out(own, own, common)
+        why = _why_nothing_is_common(own[0], shipped)
         return common, [
             *notes,
-            "the shipped tables have none of these conditions",
+            f"the shipped tables have none of these conditions ({why})",
         ]
     names = ", ".join(map(str, paths))
-    others = (*own[1:], *([] if own[1:] else [shipped]))
-    beside = "" if len(own) > 1 else " with the shipped tables"
-    why = _why_nothing_is_common(own[0], others[0])
-    raise InputError(f"{names}: no condition in common{beside} ({why})")
+    why = _why_nothing_is_common(own[0], own[1])
+    raise InputError(f"{names}: no condition in common ({why})")
 
 
 def _notes_on_left_out(

@@ -1,5 +1,6 @@
 from evaluation.study.chosen_methods import STANDARD as STANDARD
 from evaluation.study.chosen_methods import MethodChoice as MethodChoice
+from evaluation.study.chosen_methods import choose_method as choose_method
 from evaluation.study.chosen_methods import choose_methods as choose_methods
 from evaluation.study.chosen_methods import expanded_names as expanded_names
 from evaluation.study.chosen_methods import method_settings as method_settings
@@ -8,17 +9,16 @@ from evaluation.study.engine import made_tasks as made_tasks
 from evaluation.study.feature_extraction import (
     extract_features as extract_features,
 )
-from evaluation.study.one_pair import OpenSource as OpenSource
-from evaluation.study.one_pair import measure_pairs as measure_pairs
-from evaluation.study.one_pair import pair_of as pair_of
-from evaluation.study.one_pair import pair_of_drive_maps as pair_of_drive_maps
-from evaluation.study.one_pair import pair_of_maps as pair_of_maps
 from evaluation.study.parts import LongList as LongList
 from evaluation.study.parts import MakePart as MakePart
 from evaluation.study.parts import Part as Part
 from evaluation.study.place_measurements import (
     DescribedSource as DescribedSource,
 )
+from evaluation.study.place_measurements import (
+    PlaceComparison as PlaceComparison,
+)
+from evaluation.study.place_measurements import measure_places as measure_places
 from evaluation.study.recorded_city import ShownCity as ShownCity
 from evaluation.study.recorded_city import add_city as add_city
 from evaluation.study.recorded_study import (
@@ -61,7 +61,6 @@ from evaluation.study.tasks.localise import (
 )
 from evaluation.study.tasks.map_scores import GIVEN as GIVEN
 from evaluation.study.tasks.map_scores import TRUTH as TRUTH
-from evaluation.study.tasks.map_scores import LabelledMapTask as LabelledMapTask
 from evaluation.study.tasks.map_scores import MapScores as MapScores
 from evaluation.study.tasks.map_scores import MapTask as MapTask
 from evaluation.study.tasks.map_scores import score_methods as score_methods

@@ -192,6 +192,26 @@ def method_settings(
     return found
 
 
+def choose_method(name: Path | str, texts: Iterable[str] = ()) -> MethodChoice:
+    """Returns a method with its settings.
+
+    Args:
+        name: name of the method, or a Python file that registers it.
+        texts: its settings, see `method_settings`.
+
+    Raises:
+        InputError: the file cannot be used, or a text has another form or names
+            another method.
+    """
+    name, file = str(name), None
+    if name.endswith(".py"):
+        # Errors name the file as the user does.
+        file = Path(name).absolute()
+        name = load_method(Path(name)).name
+    settings = method_settings(texts, [name])[name]
+    return MethodChoice(name, file, tuple(settings.items()))
+
+
 def choose_methods(
     names: Iterable[Path | str] = (),
     settings: Iterable[str] = (),

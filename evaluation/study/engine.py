@@ -25,8 +25,6 @@ from cns_drake.base import (
     run_jobs,
 )
 from evaluation.results import (
-    QUERIES,
-    RESULTS,
     Answers,
     QueryRows,
     Results,
@@ -34,7 +32,7 @@ from evaluation.results import (
     as_factor,
     made_by,
     make_output,
-    remove_earlier,
+    write_tables,
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import FeatureExtraction
@@ -156,7 +154,7 @@ class Engine:
                 f"{self.experiment}: nothing could be measured; the notes say"
                 " why"
             )
-        self._write(*tables)
+        write_tables(self.output, *tables)
         _remove_descriptors(jobs)
         if pictures:
             run_jobs(pictures, cluster)
@@ -169,15 +167,9 @@ class Engine:
         Raises:
             InputError: a job has not been done, or a file cannot be written.
         """
-        return self._write(*self.tables())
-
-    def _write(
-        self, results: Results, queries: QueryRows
-    ) -> tuple[Results, QueryRows]:
-        remove_earlier(self.output)
-        results.write_csv(self.output / RESULTS)
-        queries.write_csv(self.output / QUERIES)
-        return results, queries
+        tables = self.tables()
+        write_tables(self.output, *tables)
+        return tables
 
     def tables(self) -> tuple[Results, QueryRows]:
         """Returns the tables of results and of queries of finished jobs.

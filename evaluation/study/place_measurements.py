@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from cns_drake.base import Reporter, track
-from cns_drake.drives import check_same_world
+from cns_drake.drives import Drive, check_same_world
 from evaluation.drives import cloud_at
 from evaluation.methods import Method
 from evaluation.recognition import (
@@ -34,11 +34,10 @@ from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import describe_recording
 from evaluation.study.features import KeptScans
 from evaluation.study.parts import LongList, Part
-from evaluation.study.sources import DriveSource
 
-# The source of a drive, or the parts of its scans and of its descriptors by
-# each method.
-DescribedSource: TypeAlias = "DriveSource | tuple[Part, ...]"
+# A function that opens a drive, such as a `DriveSource`; or the parts of its
+# scans and of its descriptors by each method.
+DescribedSource: TypeAlias = "Callable[[], Drive] | tuple[Part, ...]"
 
 # A method that takes longer for all queries is left out [ms].
 _LONGEST_MS = 3.6e6
@@ -539,7 +538,7 @@ class _ReadDrive:
 
     def __init__(
         self,
-        source: DriveSource,
+        source: Callable[[], Drive],
         role: Role,
         methods: tuple[MethodChoice, ...],
         protocol: RetrievalProtocol,

@@ -26,11 +26,9 @@ from evaluation.recognition import (
     METRICS,
     SIGNIFICANT,
     Interval,
-    PlaceOutcome,
     QueryOutcomes,
-    RetrievalProtocol,
     compared_by_right_answers,
-    place_numbers,
+    numbers_of,
 )
 from evaluation.results import (
     Answers,
@@ -147,29 +145,6 @@ def answers(
     return found
 
 
-def outcome(outcomes: QueryOutcomes) -> PlaceOutcome:
-    number = len(outcomes)
-    return PlaceOutcome(
-        method="solid",
-        database="a",
-        query="b",
-        protocol=RetrievalProtocol(),
-        protocol_name="own",
-        outcomes=outcomes,
-        columns={
-            "why": np.full(number, ""),
-            "overlap": np.full(number, np.nan),
-            "translation_error": np.full(number, np.nan),
-            "rotation_error_deg": np.full(number, np.nan),
-        },
-        place_frames=np.arange(100),
-        best_places=np.full((number, 5), -1),
-        best_scores=np.full((number, 5), np.nan),
-        matches=np.empty((0, 2), int),
-        nearest=np.full(number, np.inf),
-    )
-
-
 def drives(
     runs: int, scenarios: Sequence[Sequence[float]] = CHANGES
 ) -> Iterator[dict[str, object]]:
@@ -186,7 +161,7 @@ def drives(
             counts = {name: Count(truth[name]) for name in (*names, *kept)}
             for _ in range(runs):
                 then, now = answers(rng, (before, after), num_blocks)
-                for one in place_numbers(outcome(now), outcome(then)):
+                for one in numbers_of("place", now, then):
                     if one.metric in counts:
                         counts[one.metric].add(one.interval)
             for name, count in counts.items():

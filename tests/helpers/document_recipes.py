@@ -355,7 +355,7 @@ RECIPES = {
         prints=("AUROC",),
     ),
     "scores": Recipe(
-        ".venv/bin/cns-eval pr --scores",
+        ".venv/bin/cns-eval scores kitti",
         changes=(("sequences/04", "sequences/02"),),
         after=("exports",),
         makes=("scores.csv",),

@@ -5,6 +5,7 @@ that `docs/explanation/structure.md` names.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -12,17 +13,20 @@ from cns_drake.drives import Drive
 from evaluation.change import (
     ChangeReport,
     DriveMap,
-    change_between,
+    change_of_maps,
     same_stage_partner,
     spread_over_grids,
 )
 from evaluation.methods import Method
 from evaluation.recognition import (
     RECORDED_PROTOCOL,
+    Mode,
     PlaceOutcome,
+    PlaceRecognitionMetrics,
     QueryDrive,
     RetrievalProtocol,
     check_has_match,
+    evaluate,
     retrieve,
 )
 
@@ -69,6 +73,18 @@ def place_outcome(
     return outcome
 
 
+def place_scores(*arguments: Any, **options: Any) -> PlaceRecognitionMetrics:
+    """Returns the scores of `place_outcome`, over all queries."""
+    return evaluate(place_outcome(*arguments, **options).outcomes)
+
+
+def values_of(
+    outcome: PlaceOutcome, task: str = "place", mode: Mode = "all"
+) -> dict[str, float]:
+    """Returns name -> value of each metric of a task."""
+    return {n.metric: n.value for n in outcome.numbers(task, mode=mode)}
+
+
 def compare_maps(
     source: DriveMap,
     target: DriveMap,
@@ -82,9 +98,9 @@ def compare_maps(
         control: map of a third drive, which follows the route of A in the stage
             of B, or the route of B in the stage of A; None for no control.
     """
-    report = change_between(source, target)
+    report = change_of_maps(source, target)
     if control is not None:
         both = control, same_stage_partner(source, target, control)
-        report = report.beside(change_between(*both))
+        report = report.beside(change_of_maps(*both))
     spread = spread_over_grids(source, target, report.change)
     return replace(report, spread=spread)

@@ -13,7 +13,6 @@ from evaluation.recognition import (
     PoseErrors,
     QueryDrive,
     Retrieval,
-    place_numbers,
 )
 from evaluation.results import (
     OWN,
@@ -104,8 +103,7 @@ def tables(outcomes):
             **made_by(PAPER_PROTOCOL),
         }
         rows += [
-            Row.of(number, **key, task="place")
-            for number in place_numbers(one, None)
+            Row.of(number, **key, task="place") for number in one.numbers()
         ]
         change = Number("", False, "tcr_sym", 0.25, n=9)
         rows.append(Row.of(change, **key, task="change"))

@@ -1,9 +1,9 @@
 """The task `seen`: which changes of a city the drives of a database see."""
 
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 import math
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from cns_drake.base import (
 from cns_drake.simulation import SimulatedDrive, SimulationSource
 from cns_drake.studies.pairs.map_upkeep import UpkeptSource
 from evaluation.drives import sample_frames
-from evaluation.recognition import Number
 from evaluation.study import (
     OPENING_COST,
     SCAN_COST,
@@ -75,6 +74,53 @@ class Noticed:
     names: list[str]
     is_noticed: np.ndarray
     delay: np.ndarray
+
+    def chosen(self, rows: np.ndarray) -> "Noticed":
+        """Returns some of the structures, by a mask (S,) bool."""
+        names = [self.names[k] for k in np.flatnonzero(rows)]
+        return Noticed(names, self.is_noticed[rows], self.delay[rows])
+
+    @property
+    def changed(self) -> int:
+        """Number of the structures that changed."""
+        return len(self.names)
+
+    @property
+    def seen(self) -> float:
+        """Share of the changes that a drive notices; NaN without a change."""
+        return float(self.is_noticed.mean()) if self.names else math.nan
+
+    @property
+    def num_delays(self) -> int:
+        """Number of the changes whose delay is known."""
+        return int((~np.isnan(self.delay)).sum())
+
+    @property
+    def delay_median(self) -> float:
+        """Median of the known delays [years]; NaN without one."""
+        return self._delay(50.0)
+
+    @property
+    def delay_95(self) -> float:
+        """95 % quantile of the known delays [years]; NaN without one."""
+        return self._delay(95.0)
+
+    def _delay(self, percentage: float) -> float:
+        if not self.num_delays:
+            return math.nan
+        return float(np.nanpercentile(self.delay, percentage))
+
+
+class Sightings(NamedTuple):
+    """Which changes are noticed, from which the metrics of `seen` follow.
+
+    Attributes:
+        all: all changes.
+        by_query: the changes that the query drive notices, too.
+    """
+
+    all: Noticed
+    by_query: Noticed
 
 
 def noticed_changes(
@@ -170,33 +216,11 @@ class SeenTask(Task):
     def found(self, pair: Pair) -> Any:
         *sightings, years = [part.read() for part in pair.parts[self.name]]
         *drives, query = zip(pair.ages, sightings, strict=True)
-        return [
+        every, by_query = (
             noticed_changes(some, query[1], *years)
             for some in (drives, [drives[0], query])
-        ]
-
-    def numbers(
-        self, found: Sequence[Noticed], before: Any | None
-    ) -> Iterator[Number]:
-        drives, query = found
-        everywhere = np.ones(len(drives.names), bool)
-        for end, chosen in (("", everywhere), ("_here", query.is_noticed)):
-            number = int(chosen.sum())
-            delays = drives.delay[chosen]
-            delays = delays[~np.isnan(delays)]
-            values = {"changed": (float(number), number)}
-            if number:
-                share = float(drives.is_noticed[chosen].mean())
-                values["seen"] = share, number
-            if len(delays):
-                late = float(np.percentile(delays, 95.0))
-                values["delay_median"] = (
-                    float(np.median(delays)),
-                    len(delays),
-                )
-                values["delay_95"] = late, len(delays)
-            for name, (value, n) in values.items():
-                yield Number("", False, f"{name}{end}", value, n=n)
+        )
+        return Sightings(every, every.chosen(by_query.is_noticed))
 
 
 def plain_source(source: DriveSource) -> SimulationSource:

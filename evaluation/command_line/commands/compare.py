@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from cns_drake.base import number_text, shared_options, terminal
-from evaluation.command_line.printed_text import interval_text
-
-if TYPE_CHECKING:
-    from evaluation.recognition import Interval
+from evaluation.command_line.printed_text import spaced_interval
 
 GROUP = "Recognise places"
 
@@ -70,13 +67,13 @@ def compare(
     rows = [
         (
             mean.method,
-            f"{number_text(mean.value)}{_spaced_interval(mean.interval)}",
+            f"{number_text(mean.value)}{spaced_interval(mean.interval)}",
         )
         for mean in found.ranked
     ]
     if rows:
         where = f"mean of {found.conditions or 'its own'} conditions"
-        known = any(_spaced_interval(mean.interval) for mean in found.ranked)
+        known = any(spaced_interval(mean.interval) for mean in found.ranked)
         level = "  [95 %]" if known else ""
         rows.insert(0, ("method", f"{found.metric}, {where}{level}"))
     for compared in found.differences:
@@ -85,7 +82,7 @@ def compare(
             (
                 f"R@1 of {compared.first} - {compared.second}",
                 f"{number_text(difference.value)}"
-                f"{_spaced_interval(difference.interval) or '  cannot show'}"
+                f"{spaced_interval(difference.interval) or '  cannot show'}"
                 f"  p {_p_text(difference.p_value)}",
             )
         )
@@ -93,7 +90,7 @@ def compare(
         rows.append(
             (
                 f"{one.method}, loss in {one.cities} cities",
-                f"{number_text(one.loss)}{_spaced_interval(one.interval)}"
+                f"{number_text(one.loss)}{spaced_interval(one.interval)}"
                 f"  {one.verdict}",
             )
         )
@@ -106,7 +103,7 @@ def compare(
         )
         families = (
             f"{number_text(alike.tau_of_families)}"
-            f"{_spaced_interval(alike.interval)}"
+            f"{spaced_interval(alike.interval)}"
         )
         rows.append(
             (
@@ -121,10 +118,3 @@ def _p_text(p_value: float) -> str:
     if isnan(p_value):
         return number_text(p_value)
     return "< 0.0001" if p_value < 0.5e-4 else f"{p_value:.4f}"
-
-
-def _spaced_interval(interval: Interval) -> str:
-    """Returns an interval after two spaces; "" if it is unknown."""
-    if isnan(interval.low):
-        return ""
-    return f"  {interval_text(interval)}"

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import shared_options, terminal
+from cns_drake.base import json_values, shared_options, terminal
 from evaluation.command_line import options
+from evaluation.command_line.printed_text import metric_rows
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from cns_drake.drives import Drive
-    from evaluation.study import Engine, LocaliseTask, Pair
+    from evaluation.verbs import Localisation
 
 GROUP = "Localise, and keep maps"
-
-# Drift of the odometry by default, as a share of the distance.
-_USUAL_DRIFT = 0.01
 
 
 def localise(
@@ -86,238 +79,74 @@ def localise(
         cns-eval localise drives/metropolis_01 \\
             drives/metropolis_04 --method gicp --start 1
     """
-    from cns_drake.base import InputError, choose_cluster
-    from evaluation.localisation import (
-        FEWEST_POINTS,
-        Starts,
-        default_settings,
-        localisation_summary,
-        make_estimator,
-        tracking_summary,
-    )
+    from cns_drake.base import choose_cluster
     from evaluation.results import make_output
-    from evaluation.study import (
-        LocaliseTask,
-        OpenSource,
-        method_settings,
-        pair_of,
-    )
+    from evaluation.study import method_settings
+    from evaluation.verbs import localise as localise_scans
 
-    _check_together(query_spacing, odometry_drift, track=track)
-    if odometry_drift is None:
-        odometry_drift = _USUAL_DRIFT
-    num_jobs = choose_cluster(jobs, None).num_workers
-    Starts(start, start_turn, seed)  # It checks them.
     name = Path(method).stem
-    given = method_settings(parameter or [], [name])[name]
-    # Faults are told before the slow work.
-    chosen = default_settings(method).with_values(given.items(), method)
-    make_estimator(method, chosen)
-    source, drive = _opened(place, query, align, lidar, columns)
     if output is not None:
         make_output(output, ["localise"])
-    settings: dict = {
-        "methods": [method],
-        "starts": [[start, start_turn]],
-        "seed": seed,
-        "estimator": given,
-        "odometry_drift": odometry_drift if track else None,
-    }
-    if query_spacing is not None:
-        settings["spacing"] = query_spacing
-    pair = pair_of(
-        OpenSource(source, columns),
-        OpenSource(drive),
-        (source.name, drive.name),
+    found = localise_scans(
+        place,
+        query,
+        method,
+        start=start,
+        start_turn=start_turn,
+        seed=seed,
+        settings=method_settings(parameter or [], [name])[name],
+        query_spacing=query_spacing,
+        track=track,
+        odometry_drift=odometry_drift,
+        align=align,
+        lidar=lidar,
+        columns=columns,
+        processes=choose_cluster(jobs, None).num_workers,
     )
-    task = LocaliseTask(settings, "localise")
-    engine, rows, notes = _localised(pair, task, output, num_jobs)
-    if all(map(math.isnan, rows["unmapped"])):
-        raise InputError(
-            f"{drive.name}: no scan has {FEWEST_POINTS} points in"
-            f" different voxels of {chosen.scan_voxel:g} m"
-        )
-    for note in notes:
-        terminal.note(note)
     values: dict = {
-        "method": name,
-        "map": source.name,
-        "query": drive.name,
+        "method": found.method,
+        "map": found.map_name,
+        "query": found.query_name,
         "start": start,
         "start_turn_deg": start_turn,
         "seed": seed,
+        **found.metrics,
+        "seconds_mean": float(found.rows["seconds"].mean()),
     }
     if track:
-        values |= {"odometry_drift": odometry_drift}
-        values |= tracking_summary(rows)
-    values |= localisation_summary(rows)
+        values["odometry_drift"] = found.odometry_drift
     if output is not None:
-        title = f"{drive.name}, tracked by {name} in the map of {source.name}"
-        _write_results(engine, rows, output, title if track else None)
-    terminal.show(values, _rows(values), json=json)
-
-
-def _localised(
-    pair: Pair, task: LocaliseTask, output: Path | None, num_jobs: int
-) -> tuple[Engine, np.ndarray, list[str]]:
-    """Localises the scans of a pair.
-
-    Returns:
-        The engine; (K,) results, one per query; the notes.
-
-    Raises:
-        InputError: the scans cannot be localised.
-    """
-    from cns_drake.base import InputError
-    from evaluation.study import (
-        NOT_LOCALISED,
-        measure_pairs,
-    )
-
-    notes: list[str] = []
-    engine = measure_pairs(
-        "localise",
-        [pair],
-        [task],
-        output,
-        on_note=notes.append,
-        processes=num_jobs,
-    )
-    if not (measured := engine.found(pair, task.name)):
-        raise InputError(notes[-1].removesuffix(NOT_LOCALISED))
-    (rows,) = measured
-    return engine, rows, notes
+        title = (
+            f"{found.query_name}, tracked by {name} in the map of"
+            f" {found.map_name}"
+        )
+        _write_results(found, output, title if track else None)
+    rows = [
+        ("method", found.method),
+        ("map <- query", f"{found.map_name} <- {found.query_name}"),
+        ("initial guess", f"{start:g} m, {start_turn:g} deg"),
+        *metric_rows(found),
+    ]
+    terminal.show(json_values(values), rows, json=json)
 
 
 def _write_results(
-    engine: Engine, rows: np.ndarray, output: Path, title: str | None
+    found: Localisation, output: Path, title: str | None
 ) -> None:
     """Writes the tables and, of a tracked drive, the picture.
 
     Args:
-        engine: has the tables.
-        rows: (K,) results, one per query.
+        found: what was measured.
         output: folder of the files.
         title: title of the picture; None if no drive is tracked.
     """
     from evaluation.localisation import write_rows
 
-    options.write_tables(engine)
-    write_rows(rows, output / "localisation.csv")
+    options.write_tables(found, output)
+    write_rows(found.rows, output / "localisation.csv")
     terminal.note(f"wrote {output / 'localisation.csv'}")
     # A picture that fails takes no number along.
     if title:
         from evaluation.results import draw_track
 
-        draw_track(rows, output / "track", title)
-
-
-def _check_together(
-    query_spacing: float | None,
-    odometry_drift: float | None,
-    *,
-    track: bool,
-) -> None:
-    """Checks which options are given together, and the ranges of options.
-
-    Raises:
-        InputError: an option cannot be used.
-    """
-    from cns_drake.base import InputError
-
-    if track and query_spacing is not None:
-        raise InputError("--query-spacing: not together with --track")
-    if not track and odometry_drift is not None:
-        raise InputError("--odometry-drift: only together with --track")
-    if query_spacing is not None and not 0.0 < query_spacing < math.inf:
-        raise InputError(f"--query-spacing: {query_spacing:g} is not above 0")
-    if odometry_drift is not None and not 0.0 <= odometry_drift <= 1.0:
-        raise InputError(
-            f"--odometry-drift: {odometry_drift:g} is not from 0 to 1"
-        )
-
-
-def _opened(
-    place: Path,
-    query: Path,
-    align: options.When,
-    lidar: str | None,
-    columns: int | None,
-) -> tuple[Drive | Path, Drive]:
-    """Returns the map and the drive of the queries, and shows notes on them.
-
-    Two drives are in one world. A point cloud as the map stays a path; a point
-    cloud as the query becomes a drive of one scan.
-
-    Raises:
-        InputError: a path cannot be opened, or the drives cannot be aligned.
-    """
-    from cns_drake.base import InputError
-    from cns_drake.drives import Drive, check_same_world
-    from evaluation.change import open_source
-    from evaluation.localisation import OneScan
-
-    source = open_source(place, lidar, columns)
-    asked = open_source(query, lidar, columns)
-    drive = asked if isinstance(asked, Drive) else OneScan(asked, columns)
-    for opened in (source, drive):
-        for note in opened.notes if isinstance(opened, Drive) else ():
-            terminal.note(note)
-    if align == "always" and not isinstance(source, Drive):
-        raise InputError(f"--align: {place} is no drive, and stays as it is")
-    if isinstance(source, Drive):
-        source, drive = options.aligned((source, drive), align)
-        check_same_world(source, drive)
-    return source, drive
-
-
-def _rows(values: dict) -> Iterator[tuple[str, str]]:
-    """Yields names and values of the results."""
-
-    def text(name: str) -> str:
-        value = values[name]
-        return "undefined" if value is None else f"{value:.3f}"
-
-    yield "method", values["method"]
-    yield "map <- query", f"{values['map']} <- {values['query']}"
-    yield (
-        "initial guess",
-        f"{values['start']:g} m, {values['start_turn_deg']:g} deg",
-    )
-    if "within_03m" in values:
-        yield "path in the map", f"{values['way']:.0f} m"
-        yield "  within 0.3 m", text("within_03m")
-        yield (
-            "  lost",
-            f"{text('lost_per_km')} a kilometre ({values['lost']} times,"
-            f" {values['lost_for_good']} for good)",
-        )
-        yield "  recovered after", f"{text('back_after_median')} m"
-    yield (
-        "scans",
-        f"{values['queries']}, {values['without_pose']} without a pose",
-    )
-    yield "within 0.3 m and 1 deg", text("success_03m_1deg")
-    yield "within 2 m and 5 deg", text("success_2m_5deg")
-    for name, unit in (("translation", "m"), ("rotation", "deg")):
-        ending = "_deg" if unit == "deg" else ""
-        yield (
-            f"{name} error, median, 95 %",
-            f"{text(f'{name}_median{ending}')} {unit},"
-            f" {text(f'{name}_95{ending}')} {unit}",
-        )
-    yield (
-        "  along, across, up",
-        ", ".join(text(f"{axis}_median") for axis in ("along", "across", "up")),
-    )
-    yield (
-        "AUROC of the estimator's score",
-        f"{text('auroc_own_score')}  (fit {text('auroc_fit')}, residual"
-        f" {text('auroc_residual')}, Hessian {text('auroc_hessian')})",
-    )
-    yield (
-        "wrong, but confident",
-        f"{text('confident_wrong')} of all results,"
-        f" {text('confident_of_wrong')} of the wrong ones",
-    )
-    yield "share of a scan that the map lacks", text("unmapped_mean")
+        draw_track(found.rows, output / "track", title)

@@ -1,14 +1,14 @@
 """The command `map-update`."""
 
-from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cns_drake.base import shared_options, terminal
+from cns_drake.base import InputError, json_values, shared_options, terminal
 from evaluation.command_line import options
+from evaluation.command_line.printed_text import metric_rows
 
 GROUP = "Localise, and keep maps"
 
@@ -55,15 +55,9 @@ def map_update(
     Example:
         cns-eval map-update maps --baseline distance
     """
-    from cns_drake.base import InputError
-    from evaluation.map_update import read_pair, write_labels
+    from evaluation.map_update import write_labels
     from evaluation.results import make_output
-    from evaluation.study import (
-        GIVEN,
-        LabelledMapTask,
-        measure_pairs,
-        pair_of_maps,
-    )
+    from evaluation.verbs import update_map
 
     if (labels_a is None) != (labels_b is None):
         raise InputError("--labels-a and --labels-b: give both")
@@ -71,46 +65,17 @@ def map_update(
         raise InputError("--baseline: not together with --labels-a")
     if output is not None:
         make_output(output, ["map-update"])
-    pair = read_pair(folder)
-    given = [file for file in (labels_a, labels_b) if file is not None]
-    method = (baseline or BaselineName.FREE_SPACE).value
-    name = GIVEN if given else method
-    maps = pair_of_maps(pair.A.folder, pair.B.folder, folder.resolve().name)
-    task = LabelledMapTask(folder, [] if given else [method], given)
-    engine = measure_pairs("map-update", [maps], [task], output)
-    found = engine.found(maps, task.name)[name]
-    if output is not None:
-        options.write_tables(engine)
-        for session, labels in zip(pair, found.labels, strict=True):
-            write_labels(output / f"{session.side}.npy", labels)
-    terminal.show(
-        {"method": name, **found.scores}, _rows(name, found.scores), json=json
+    found = update_map(
+        folder,
+        baseline=(baseline or BaselineName.FREE_SPACE).value,
+        labels=(labels_a, labels_b) if labels_a and labels_b else None,
     )
-
-
-def _rows(name: str, scores: dict) -> Iterator[tuple[str, str]]:
-    yield "method", name
-    yield "mean IoU", terminal.number_text(scores["miou"])
-    for label in ("kept", "gone", "new", "unobserved"):
-        yield f"  {label}", terminal.number_text(scores[f"iou_{label}"])
-    for title, part in (
-        ("by point", scores),
-        ("within 0.2 m", scores["within_02m"]),
-        ("within 0.5 m", scores["within_05m"]),
-        ("by structure", scores["by_structure"]),
-    ):
-        text = ", ".join(
-            f"{change} {terminal.number_text(part[f'precision_{change}'])} and "
-            f"{terminal.number_text(part[f'recall_{change}'])}"
-            for change in ("gone", "new")
-        )
-        yield f"precision and recall {title}", text
-    still = scores["without_vehicles_and_people"]["miou"]
-    yield "mean IoU without vehicles and people", terminal.number_text(still)
-    updated = scores["updated_map"]
-    yield (
-        "updated map: complete, accurate, Chamfer",
-        f"{terminal.number_text(updated['completeness'])}, "
-        f"{terminal.number_text(updated['accuracy'])}, "
-        f"{terminal.number_text(updated['chamfer'])} m",
+    if output is not None:
+        options.write_tables(found, output)
+        for side, labels in zip("AB", found.labels, strict=True):
+            write_labels(output / f"{side}.npy", labels)
+    terminal.show(
+        json_values({"method": found.method, **found.scores, **found.metrics}),
+        [("method", found.method), *metric_rows(found)],
+        json=json,
     )

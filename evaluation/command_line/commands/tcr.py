@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import number_text, shared_options, terminal
+from cns_drake.base import json_values, shared_options, terminal
 from evaluation.command_line import options
+from evaluation.command_line.printed_text import metric_rows
 
 if TYPE_CHECKING:
     from evaluation.change import ChangeReport
@@ -49,91 +48,55 @@ def tcr(
     Example:
         cns-eval tcr drives/metropolis_01 drives/metropolis_04
     """
-    from evaluation.change import (
-        maps_in_one_world,
-        registered_change,
-        same_stage_partner,
-        spread_over_grids,
-    )
-    from evaluation.drives import NOT_FINITE
-    from evaluation.results import LAST, OWN, STAGE, make_output
-    from evaluation.study import ChangeTask, measure_pairs, pair_of_drive_maps
+    from evaluation.results import make_output
+    from evaluation.verbs import change_between
 
-    named = [path for path in (source, target, no_change) if path is not None]
-    maps, alignments = maps_in_one_world(named, align, lidar, columns)
-    before, after, *controls = maps
-    compared = [(before, after)] + [
-        (third, same_stage_partner(before, after, third)) for third in controls
-    ]
-    pairs = [
-        pair_of_drive_maps(
-            both,
-            (before.name, after.name),
-            factors={STAGE: stage} if controls else {},
-            key=stage,
-        )
-        for both, stage in zip(compared, (OWN, LAST), strict=False)
-    ]
     if output is not None:
         make_output(output)
-    engine = measure_pairs("tcr", pairs, [ChangeTask({}, "tcr")], output)
-    report, *beside = (engine.found(pair, ChangeTask.name) for pair in pairs)
-    for other in beside:
-        report = report.beside(other)
-    report = replace(
-        report,
-        spread=spread_over_grids(before, after, report.change),
-        alignment=alignments[0] if alignments else None,
-        registered=registered_change(before, after),
+    found = change_between(
+        source,
+        target,
+        no_change=no_change,
+        align=align,
+        lidar=lidar,
+        columns=columns,
     )
-    for drive_map in maps:
-        for note in drive_map.notes:
-            terminal.note(note)
-        ignored = drive_map.voxels.num_ignored
-        if ignored:
-            terminal.note(f"{drive_map.name}: {ignored} {NOT_FINITE}")
-    for alignment in alignments:
-        terminal.note(alignment.to_text())
-    if report.note is not None:
-        terminal.note(report.note)
+    report = found.report
     if output is not None:
-        options.write_tables(engine)
-    terminal.show(report.to_json(), _change_rows(report), json=json)
+        options.write_tables(found, output)
+    values = {
+        "source": report.source,
+        "target": report.target,
+        "tcr_sym_registered": None,
+        "registration_yaw_deg": None,
+        **found.metrics,
+        **report.to_json(),
+    }
+    rows = [
+        ("first <-> second", f"{report.source} <-> {report.target}"),
+        *metric_rows(found, _beside(report)),
+    ]
+    terminal.show(json_values(values), rows, json=json)
 
 
-def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
-    """Yields names and values of the results of `tcr`."""
+def _beside(report: ChangeReport) -> dict[str, str]:
+    """Returns what stands beside the metrics of `tcr`, by their names."""
     from evaluation.change import COVERAGE_RADIUS
 
-    change = report.change
     source, target = report.source, report.target
-    yield "pair", f"{source} <-> {target}"
-    yield "TCR_sym", number_text(change.symmetric)
-    yield "  on shifted grids", " to ".join(map(number_text, report.spread))
-    if change.undefined_because:
-        yield "  because", change.undefined_because
-    if (registered := report.registered) is not None:
-        x, y, z = registered.offset
-        yield (
-            "  after registration",
-            f"{number_text(registered.symmetric)}"
-            f"  (yaw {registered.yaw_deg:.2f} deg,"
-            f" offset {x:.2f}, {y:.2f}, {z:.2f} m)",
+    found = {
+        "tcr_source_to_target": f"{source} -> {target}",
+        "tcr_target_to_source": f"{target} -> {source}",
+    }
+    if report.change.undefined_because:
+        found["tcr_sym"] = report.change.undefined_because
+    if report.masked is not None and report.masked.undefined_because:
+        found["tcr_sym_masked"] = (
+            f"no point lies within {COVERAGE_RADIUS:g} m of both routes"
         )
-    for names, side in (
-        (f"{source} -> {target}", change.source_to_target),
-        (f"{target} -> {source}", change.target_to_source),
-    ):
-        counts = f"({side.num_unchanged} of {side.num_in_hull} unchanged)"
-        yield f"TCR {names}", f"{number_text(side.ratio)}  {counts}"
-    if report.masked is not None:
-        value = number_text(report.masked.symmetric)
-        if report.masked.undefined_because:
-            value += (
-                f"  (no point lies within {COVERAGE_RADIUS:g} m of both routes)"
-            )
-        yield "TCR_sym where both drove", value
-    if report.control is not None and report.control_names is not None:
-        names = " <-> ".join(report.control_names)
-        value = number_text(report.control.symmetric)
-        yield "TCR_sym of only the routes", f"{value}  ({names})"
+    if report.registered is not None:
+        x, y, z = report.registered.offset
+        found["tcr_sym_registered"] = f"offset {x:.2f}, {y:.2f}, {z:.2f} m"
+    if report.control_names is not None:
+        found["tcr_sym_no_change"] = " <-> ".join(report.control_names)
+    return found

@@ -157,5 +157,5 @@ def _method_data(result: PlaceOutcome) -> dict:
         "scores": values,
         "ranks": result.outcomes.known_ranks,
         "why": result.columns["why"].tolist(),
-        "auc": round(result.by_mode["all"].auc, 4),
+        "auc": round(result.outcomes.curve.auc, 4),
     }

@@ -1,12 +1,10 @@
 """The task `change`: how much the city changed between two drives."""
 
-from collections.abc import Iterator, Mapping
-import math
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from cns_drake.base import Reporter
-from evaluation.change import ChangeReport, change_between
-from evaluation.recognition import Number
+from evaluation.change import ChangeReport, change_of_maps
 from evaluation.study.features import DriveSummary
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import Pair, Result
@@ -41,23 +39,6 @@ class ChangeTask(Task):
         found = jobs.add(part, measure_change, maps, needs, 2.0, self.version)
         return (found,)
 
-    def numbers(
-        self, found: ChangeReport, before: Any | None
-    ) -> Iterator[Number]:
-        values = [("tcr_sym", found.change.symmetric, found.change.num_in_hull)]
-        if (masked := found.masked) is not None:
-            values.append(
-                ("tcr_sym_masked", masked.symmetric, masked.num_in_hull)
-            )
-        for name, side in (
-            ("tcr_source_to_target", found.change.source_to_target),
-            ("tcr_target_to_source", found.change.target_to_source),
-        ):
-            values.append((name, side.ratio, side.num_in_hull))
-        for name, value, number in values:
-            if not math.isnan(value):
-                yield Number("", False, name, float(value), n=number)
-
 
 def measure_change(
     reporter: Reporter, first: Result, second: Result
@@ -76,4 +57,4 @@ def measure_change(
     a, b = (
         one.drive_map if isinstance(one, DriveSummary) else one for one in maps
     )
-    return change_between(a, b)
+    return change_of_maps(a, b)

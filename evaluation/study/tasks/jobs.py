@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 from cns_drake.base import Job, fingerprint
 from evaluation.recognition import RetrievalProtocol, Role
@@ -42,12 +41,7 @@ class Jobs:
             keeps the order and omits repetitions.
         radii: key of a pair -> radii of a match that are used for this pair
             [m].
-        processes: number of processes that a task may use by itself.
-        leaves_out_slow: whether methods that would take more than an hour for a
-            pair are left out.
     """
-
-    leaves_out_slow: ClassVar[bool] = True
 
     files: StudyFiles
     methods: tuple[MethodChoice, ...]
@@ -55,7 +49,6 @@ class Jobs:
     jobs: dict[str, Job] = field(default_factory=dict)
     notes: dict[str, None] = field(default_factory=dict)
     radii: dict[str, set[float]] = field(default_factory=dict)
-    processes: int = 1
     # Descriptor -> keys of the pairs that need it.
     _uses: dict[str, set[str]] = field(default_factory=dict)
 

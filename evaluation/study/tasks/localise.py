@@ -31,10 +31,9 @@ from evaluation.localisation import (
     Settings,
     Starts,
     default_settings,
-    is_right,
     localisation_columns,
-    localisation_numbers,
     localise,
+    localised,
     make_estimator,
     make_map,
     map_of,
@@ -44,10 +43,9 @@ from evaluation.localisation import (
     query_frames,
     read_queries,
     track_drive,
-    tracking_numbers,
 )
 from evaluation.maps import map_drive
-from evaluation.recognition import KEEP_ALL, Number, kept_share
+from evaluation.recognition import KEEP_ALL, Number, numbers_of
 from evaluation.study.parts import MakePart, Part
 from evaluation.study.sources import (
     DriveSource,
@@ -162,7 +160,6 @@ class LocaliseTask(Task):
             spacing,
             tuple(self.settings["estimator"].items()),
             self.settings["odometry_drift"],
-            jobs.processes,
         )
         cost = openings * OPENING_COST + _QUERIES_COST * pair.query.share
         cost += sum(_MAP_COST * one.share for one in drives)
@@ -187,23 +184,15 @@ class LocaliseTask(Task):
                 yield f"{stem}{far}", next(rows)
 
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
-        then = dict(self._named_results(before)) if before is not None else {}
+        then = dict(self._named_results(before or ()))
         for method, rows in self._named_results(found):
-            yield from localisation_numbers(rows, method)
-            if self.settings["odometry_drift"] is not None:
-                yield from tracking_numbers(rows, method)
-            if method in then:
-                share = kept_share(
-                    float(is_right(rows).mean()),
-                    float(is_right(then[method]).mean()),
-                )
-                yield Number(
-                    method,
-                    False,
-                    "relative_success",
-                    float(share),
-                    n=len(rows),
-                )
+            base = then.get(method)
+            yield from numbers_of(
+                self.name,
+                localised(rows),
+                None if base is None else localised(base),
+                method=method,
+            )
 
     def answers(self, found: Any) -> Iterator[Answered]:
         for method, rows in self._named_results(found):
@@ -227,8 +216,8 @@ def _check(name: str, value: Any, where: str) -> None:
 
 def measure_localisation(
     reporter: Reporter,
-    database: DriveSource,
-    query: DriveSource,
+    database: Callable[[], Drive | Path],
+    query: Callable[[], Drive],
     methods: tuple[str | Path, ...],
     texts: tuple[str, ...],
     starts: tuple[Starts, ...],
@@ -236,6 +225,7 @@ def measure_localisation(
     values: tuple[tuple[str, Any], ...] = (),
     odometry_drift: float | None = None,
     processes: int = 1,
+    columns: int | None = None,
 ) -> list[np.ndarray]:
     """Localises the queries of a pair of drives in one world.
 
@@ -244,8 +234,8 @@ def measure_localisation(
 
     Args:
         reporter: reports progress.
-        database: the drive of the map, or the file of its points.
-        query: the drive whose scans are localised.
+        database: opens the drive of the map, or returns the file of its points.
+        query: opens the drive whose scans are localised.
         methods: names of registration methods, or Python files with your own.
         texts: contents of the Python files, and "" for names of shipped
             methods. Results are computed again if a text changes.
@@ -257,6 +247,7 @@ def measure_localisation(
             see `evaluation.localisation.track_drive`; None to localise single
             scans, `spacing` apart.
         processes: number of processes that localise single scans.
+        columns: number of columns of a `.bin` file of points.
 
     Returns:
         An array for each pair of a method and an entry of `starts`. The arrays
@@ -267,7 +258,6 @@ def measure_localisation(
     """
     mapped = database()
     asked = CountedDrive(query())
-    columns = getattr(database, "columns", None)
     keep = database.keep if isinstance(database, JoinedSource) else KEEP_ALL
     made: list[LocalisationMap] = []
 

@@ -1,6 +1,7 @@
 """The part of the task `map` that needs no simulator: scores of labels."""
 
 from collections.abc import Iterator, Mapping, Sequence
+import math
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -17,26 +18,9 @@ from evaluation.map_update import (
     run_baseline,
     score,
 )
-from evaluation.recognition import Number
-from evaluation.study.tasks.jobs import Jobs
-from evaluation.study.tasks.pair import Pair, Result
+from evaluation.recognition import Number, numbers_of
 from evaluation.study.tasks.task import Task, check_positive
 
-# Scores of a detector that go into a table of results: IoUs, precisions and
-# recalls by points; shares of the points and of the structures that it calls
-# gone or new; and share of the structures whose verdict is right.
-_SCORES = (
-    "miou",
-    *(f"iou_{name}" for name in ("kept", "gone", "new", "unobserved")),
-    *(
-        f"{kind}_{name}"
-        for name in ("gone", "new")
-        for kind in ("precision", "recall")
-    ),
-    "called_points",
-    "called_structures",
-    "right_structures",
-)
 # Name under which the exact labels are scored, like a method's labels.
 TRUTH = "truth"
 # Name of labels that the user gives.
@@ -57,6 +41,18 @@ class MapScores(NamedTuple):
     gone: int
     new: int
     labels: PairLabels
+
+    def score(self, *keys: str) -> float:
+        """Returns a score by its keys in `scores`; NaN if it is undefined."""
+        value: Any = self.scores
+        for key in keys:
+            value = value[key]
+        return math.nan if value is None else float(value)
+
+    @property
+    def num_changed(self) -> int:
+        """Number of points with the exact label gone or new."""
+        return self.gone + self.new
 
 
 class MapTask(Task):
@@ -80,36 +76,7 @@ class MapTask(Task):
         self, found: Mapping[str, MapScores], before: Any | None
     ) -> Iterator[Number]:
         for method, one in found.items():
-            number = one.gone + one.new
-            values = {name: one.scores[name] for name in _SCORES}
-            values |= {"gone": one.gone, "new": one.new}
-            for name, value in values.items():
-                if value is not None:
-                    yield Number(method, False, name, float(value), n=number)
-
-
-class LabelledMapTask(MapTask):
-    """The task `map` on two maps with exact labels in an existing folder."""
-
-    def __init__(
-        self, maps: Path, methods: Sequence[str], given: Sequence[Path] = ()
-    ):
-        """Sets up the task for two maps; their files are not read yet.
-
-        Args:
-            maps: folder with the maps of two drives and their exact labels.
-            methods: names of change detectors.
-            given: files with labels of the older and of the newer map. These
-                labels are scored instead of the labels of change detectors.
-        """
-        super().__init__({}, str(maps))
-        self._arguments = maps, tuple(methods), tuple(given)
-
-    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
-        part = jobs.files.part("map", pair.key)
-        arguments = self._arguments
-        found = jobs.add(part, score_methods, arguments, version=self.version)
-        return (found,)
+            yield from numbers_of(self.name, one, method=method)
 
 
 def score_methods(

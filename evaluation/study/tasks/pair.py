@@ -5,8 +5,6 @@ from dataclasses import dataclass, field
 import math
 from typing import Any, Protocol
 
-import numpy as np
-
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, Role
 from evaluation.study.sources import DriveSource
 
@@ -52,17 +50,6 @@ class Result(Protocol):
 
 
 @dataclass(frozen=True)
-class Held:
-    """A result that is in memory instead of in a file."""
-
-    value: Any
-
-    def read(self) -> Any:
-        """Returns the result."""
-        return self.value
-
-
-@dataclass(frozen=True)
 class Pair:
     """Two drives that are measured under a condition of an experiment.
 
@@ -103,8 +90,6 @@ class Pair:
         settings: name -> value of settings outside of the protocol that change
             a number, such as the height of a LiDAR that differs from the
             methods' default.
-        overlaps: (Q, D) overlap of each query with each place, if the protocol
-            says that matches are by overlap; otherwise None.
         methods: names of the methods that are measured; None for all methods
             of the study.
         parts: task -> its results, as files or in memory, for the tasks that
@@ -129,7 +114,6 @@ class Pair:
     leaves_out_itself: bool = False
     may_repeat: bool = False
     settings: Mapping[str, Any] = field(default_factory=dict)
-    overlaps: np.ndarray | None = None
     methods: Collection[str] | None = None
     parts: dict[str, tuple[Result, ...]] = field(default_factory=dict)
 

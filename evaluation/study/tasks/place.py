@@ -12,8 +12,7 @@ from evaluation.recognition import (
     PlaceOutcome,
     QueryCost,
     measure_search,
-    place_numbers,
-    pose_numbers,
+    numbers_of,
 )
 from evaluation.study.parts import MakePart
 from evaluation.study.place_measurements import (
@@ -44,7 +43,6 @@ class PoseTask(Task):
 
     name = "pose"
     asks = True
-    _numbers = staticmethod(pose_numbers)
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         if not any(pair.has_method(one.name) for one in jobs.methods):
@@ -107,14 +105,14 @@ class PoseTask(Task):
         self, found: Outcomes, before: Outcomes | None
     ) -> Iterator[Number]:
         for now in found:
-            yield from self._numbers(now, _same_settings_outcome(before, now))
+            then = _same_settings_outcome(before, now)
+            yield from now.numbers(self.name, then)
 
 
 class PlaceTask(PoseTask):
     """Measures how well methods find a query's place in the database."""
 
     name = "place"
-    _numbers = staticmethod(place_numbers)
 
     def answers(self, found: Outcomes) -> Iterator[Answered]:
         for now in found:
@@ -139,12 +137,7 @@ class CostTask(Task):
 
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         for method, cost in found.items():
-            for name, value in (
-                ("build_time", 1e-3 * cost.build_ms),
-                ("query_time", 1e-3 * cost.query_ms),
-                ("memory", float(cost.memory)),
-            ):
-                yield Number(method, False, name, value, n=cost.places)
+            yield from numbers_of(self.name, cost, method=method)
 
 
 def _comparison(
@@ -188,8 +181,6 @@ def _comparison(
         ),
         pair.keep,
         pair.leaves_out_itself,
-        pair.overlaps,
-        leaves_out_slow=jobs.leaves_out_slow,
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 
 from cns_drake.base import InputError, did_you_mean, repeated
-from evaluation.recognition import Number
+from evaluation.recognition import Number, numbers_of
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import Pair, Result
 
@@ -100,9 +100,10 @@ class Task(abc.ABC):
         (part,) = pair.parts[self.name]
         return part.read()
 
-    @abc.abstractmethod
     def numbers(self, found: Any, before: Any | None) -> Iterable[Number]:
         """Yields the results of a pair of drives, a `Number` for each metric.
+
+        By default `found` has the values of the metrics of the task.
 
         Args:
             found: the task's result for the pair.
@@ -110,6 +111,7 @@ class Task(abc.ABC):
                 `found` itself if the pair is the baseline, None if there is no
                 baseline.
         """
+        return numbers_of(self.name, found, before)
 
     def answers(self, found: Any) -> Iterable[Answered]:
         """Yields the answers of each method to all queries; by default none.

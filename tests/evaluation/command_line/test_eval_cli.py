@@ -145,7 +145,8 @@ def test_queries_are_turned(capsys, towns):
     assert protocol["turn_queries"]
     assert (protocol["tilt_queries"], protocol["hide_sector"]) == (2.0, 60.0)
     assert found[1] == found[3]
-    assert found[1]["pose"] != found[2]["pose"] != found[0]["pose"]
+    errors = [one["rotation_median_deg"] for one in found]
+    assert errors[1] != errors[2] != errors[0]
     _, out, _ = run(capsys, *both, *options)
     assert "each query with a random yaw" in out
     for option, value in (
@@ -192,7 +193,7 @@ def test_tcr_table(capsys, towns):
     for text in (
         "town_01 <-> town_02",
         "TCR_sym ",
-        "TCR town_02 -> town_01",
+        "(town_02 -> town_01)",
         "where both drove",
         "TCR_sym of only the routes",
     ):
@@ -321,12 +322,12 @@ def test_scores_of_all_pairs(capsys, towns, tmp_path):
     output = tmp_path / "scores.csv"
     status, out, err = run(
         capsys,
-        "pr",
+        "scores",
         towns / "town_01_scans",
         towns / "town_02_scans",
         "--method",
         "scan-context++",
-        "--scores",
+        "--output",
         output,
     )
     assert (status, out) == (0, "")
@@ -409,6 +410,6 @@ def test_a_method_matches_sequences(capsys, towns, tmp_path):
     assert json.loads(out)["parameters"]["sequence"] == 20.0
     assert_refused(capsys, [*both, "sequence=-1"], "solid: sequence")
     (tmp_path / "scans").mkdir()
-    scores = ["pr", *2 * [tmp_path / "scans"], "--method", "solid"]
-    scores += ["--set", "sequence=20", "--scores", tmp_path / "scores.csv"]
+    scores = ["scores", *2 * [tmp_path / "scans"], "--method", "solid"]
+    scores += ["--set", "sequence=20", "--output", tmp_path / "scores.csv"]
     assert_refused(capsys, scores, "solid: sequence: needs the poses of scans")

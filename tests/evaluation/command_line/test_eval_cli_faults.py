@@ -81,7 +81,7 @@ def test_points_that_are_not_finite_are_noted(capsys, towns, tmp_path):
     )
     folders = [tmp_path / "scans", tmp_path / "scans"]
     output = tmp_path / "scores.csv"
-    scores = ["pr", *folders, "--method", "solid", "--scores", output]
+    scores = ["scores", *folders, "--method", "solid", "--output", output]
     status, _, err = run(capsys, *scores)
     assert status == 0
     assert err.startswith("14 points are not finite, and left out\n")
@@ -108,8 +108,8 @@ def test_bad_folders_of_scans(capsys, towns, tmp_path):
     good = towns / "town_01_scans"
 
     def scores(database, query, output=tmp_path / "out.csv"):
-        options = ["--method", "scan-context++", "--scores", output]
-        return ["pr", database, query, *options]
+        options = ["--method", "scan-context++", "--output", output]
+        return ["scores", database, query, *options]
 
     empty = tmp_path / "empty"
     empty.mkdir()

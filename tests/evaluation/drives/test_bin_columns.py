@@ -144,8 +144,8 @@ def test_folders_of_scans(capsys, tmp_path):
         folder.mkdir()
         for k in range(2):
             columns("nuscenes").tofile(folder / f"{k}.bin")
-    arguments = ["pr", *folders, "--method", "solid"]
-    arguments += ["--scores", tmp_path / "a.csv"]
+    arguments = ["scores", *folders, "--method", "solid"]
+    arguments += ["--output", tmp_path / "a.csv"]
     status, _, err = run(capsys, *arguments)
     assert status == 0
     assert err.count("its values show 5 columns") == 2

@@ -194,8 +194,8 @@ def test_faults_of_a_method_are_one_line(
     if data == "drives":
         words = ["pr", towns / "town_01", towns / "town_02"]
     else:
-        words = ["pr", towns / "town_01_scans", towns / "town_02_scans"]
-        words += ["--scores", tmp_path / "scores.csv"]
+        words = ["scores", towns / "town_01_scans", towns / "town_02_scans"]
+        words += ["--output", tmp_path / "scores.csv"]
     assert_refused(capsys, [*words, "--method", path], fault)
     assert not (tmp_path / "scores.csv").exists()
 

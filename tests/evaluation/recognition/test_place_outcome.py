@@ -8,59 +8,14 @@ from evaluation.recognition import (
     PlaceOutcome,
     PoseErrors,
     QueryDrive,
-    QueryOutcomes,
     Retrieval,
     RetrievalProtocol,
-    pose_numbers,
 )
-
-
-def outcome_of(method, outcomes, columns, errors):
-    """An outcome whose best places are not known."""
-    number = len(outcomes)
-    poses = {
-        "translation_error": errors.translation,
-        "rotation_error_deg": errors.rotation_deg,
-    }
-    return PlaceOutcome(
-        method=method,
-        database="a",
-        query="b",
-        protocol=RetrievalProtocol(),
-        protocol_name="recorded",
-        outcomes=outcomes,
-        columns={**columns, **poses},
-        place_frames=np.arange(9),
-        best_places=np.full((number, 5), -1),
-        best_scores=np.full((number, 5), np.nan),
-        matches=np.empty((0, 2), int),
-        nearest=np.full(number, np.inf),
-    )
 
 
 def part(number, kept):
     """Returns which queries are right: the first ones."""
     return np.arange(number) < kept
-
-
-def test_median_errors_are_those_of_right_answers():
-    """Thirty queries without a match, and one wrong place, do not count."""
-    right = part(41, 10)
-    outcomes = QueryOutcomes(
-        np.linspace(1.0, 0.5, 41),
-        right,
-        part(41, 11),
-        np.where(right, 1.0, np.inf),
-        9,
-    )
-    far = np.where(right, 0.1, 50.0)
-    far[0] = np.nan
-    now = outcome_of("btc", outcomes, {}, PoseErrors(far, 2.0 * far))
-    assert {n.metric: (n.value, n.n) for n in pose_numbers(now, None)} == {
-        "pose_success": (9 / 11, 11),
-        "translation_median": (0.1, 9),
-        "rotation_median_deg": (0.2, 9),
-    }
 
 
 @pytest.mark.parametrize("blocks", [None, np.arange(8) // 2])
@@ -107,5 +62,5 @@ def test_columns_hold_all_that_numbers_follow_from(blocks):
     np.testing.assert_array_equal(one.best_scores[:, 0], np.diag(scores))
     assert np.isnan(one.best_scores[:, 1:]).all()
     assert one.matches.tolist() == [[k, k] for k in range(5)]
-    assert one.nearest.tolist() == [1.0] * 8
+    assert found["nearest"].tolist() == [1.0] * 8
     assert [bool(why) for why in found["why"]] == [*~right]

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
-from helpers.measured_pairs import place_outcome
+from helpers.measured_pairs import place_outcome, values_of
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -72,9 +72,9 @@ def test_poses_are_judged_against_the_turned_sensor(drives):
         for protocol in (RetrievalProtocol(), TURNED)
     )
     for found in (plain, turned):
-        assert found.pose.success == 1.0
-        assert found.pose_errors.translation.max() < 1e-4
-        assert found.pose_errors.rotation_deg.max() < 1e-4
+        assert values_of(found, "pose")["pose_success"] == 1.0
+        assert found.columns["translation_error"].max() < 1e-4
+        assert found.columns["rotation_error_deg"].max() < 1e-4
     plain, turned = (
         retrieve(*drives, Corresponding(), protocol)
         for protocol in (RetrievalProtocol(), TURNED)

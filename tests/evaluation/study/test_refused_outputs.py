@@ -7,10 +7,9 @@ import pytest
 from cns_drake.base import InputError, choose_cluster
 from evaluation.real import measure_real
 from evaluation.results import check_output
-from evaluation.study import measure_pairs, study_recordings
+from evaluation.study import study_recordings
 
 MEASURE = {
-    "pair": lambda output: measure_pairs("one", [], [], output),
     "real": lambda output: measure_real(
         Path("nowhere"), output, choose_cluster(1, None)
     ),

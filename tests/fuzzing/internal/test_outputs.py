@@ -116,7 +116,8 @@ WRITERS = [
         True,
     ),
     Writer(
-        f"{EVAL} pr town_01_scans town_02_scans --method solid --scores OUT",
+        f"{EVAL} scores town_01_scans town_02_scans --method solid"
+        " --output OUT",
         ("",),
         True,
     ),

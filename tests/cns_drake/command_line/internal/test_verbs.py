@@ -27,6 +27,7 @@ def options(program, command):
 @pytest.mark.parametrize(
     ("words", "names"),
     [
+        (("pr", "a", "b", "--scores", "s"), "cns-eval scores"),
         (("tcr", "a", "b", "--paths"), "cns-drake export --format tum"),
         (("localise", "a", "--estimate", "e"), "evo_ape"),
         (("localise", "a", "--estimate=e"), "evo_ape"),
@@ -81,22 +82,6 @@ def test_formats_have_a_number_of_drives(
     assert err == f"cns-drake: error: {fault}\n"
 
 
-# What turns a command into another one -> words of the command, an option that
-# has no effect then, and one that has.
-@pytest.mark.parametrize(
-    ("words", "refused"),
-    [
-        (("pr", "a", "b", "--method", "solid", "--scores", "s"), "--mode=all"),
-        (("pr", "a", "b", "--method", "solid", "--scores", "s"), "--json"),
-    ],
-)
-def test_options_without_an_effect_are_refused(capsys, words, refused):
-    status, out, err = run(capsys, "cns-eval", *words, refused)
-    assert (status, out) == (2, "")
-    name = refused.partition("=")[0]
-    assert err.endswith(f"error: {name}: not together with --scores\n")
-
-
 # Commands whose results are no numbers: recordings, a report or weights.
 WITHOUT_NUMBERS = {
     "city",
@@ -106,6 +91,7 @@ WITHOUT_NUMBERS = {
     "train",
     "report",
     "real",
+    "scores",
 }
 
 

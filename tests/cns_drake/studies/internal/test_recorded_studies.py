@@ -3,7 +3,7 @@
 from helpers.drive_files import make_scan, write_recording
 from helpers.internal import studies
 from helpers.internal.eval_program import write_towns
-from helpers.measured_pairs import compare_maps, place_outcome
+from helpers.measured_pairs import compare_maps, place_scores
 from helpers.small_towns import drive
 import numpy as np
 import pytest
@@ -69,12 +69,12 @@ def test_the_numbers_are_those_of_the_single_commands(folder, tmp_path):
     for stage, name in databases.items():
         here = {"both.stage": stage}
         found[stage] = values(results, **here, task="place", verified=False)
-        alone = place_outcome(
+        alone = place_scores(
             open_drive(folder / name),
             open_drive(query),
             make_method("solid", {}),
             protocol=RANDOM_YAW_PROTOCOL,
-        ).by_mode["all"]
+        )
         assert found[stage]["auc"] == pytest.approx(alone.auc, abs=1e-9)
         change = compare_maps(read_map(folder / name), read_map(query)).change
         assert values(results, **here, task="change")["tcr_sym"] == (
@@ -115,12 +115,12 @@ def test_protocols_may_vary(folder, tmp_path):
         protocol={"base": "recorded", "radius": [5.0, 15.0]},
     )
     for radius in (5.0, 15.0):
-        alone = place_outcome(
+        alone = place_scores(
             open_drive(folder / "metropolis_01"),
             open_drive(folder / "metropolis_04"),
             make_method("solid", {}),
             protocol=RetrievalProtocol(radius=radius),
-        ).by_mode["all"]
+        )
         found = values(results, **{"protocol.radius": radius}, verified=False)
         assert found["auc"] == pytest.approx(alone.auc, abs=1e-9)
         assert found["with_match"] == alone.num_with_match
@@ -329,12 +329,12 @@ def test_drives_are_read_anew_for_another_protocol(folder, tmp_path):
     fields = {"protocol": {"base": "recorded", "query_spacing": spacings}}
     found = measure(tmp_path, folder, tasks=["place"], **fields)
     for spacing in spacings:
-        alone = place_outcome(
+        alone = place_scores(
             open_drive(folder / "metropolis_01"),
             open_drive(folder / "metropolis_04"),
             make_method("solid", {}),
             RetrievalProtocol(query_spacing=spacing),
-        ).by_mode["all"]
+        )
         here = {"protocol.query_spacing": spacing, "verified": False}
         shown = values(found, **here)
         assert shown["auc"] == pytest.approx(alone.auc, abs=1e-9)

@@ -7,7 +7,7 @@ import shutil
 
 from helpers.internal import studies
 from helpers.internal.eval_program import run_program
-from helpers.measured_pairs import compare_maps, place_outcome
+from helpers.measured_pairs import compare_maps, place_scores
 from helpers.small_map import write_town
 import numpy as np
 import pytest
@@ -151,12 +151,12 @@ def test_the_numbers_are_those_of_the_single_commands(
         change = compare_maps(mapped[stage], mapped["query"]).change
         assert found["tcr_sym"] == pytest.approx(change.symmetric, abs=1e-9)
         for ranges in (20, 40):
-            alone = place_outcome(
+            alone = place_scores(
                 drives[stage],
                 drives["query"],
                 make_method("solid", {"ranges": str(ranges)}),
                 protocol=protocol,
-            ).by_mode["all"]
+            )
             with_it = {**there, "methods__solid__ranges": ranges}
             found = values(results, **with_it, task="place")
             assert found["auc"] == pytest.approx(alone.auc, abs=1e-9)
@@ -288,12 +288,12 @@ def test_protocols_are_factors(town, tmp_path, jobs_done):
         for k in ("01", "04")
     )
     for radius in (2.0, 9.0):
-        alone = place_outcome(
+        alone = place_scores(
             database,
             query,
             make_method("solid", {}),
             protocol=RetrievalProtocol(radius=radius),
-        ).by_mode["all"]
+        )
         own, last = (
             values(
                 results,

@@ -7,15 +7,16 @@ from cns_drake.base import Reporter
 from evaluation.drives import open_drive
 from evaluation.localisation import (
     COLUMNS,
+    Localised,
     Localiser,
     Starts,
     default_settings,
-    localisation_summary,
     localise,
     make_estimator,
     make_map,
     read_queries,
 )
+from evaluation.recognition import numbers_of
 from evaluation.study import LocaliseTask, RecordingSource, measure_localisation
 
 STARTS = (Starts(0.5, 5.0), Starts(2.0, 10.0))
@@ -53,12 +54,8 @@ def test_numbers_of_a_pair(found):
     assert list(dict.fromkeys(n.method for n in numbers)) == names
     for name, rows in zip(names, found, strict=True):
         mine = {n.metric: n.value for n in numbers if n.method == name}
-        alone = localisation_summary(rows)
-        assert mine == {
-            metric: alone[metric]
-            for metric in mine
-            if alone[metric] is not None
-        }
+        alone = numbers_of("localise", Localised(rows))
+        assert repr(mine) == repr({n.metric: n.value for n in alone})
         assert {n.n for n in numbers if n.method == name} == {8}
     # Half of the scans are right that were right before.
     worse = [rows.copy() for rows in found]

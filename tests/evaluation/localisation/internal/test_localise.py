@@ -23,14 +23,13 @@ from evaluation.localisation import (
     METHODS,
     QUERY,
     InitialPose,
+    Localised,
     Localiser,
     Query,
     Settings,
     Starts,
     default_settings,
     estimators,
-    is_right,
-    localisation_summary,
     localise,
     make_estimator,
     make_map,
@@ -42,7 +41,7 @@ from evaluation.localisation import (
 )
 from evaluation.localisation.estimators import Estimate, _gauss_newton_step
 from evaluation.localisation.localiser import fit_at
-from evaluation.recognition import auroc
+from evaluation.recognition import auroc, numbers_of
 
 SHIPPED = [name for name in METHODS if name != "kiss-matcher"]
 # Each point of a scan is in a voxel of its own.
@@ -133,8 +132,7 @@ def test_another_sample_of_the_same_street_is_found(method):
         X_WS = a_pose(-10.0 + frame / 3.1, math.sin(frame), 1.7)
         offset, turn = starts.draw(frame)
         errors.append(one_query(found, X_WS, near, offset, turn))
-    right = is_right(np.array(errors, QUERY))
-    assert right.mean() >= 0.98
+    assert Localised(np.array(errors, QUERY)).success >= 0.98
 
 
 ROBUST = ("robust-plane-icp", "robust-gicp")
@@ -460,11 +458,16 @@ def test_far_coordinates_lose_nothing():
         assert rows[0][name] == pytest.approx(rows[1][name], abs=1e-4)
 
 
+def values_of(rows):
+    numbers = numbers_of("localise", Localised(rows))
+    return {one.metric: one.value for one in numbers}
+
+
 def with_scores(scores, wrong):
     rows = np.zeros(len(scores), QUERY)
     rows["own_score"], rows["fit"] = scores, scores
     rows["translation_error"] = np.where(wrong, 5.0, 0.0)
-    return localisation_summary(rows)
+    return values_of(rows)
 
 
 def test_whether_an_estimator_knows():
@@ -483,8 +486,9 @@ def test_whether_an_estimator_knows():
     assert values["success_03m_1deg"] == pytest.approx(40 / 44)
     assert values["translation_median"] == 0.0
     nothing = with_scores([1.0, 2.0], [True, True])
-    assert nothing["auroc_own_score"] is None is nothing["believed_from"]
-    assert nothing["confident_wrong"] is None is nothing["confident_of_wrong"]
+    for name in ("auroc_own_score", "believed_from", "confident_wrong"):
+        assert math.isnan(nothing[name])
+    assert math.isnan(nothing["confident_of_wrong"])
 
 
 def test_auroc_of_scores():
@@ -502,10 +506,10 @@ def test_an_end_without_a_pose_is_a_failure():
         EXACT,
     )
     row = one_query(found, a_pose(0, 0, 1.7), street(), *np.zeros((2, 3)))
-    values = localisation_summary(np.array([row]))
+    values = values_of(np.array([row]))
     assert values["without_pose"] == 1
     assert values["success_2m_5deg"] == 0.0
-    assert values["translation_median"] is None
+    assert math.isnan(values["translation_median"])
 
 
 @pytest.mark.parametrize(("number", "is_sparse"), [(9, True), (10, False)])
@@ -519,7 +523,7 @@ def test_a_scan_of_few_points_is_a_failure(number, is_sparse):
             one_query(found, X_WS, street(), *still),
         ]
     )
-    values = localisation_summary(rows)
+    values = values_of(rows)
     notes = []
     note_sparse("town", rows, notes.append)
     assert values["success_03m_1deg"] == (0.5 if is_sparse else 1.0)

@@ -14,13 +14,13 @@ from evaluation.localisation import (
     Localiser,
     Settings,
     Starts,
-    localisation_summary,
+    localised,
     map_of,
     track_drive,
-    tracking_summary,
 )
 from evaluation.localisation.estimators import Estimate
-from evaluation.localisation.tracking import drifting_steps, losses
+from evaluation.localisation.tracking import drifting_steps
+from evaluation.recognition import numbers_of
 
 MOUNT = Rotation.from_euler("ZYX", [130.0, 20.0, -8.0], degrees=True)
 CLOUD = np.random.default_rng(1).uniform(-20.0, 20.0, (400, 3))
@@ -56,6 +56,11 @@ def follow(line, estimator, drift=0.0, mapped=None, starts=None):
     return track_drive(found, line, mapped, starts, drift)
 
 
+def values_of(rows):
+    numbers = numbers_of("localise", localised(rows))
+    return {one.metric: one.value for one in numbers}
+
+
 def stay(place, scan, measured, start):
     return Estimate(start, 1.0)
 
@@ -64,11 +69,11 @@ def test_an_exact_odometry_keeps_the_first_error():
     rows = follow(Line(40), stay)
     assert rows["translation_error"] == pytest.approx(0.5)
     assert rows["rotation_error_deg"] == pytest.approx(0.0, abs=1e-6)
-    values = tracking_summary(rows)
+    values = values_of(rows)
     assert values["way"] == pytest.approx(78.0, abs=0.2)
     assert values["within_03m"] == 0.0
     assert values["lost_per_km"] == 0.0
-    assert values["back_after_median"] is None
+    assert math.isnan(values["back_after_median"])
 
 
 def test_drift_in_closed_form():
@@ -117,11 +122,11 @@ def test_losses_and_returns():
     # The odometry's error is none of a result.
     assert rows["track_error"][50] == pytest.approx(0.0, abs=1e-9)
     assert np.flatnonzero(np.isnan(rows["translation_error"])).tolist() == [50]
-    assert localisation_summary(rows)["without_pose"] == 1
-    (one, two), values = losses(rows), tracking_summary(rows)
+    (one, two), values = localised(rows).lost, values_of(rows)
+    assert values["without_pose"] == 1
     assert one == (pytest.approx(10.0, abs=0.02), True)
     assert two == (pytest.approx(18.0, abs=0.02), False)
-    assert values["lost"] == 2
+    assert values["losses"] == 2
     assert values["lost_for_good"] == 1
     assert values["lost_per_km"] == pytest.approx(2.0 / 0.198, rel=1e-3)
     assert values["back_after_median"] == pytest.approx(10.0, abs=0.02)
@@ -146,7 +151,7 @@ def test_each_stretch_has_a_start_of_its_own():
     assert rows["translation_error"] == pytest.approx(0.5)
     first = [rows[f"start_{axis}"][[0, 20]] for axis in "xyz"]
     assert not np.allclose(*np.transpose(first))
-    assert tracking_summary(rows)["way"] == pytest.approx(86.0, abs=0.2)
+    assert values_of(rows)["way"] == pytest.approx(86.0, abs=0.2)
 
 
 def test_drift_moves_the_start_and_not_the_truth():
@@ -177,4 +182,4 @@ def test_the_command_tracks(towns, tmp_path, capsys):
     table = (tmp_path / "localisation.csv").read_text().splitlines()
     assert table[0].startswith("stretch,way,step,track_error,frame,")
     status, out, _ = run(capsys, *command)
-    assert "a kilometre" in out
+    assert "losses of the track [1/km] " in out

@@ -1,5 +1,6 @@
 """What a method makes of two drives, in numbers."""
 
+from dataclasses import replace
 import math
 
 import numpy as np
@@ -8,12 +9,9 @@ from scipy.stats import binom
 
 from evaluation.recognition import (
     FAULTS,
-    PlaceOutcome,
-    PoseErrors,
     QueryOutcomes,
-    RetrievalProtocol,
     jackknife_interval,
-    place_numbers,
+    numbers_of,
 )
 from evaluation.recognition.faults import faults
 
@@ -34,30 +32,7 @@ def answered(is_right, scores=None, blocks=None):
         "why": faults(outcomes, np.arange(number), np.ones(number), 7.5),
         "overlap": np.linspace(0.2, 0.8, number),
     }
-    return outcome_of("solid", outcomes, columns, PoseErrors.unknown(number))
-
-
-def outcome_of(method, outcomes, columns, errors):
-    """An outcome whose best places are not known."""
-    number = len(outcomes)
-    poses = {
-        "translation_error": errors.translation,
-        "rotation_error_deg": errors.rotation_deg,
-    }
-    return PlaceOutcome(
-        method=method,
-        database="a",
-        query="b",
-        protocol=RetrievalProtocol(),
-        protocol_name="recorded",
-        outcomes=outcomes,
-        columns={**columns, **poses},
-        place_frames=np.arange(9),
-        best_places=np.full((number, 5), -1),
-        best_scores=np.full((number, 5), np.nan),
-        matches=np.empty((0, 2), int),
-        nearest=np.full(number, np.inf),
-    )
+    return replace(outcomes, columns=columns)
 
 
 def part(number, kept):
@@ -67,10 +42,10 @@ def part(number, kept):
 
 def numbers(now, before=None):
     """Metric -> value, and metric -> interval."""
-    found = list(place_numbers(now, before))
+    found = list(numbers_of("place", now, before, method="solid"))
     assert len({one.metric for one in found}) == len(found)
     assert {(one.method, one.verified, one.n) for one in found} == {
-        ("solid", False, len(now.outcomes))
+        ("solid", False, len(now))
     }
     return (
         {one.metric: one.value for one in found},
@@ -122,10 +97,10 @@ def test_intervals_of_kept_are_of_the_blocks_of_now(blocks_before):
 def test_what_is_wrong_with_each_answer():
     """Each kind of fault occurs once, and two best places are right."""
     one = answered([1, 1, 0, 0, 0, 0, 0])
-    one.outcomes.has_match[2] = False
+    one.has_match[2] = False
     frames = np.array([0, 1, 2, -1, 4, 5, 6])
     distances = np.array([1.0, 1.0, 1.0, np.nan, np.nan, 15.0, 15.1])
-    one.columns["why"][:] = faults(one.outcomes, frames, distances, 7.5)
+    one.columns["why"][:] = faults(one, frames, distances, 7.5)
     assert one.columns["why"].tolist() == [
         "",
         "",
@@ -147,7 +122,7 @@ def test_what_is_wrong_with_each_answer():
 
 @pytest.mark.parametrize("radius", [5.0, 7.5])
 def test_places_within_two_radii_are_near_miss(radius):
-    outcomes = answered([0, 0]).outcomes
+    outcomes = answered([0, 0])
     distances = 2 * radius + np.array([-1e-9, 1e-9])
     found = faults(outcomes, np.arange(2), distances, radius)
     assert found.tolist() == ["near_miss", "elsewhere"]

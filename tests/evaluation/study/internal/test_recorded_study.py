@@ -11,7 +11,7 @@ from helpers.contradictions import add_images
 from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
 from helpers.internal import studies
 from helpers.internal.eval_program import run
-from helpers.measured_pairs import place_outcome
+from helpers.measured_pairs import place_scores
 from helpers.small_towns import drive
 import numpy as np
 from PIL import Image
@@ -294,10 +294,10 @@ def test_each_protocol_is_that_of_the_single_command(
     # BTC's places differ between the two, those of SOLiD do not.
     for name in ("btc", "solid"):
         for protocol in both_protocols.values():
-            alone = place_outcome(
+            alone = place_scores(
                 *drives, make_method(name, {}), protocol=protocol
             )
-            expected = alone.by_mode["all"].auc
+            expected = alone.auc
             assert found[name, protocol.name].value == expected
 
 

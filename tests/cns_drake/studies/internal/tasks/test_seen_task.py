@@ -14,6 +14,7 @@ from cns_drake.studies.study import plan_study
 from cns_drake.studies.tasks.seen_task import (
     SeenTask,
     Sighting,
+    Sightings,
     changes_until,
     noticed_changes,
     sight_structures,
@@ -59,12 +60,14 @@ def test_the_first_drive_alone_notices_nothing():
 
 def test_numbers_of_all_changes_and_of_those_that_the_query_sees():
     query = sighting(LAST, {"house"}, {"elm"})
-    both = [
+    every, by_query = (
         noticed_changes(some, query, CAME, WENT)
         for some in (DRIVES, [DRIVES[0], (9, query)])
-    ]
+    )
     task = SeenTask({}, "mine.yaml")
-    found = {one.metric: (one.value, one.n) for one in task.numbers(both, None)}
+    sightings = Sightings(every, every.chosen(by_query.is_noticed))
+    numbers = task.numbers(sightings, None)
+    found = {one.metric: (one.value, one.n) for one in numbers}
     assert found == {
         "changed": (4.0, 4),
         "seen": (0.5, 4),

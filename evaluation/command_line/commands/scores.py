@@ -1,0 +1,69 @@
+"""The command `scores`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cns_drake.base import errors_at_option, shared_options, terminal
+from evaluation.command_line import options
+from evaluation.recognition import RECORDED_PROTOCOL
+
+GROUP = "Recognise places"
+
+
+def scores(
+    database: Annotated[Path, typer.Argument(metavar="DATABASE")],
+    query: Annotated[Path, typer.Argument(metavar="QUERY")],
+    method: options.MethodName,
+    output: Annotated[Path, typer.Option(metavar="FILE.csv")],
+    parameter: shared_options.MethodSettings = None,
+    sensor_height: options.SensorHeight = 1.6,
+    verified: Annotated[bool, typer.Option("--verified")] = False,
+    radius: float = RECORDED_PROTOCOL.radius,
+    columns: shared_options.Columns = None,
+) -> None:
+    """Score each pair of scans of two folders.
+
+    DATABASE and QUERY are folders with .bin, .pcd, .npy or .ply files. The
+    scans need no poses, so that the command computes only scores, and no
+    metric. Every query is compared with every place, even if the method usually
+    skips some places to save time. A higher score means more similar; the score
+    of a place that the method rejects is empty.
+
+    Args:
+        database: Folder with the scans of the known places.
+        query: Folder with the scans to recognise.
+        output: CSV file to write, with the columns query, database and score.
+            An existing file is replaced.
+        verified: Use geometric verification: reject a place if the method's own
+            pose estimate puts the query farther than --radius from that place.
+        radius: Radius of the geometric verification [m].
+
+    Example:
+        cns-eval scores kitti/01/velodyne kitti/04/velodyne \\
+            --method solid --output scores.csv
+    """
+    from evaluation.drives import NOT_FINITE
+    from evaluation.recognition import write_scores
+    from evaluation.study import choose_method
+
+    choice = choose_method(method, parameter or ()).at_height(sensor_height)
+    with errors_at_option("--method", "name"):
+        made = choice.make()
+    num_ignored = write_scores(
+        made,
+        database,
+        query,
+        output,
+        verification_radius=radius if verified else None,
+        columns=columns,
+        on_note=terminal.note,
+    )
+    if num_ignored:
+        terminal.note(f"{num_ignored} {NOT_FINITE}")
+    terminal.note(f"wrote {output}")
+    if (assumed := made.assumption(None)) is not None:
+        terminal.note(assumed)

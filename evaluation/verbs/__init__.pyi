@@ -1,0 +1,9 @@
+from evaluation.verbs.change import Change as Change
+from evaluation.verbs.change import change_between as change_between
+from evaluation.verbs.localisation import Localisation as Localisation
+from evaluation.verbs.localisation import localise as localise
+from evaluation.verbs.map_update import MapUpdate as MapUpdate
+from evaluation.verbs.map_update import update_map as update_map
+from evaluation.verbs.measured import Measured as Measured
+from evaluation.verbs.recognition import Recognition as Recognition
+from evaluation.verbs.recognition import recognise as recognise

@@ -1,0 +1,112 @@
+"""The verb `tcr`: how much changed between two drives or maps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from cns_drake.base import note
+from cns_drake.drives import Drive
+from evaluation.alignment import When
+from evaluation.change import (
+    ChangeReport,
+    DriveMap,
+    change_of_maps,
+    maps_in_one_world,
+    registered_change,
+    same_stage_partner,
+    spread_over_grids,
+)
+from evaluation.drives import NOT_FINITE
+from evaluation.recognition import numbers_of
+from evaluation.results import LAST, OWN, STAGE, QueryRows, Results
+from evaluation.verbs.measured import Measured, map_of, pair_key, rows_of
+
+
+@dataclass(frozen=True, eq=False)
+class Change(Measured):
+    """How much changed between two drives or maps.
+
+    Attributes:
+        report: the change, with its context.
+    """
+
+    report: ChangeReport
+
+
+def change_between(
+    a: Drive | Path | str,
+    b: Drive | Path | str,
+    *,
+    no_change: Drive | Path | str | None = None,
+    align: When = "auto",
+    lidar: str | None = None,
+    columns: int | None = None,
+    on_note: Callable[[str], None] = note,
+) -> Change:
+    """Measures how much changed between two drives, as `cns-eval tcr` does.
+
+    Args:
+        a: drive before the change, open or as a path, or the path of a map.
+        b: drive or map after the change.
+        no_change: control: a third drive, on A's route in B's stage or on B's
+            route in A's stage.
+        align: whether to align the drives: `auto` (if their world frames
+            differ), `always` or `never`.
+        lidar: name of the LiDAR, for recordings with several LiDARs.
+        columns: number of columns of `.bin` files.
+        on_note: is called with notes for the user.
+
+    Raises:
+        InputError: something cannot be read, drives cannot be aligned, or the
+            control follows neither route.
+
+    Example:
+        from evaluation import change_between
+
+        print(change_between("before.pcd", "after.pcd").metrics["tcr_sym"])
+    """
+    given = [one for one in (a, b, no_change) if one is not None]
+    maps, alignments = maps_in_one_world(given, align, lidar, columns)
+    before, after, *controls = maps
+    report = change_of_maps(before, after)
+    compared = {OWN: (report, after)}
+    for third in controls:
+        partner = same_stage_partner(before, after, third)
+        control = change_of_maps(third, partner)
+        compared[LAST] = control, partner
+        report = report.beside(control)
+    report = replace(
+        report,
+        spread=spread_over_grids(before, after, report.change),
+        alignment=alignments[0] if alignments else None,
+        registered=registered_change(before, after),
+    )
+    compared[OWN] = report, after
+    for drive_map in maps:
+        for text in drive_map.notes:
+            on_note(text)
+        if ignored := drive_map.voxels.num_ignored:
+            on_note(f"{drive_map.name}: {ignored} {NOT_FINITE}")
+    for alignment in alignments:
+        on_note(alignment.to_text())
+    if report.note is not None:
+        on_note(report.note)
+    names = before.name, after.name
+    rows = []
+    for stage, (found, newer) in compared.items():
+        factors = {STAGE: stage} if controls else {}
+        key = pair_key("tcr", _map_of(newer), names, "change", factors=factors)
+        rows += rows_of(numbers_of("change", found), key)
+    return Change(
+        {one.metric: one for one in numbers_of("change", report)},
+        Results.of(rows),
+        QueryRows.of(()),
+        report,
+    )
+
+
+def _map_of(drive_map: DriveMap) -> str:
+    drive = drive_map.drive
+    return map_of(drive if isinstance(drive, Drive) else Path(drive_map.name))

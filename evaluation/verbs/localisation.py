@@ -1,0 +1,242 @@
+"""The verb `localise`: how well scans are localised in a map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cns_drake.base import InputError, note
+from cns_drake.drives import Drive, check_same_world
+from evaluation.alignment import When, in_one_world
+from evaluation.change import open_source
+from evaluation.localisation import (
+    FEWEST_POINTS,
+    OneScan,
+    Starts,
+    default_settings,
+    localisation_columns,
+    localised,
+    make_estimator,
+)
+from evaluation.recognition import RANDOM_YAW_PROTOCOL, numbers_of
+from evaluation.results import Answers, QueryRows, Results
+from evaluation.study import NOT_LOCALISED, LocaliseTask, measure_localisation
+from evaluation.verbs.measured import (
+    Measured,
+    map_of,
+    noted,
+    noting,
+    pair_key,
+    rows_of,
+)
+
+# Drift of the odometry by default, as a share of the distance.
+_USUAL_DRIFT = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Localisation(Measured):
+    """How well scans are localised in a map.
+
+    Attributes:
+        method: name of the registration method.
+        map_name: name of the map's drive or file.
+        query_name: name of the queries' drive or file.
+        odometry_drift: drift of the odometry with which the drive was tracked;
+            None if single scans were localised.
+        rows: (K,) results of single queries, records of
+            `evaluation.localisation.QUERY`, or of a tracked drive.
+    """
+
+    method: str
+    map_name: str
+    query_name: str
+    odometry_drift: float | None
+    rows: np.ndarray
+
+
+def localise(
+    place: Drive | Path | str,
+    query: Drive | Path | str,
+    method: Path | str,
+    *,
+    start: float = 0.5,
+    start_turn: float = 2.0,
+    seed: int = 0,
+    settings: Mapping[str, Any] | None = None,
+    query_spacing: float | None = None,
+    track: bool = False,
+    odometry_drift: float | None = None,
+    align: When = "auto",
+    lidar: str | None = None,
+    columns: int | None = None,
+    processes: int = 1,
+    on_note: Callable[[str], None] = note,
+) -> Localisation:
+    """Localises scans in a map from wrong poses, as `cns-eval localise` does.
+
+    Args:
+        place: the map: a drive, open or as a path, or the path of a cloud.
+        query: the drive whose scans are localised; a cloud counts as one scan.
+        method: registration method, or a Python file with one of your own.
+        start: distance of the initial guess from the ground truth [m].
+        start_turn: angle between the initial guess and the ground truth [deg].
+        seed: seed of the random directions of the initial guesses.
+        settings: name -> value of each parameter of the method that differs
+            from its default.
+        query_spacing: distance that the car drives between two queries [m]; by
+            default 10. Not with `track`.
+        track: whether to track the whole drive.
+        odometry_drift: drift of the odometry with which the drive is tracked,
+            as a share of the distance; by default 0.01. Only with `track`.
+        align: whether to align the drives: `auto` (if their world frames
+            differ), `always` or `never`.
+        lidar: name of the LiDAR, for recordings with several LiDARs.
+        columns: number of columns of `.bin` files.
+        processes: number of processes that localise single scans.
+        on_note: is called with notes for the user.
+
+    Raises:
+        InputError: something cannot be read or used, or no scan can be
+            localised.
+
+    Example:
+        from evaluation import localise
+
+        found = localise("cns/01", "cns/02", "gicp", start=1.0)
+        print(found.metrics["success_2m_5deg"])
+    """
+    _check(query_spacing, odometry_drift, track=track)
+    if track and odometry_drift is None:
+        odometry_drift = _USUAL_DRIFT
+    spacing = query_spacing or RANDOM_YAW_PROTOCOL.query_spacing
+    starts = Starts(start, start_turn, seed)  # It checks them.
+    # Faults are told before the slow work.
+    values = tuple((settings or {}).items())
+    chosen = default_settings(str(method)).with_values(values, str(method))
+    make_estimator(str(method), chosen)
+    source, drive = _opened(place, query, align, lidar, columns, on_note)
+    notes: list[str] = []
+    found = measure_localisation(
+        noting(notes.append),
+        lambda: source,
+        lambda: drive,
+        (
+            Path(method).absolute()
+            if str(method).endswith(".py")
+            else str(method),
+        ),
+        ("",),
+        (starts,),
+        spacing,
+        values,
+        odometry_drift,
+        processes,
+        columns,
+    )
+    if not found:
+        raise InputError(notes[-1].removesuffix(NOT_LOCALISED))
+    (rows,) = found
+    if all(map(math.isnan, rows["unmapped"])):
+        raise InputError(
+            f"{drive.name}: no scan has {FEWEST_POINTS} points in"
+            f" different voxels of {chosen.scan_voxel:g} m"
+        )
+    for text in notes:
+        on_note(text)
+    name = Path(method).stem
+    task = LocaliseTask(
+        {
+            "starts": [[start, start_turn]],
+            "seed": seed,
+            "estimator": dict(values),
+            "odometry_drift": odometry_drift,
+            **({"spacing": query_spacing} if query_spacing else {}),
+        },
+        "localise",
+    )
+    key = pair_key(
+        "localise",
+        map_of(drive),
+        (source.name, drive.name),
+        task.name,
+        settings=task.changed_settings,
+    )
+    numbers = [*numbers_of(task.name, localised(rows), method=name)]
+    answers = Answers(
+        **key, method=name, verified=False, columns=localisation_columns(rows)
+    )
+    return Localisation(
+        {one.metric: one for one in numbers},
+        Results.of(rows_of(numbers, key)),
+        QueryRows.of([answers]),
+        name,
+        source.name,
+        drive.name,
+        odometry_drift,
+        rows,
+    )
+
+
+def _check(
+    query_spacing: float | None, odometry_drift: float | None, *, track: bool
+) -> None:
+    """Checks which options are given together, and their ranges.
+
+    Raises:
+        InputError: an option cannot be used.
+    """
+    if track and query_spacing is not None:
+        raise InputError("--query-spacing: not together with --track")
+    if not track and odometry_drift is not None:
+        raise InputError("--odometry-drift: only together with --track")
+    if query_spacing is not None and not 0.0 < query_spacing < math.inf:
+        raise InputError(f"--query-spacing: {query_spacing:g} is not above 0")
+    if odometry_drift is not None and not 0.0 <= odometry_drift <= 1.0:
+        raise InputError(
+            f"--odometry-drift: {odometry_drift:g} is not from 0 to 1"
+        )
+
+
+def _opened(
+    place: Drive | Path | str,
+    query: Drive | Path | str,
+    align: When,
+    lidar: str | None,
+    columns: int | None,
+    on_note: Callable[[str], None],
+) -> tuple[Drive | Path, Drive]:
+    """Returns the map and the drive of the queries, and notes on them.
+
+    Two drives are in one world. A point cloud as the map stays a path; a point
+    cloud as the query becomes a drive of one scan.
+
+    Raises:
+        InputError: a path cannot be opened, or the drives cannot be aligned.
+    """
+    source, asked = (
+        one
+        if isinstance(one, Drive)
+        else open_source(Path(one), lidar, columns)
+        for one in (place, query)
+    )
+    drive = asked if isinstance(asked, Drive) else OneScan(asked, columns)
+    for opened in (source, drive):
+        noted(opened, on_note)
+    if not isinstance(source, Drive):
+        if align == "always":
+            raise InputError(
+                f"--align: {place} is no drive, and stays as it is"
+            )
+        return source, drive
+    alignment = in_one_world(source, drive, align)
+    if alignment is not None:
+        on_note(alignment.report.to_text())
+        source, drive = alignment.first, alignment.second
+    check_same_world(source, drive)
+    return source, drive

@@ -1,0 +1,134 @@
+"""What a verb measures: its metrics, and its rows in the two tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+import math
+from pathlib import Path
+from typing import Any
+
+from cns_drake.base import Reporter, one_line
+from cns_drake.drives import Drive
+from evaluation.drives import open_drive
+from evaluation.recognition import (
+    RANDOM_YAW_PROTOCOL,
+    Interval,
+    Number,
+    RetrievalProtocol,
+)
+from evaluation.results import QueryRows, Results, Row, made_by
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What a verb measures of a pair of drives, maps or sessions.
+
+    Attributes:
+        numbers: name of a metric -> its result, in the order of
+            `evaluation.recognition.METRICS`.
+        results: the rows of `results.csv`.
+        queries: the rows of `queries.csv`.
+    """
+
+    numbers: Mapping[str, Number]
+    results: Results
+    queries: QueryRows
+
+    @property
+    def metrics(self) -> dict[str, float]:
+        """Name of a metric -> its value; NaN if it is undefined."""
+        return {name: one.value for name, one in self.numbers.items()}
+
+    @property
+    def intervals(self) -> dict[str, Interval]:
+        """Name of a metric -> its 95 % interval, where it has one."""
+        return {
+            name: one.interval
+            for name, one in self.numbers.items()
+            if not math.isnan(one.interval.low)
+        }
+
+
+def pair_key(
+    verb: str,
+    map_name: str,
+    names: tuple[str, str],
+    task: str,
+    protocol: RetrievalProtocol = RANDOM_YAW_PROTOCOL,
+    settings: Mapping[str, Any] | None = None,
+    factors: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Returns the columns that all rows of a pair have.
+
+    Args:
+        verb: name of the verb, the `experiment` of the rows.
+        map_name: name of the map.
+        names: names of the first and of the second drive.
+        task: the task.
+        protocol: the protocol.
+        settings: name -> value of settings outside of the protocol that change
+            a number.
+        factors: name -> value of each factor.
+    """
+    database, query = names
+    return {
+        "experiment": verb,
+        "map": map_name,
+        "database": database,
+        "query": query,
+        "seed": protocol.seed,
+        "factors": factors or {},
+        "task": task,
+        **made_by(protocol, settings),
+    }
+
+
+def rows_of(numbers: Iterable[Number], key: Mapping[str, Any]) -> list[Row]:
+    """Returns numbers as rows of `results.csv` with the columns of a key."""
+    return [Row.of(number, **key) for number in numbers]
+
+
+def map_of(opened: Drive | Path) -> str:
+    """Returns the name of a drive's map; without a map, of its world frame."""
+    if isinstance(opened, Path):
+        return one_line(opened.name)
+    named = (opened.scenario or {}).get("map")
+    if named is not None:
+        return one_line(Path(str(named)).name)
+    return opened.world_frame.partition("/")[0] or opened.name
+
+
+def noted(opened: Any, on_note: Callable[[str], None]) -> Any:
+    """Returns a drive or a path; notes how a drive was read."""
+    if isinstance(opened, Drive):
+        for text in opened.notes:
+            on_note(text)
+    return opened
+
+
+def opened_drive(
+    given: Drive | Path | str,
+    lidar: str | None,
+    columns: int | None,
+    on_note: Callable[[str], None],
+) -> Drive:
+    """Returns a drive that may be open already; notes how it was read.
+
+    Raises:
+        InputError: the drive cannot be read.
+    """
+    if isinstance(given, Drive):
+        return given
+    drive: Drive = noted(open_drive(Path(given), lidar, columns), on_note)
+    return drive
+
+
+def noting(on_note: Callable[[str], None]) -> Reporter:
+    """Returns a reporter of notes, and of nothing else."""
+
+    def send(kind: str, *values: Any) -> None:
+        if kind == "note":
+            on_note(*values)
+
+    return Reporter(send)

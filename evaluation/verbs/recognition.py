@@ -1,0 +1,326 @@
+"""The verb `pr`: how well a method recognises the places of a drive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cns_drake.base import (
+    InputError,
+    check_regular,
+    did_you_mean,
+    note,
+)
+from cns_drake.drives import Drive, check_same_map, check_same_world
+from evaluation.alignment import When, in_one_world
+from evaluation.drives import NOT_FINITE, CountedDrive
+from evaluation.methods import Method
+from evaluation.recognition import (
+    PROTOCOLS,
+    Mode,
+    PlaceOutcome,
+    RetrievalProtocol,
+    check_has_match,
+    compared_frames,
+    load_metrics,
+    overlap_matrix,
+    read_overlaps,
+)
+from evaluation.results import (
+    Answers,
+    QueryRows,
+    Results,
+    as_factor,
+    check_metric_names,
+)
+from evaluation.study import (
+    MethodChoice,
+    PlaceComparison,
+    choose_method,
+    measure_places,
+)
+from evaluation.verbs.measured import (
+    Measured,
+    map_of,
+    noting,
+    opened_drive,
+    pair_key,
+    rows_of,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Recognition(Measured):
+    """How well a method recognises the places of a drive.
+
+    Attributes:
+        method: the method.
+        outcome: its answers to the queries.
+        mode: which queries the precision-recall curve counts.
+        overlaps: (Q, D) overlap of each query with each place, if matches are
+            by overlap; otherwise None.
+    """
+
+    method: Method
+    outcome: PlaceOutcome
+    mode: Mode
+    overlaps: np.ndarray | None
+
+
+@dataclass(frozen=True, eq=False)
+class _MadeChoice(MethodChoice):
+    """A method that is made already."""
+
+    made: Method | None = None
+
+    def make(self) -> Method:
+        assert self.made is not None
+        return self.made
+
+
+def recognise(
+    database: Drive | Path | str,
+    query: Drive | Path | str,
+    method: Method | MethodChoice | Path | str,
+    *,
+    protocol: RetrievalProtocol | str = "random-yaw",
+    mode: Mode = "all",
+    settings: Mapping[str, Any] | None = None,
+    sensor_height: float = 1.6,
+    metrics: Iterable[Path | str] = (),
+    align: When = "auto",
+    across_maps: bool = False,
+    lidar: str | None = None,
+    columns: int | None = None,
+    exact_overlaps: Path | None = None,
+    on_note: Callable[[str], None] = note,
+    **fields: Any,
+) -> Recognition:
+    """Measures place recognition between two drives, as `cns-eval pr` does.
+
+    Drives in different world frames are aligned first.
+
+    Args:
+        database: drive that provides the known places, open or as a path.
+        query: drive that provides the scans to recognise.
+        method: the method: its name, a Python file with a method of your own,
+            an object, or a choice of a study.
+        protocol: the protocol, or its name.
+        mode: which queries the precision-recall curve counts: `all`, or only
+            queries with a match (`filtered`). The tables count all.
+        settings: name -> value of each parameter of a named method that differs
+            from its default.
+        sensor_height: height of the LiDAR above the ground for a named method
+            [m].
+        metrics: Python files that register metrics of your own.
+        align: whether to align the drives: `auto` (if their world frames
+            differ), `always` or `never`.
+        across_maps: whether the drives may be through maps of different names.
+        lidar: name of the LiDAR, for recordings with several LiDARs.
+        columns: number of columns of `.bin` files.
+        exact_overlaps: file with exact overlaps; by default overlaps are
+            estimated from the scans. It needs the field `overlap`.
+        on_note: is called with notes for the user.
+        fields: fields of the protocol that differ, such as `radius=5.0` or
+            `verified=True`; see `RetrievalProtocol`.
+
+    Raises:
+        InputError: something cannot be read or used, the drives are not of one
+            map, or no query has a match.
+
+    Example:
+        from evaluation import open_drive, recognise
+
+        database, query = map(open_drive, ("cns/01", "cns/02"))
+        found = recognise(database, query, "solid", verified=True)
+        print(found.metrics["auc"], found.intervals["auc"])
+    """
+    protocol = replace(_protocol(protocol), **fields)
+    if exact_overlaps is not None:
+        if protocol.overlap is None:
+            raise InputError("--exact-overlaps: add --truth overlap:PART")
+        check_regular(exact_overlaps)
+    own = [one for path in metrics for one in load_metrics(Path(path))]
+    choice, factors = _choice(method, settings or {}, sensor_height)
+    check_metric_names(own, factors)
+    made = choice.make()
+    if protocol.exclude_recent is not None and not _is_itself(database, query):
+        raise InputError(
+            f"--exclude-recent: it is for a drive against itself, but"
+            f" {_named(query)} is not {_named(database)}"
+        )
+    opened = [
+        opened_drive(one, lidar, columns, on_note) for one in (database, query)
+    ]
+    drives = _in_one_world(opened, align, on_note, across_maps=across_maps)
+    overlaps = _overlaps(*drives, protocol, exact_overlaps)
+    places, queries = drives
+    outcomes = measure_places(
+        noting(on_note),
+        PlaceComparison(
+            lambda: places,
+            lambda: queries,
+            (choice,),
+            protocol,
+            (protocol.radius,),
+            truth=overlaps,
+            leaves_out_slow=False,
+        ),
+    )
+    outcomes = [replace(one, method=choice.name) for one in outcomes]
+    (outcome,) = (
+        one for one in outcomes if one.is_verified == protocol.verified
+    )
+    check_has_match(outcome)
+    for text in _notes(made, drives):
+        on_note(text)
+    if protocol.exclude_recent is None and _is_itself(database, query):
+        on_note(
+            f"{_named(query)}: every scan finds itself (--exclude-recent leaves"
+            " out recent places)"
+        )
+    height = dict(choice.settings).get("sensor_height")
+    key = {
+        task: pair_key(
+            "pr",
+            map_of(queries),
+            (places.name, queries.name),
+            task,
+            protocol,
+            # A text on the command line and a number are the same.
+            {} if height is None else {"sensor_height": float(str(height))},
+            factors,
+        )
+        for task in ("place", "pose")
+    }
+    return Recognition(
+        {
+            one.metric: one
+            for task in key
+            for one in outcome.numbers(task, mode=mode)
+        },
+        Results.of(
+            row
+            for task in key
+            for one in outcomes
+            for row in rows_of(one.numbers(task), key[task])
+        ),
+        QueryRows.of(
+            Answers(
+                **key["place"],
+                method=one.method,
+                verified=one.is_verified,
+                columns=one.columns,
+            )
+            for one in outcomes
+        ),
+        made,
+        outcome,
+        mode,
+        overlaps,
+    )
+
+
+def _protocol(protocol: RetrievalProtocol | str) -> RetrievalProtocol:
+    if isinstance(protocol, RetrievalProtocol):
+        return protocol
+    if protocol not in PROTOCOLS:
+        raise InputError(
+            f"protocol: {protocol!r} is none of {', '.join(PROTOCOLS)}"
+            f"{did_you_mean(protocol, PROTOCOLS)}"
+        )
+    return PROTOCOLS[protocol]
+
+
+def _choice(
+    method: Method | MethodChoice | Path | str,
+    settings: Mapping[str, Any],
+    sensor_height: float,
+) -> tuple[MethodChoice, dict[str, Any]]:
+    """Returns the method with its settings, and the columns of these.
+
+    The height of the sensor is in the digest of the protocol, and no column.
+    """
+    if isinstance(method, Method):
+        changed = method.config.model_dump(exclude_defaults=True)
+        given: MethodChoice = _MadeChoice(
+            method.name, settings=tuple(changed.items()), made=method
+        )
+        choice = given
+    else:
+        if isinstance(method, MethodChoice):
+            given = method
+        else:
+            given = choose_method(method)
+        given = replace(given, settings=(*given.settings, *settings.items()))
+        choice = given.at_height(sensor_height)
+    columns = {name: as_factor(value) for name, value in given.columns.items()}
+    return choice, columns
+
+
+def _is_itself(database: Drive | Path | str, query: Drive | Path | str) -> bool:
+    if isinstance(database, Drive) or isinstance(query, Drive):
+        return database is query
+    return Path(database).resolve() == Path(query).resolve()
+
+
+def _named(given: Drive | Path | str) -> str:
+    return given.name if isinstance(given, Drive) else str(given)
+
+
+def _in_one_world(
+    drives: Sequence[Drive],
+    align: When,
+    on_note: Callable[[str], None],
+    *,
+    across_maps: bool,
+) -> tuple[CountedDrive, CountedDrive]:
+    """Returns both drives in one world, and counts what is ignored of them.
+
+    Raises:
+        InputError: the drives are not of one map, or cannot be aligned.
+    """
+    database, query = drives
+    if not across_maps:
+        try:
+            check_same_map(database, query)
+        except InputError as error:
+            raise InputError(
+                f"{error} (--across-maps allows this, for cities along the same"
+                " streets)"
+            ) from None
+    alignment = in_one_world(database, query, align, across_maps=across_maps)
+    if alignment is not None:
+        on_note(alignment.report.to_text())
+        database, query = alignment.first, alignment.second
+    check_same_world(database, query, across_maps=across_maps)
+    return CountedDrive(database), CountedDrive(query)
+
+
+def _overlaps(
+    places: Drive,
+    queries: Drive,
+    protocol: RetrievalProtocol,
+    exact_overlaps: Path | None,
+) -> np.ndarray | None:
+    """Returns the overlaps (Q, D) if matches are by overlap, otherwise None."""
+    if exact_overlaps is not None:
+        frames = compared_frames(places, queries, protocol)
+        return read_overlaps(exact_overlaps, *frames)
+    if protocol.overlap is not None:
+        return overlap_matrix(places, queries, protocol)
+    return None
+
+
+def _notes(method: Method, drives: Iterable[CountedDrive]) -> list[str]:
+    """Returns what the method assumes, and what was ignored of the scans."""
+    assumptions = {method.assumption(one.lidar_field): None for one in drives}
+    return [text for text in assumptions if text is not None] + [
+        f"{drive.name}: {drive.num_ignored} {NOT_FINITE}"
+        for drive in drives
+        if drive.num_ignored
+    ]
