@@ -150,7 +150,10 @@ def _camera(scenario: Scenario, given: Mapping[str, int] | str) -> Scenario:
 def _set(scenario: Scenario, texts: Iterable[str]) -> Scenario:
     from cns_drake.scenarios import set_fields
 
-    return set_fields(scenario, texts)
+    found = set_fields(scenario, texts)
+    for name in found.lidars.keys() - scenario.lidars.keys():
+        note(f"--set: lidars.{name}: a further LiDAR")
+    return found
 
 
 # By the names of parameters, in the order in which they change a scenario.

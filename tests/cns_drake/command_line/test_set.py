@@ -154,11 +154,13 @@ def test_a_scan_has_the_fields_of_one_lidar(tmp_path, capfd):
 
 def test_generate_sets_fields_of_all_drives(drive, tmp_path, capfd):
     words = ("--frames", 2, "--jobs", 1, "--set", "lidars.lidar.rings=3")
+    words += ("--set", "lidars.rear.columns=8")
     output = ("--output", tmp_path)
     done = run_program(
         capfd, "cns-drake", main, "generate", drive, *output, *words
     )
     assert done[0] == 0
+    assert done[2].count("a further LiDAR") == 1
     recorded = yaml.safe_load((tmp_path / "drive/scenario.yaml").read_text())
     assert recorded["lidars"]["lidar"]["rings"] == 3
 
