@@ -20,6 +20,12 @@ _BENT = 0.05
 _MM = 1000.0
 # Smaller polygons of a geometry are dropped [m^2].
 _LEAST_PART_AREA = 0.01
+# Lines that cross themselves more often are not read, nor lines whose pieces
+# meet more others than this.
+_MOST_CROSSINGS = 1000
+_MOST_MET = 8.0
+# Number of pieces of a line whose crossings are counted.
+_SAMPLED = 64
 # The four corner triangles of a face with four corners. The second and the last
 # one together fill the face.
 _CORNERS_OF_FOUR = np.array([(3, 0, 1), (0, 1, 2), (1, 2, 3), (0, 2, 3)])
@@ -117,10 +123,11 @@ def _triangulate_along(
         for key, corner in zip(keys.tolist(), ring, strict=True)
     }
     holes = [hole / _MM for hole in flat_mm[1:] if len(hole) >= 3]
-    polygon: BaseGeometry = Polygon(flat_mm[0] / _MM, holes)
-    if not polygon.is_valid:
-        faults.add("face that crosses itself, repaired", name)
-        polygon = shapely.set_precision(make_valid(polygon), 1.0 / _MM)
+    face = Polygon(flat_mm[0] / _MM, holes)
+    polygon: BaseGeometry = face
+    if not face.is_valid:
+        polygon = repaired(face, "face", name, faults)
+        polygon = shapely.set_precision(polygon, 1.0 / _MM)
     parts = [np.zeros((0, 3, 2))]
     for part in shapely.get_parts(polygon):
         if isinstance(part, Polygon) and part.area >= LEAST_AREA:
@@ -142,6 +149,57 @@ def _triangulate_along(
         row[axis] = origin[axis]
         row[axis] -= normal @ (row - origin) / normal[axis]
     return lifted.reshape(-1, 3, 3)
+
+
+def repaired(
+    polygon: Polygon, what: str, name: str, faults: ImportFaults
+) -> BaseGeometry:
+    """Returns `valid_area`, and counts why it is not the polygon.
+
+    The fault is counted in `faults`, with `name` as the name of the object and
+    `what` as the kind of outline.
+    """
+    area = valid_area(polygon)
+    if area.is_empty:
+        faults.add(f"{what} that crosses itself very often, left out", name)
+    elif area is not polygon:
+        faults.add(f"{what} that crosses itself, repaired", name)
+    return area
+
+
+def valid_area(polygon: Polygon) -> BaseGeometry:
+    """Returns a polygon, as valid areas if its outline crosses itself.
+
+    An outline that crosses itself very often has none.
+    """
+    if polygon.is_valid:
+        return polygon
+    rings = (polygon.exterior, *polygon.interiors)
+    if any(is_tangled(np.array(ring.coords)) for ring in rings):
+        return Polygon()
+    return make_valid(polygon)
+
+
+def is_tangled(line: np.ndarray, reach: float = 0.0) -> bool:
+    """Returns whether pieces of a line (N, 2) meet too many others.
+
+    Shapely takes minutes and gigabytes for a line that crosses or covers itself
+    very often, which no map needs and a small file can contain. The pieces of
+    long lines are sampled.
+
+    Args:
+        line: the corners of the line.
+        reach: distance at which pieces meet; by default they cross.
+    """
+    ends = np.stack([line[:-1], line[1:]], axis=1)
+    pieces = np.asarray(shapely.linestrings(ends))
+    some = pieces[:: max(1, len(pieces) // _SAMPLED)]
+    tree = shapely.STRtree(pieces)
+    _, met = tree.query(some, predicate="dwithin", distance=reach)
+    # Each piece meets itself and its neighbours.
+    others = len(met) / len(some) - 3.0
+    crossings = 0.0 if reach else others * len(pieces) / 2.0
+    return others > _MOST_MET or crossings > _MOST_CROSSINGS
 
 
 def flat_surface(
@@ -187,8 +245,5 @@ def valid_parts(
     An outline that crosses itself is repaired, and counted in `faults` with
     `name` as the name of the object.
     """
-    geometry: BaseGeometry = polygon
-    if not polygon.is_valid:
-        faults.add("outline that crosses itself, repaired", name)
-        geometry = make_valid(polygon)
+    geometry = repaired(polygon, "outline", name, faults)
     return list(parts_of(shapely.set_precision(geometry, GRID)))

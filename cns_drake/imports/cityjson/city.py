@@ -23,7 +23,11 @@ from cns_drake.imports.cityjson.city_file import (
     CityObject,
 )
 from cns_drake.imports.cityjson.reading import read_cityjson
-from cns_drake.imports.faces import face_triangles, joined_triangles
+from cns_drake.imports.faces import (
+    face_triangles,
+    joined_triangles,
+    valid_area,
+)
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.imported_objects import ImportedObject, make_object
@@ -301,7 +305,7 @@ def _is_covered(geometry: CityGeometry, others: Sequence[CityGeometry]) -> bool:
 def _footprint(geometries: Iterable[CityGeometry]) -> BaseGeometry:
     """Returns the area of geometries seen from above, in whole millimetres."""
     polygons = [
-        shapely.make_valid(shapely.Polygon(np.round(face[0][:, :2], 3)))
+        valid_area(shapely.Polygon(np.round(face[0][:, :2], 3)))
         for geometry in geometries
         for face in geometry.faces
         if len(face[0]) > 2

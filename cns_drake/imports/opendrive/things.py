@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base import step_lengths
 from cns_drake.city import GRID, OBJECTS, Structure, name_stem, placed, tree
+from cns_drake.imports.faces import repaired
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.imported_objects import make_object
 from cns_drake.imports.opendrive.lanes import TYPES, stations
@@ -187,12 +188,12 @@ def _extruded_object(
         faults.add("object without a height, left out", name)
         return None
     polygon = _area_of_outline(thing, outline.line)
-    if not polygon.is_valid:
-        faults.add("outline that crosses itself, repaired", name)
     pieces = [
         piece
         for piece in shapely.get_parts(
-            shapely.set_precision(shapely.make_valid(polygon), GRID)
+            shapely.set_precision(
+                repaired(polygon, "outline", name, faults), GRID
+            )
         )
         if isinstance(piece, Polygon) and piece.area > _LEAST_AREA
     ]
@@ -216,7 +217,7 @@ def _extruded_object(
     return _object_structure(thing, triangles, shapely.union_all(pieces))
 
 
-def _area_of_outline(thing: Thing, line: LineString) -> BaseGeometry:
+def _area_of_outline(thing: Thing, line: LineString) -> Polygon:
     """Returns the area of an object with an outline [m], perhaps invalid.
 
     An object whose outline is open, or has just two corners, is narrow.

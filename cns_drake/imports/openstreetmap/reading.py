@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base import InputError, check_regular, user_errors
 from cns_drake.city import hull_of
+from cns_drake.imports.faces import is_tangled
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.element_kinds import (
     element_kind,
@@ -32,6 +33,10 @@ from cns_drake.imports.openstreetmap.features import (
 _NO_AREA = 1e-12
 _WITHOUT_AREA = "without area"
 _NOT_CLOSED = "whose outline does not close"
+# Ways of fewer nodes cost little, however often they cross themselves.
+_MANY_NODES = 64
+# Distance of pieces of a way that lie in each other, about 0.3 m [deg].
+_NEAR = 3e-6
 _LETTERS = {"Node": "n", "Way": "w", "Relation": "r"}
 # A negative id of a file becomes this number minus the id.
 _FIRST_NEW = 10**12
@@ -206,6 +211,11 @@ def _way_of(
     if len(nodes) < 2:
         return None
     line = np.array([(node.lon, node.lat) for node in nodes])
+    if len(line) > _MANY_NODES and (
+        is_tangled(line) or is_tangled(line, _NEAR)
+    ):
+        faults.add("way with a tangle of nodes, left out", name)
+        return None
     return OsmWay(name, tags, line, tuple(node.ref for node in nodes))
 
 

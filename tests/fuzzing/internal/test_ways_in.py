@@ -918,6 +918,11 @@ OSM = {
     "tree row": (FAR, {"natural": "tree_row"}),
     "street": (FAR, {"highway": "residential"}),
     "lanes": ([(0, 30), (9, 30)], {"highway": "primary", "lanes": "99999999"}),
+    "laps": (SQUARE[:4] * 1500, {"highway": "residential"}),
+    "zigzag": (
+        [(0.02 * k, 30 + 0.3 * (k % 2)) for k in range(6000)],
+        {"barrier": "wall"},
+    ),
     "wood": (SQUARE, {"natural": "wood"}),
     "levels": (
         [(0, 40), (900, 40), (900, 900), (0, 900), (0, 40)],
@@ -1024,6 +1029,12 @@ def _(folder):
         for x in (0.0, 3e6)
     ]
     city_json(folder, *faces)
+
+
+@way("CityJSON: one ring", "x.json", *CITYJSON, use=imported("x.json"))
+def _(folder):
+    laps = [(0, 0, 0), (10, 0, 0), (10, 0, 9), (0, 0, 9), (3, 0, 5)] * 2000
+    city_json(folder, laps, [(0, 0, 0), (10, 0, 0), (10, 0, 9)])
 
 
 @way("CityJSON: templates", "x.json", *CITYJSON, use=imported("x.json"))

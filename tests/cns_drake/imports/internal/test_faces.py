@@ -55,6 +55,7 @@ def test_an_arrowhead_is_not_filled_across_its_notch():
         ([(0, 0), (1, 0)], "without area", 0.0),
         ([], "without area", 0.0),
         ([(0, 0), (0, 0), (3, 0), (3, 1), (0, 0)], "repeated corner", 1.5),
+        ([(0, 0), (3, 0), (0, 1), (3, 2)] * 300, "very often, left out", 0.0),
     ],
 )
 def test_faults_are_repaired_or_left_out_and_noted(xy, kind, area):
