@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
 import copy
@@ -20,18 +21,15 @@ from cns_drake.base.progress import JobsListener, Listener, heard_by, listener
 
 # Work that takes less time than this is not shown [s].
 PATIENCE = 1.0
-# Least time between two lines of a log when the activity changes [s].
-_CHANGE_INTERVAL = 1.0
-# Least time between two lines about the same activity, at the start [s].
-_INTERVAL = 1.8
-# This least time grows with the time since the start, of which it is this
-# share, so that a long run does not fill its log.
-_GROWTH = 1 / 30
+# Least time between two lines of a log [s].
+_INTERVAL = 30.0
 # How often it is checked whether something must be shown [s].
 _TICK = 0.25
 # Part of a fingerprint at the end of a job's name, which keeps it unique. Words
 # and dates are none.
 _FINGERPRINT = re.compile(r" (?=\S*\d)(?=\S*[a-f])(?:[0-9a-f]{6}|[0-9a-f]{8})$")
+# A word that is a name, such as `riverside_01` or `scan.bin`.
+_NAME = re.compile(r"[\d_./]")
 # Length of a bar [characters].
 _BAR = 20
 # An estimate is made once this share of the work is done.
@@ -272,10 +270,9 @@ class _Task:
 
     def update(
         self, activity: str, done: int, total: int, unit: str, now: float
-    ) -> bool:
-        """Records what is done; returns whether it is something else."""
-        is_new = activity != self.activity
-        if is_new or not self.total or done < self.done:
+    ) -> None:
+        """Records what is done."""
+        if activity != self.activity or not self.total or done < self.done:
             self.since = now
             self.first = done
             self.pace = Pace()
@@ -284,7 +281,6 @@ class _Task:
         self.total = total
         self.unit = unit
         self.pace.measure(done - self.first, now - self.since)
-        return is_new
 
     def text(self) -> str:
         """Returns what is done, and how far it is."""
@@ -293,6 +289,11 @@ class _Task:
             counted = f"{self.done} of {self.total} {self.unit}".rstrip()
         what = ", ".join(filter(None, (self.activity, counted)))
         return ": ".join(filter(None, (shown_name(self.name), what)))
+
+    def in_words(self) -> str:
+        """Returns what is done, without names and numbers."""
+        words = [one for one in self.activity.split() if not _NAME.search(one)]
+        return " ".join([*words, self.unit]).rstrip()
 
     def left(self) -> float | None:
         """Returns the time left for this activity [s], if it can be told."""
@@ -325,9 +326,9 @@ class Display(Listener):
     """Shows on a stream what the program does, while the `with` block runs.
 
     On a terminal, the last lines show the progress: one line for the program,
-    or for all of its jobs, and one for each running job. In a file or pipe,
-    whole lines are printed when the activity changes, and after growing
-    intervals. Work that ends at once is not shown.
+    or for all of its jobs, and one for each running job. In a file or pipe, a
+    line is printed at most every half a minute. Work that ends at once is not
+    shown.
     """
 
     def __init__(
@@ -347,9 +348,8 @@ class Display(Listener):
         self._start = clock()
         self._own = _Task()
         self._jobs: _JobsDisplay | None = None
-        # When a line was printed last, and whether something changed since.
-        self._printed: float | None = None
-        self._has_changed = False
+        # When a line was printed last.
+        self._printed = -math.inf
         # Number of lines at the bottom of the terminal that are ours.
         self._num_drawn = 0
         self._ends_line = True
@@ -375,9 +375,7 @@ class Display(Listener):
         self, activity: str, done: int = 0, total: int = 0, unit: str = ""
     ) -> None:
         with self._lock:
-            self._has_changed |= self._own.update(
-                activity, done, total, unit, self._now()
-            )
+            self._own.update(activity, done, total, unit, self._now())
         if not self._is_terminal:
             self.refresh()
 
@@ -403,16 +401,9 @@ class Display(Listener):
                 return
             if self._is_terminal:
                 self._draw(now)
-            elif self._printed is None or now >= self._printed + self._wait(
-                now
-            ):
-                self._print("; ".join(line for line, _ in self._rows(now)), now)
-
-    def print(self, text: str) -> None:
-        """Prints a line, unless the stream is a terminal."""
-        with self._lock:
-            if not self._is_terminal:
-                self._print(text, self._now())
+            elif now >= self._printed + _INTERVAL and (text := self._line(now)):
+                self._printed = now
+                self._write(f"{printable(text)}\n")
 
     @contextlib.contextmanager
     def erased(self) -> Iterator[None]:
@@ -429,11 +420,11 @@ class Display(Listener):
         while not self._ended.wait(_TICK):
             self.refresh()
 
-    def _wait(self, now: float) -> float:
-        """Returns how long after a line the next one comes [s]."""
-        if self._has_changed:
-            return _CHANGE_INTERVAL
-        return max(_INTERVAL, _GROWTH * (now - self._start))
+    def _line(self, now: float) -> str:
+        """Returns all that is done as one line, for a log."""
+        if self._jobs is not None:
+            return self._jobs.line(now)
+        return "; ".join(line for line, _ in self._rows(now))
 
     def _rows(self, now: float) -> list[tuple[str, float | None]]:
         """Returns each line, and the share that is done, if it is known."""
@@ -442,12 +433,6 @@ class Display(Listener):
         if not self._own.activity:
             return []
         return [(_shown(self._own, now - self._start), _share(self._own))]
-
-    def _print(self, text: str, now: float) -> None:
-        if text:
-            self._printed = now
-            self._has_changed = False
-            self._write(f"{printable(text)}\n")
 
     def _erase(self) -> None:
         if self._num_drawn:
@@ -553,10 +538,17 @@ class _JobsDisplay(JobsListener):
         self._left.end(name, self._now())
         self._num_ended += 1
         self._tasks.pop(name, None)
-        if not fault:
-            shown = shown_name(name)
-            self._display.print(f"{shown}: done, {self._summary()}")
         self._display.refresh()
+
+    def line(self, now: float) -> str:
+        """Returns how far all jobs are, and what is done, as one line."""
+        whole, *_ = self.rows(now)
+        found = Counter(one.in_words() for one in list(self._tasks.values()))
+        words = [
+            f"{text} ({number} times)" if number > 1 else text
+            for text, number in found.items()
+        ]
+        return ": ".join(filter(None, (whole[0], ", ".join(words))))
 
     def rows(self, now: float) -> list[tuple[str, float | None]]:
         """Returns a line for all jobs, and one for each running job.

@@ -6,12 +6,20 @@ import sys
 
 import pytest
 
+# A log that says at once what is done.
+_PROGRAM = """
+from cns_drake.base import progress_display
+progress_display._INTERVAL = 0.0
+from cns_drake.__main__ import main
+main()
+"""
+
 
 class Generation:
     """A run of the command line, in a group of processes of its own."""
 
     def __init__(self, files, output, *options, **environment):
-        command = [sys.executable, "-m", "cns_drake", "generate", *files]
+        command = [sys.executable, "-c", _PROGRAM, "generate", *files]
         self.process = subprocess.Popen(
             [*command, "--output", output, *options],
             stdout=subprocess.PIPE,

@@ -57,7 +57,7 @@ def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):
     # Ctrl-C reaches every process of the terminal.
     output = tmp_path / "output"
     run = Generation(files, output, "--jobs", "2")
-    run.wait_for("simulating, ")
+    run.wait_for("simulating frames")
     os.killpg(run.process.pid, signal.SIGINT)
     status, results = run.end()
     assert (status, results) == (130, [])
@@ -67,7 +67,7 @@ def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):
 
     # A parent that is killed cannot end its processes; they do so themselves.
     run = Generation(files, output, "--jobs", "2")
-    run.wait_for("simulating, ")
+    run.wait_for("simulating frames")
     run.process.kill()
     status, _ = run.end()
     assert status == -signal.SIGKILL
