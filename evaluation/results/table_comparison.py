@@ -591,7 +591,7 @@ def _mismatch_notes(
         row.baseline or "the first values"
         for of_method in rows.values()
         for row in of_method
-        if metric_named(row.metric).share_of
+        if metric_named(row.metric).is_compared
     }
     if len(baselines) > 1:
         yield f"not the same baselines: {', or '.join(sorted(baselines))}"

@@ -45,12 +45,16 @@ from cns_drake.base import (
     user_errors,
 )
 
-_MAGIC = b"cns-eval part 3\n"
+_MAGIC = b"cns-eval part 2\n"
 _LEVEL = 1
 # Field of the header of a part whose value was removed.
 _REMOVED = "spent"
 # Greatest size of a line of inputs [bytes].
 _MOST_INPUTS = 1 << 24
+# Limit of the uncompressed size, as a multiple of the compressed bytes.
+_MOST_RATIO = 200
+# This uncompressed size is always allowed [bytes].
+_ALWAYS_BYTES = 1 << 27
 # A `LongList` keeps at most this number of its last items in memory.
 _MOST_HELD = 512
 # Number of items of a `LongList` that are written and read together.
@@ -179,7 +183,7 @@ class LongList(_Joined):
     def _write(self, number: int) -> None:
         """Writes the next items to the file as one block."""
         plain = encode(self._recent[:number])
-        data = _compressed(plain)
+        data, _ = _compressed(plain)
         with user_errors(self._where):
             if self._stream is None:
                 self._stream = tempfile.TemporaryFile(dir=self._path)  # noqa: SIM115
@@ -195,7 +199,11 @@ class LongList(_Joined):
         """Returns the items of a block."""
         data = self._bytes(number)
         with _damage_named(self._where):
-            return decode(zstandard.ZstdDecompressor().decompress(data))
+            # Lengths at the start of stored values are far smaller.
+            if data.startswith(zstandard.FRAME_HEADER):
+                _check_size(data, len(data))
+                data = zstandard.ZstdDecompressor().decompress(data)
+            return decode(data)
 
     def _bytes(self, number: int) -> bytes:
         """Returns a block as it is in the file."""
@@ -247,6 +255,26 @@ class _Stretch(_Joined):
         return self._of[self._rows[index]]
 
 
+def _uncompressed_size(size: int) -> int:
+    """Returns the greatest uncompressed size of some compressed bytes."""
+    return max(_MOST_RATIO * size, _ALWAYS_BYTES)
+
+
+def _check_size(start: bytes, size: int) -> None:
+    """Refuses a compressed value that may be larger than the memory.
+
+    Args:
+        start: the first bytes of the value.
+        size: size of the whole value [bytes].
+
+    Raises:
+        ValueError: the uncompressed value would be too large.
+    """
+    claimed = zstandard.frame_content_size(start)
+    if not 0 <= claimed <= _uncompressed_size(size):
+        raise ValueError(f"{size} bytes stand for {claimed}")
+
+
 def _check_lists(lists: Sequence[Mapping[str, Any]]) -> None:
     """Refuses damaged results of `LongList._stored` in a header.
 
@@ -266,9 +294,13 @@ def _check_lists(lists: Sequence[Mapping[str, Any]]) -> None:
             raise ValueError("a list has another length")
 
 
-def _compressed(plain: bytes) -> bytes:
+def _compressed(plain: bytes) -> tuple[bytes, bool]:
+    """Returns the bytes to store, and whether they are not compressed."""
     compressor = zstandard.ZstdCompressor(level=_LEVEL, write_checksum=True)
-    return compressor.compress(plain)
+    data = compressor.compress(plain)
+    if len(plain) > _uncompressed_size(len(data)):
+        return plain, True
+    return data, False
 
 
 @dataclass(frozen=True)
@@ -296,11 +328,12 @@ class Part:
             stored = [one._stored() for one in lists]
         except TypeError as error:
             raise InputError(f"{self.path}: {error}") from error
-        data = _compressed(plain)
+        data, is_stored = _compressed(plain)
         header = {
             "digest": fingerprint(inputs),
             "bytes": len(data),
             "inputs": inputs,
+            **({"stored": True} if is_stored else {}),
             **({"lists": stored} if stored else {}),
         }
         make_folder(self.path.parent)
@@ -373,7 +406,8 @@ class Part:
             if _REMOVED in header:
                 raise InputError(f"{self.path}: its value was removed")
             data = stream.read(header["bytes"])
-            data = zstandard.ZstdDecompressor().decompress(data)
+            if "stored" not in header:
+                data = zstandard.ZstdDecompressor().decompress(data)
             lists = []
             start = stream.tell()
             for stored in header.get("lists", []):
@@ -391,8 +425,8 @@ class Part:
         """
         with self._opened() as (header, stream):
             in_lists = sum(one["plain"] for one in header.get("lists", []))
-            if _REMOVED in header:
-                return 0
+            if {"stored", _REMOVED} & header.keys():
+                return header["bytes"] + in_lists
             return zstandard.frame_content_size(stream.read(18)) + in_lists
 
     @contextlib.contextmanager
@@ -411,6 +445,9 @@ class Part:
             if stream.seek(0, 2) - start != size + in_lists:
                 raise ValueError("cut off")
             stream.seek(start)
+            if not {"stored", _REMOVED} & header.keys():
+                _check_size(stream.read(18), size)
+                stream.seek(start)
             yield header, stream
 
 

@@ -1,15 +1,18 @@
 from dataclasses import dataclass
+import io
 import json
 import os
 import pickle
 import struct
+import tracemalloc
 from typing import NamedTuple
 
 import numpy as np
 import pytest
+import zstandard
 
 from cns_drake.base import InputError, Reporter, fingerprint, nothing_left
-from evaluation.study import MakePart, Part
+from evaluation.study import MakePart, Part, parts
 from evaluation.study.parts import decode, encode
 
 INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
@@ -208,12 +211,42 @@ def test_headers_that_are_none(part, header):
         part.read()
 
 
-def test_a_part_that_is_no_file(part):
+def test_a_part_neither_fills_the_memory_nor_waits(part, monkeypatch):
+    monkeypatch.setattr(parts, "_ALWAYS_BYTES", 1 << 16)
+    bomb = zstandard.compress(bytes(1 << 24))
+    assert len(bomb) < 2_000
+    _replaced(part, data=bomb)
+    tracemalloc.start()
+    with pytest.raises(InputError, match=r"damaged .*stand for 16777216"):
+        part.read()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 5e6
+    monkeypatch.undo()
+    lying = struct.pack("<Q", 2) + b"{}" + npy_header("(100000000000000,)")
+    _replaced(part, data=zstandard.compress(lying))
+    with pytest.raises(InputError, match="damaged"):
+        part.read()
     part.path.unlink()
     os.mkfifo(part.path)
     assert not part.is_current(INPUTS)
     with pytest.raises(InputError, match="not a regular file"):
         part.read()
+
+
+def npy_header(shape):
+    stream = io.BytesIO()
+    np.save(stream, np.zeros(0))
+    return stream.getvalue().replace(b"(0,)", shape.encode())
+
+
+def test_a_part_of_zeros_is_read_however_small_it_could_be(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(parts, "_ALWAYS_BYTES", 1 << 16)
+    part = Part(tmp_path / "zeros.data")
+    part.write(INPUTS, np.zeros(1 << 20))
+    assert not part.read().any()
 
 
 def test_a_value_that_is_removed_keeps_its_results(tmp_path):
