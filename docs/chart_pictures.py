@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import BboxTransformTo, ScaledTranslation
 import numpy as np
+from scipy.optimize import isotonic_regression
 from scipy.signal import welch
 from scipy.stats import spearmanr
-from sklearn.isotonic import isotonic_regression
 import yaml
 
 from cns_drake.motion import RoadProfile
@@ -335,7 +335,7 @@ def _name_lines(figure: Figure, axes: Axes, gap: float, size: float) -> None:
     order = np.argsort(heights, kind="stable")
     # In steps of the gap, names in order must not descend.
     steps = gap * np.arange(len(lines))
-    moved = isotonic_regression(heights[order] - steps)
+    moved = isotonic_regression(heights[order] - steps).x
     moved = np.clip(moved, 0.0, max(1.0 - steps[-1], 0.0)) + steps
     for index, height in zip(order, moved, strict=True):
         line = lines[index]

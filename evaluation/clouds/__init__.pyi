@@ -4,10 +4,6 @@ from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES as SCAN_LIMIT_BYTES
 from evaluation.clouds.cloud_files import is_cloud as is_cloud
 from evaluation.clouds.cloud_files import read_blocks as read_blocks
 from evaluation.clouds.cloud_files import read_cloud as read_cloud
-from evaluation.clouds.count_images import check_image as check_image
-from evaluation.clouds.count_images import count_image as count_image
-from evaluation.clouds.count_images import image_points as image_points
-from evaluation.clouds.count_images import read_image as read_image
 from evaluation.clouds.notes import OnNote as OnNote
 from evaluation.clouds.notes import no_note as no_note
 from evaluation.clouds.npy_files import read_npy as read_npy

@@ -14,6 +14,7 @@ app = program.make_program(
     groups=("Measure change", "Recognise places", "Localise, and keep maps"),
     gone={
         "pr --scores": "cns-eval scores",
+        "real": "pr and localise on drives of your own; docs/real.md has more",
         "tcr --paths": "cns-drake export --format tum, and evo_traj of evo",
         "localise --estimate": (
             "cns-drake export --format tum, and evo_ape and evo_rpe of evo"

@@ -6,9 +6,7 @@ from evaluation.drives.drive_views import CountedDrive as CountedDrive
 from evaluation.drives.drive_views import DriveView as DriveView
 from evaluation.drives.drive_views import MovedDrive as MovedDrive
 from evaluation.drives.drive_views import RecentScans as RecentScans
-from evaluation.drives.helipr import read_helipr_scan as read_helipr_scan
 from evaluation.drives.joined_drive import JoinedDrive as JoinedDrive
-from evaluation.drives.nclt import read_nclt_scan as read_nclt_scan
 from evaluation.drives.opening import data_sets as data_sets
 from evaluation.drives.opening import find_data_sets as find_data_sets
 from evaluation.drives.opening import open_drive as open_drive

@@ -118,7 +118,7 @@ class HeliprDrive(FileDrive):
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=X_WS,
-            read=partial(read_helipr_scan, lidar),
+            read=partial(_read_scan, lidar),
             tables=[trajectory.path],
             notes=chosen + notes,
             datum=DATUM if in_utm else None,
@@ -126,9 +126,7 @@ class HeliprDrive(FileDrive):
         )
 
 
-def read_helipr_scan(
-    lidar: str, path: Path, stamp_ns: int = 2**63
-) -> np.ndarray:
+def _read_scan(lidar: str, path: Path, stamp_ns: int = 2**63) -> np.ndarray:
     """Returns the points of a scan file as a structured array (N,).
 
     Args:

@@ -90,7 +90,7 @@ class NcltDrive(FileDrive):
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=_X_WN @ X_NB @ _X_BS,
-            read=lambda path, stamp_ns: read_nclt_scan(path),
+            read=lambda path, stamp_ns: _read_scan(path),
             tables=[trajectory.path],
             notes=(*chosen, *unknown, *notes),
             unit="hdl-32e-upside-down",
@@ -114,7 +114,7 @@ DATA_SET = DataSet(
 )
 
 
-def read_nclt_scan(path: Path) -> np.ndarray:
+def _read_scan(path: Path) -> np.ndarray:
     """Returns the points (N,) of a `velodyne_sync` file, in the LiDAR's frame.
 
     Raises:

@@ -137,8 +137,6 @@ def read_quaternions(
     path: Path,
     separator: str | None,
     parse: Callable[[np.ndarray], np.ndarray] | None = None,
-    *,
-    in_order: bool = True,
 ) -> StampedPoses:
     """Reads a trajectory: rows with a time, x y z [m] and quaternion x y z w.
 
@@ -147,17 +145,12 @@ def read_quaternions(
         separator: text between columns; None for white space.
         parse: function that converts an array of texts to times [ns]; by
             default `parse_stamps_ns`.
-        in_order: whether the rows must be in the order of their times. If not,
-            the rows are sorted: their times are numbers of scans.
 
     Raises:
         InputError: if the table does not have that form, a quaternion is not of
             unit length, or the poses are out of order.
     """
     stamps_ns, values = read_stamped_rows(path, 7, separator, parse, _COLUMNS)
-    if not in_order:
-        order = np.argsort(stamps_ns, kind="stable")
-        stamps_ns, values = stamps_ns[order], values[order]
     with np.errstate(over="ignore"):
         lengths = np.linalg.norm(values[:, 3:], axis=1)
     bad = np.flatnonzero(np.abs(lengths - 1.0) > _ROTATION_TOLERANCE)

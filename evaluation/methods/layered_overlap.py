@@ -500,7 +500,6 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     place_time = 4.5e-5
     Config = LayeredOverlapConfig
     skips_places = True
-    sees_images = True
     config: LayeredOverlapConfig
 
     def describe(self, points: np.ndarray) -> LayeredScan:

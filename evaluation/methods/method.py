@@ -85,12 +85,6 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         batch_size: number of clouds for one call of `describe_batch`.
         skips_places: whether scores may be NaN (no candidate) even if every
             place is compared (`exhaustive`). If false, such a NaN is an error.
-        sees_images: whether the method can compare bird's-eye images, of which
-            each pixel is a column of points (see
-            `evaluation.clouds.count_images`). Such a method may use the
-            horizontal positions of points, and how many points lie above each
-            other, but nothing that only scans contain, such as planes or angles
-            of beams.
         rerank_best: number of top-ranked places that a second stage, `rerank`,
             compares by their points; 0 without a second stage.
         divides: whether a database that is too large for the memory can be
@@ -124,7 +118,6 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     point_fields: ClassVar[tuple[str, ...]] = ()
     batch_size: ClassVar[int] = 1
     skips_places: ClassVar[bool] = False
-    sees_images: ClassVar[bool] = False
     rerank_best: ClassVar[int] = 0
     divides: ClassVar[bool] = False
     describe_time: ClassVar[float] = 0.02

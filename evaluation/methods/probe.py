@@ -122,7 +122,6 @@ class ProbeMethod(Method[Probe, ProbeDatabase]):
     order = 10
     Config = ProbeConfig
     skips_places = True
-    sees_images = True
     config: ProbeConfig
 
     def describe(self, points: np.ndarray) -> Probe:

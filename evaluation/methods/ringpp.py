@@ -167,7 +167,6 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     place_time = 1.2e-4
     Config = RingPlusPlusConfig
     skips_places = True
-    sees_images = True
     divides = True
     config: RingPlusPlusConfig
 

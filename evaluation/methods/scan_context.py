@@ -164,7 +164,6 @@ class ScanContext(Method[Contexts, ContextDatabase]):
     place_time = 1e-6
     Config = ScanContextConfig
     skips_places = True
-    sees_images = True
     divides = True
     config: ScanContextConfig
 

@@ -187,7 +187,6 @@ def compare_at_radii(
     verification_radii: Collection[float | None],
     overlaps: np.ndarray | None = None,
     *,
-    leaves_out_itself: bool = False,
     most_pairs: int = MOST_PAIRS,
 ) -> Iterator[tuple[range, list[Retrieval]]]:
     """Yields the scores after geometric verification with several radii.
@@ -208,8 +207,6 @@ def compare_at_radii(
             of a radius stands for scores without geometric verification.
         overlaps: (Q, D) share of each query's scan that each place's scan
             shows; needed for matches by overlap.
-        leaves_out_itself: whether query and place of the same number are the
-            same scan, so that this place is not allowed as an answer.
         most_pairs: see `query_batches`.
 
     Yields:
@@ -235,7 +232,6 @@ def compare_at_radii(
                 protocol,
                 verification_radii,
                 overlaps,
-                leaves_out_itself,
                 rows,
             ),
         )
@@ -248,18 +244,17 @@ def _compare_batch(
     protocol: RetrievalProtocol,
     verification_radii: Collection[float | None],
     overlaps: np.ndarray | None,
-    leaves_out_itself: bool,
     rows: range,
 ) -> list[Retrieval]:
     """Returns the retrievals of one batch, see `compare_at_radii`.
 
     Args:
         search: search in the database.
-        database, query, protocol, verification_radii, overlaps,
-            leaves_out_itself: see `compare_at_radii`.
+        database, query, protocol, verification_radii, overlaps: see
+            `compare_at_radii`.
         rows: numbers of the queries of the batch.
     """
-    is_known = _known_places(database, query, protocol, rows, leaves_out_itself)
+    is_known = _known_places(database, query, protocol, rows)
     places = database.places
     queries = query.queries.positions_only.chosen(np.array(rows, np.int64))
     alone = search.scores(query, rows, is_known)
@@ -354,8 +349,6 @@ def matches_within_radius(
     query: DriveDescriptors,
     protocol: RetrievalProtocol,
     rows: range,
-    *,
-    leaves_out_itself: bool = False,
 ) -> np.ndarray:
     """Returns which places are true matches of some queries, (R, D) bool.
 
@@ -366,12 +359,9 @@ def matches_within_radius(
         query: drive of the queries.
         protocol: protocol of the comparison.
         rows: numbers of R queries.
-        leaves_out_itself: see `compare_at_radii`.
     """
     is_near = _distances(database, query, rows) <= protocol.radius
-    return is_near & _known_places(
-        database, query, protocol, rows, leaves_out_itself
-    )
+    return is_near & _known_places(database, query, protocol, rows)
 
 
 def _distances(
@@ -412,12 +402,9 @@ def _known_places(
     query: DriveDescriptors,
     protocol: RetrievalProtocol,
     rows: range,
-    leaves_out_itself: bool,
 ) -> np.ndarray:
     """Returns which places are allowed for some queries, (R, D) bool."""
     place_ns = database.places.stamps_ns
-    if leaves_out_itself:
-        return np.array(rows)[:, None] != np.arange(len(place_ns))
     if protocol.exclude_recent is None or database.name != query.name:
         return np.ones((len(rows), len(place_ns)), dtype=bool)
     query_ns = query.queries.stamps_ns[rows.start : rows.stop]

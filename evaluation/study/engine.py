@@ -222,7 +222,7 @@ class Engine:
         self, one: Pair, task: str, method: str, verified: bool
     ) -> dict[str, Any]:
         factors = {name: as_factor(v) for name, v in one.factors.items()}
-        settings = {**self.tasks[task].changed_settings, **one.settings}
+        settings = dict(self.tasks[task].changed_settings)
         if method in self.methods:
             choice, columns = self.methods[method]
             method = choice.name

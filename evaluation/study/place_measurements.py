@@ -161,7 +161,7 @@ class PlaceComparison(NamedTuple):
             are added to the database.
         beside: the files of further drives in the same world, like the files of
             `database`.
-        keep, leaves_out_itself: see `Pair`.
+        keep: see `Pair`.
         truth: (Q, D) overlap of each query with each place, if the protocol
             says that matches are by overlap.
         overlaps: file with the share of each query's scan that its best match
@@ -180,7 +180,6 @@ class PlaceComparison(NamedTuple):
     num_distractors: int = 0
     beside: tuple[tuple[Part, ...], ...] = ()
     keep: str | int = KEEP_ALL
-    leaves_out_itself: bool = False
     truth: np.ndarray | None = None
     overlaps: Part | None = None
     leaves_out_slow: bool = True
@@ -290,7 +289,6 @@ def shown_overlaps(
                 query,
                 replace(protocol, radius=radius),
                 rows,
-                leaves_out_itself=compared.leaves_out_itself,
             )
             shown = overlaps_with_best_match(
                 chosen,
@@ -447,7 +445,6 @@ def _method_outcomes(
         protocol,
         [None, *radii],
         truth,
-        leaves_out_itself=compared.leaves_out_itself,
     ):
         batch = slice(rows.start, rows.stop)
         asked = QueryDrive(

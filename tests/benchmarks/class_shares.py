@@ -44,15 +44,15 @@ _UNLABELLED = (0, 1)
 _SHARE_UNLABELLED = 0.0192
 
 
-def judged(name: str, roadsides: float) -> Scenario:
-    """Returns the scenario of a drive."""
+def judged(name: str, roadsides: float, columns: int = 1078) -> Scenario:
+    """Returns a drive with an `hdl-64e` of so many columns, as KITTI's."""
     own = load_scenario(name).model_dump(mode="json", exclude_none=True)
     key, lidar = next(iter(own["lidars"].items()))
     lidar |= {
         "preset": "hdl-64e",
         "rate": 1,
         "returns": "calibrated",
-        "columns": 1078,
+        "columns": columns,
         "xyz": [0.0, 0.0, 1.73],
     }
     for field in ("min_range", "max_range"):

@@ -359,25 +359,6 @@ def write_worlds(folder):
     return "meshes.sdf", "yard.urdf"
 
 
-def write_revisits(folder):
-    """Writes four scans as KITTI 00's revisits: two places, seen twice."""
-    frames = {
-        "000026": (1, 0.1, 0.0, 0.0),
-        "000560": (2, 1.0, 400.0, 0.0),
-        "003528": (1, 2.5, 2.0, 1.0),
-        "004481": (2, 1.2, 401.0, 2.0),
-    }
-    scans = folder / "scans" / "kitti_00_revisits"
-    scans.mkdir(parents=True)
-    rows = ["# frame x y z qx qy qz qw"]
-    for name, (seed, yaw, x, y) in frames.items():
-        scan = seen_from(town(seed), yaw, x - 400.0 * (seed - 1), y)
-        np.save(scans / f"{name}.npy", np.c_[scan, scan[:, 0] * 0 + 0.5])
-        cells = x, y, 1.6, 0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)
-        rows.append(" ".join(map(str, (int(name), *cells))))
-    (scans / "poses.txt").write_text("\n".join(rows) + "\n")
-
-
 def write_maps(folder):
     """Writes two maps with labels at random, some of which are true."""
     rng = np.random.default_rng(3)

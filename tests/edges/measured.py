@@ -313,15 +313,6 @@ def map_update(folder: Path) -> dict[str, str]:
     return _tables(folder / "out", "map-update")
 
 
-def real(folder: Path) -> dict[str, str]:
-    inputs.write_revisits(folder)
-    words = ["real", "scans", "--output", "out", "--jobs", 1]
-    for method in ("layered-overlap", "plane-icp"):
-        words += ["--method", method]
-    run(folder, "evaluation", *words)
-    return _tables(folder / "out", "real")
-
-
 def _tables(folder: Path, name: str) -> dict[str, str]:
     """Returns both tables of a folder without what differs each time."""
     found = {}
@@ -373,7 +364,6 @@ BY_NIGHT: dict[str, Callable[[Path], dict[str, str]]] = {
     "localise": localise,
     "map-update": map_update,
     "study": study,
-    "real": real,
     "age": age,
 }
 

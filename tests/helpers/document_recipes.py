@@ -9,16 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-import shutil
 
 import numpy as np
-from PIL import Image
 from scipy.spatial.transform import Rotation
 import yaml
 
-from evaluation.clouds import count_image
 from evaluation.drives import open_drive
-from helpers.layered_scans import town
 from helpers.small_cityjson import write_blocks
 from helpers.small_map import write_town
 from helpers.small_opendrive import straight, write_roads
@@ -96,28 +92,6 @@ def shorten_drives(folder: Path) -> None:
         }
         path = folder / f"town/sequence_{stage}.yaml"
         path.write_text(yaml.safe_dump(short))
-
-
-def write_real_scans(folder: Path) -> None:
-    """Writes two scans of one place, seen from 6.3 m apart."""
-    for number, x in ((26, 0.0), (4481, 6.3)):
-        scan = town(1) - [x, 0.0, 0.0]
-        path = folder / f"real_scans/kitti_00_revisits/{number:06d}.npy"
-        np.save(path, scan.astype(np.float32))
-
-
-def write_images(folder: Path) -> None:
-    """Writes two images of one place, and two of another."""
-    sequence = folder / "real_scans/kitti_bev/05"
-    (sequence / "imgs").mkdir(parents=True)
-    rows = []
-    for number, (seed, x) in enumerate(((1, 0.0), (2, 90.0)) * 2):
-        image = count_image(town(seed))
-        path = sequence / "imgs" / f"{number:06d}.png"
-        Image.fromarray(image).save(path)
-        rows.append([1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 0])
-    np.savetxt(sequence / "pose.txt", rows)
-    shutil.copytree(sequence, folder / "real_images/kitti_bev/05")
 
 
 _FIRST = ("metropolis_01", "town_01")
@@ -365,49 +339,6 @@ RECIPES = {
         changes=(("report drives", "report output"),),
         after=("own city",),
         prints=("report/index.html",),
-    ),
-    "named poses": Recipe(
-        "# number x y z qx qy qz qw",
-        file="real_scans/kitti_00_revisits/poses.txt",
-        prepare=write_real_scans,
-    ),
-    "real": Recipe(
-        ".venv/bin/cns-eval real real_scans --output",
-        changes=(("--output", "--method solid --method btc --output"),),
-        after=("named poses",),
-        makes=("real/results.csv", "real/queries.csv"),
-        all_methods=True,
-    ),
-    "real images": Recipe(
-        ".venv/bin/cns-eval real real_scans --method scan-context++",
-        changes=((" --method ring++", ""),),
-        prepare=write_images,
-        makes=("images/results.csv",),
-    ),
-    "images ranked": Recipe(
-        ".venv/bin/cns-drake export drives/suburbia_02_hdl_64e --format bev",
-        changes=(
-            ("drives/suburbia_02_hdl_64e", "output/town_01"),
-            ("--lidar lidar ", ""),
-            ("--lidar query ", ""),
-            ("--method ring++", "--method probe"),
-        ),
-        after=("own city", "real images"),
-        prints=("Kendall's tau, real and simulated",),
-        makes=("made/kitti_bev/suburbia/queries/imgs/000000.png",),
-        by_night=True,
-    ),
-    "help: real": Recipe(
-        "cns-eval real real_scans",
-        changes=(("--output real", "--method plane-icp --output fits"),),
-        after=("named poses",),
-        prints=("fits/results.csv",),
-    ),
-    "rankings": Recipe(
-        ".venv/bin/cns-eval compare --rankings ladder real",
-        changes=(("ladder real", "real real"),),
-        after=("real",),
-        prints=("Kendall's tau",),
     ),
     "table of an entrant": Recipe("experiment,map,database", file="mine.csv"),
     "compare": Recipe(
@@ -1086,7 +1017,6 @@ NOT_RUN = {
     "pip install '.[map-closures]'": "installs that extra",
     "pip install '.[kiss-matcher]'": "installs another extra",
     "pip install '.[map-update]'": "installs another extra",
-    "pip install '.[judge]'": "installs another extra",
     "pip install pandas": "installs from the network",
     "python -m pydrake.visualization.meldis": "a server, which does not end; "
     "test_example_diagrams runs the scenario",
@@ -1096,12 +1026,6 @@ NOT_RUN = {
     "for minutes",
     ".venv/bin/cns-drake export aged/sequence_01.yaml": "needs a city that has "
     "aged, and minutes; the recipe map truth has a small one",
-    ".venv/bin/cns-drake simulate docs/examples/like_nuscenes": "records a "
-    "shipped drive, for minutes; test_real has recordings",
-    ".venv/bin/cns-drake simulate docs/examples/like_kitti": "likewise; the "
-    "recipe images ranked has another drive",
-    ".venv/bin/cns-eval real real_images --simulated": "needs an extra, and "
-    "simulated drives; test_images judges images",
     ".venv/bin/cns-drake study docs/examples/nclt_twin": "ages a shipped city "
     "and drives through it, for an hour",
     ".venv/bin/cns-drake study docs/examples/nclt_prediction": "likewise, and "
@@ -1115,7 +1039,7 @@ NOT_RUN = {
     "shipped",
     ".venv/bin/cns-eval pr data/nclt": "needs them, too",
     ".venv/bin/cns-eval pr data/sequences": "needs KITTI's scans",
-    ".venv/bin/cns-eval tcr data/boreas": "likewise",
+    ".venv/bin/python tests/benchmarks/real_or_simulated.py": "likewise",
     "evo_rpe tum": "a program of its own",
     ".venv/bin/cns-drake import neukolln": "needs the file that is not shipped",
     "/** A batch of rays": "C++ of a design",

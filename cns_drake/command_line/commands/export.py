@@ -47,7 +47,6 @@ class Format(str, Enum):
     OVERLAP_TABLE = "overlap-table"
     MAP_TRUTH = "map-truth"
     MAP_SESSIONS = "map-sessions"
-    BEV_IMAGES = "bev-images"
     FILM = "film"
 
 
@@ -56,8 +55,8 @@ _PAIRS = (Format.POINTNETVLAD, Format.OVERLAP, Format.OVERLAP_TABLE)
 _MAPS = (Format.MAP_TRUTH, Format.MAP_SESSIONS)
 # Option -> the formats with which it has an effect.
 _FORMATS: Mapping[str, tuple[str, ...]] = {
-    "lidar": (*_CONVERTED, Format.MAP_SESSIONS, Format.BEV_IMAGES),
-    "columns": (Format.MAP_SESSIONS, Format.BEV_IMAGES),
+    "lidar": (*_CONVERTED, Format.MAP_SESSIONS),
+    "columns": (Format.MAP_SESSIONS,),
     "absent_in": _CONVERTED,
     "sequence": _CONVERTED,
     "vary": _PAIRS,
@@ -140,9 +139,6 @@ def export(
     whose world is unknown, such as real drives. Before cns-eval map-update can
     use these maps, add ground truth of your own: A/truth.npy and B/truth.npy.
 
-    The format bev-images contains a bird's-eye image and a pose for each scan
-    of a recording or of a real drive. cns-eval real reads this format.
-
     The format film shows one stretch of a shipped drive or of a scenario file
     in every stage of the city. The film begins with one shot per stage from
     behind the car, with the points that the LiDAR measures. Then follows one
@@ -157,14 +153,14 @@ def export(
             PointNetVLAD), overlap (scans and the exact overlap of each pair),
             overlap-table (only the overlaps between a database and a query
             drive, for cns-eval pr --exact-overlaps), map-truth (two maps with
-            labels of what changed), map-sessions (two maps without labels),
-            bev-images (bird's-eye images with poses) or film.
+            labels of what changed), map-sessions (two maps without labels)
+            or film.
         output: Folder to write; created if it does not exist. The folder must
             be new or empty, or contain earlier exports of the same format,
-            except with map-truth, map-sessions and bev-images, which need a new
-            or empty folder. With film, the output is a file instead, and an
-            existing file is replaced; its name ends in .webp, or in .mp4, which
-            needs ffmpeg.
+            except with map-truth and map-sessions, which need a new or empty
+            folder. With film, the output is a file instead, and an existing
+            file is replaced; its name ends in .webp, or in .mp4, which needs
+            ffmpeg.
         absent_in: Another stage of the map, such as 01. Points on structures
             that do not exist in that stage get SemanticKITTI's labels of moving
             objects (252 to 259). Only with a format that has labels, such as
@@ -237,8 +233,6 @@ def export(
     elif layout == Format.MAP_SESSIONS:
         opened = _open_drives(words, lidar, columns)
         _write_sessions(opened, output, spacing or _MAP_SPACING, json=json)
-    elif layout == Format.BEV_IMAGES:
-        _write_images(_open_drives(words, lidar, columns)[0], output, json=json)
     elif layout == Format.FILM:
         _export_film(
             first,
@@ -515,13 +509,4 @@ def _write_sessions(
     with draft_folder(output) as draft:
         for side, drive in zip(SIDES, drives, strict=True):
             write_session(drive, draft / side, spacing)
-    show({"output": str(output)}, str(output), json=json)
-
-
-def _write_images(drive: Drive, output: Path, *, json: bool) -> None:
-    """Writes bird's-eye images of a drive."""
-    with ended_by_interrupts("cns-drake"):
-        from evaluation.real import write_images
-
-    write_images(drive, output, note)
     show({"output": str(output)}, str(output), json=json)

@@ -1,7 +1,6 @@
 """The task `localise`: scans are localised in a map of the database."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-import math
 from pathlib import Path
 import tempfile
 from typing import Any, ClassVar
@@ -15,19 +14,15 @@ from cns_drake.base import (
     Reporter,
     read_bytes,
     run_jobs,
-    track,
 )
 from cns_drake.drives import Drive
 from evaluation.drives import NOT_FINITE, CountedDrive
 from evaluation.localisation import (
     KISS_MATCHER,
     METHODS,
-    NEAR,
     QUERY,
-    InitialPose,
     LocalisationMap,
     Localiser,
-    Query,
     Settings,
     Starts,
     default_settings,
@@ -39,16 +34,13 @@ from evaluation.localisation import (
     map_of,
     mapped_frames,
     note_sparse,
-    path_axes,
     query_frames,
     read_queries,
     track_drive,
 )
-from evaluation.maps import map_drive
 from evaluation.recognition import KEEP_ALL, Number, numbers_of
 from evaluation.study.parts import MakePart, Part
 from evaluation.study.sources import (
-    DriveSource,
     JoinedSource,
 )
 from evaluation.study.tasks.jobs import OPENING_COST, Jobs
@@ -57,15 +49,10 @@ from evaluation.study.tasks.task import Answered, Task, check_positive
 
 # The methods that need no optional package.
 SHIPPED = tuple(name for name in METHODS if name != KISS_MATCHER)
-# Expected time to localise each scan of a drive among its other scans [s].
-_COST = 60.0
 # Expected time to localise the queries of a usual drive [s].
 _QUERIES_COST = 10.0
 # Expected time to add a usual drive to the map [s].
 _MAP_COST = 50.0
-# Scans within this distance make the map of a scan that is localised among
-# the other scans of its drive [m].
-_AROUND = 30.0
 # The end of a note on a drive without a query near the map.
 NOT_LOCALISED = ": not localised"
 
@@ -132,16 +119,6 @@ class LocaliseTask(Task):
         )
         starts = self._starts(self.settings["starts"])
         part = jobs.files.part("localise", pair.key)
-        if pair.leaves_out_itself:
-            only = pair.database.source, named, texts, starts
-            found = jobs.add(
-                part,
-                localise_among_others,
-                only,
-                cost=_COST,
-                version=self.version,
-            )
-            return (found,)
         spacing = self.settings["spacing"] or pair.protocol.query_spacing
         drives = pair.database, *pair.beside
         database = pair.database.source
@@ -396,64 +373,3 @@ def localise_queries(
 
     localisers = _localisers(methods, values, make)
     return localise(localisers, asked, starts, name, len(asked))
-
-
-def localise_among_others(
-    reporter: Reporter,
-    source: DriveSource,
-    methods: tuple[str | Path, ...],
-    texts: tuple[str, ...],
-    starts: tuple[Starts, ...],
-) -> list[np.ndarray]:
-    """Localises each scan of a drive in a map of the other scans around it.
-
-    A scan without another scan within `NEAR` is left out.
-
-    Args:
-        reporter: reports progress.
-        source: the drive, whose scans can be read in any order.
-        methods, texts, starts: see `measure_localisation`.
-
-    Returns:
-        As `measure_localisation`.
-    """
-    drive = source()
-    X_WS = drive.X_WS
-    R_WT = path_axes(X_WS[:, :3, 3], X_WS)
-    made = [
-        (make_estimator(one, settings), settings)
-        for one in map(str, methods)
-        for settings in (default_settings(one),)
-    ]
-    found: list[list[np.ndarray]] = [[] for _ in range(len(made) * len(starts))]
-    frames = range(len(drive))
-    for k in track(frames, f"localising {drive.name}", len(frames), "scans"):
-        apart = np.linalg.norm(X_WS[:, :3, 3] - X_WS[k, :3, 3], axis=1)
-        apart[k] = math.inf
-        if apart.min() > NEAR:
-            continue
-        around = np.flatnonzero(apart < _AROUND).tolist()
-        mapped = map_drive(drive, Settings.voxel, frames=around)
-        surroundings = map_of(
-            mapped.centroids_W, drive.name, Settings.neighbours
-        )
-        stamp_ns, scan = int(drive.stamps_ns[k]), drive.scan(k)
-        asked = Query(k, stamp_ns, scan, X_WS[k], R_WT[k])
-        ends = iter(found)
-        for estimator, settings in made:
-            one = Localiser(surroundings, estimator, settings)
-            for some in starts:
-                initial = InitialPose.moved(X_WS[k], *some.draw(k))
-                row, _ = one.query(asked, initial)
-                next(ends).append(row)
-    number = len(found[0])
-    if number < len(drive):
-        reporter.note(
-            f"{drive.name}: {number} of {len(drive)} scans localised; the"
-            f" others have no other scan within {NEAR:g} m"
-        )
-    if number == 0:
-        return []
-    rows = [np.array(some, QUERY) for some in found]
-    note_sparse(drive.name, rows[0], reporter.note)
-    return rows

@@ -81,15 +81,10 @@ class Pair:
             see `evaluation.recognition.place_selection.kept_places`.
         ages: number of years by which the city has aged at each drive of the
             database, and at the query drive; empty if the city does not age.
-        leaves_out_itself: whether database and query are the same drive; each
-            scan is then compared with all other scans.
         may_repeat: whether the pair can repeat drives of another pair, because
             its condition changes the queries (random yaw, tilt or occluded
             sector) or adds distractors. A task whose results depend only on the
             drives then skips the pair if it has measured these drives before.
-        settings: name -> value of settings outside of the protocol that change
-            a number, such as the height of a LiDAR that differs from the
-            methods' default.
         methods: names of the methods that are measured; None for all methods
             of the study.
         parts: task -> its results, as files or in memory, for the tasks that
@@ -111,9 +106,7 @@ class Pair:
     beside: tuple[NamedDrive, ...] = ()
     keep: str | int = KEEP_ALL
     ages: tuple[int, ...] = ()
-    leaves_out_itself: bool = False
     may_repeat: bool = False
-    settings: Mapping[str, Any] = field(default_factory=dict)
     methods: Collection[str] | None = None
     parts: dict[str, tuple[Result, ...]] = field(default_factory=dict)
 

@@ -180,7 +180,6 @@ def _comparison(
             for scans, *of_methods in jobs.beside(pair, needs)
         ),
         pair.keep,
-        pair.leaves_out_itself,
     )
 
 

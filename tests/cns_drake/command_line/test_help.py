@@ -110,7 +110,7 @@ def test_version(program, capsys):
         ("cns-drake", "sim", ["simulate"]),
         ("cns-drake", "city --n", ["--new"]),
         ("cns-eval", "pr --mode f", ["filtered"]),
-        ("cns-eval", "re", ["real", "report"]),
+        ("cns-eval", "re", ["report"]),
     ],
 )
 def test_completion(program, begun, completed, capsys, monkeypatch):

@@ -94,17 +94,3 @@ def test_a_header_that_contradicts(tmp_path, header, fault):
     path.write_text(f"{header}\n1 2 3 4 0 0 0 1\n")
     with pytest.raises(InputError, match=f"^{path}: {fault}"):
         read_quaternions(path, None)
-
-
-def test_numbered_rows_may_have_any_order(tmp_path):
-    rows = [f"{n} {n}.5 0 0 0 0 0 1" for n in (481, 26, 3528)]
-    path = tmp_path / "poses.txt"
-    path.write_text("\n".join(rows))
-    with pytest.raises(InputError, match="not later"):
-        read_quaternions(path, None)
-    found = read_quaternions(path, None, in_order=False)
-    assert found.stamps_ns.tolist() == [26, 481, 3528]
-    assert found.X_WB[:, 0, 3].tolist() == [26.5, 481.5, 3528.5]
-    path.write_text("\n".join([*rows, "26 9 9 9 0 0 0 1"]))
-    with pytest.raises(InputError, match="not later"):
-        read_quaternions(path, None, in_order=False)

@@ -265,10 +265,7 @@ def test_a_drive_that_saw_nothing(tmp_path):
         retrieve(blind, blind, make_method("solid", {}))
 
 
-@pytest.mark.parametrize("leaves_out_itself", [False, True])
-def test_batches_of_queries_give_the_same_as_all_at_once(
-    tmp_path, leaves_out_itself
-):
+def test_batches_of_queries_give_the_same_as_all_at_once(tmp_path):
     database = record_line(tmp_path / "a", np.arange(0.0, 31.0, 2.5))
     query = record_line(tmp_path / "b", np.arange(3.0, 84.0, 5.0))
     method, protocol = OddOneOut(), RetrievalProtocol(radius=8.0)
@@ -289,7 +286,6 @@ def test_batches_of_queries_give_the_same_as_all_at_once(
             queries,
             protocol,
             [None],
-            leaves_out_itself=leaves_out_itself,
             most_pairs=most_pairs,
         )
         for rows, (one,) in batches:

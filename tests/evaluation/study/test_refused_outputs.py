@@ -1,18 +1,12 @@
 """What cannot be written is refused before anything is measured."""
 
-from pathlib import Path
-
 import pytest
 
 from cns_drake.base import InputError, choose_cluster
-from evaluation.real import measure_real
 from evaluation.results import check_output
 from evaluation.study import study_recordings
 
 MEASURE = {
-    "real": lambda output: measure_real(
-        Path("nowhere"), output, choose_cluster(1, None)
-    ),
     "report": lambda output: study_recordings(
         [], output, choose_cluster(1, None), [], {}, source="nowhere"
     ),

@@ -90,7 +90,7 @@ WRITERS = [
     Writer("cns-drake train --output OUT", ("",), True),
     *(
         Writer(f"{EXPORT} town_01 --format {name} --output OUT", NEW)
-        for name in ("cns", "kitti", "mulran", "tum", "bev-images")
+        for name in ("cns", "kitti", "mulran", "tum")
     ),
     Writer(f"{EXPORT} tiny_01.yaml --format pointnetvlad --output OUT", NEW),
     Writer(
@@ -122,7 +122,6 @@ WRITERS = [
         True,
     ),
     Writer(f"{EVAL} report . --output OUT", PAGE),
-    Writer(f"{EVAL} real real --output OUT", PAGE),
     Writer(
         f"{EVAL} localise town_01 town_02 --method icp --output OUT",
         (*TABLES, "localisation.csv", "track.png"),
@@ -149,7 +148,6 @@ def inputs(tmp_path_factory):
     shipped = Path(evaluation.__file__).parents[1] / "results/baselines"
     (top / "tables").mkdir()
     shutil.copy(min(shipped.glob("*.csv")), top / "tables" / "results.csv")
-    (top / "real").mkdir()
     for side, name in zip(SIDES, ("town_01", "town_02"), strict=True):
         folder = top / "maps" / side
         folder.parent.mkdir(exist_ok=True)
@@ -264,7 +262,6 @@ INTERRUPTED = {
     "cns-drake scan tiny.sdf --pose 0 0 2 0 0 0 --output OUT/a.pcd": (2, 3),
     "cns-drake list town": (2, 3),
     f"{EXPORT} town_01 --format kitti --output OUT": (2, 6),
-    f"{EXPORT} town_01 --format bev-images --output OUT": (2, 6),
     f"{EXPORT} town_01 town_02 --format map-sessions --output OUT": (2, 6),
     f"{EXPORT} tiny_01.yaml tiny_01.yaml --format map-truth --output OUT": (
         3,

@@ -670,14 +670,6 @@ def _(folder):
     (folder / "x.png").write_bytes(png(65_535, 65_535))
 
 
-@way(
-    "image: of a cloud", "x.png", "evaluation.clouds.read_image",
-    use=at_door("evaluation.clouds", "read_image", "x.png"),
-)  # fmt: skip
-def _(folder):
-    (folder / "x.png").write_bytes(png(9001, 9001))
-
-
 # --- Worlds and meshes
 
 
@@ -1177,8 +1169,7 @@ def _(folder):
 
 @way(
     "helipr", "drive", *DRIVES, "data set helipr",
-    "evaluation.drives.read_helipr_scan", "evaluation.drives.read_quaternions",
-    use=drive,
+    "evaluation.drives.read_quaternions", use=drive,
 )  # fmt: skip
 def _(folder):
     from helpers import helipr_drive
@@ -1190,8 +1181,7 @@ def _(folder):
 
 @way(
     "nclt", "drive", *DRIVES, "data set nclt",
-    "evaluation.drives.read_nclt_scan", "evaluation.drives.parse_seconds",
-    use=drive,
+    "evaluation.drives.parse_seconds", use=drive,
 )  # fmt: skip
 def _(folder):
     scans = folder / "drive" / "velodyne_sync"

@@ -31,6 +31,7 @@ def options(program, command):
         (("tcr", "a", "b", "--paths"), "cns-drake export --format tum"),
         (("localise", "a", "--estimate", "e"), "evo_ape"),
         (("localise", "a", "--estimate=e"), "evo_ape"),
+        (("real", "scans"), "docs/real.md"),
     ],
 )
 def test_what_is_gone_names_what_to_use(capsys, words, names):
@@ -69,7 +70,6 @@ def test_options_of_other_formats_are_refused(capsys, tmp_path, option):
         ("film", 0, "one drive"),
         ("map-truth", 1, "two drives"),
         ("map-sessions", 3, "two drives"),
-        ("bev-images", 2, "one drive"),
     ],
 )
 def test_formats_have_a_number_of_drives(
@@ -90,7 +90,6 @@ WITHOUT_NUMBERS = {
     "reproduce",
     "train",
     "report",
-    "real",
     "scores",
 }
 

@@ -14,11 +14,11 @@ from scipy.ndimage import map_coordinates
 
 from cns_drake.base import InputError
 from evaluation import check_method
-from evaluation.clouds import count_image, image_points
 from evaluation.methods import make_method
 from evaluation.methods.bevplace import (
     SHAPES,
     _turned_images,
+    count_image,
     describe_image,
 )
 from evaluation.study import choose_methods
@@ -123,6 +123,48 @@ def embedded(weights, name, x):
     return layer("embed3.2", np.maximum(layer("embed3.0", x), 0.0))
 
 
+def column(x, y, number):
+    """Returns a column of voxels with two points each."""
+    z = np.repeat(0.4 * np.arange(number) - 1.6, 2) + [0.01, 0.3] * number
+    return np.stack([np.full(2 * number, x), np.full(2 * number, y), z], axis=1)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "row", "left"),
+    [
+        (0.0, 0.0, 75, 75),
+        # The pixel in the middle reaches to both sides.
+        (0.39, -0.39, 75, 75),
+        (0.41, 0.41, 74, 74),
+        (-0.41, -0.41, 76, 76),
+        (25.1, -25.1, 13, 137),
+        (10.1, 0.0, 50, 75),
+    ],
+)
+def test_one_column(x, y, row, left):
+    image = count_image(column(x, y, 4))
+    assert image.shape == (151, 151)
+    assert np.argwhere(image).tolist() == [[row, left]]
+    # The largest number is 255, whatever it is.
+    assert image.max() == 255
+
+
+def test_counts_are_those_beyond_the_first_up_to_ten():
+    columns = [column(2.0 * k, 5.1, k) for k in (1, 2, 6, 11, 12)]
+    image = count_image(np.concatenate(columns))
+    found = [int(image[75 - 5 * k, 75 - 12]) for k in (1, 2, 6, 11, 12)]
+    assert found[:2] == [0, round(25.5)]
+    assert found[2] == pytest.approx(127.5, abs=0.5)
+    assert found[3:] == [255, 255]
+
+
+def test_points_out_of_reach_are_left_out():
+    far = [column(x, y, 5) for x, y in ((25.3, 0.0), (0.0, -25.3))]
+    high = column(3.0, 3.0, 5) + np.array([0.0, 0.0, 30.0])
+    assert not count_image(np.concatenate([*far, high])).any()
+    assert not count_image(np.zeros((0, 3))).any()
+
+
 @pytest.mark.slow
 def test_the_descriptor_by_definition():
     weights = random_weights()
@@ -189,7 +231,7 @@ def test_the_method(tmp_path):
     path = tmp_path / "w.npz"
     np.savez(path, **weights, **{"netvlad.wq.bias": np.zeros(64, np.float32)})
     method = make_method("bevplace", {"weights": path})
-    cloud = image_points(picture(1, 111))
+    cloud = np.concatenate([column(3.0 * k, 9.0 - k, k) for k in range(2, 8)])
     described = method.describe(cloud)
     np.testing.assert_array_equal(
         described, describe_image(weights, count_image(cloud))
