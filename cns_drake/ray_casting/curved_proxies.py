@@ -11,6 +11,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from cns_drake.base import compiled
 from cns_drake.ray_casting.ray_groups import RayGroup
@@ -25,36 +26,58 @@ from cns_drake.scene import (
 
 CurvedSurface = EllipsoidSurface | CylinderSurface | CapsuleSurface
 
-# Sides of a circle.
+# Sides of a circle. Polyhedra of a world with more shapes have few sides: they
+# take a quarter of the memory, and a few more rays are cast twice.
 _SIDES = 16
+_FEW_SIDES = 8
+_MANY_SHAPES = 2000
 # Least distance between shape and polyhedron, as a fraction of the radius.
 _MARGIN = 0.005
 # Least distance in addition [m]. It exceeds the errors of single precision.
 _GAP = 1e-3
 # No point of a polyhedron is farther than this from the axis or centre of its
-# shape: a multiple of the shape's radius, and a length in addition [m].
-_BOUND_RATIO = 1.1
+# shape: a multiple of the shape's radius, by the number of sides, and a length
+# in addition [m].
+_BOUND_RATIOS = {_SIDES: 1.1, _FEW_SIDES: 1.2}
 _BOUND_GAP = 2.0 * _GAP
 
 
+def num_sides(num_shapes: int) -> int:
+    """Returns the number of sides of the polyhedra of a group of shapes."""
+    return _SIDES if num_shapes <= _MANY_SHAPES else _FEW_SIDES
+
+
 @lru_cache(maxsize=1000)
-def circumscribe(surface: CurvedSurface) -> TriangleSurface:
+def circumscribe(
+    surface: CurvedSurface, sides: int = _SIDES
+) -> TriangleSurface:
     """Returns a polyhedron that contains a curved shape.
 
     No point of the polyhedron is farther from the shape's axis or centre than
-    `_BOUND_RATIO` radii + `_BOUND_GAP`.
+    `_BOUND_RATIOS[sides]` radii + `_BOUND_GAP`.
     """
     # The faces of an inscribed ball are nearest to its centre at the equator.
-    side = np.cos(np.pi / _SIDES)
+    side = np.cos(np.pi / sides)
     scale = (1.0 + _MARGIN) / side**2
     if isinstance(surface, EllipsoidSurface):
         wide = tuple(scale * a + _GAP for a in surface.semi_axes)
-        return tessellate(EllipsoidSurface(wide), _SIDES)
+        return tessellate(EllipsoidSurface(wide), sides)
     radius = scale * surface.radius + _GAP
     if isinstance(surface, CapsuleSurface):
-        return tessellate(CapsuleSurface(radius, surface.length), _SIDES)
+        return tessellate(CapsuleSurface(radius, surface.length), sides)
     length = surface.length + 2.0 * _GAP
-    return tessellate(CylinderSurface(radius, length), _SIDES)
+    return tessellate(CylinderSurface(radius, length), sides)
+
+
+def curved_members(
+    group: RayGroup,
+) -> list[tuple[RigidTransform, CurvedSurface]]:
+    """Returns the poses X_LG and the surfaces of a group's curved shapes."""
+    return [
+        (X_LG, surface)
+        for _, X_LG, surface in group.members
+        if not isinstance(surface, TriangleSurface | HalfSpaceSurface)
+    ]
 
 
 class NearCurvedShapes:
@@ -69,16 +92,16 @@ class NearCurvedShapes:
         rows: list[int] = []
         X_LGs, sizes = [], []
         for row, group in enumerate(groups):
-            for _, X_LG, surface in group.members:
-                if isinstance(surface, TriangleSurface | HalfSpaceSurface):
-                    continue
+            curved = curved_members(group)
+            ratio = _BOUND_RATIOS[num_sides(len(curved))]
+            for X_LG, surface in curved:
                 if isinstance(surface, EllipsoidSurface):
                     half, radius = 0.0, max(surface.semi_axes)
                 else:
                     half, radius = surface.length / 2.0, surface.radius
                 rows.append(row)
                 X_LGs.append(X_LG.GetAsMatrix4())
-                sizes.append((half, _BOUND_RATIO * radius + _BOUND_GAP))
+                sizes.append((half, ratio * radius + _BOUND_GAP))
         X_LGset = np.reshape(X_LGs, (-1, 4, 4))
         halves, radii = np.reshape(sizes, (-1, 2)).T
         # Greatest stretch of a vector from G to O.

@@ -11,7 +11,11 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cns_drake.ray_casting import embree
-from cns_drake.ray_casting.curved_proxies import circumscribe
+from cns_drake.ray_casting.curved_proxies import (
+    circumscribe,
+    curved_members,
+    num_sides,
+)
 from cns_drake.ray_casting.ray_groups import Member, RayGroup
 from cns_drake.scene import (
     CapsuleSurface,
@@ -75,13 +79,11 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
     if group.frame_id is not None:
         yield from merge_curved(members)
         return
-    curved = [
-        (PROXY_OWNER, X_LG, circumscribe(surface))
-        for _, X_LG, surface in members
-        if not isinstance(surface, TriangleSurface | HalfSpaceSurface)
-    ]
+    curved = curved_members(group)
     if curved:
-        yield _triangle_primitives(curved, PROXY)
+        sides = num_sides(len(curved))
+        proxies = [(PROXY_OWNER, X, circumscribe(s, sides)) for X, s in curved]
+        yield _triangle_primitives(proxies, PROXY)
 
 
 def merge_second(group: RayGroup) -> Iterator[Primitives]:

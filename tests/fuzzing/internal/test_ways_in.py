@@ -717,6 +717,31 @@ def _(folder):
     )
 
 
+def prepared(folder):
+    from pydrake.math import RigidTransform
+
+    from cns_drake.ray_casting import RayCastingScene
+    from cns_drake.scene import load_world, read_perception_geometry
+
+    world = load_world(folder / "w.sdf")
+    inspector = world.scene_graph.model_inspector()
+    return RayCastingScene(
+        read_perception_geometry(inspector),
+        {inspector.world_frame_id(), *world.anchored_frames()},
+        lambda frame: RigidTransform(),
+    )
+
+
+@way("sdf: spheres", "w.sdf", *WORLDS, use=prepared)
+def _(folder):
+    shape = "<geometry><sphere><radius>1</radius></sphere></geometry>"
+    text = "".join(
+        f'<visual name="{k}"><pose>{9 * k} 0 0 0 0 0</pose>{shape}</visual>'
+        for k in range(8000)
+    )
+    (folder / "w.sdf").write_text(sdf(text))
+
+
 @way("sdf: one name", "w.sdf", *WORLDS, use=world())
 def _(folder):
     (folder / "w.sdf").write_text(sdf(BOX * 6000))

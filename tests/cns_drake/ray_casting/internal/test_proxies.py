@@ -5,7 +5,11 @@ from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.ray_casting.curved_proxies import NearCurvedShapes, circumscribe
+from cns_drake.ray_casting.curved_proxies import (
+    NearCurvedShapes,
+    circumscribe,
+    num_sides,
+)
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.scene import (
     CapsuleSurface,
@@ -39,8 +43,9 @@ def points_on(surface, rng, num=3000):
 
 
 @pytest.mark.parametrize("surface", SHAPES)
-def test_polyhedron_contains_the_shape_with_a_gap(surface):
-    hull = circumscribe(surface)
+@pytest.mark.parametrize("count", [1, 5000])
+def test_polyhedron_contains_the_shape_with_a_gap(surface, count):
+    hull = circumscribe(surface, num_sides(count))
     a, b, c = (hull.p_GVset[hull.triangles[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     area = np.linalg.norm(normal, axis=1)
@@ -49,6 +54,11 @@ def test_polyhedron_contains_the_shape_with_a_gap(surface):
     points = points_on(surface, np.random.default_rng(2))
     outside = points @ normal.T - np.einsum("ij,ij->i", a, normal)
     assert outside.max() < -5e-4
+    # A ray that starts in the polyhedron of one of many shapes is known.
+    members = [(k, RigidTransform(), surface) for k in range(count)]
+    group = RayGroup(None, np.eye(4), members)
+    group.place(np.zeros(3), lambda frame: None)
+    assert NearCurvedShapes([group]).contain(hull.p_GVset).all()
 
 
 def test_nearness_of_many_shapes_is_that_of_each():
