@@ -693,6 +693,7 @@ def world(file="w.sdf"):
 
 
 WORLDS = ("cns_drake.scene.load_world",
+          "cns_drake.scene.read_geometry",
           "cns_drake.scene.read_perception_geometry")  # fmt: skip
 
 
@@ -1264,6 +1265,7 @@ NO_FILES = {
     "cns_drake.base.read_bytes": "bounded by its limit",
     "cns_drake.base.read_text": "bounded by its limit",
     "cns_drake.base.read_only": "an array",
+    "cns_drake.base.start_python": "modules of this project",
     "cns_drake.city.start_city": "reads by load_road_network",
     "cns_drake.motion.load_car_masses": "a shipped model",
     "cns_drake.pictures.read_drive_page": "bounded by the limit of a page",
