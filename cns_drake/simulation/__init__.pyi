@@ -5,7 +5,6 @@ from cns_drake.simulation.scan_files import check_ending as check_ending
 from cns_drake.simulation.scan_files import save_scan as save_scan
 from cns_drake.simulation.scanning import scan_world as scan_world
 from cns_drake.simulation.scanning import still_scene as still_scene
-from cns_drake.simulation.scenario_traffic import EGO_BOX as EGO_BOX
 from cns_drake.simulation.scenario_traffic import (
     plan_scenario_traffic as plan_scenario_traffic,
 )

@@ -33,7 +33,7 @@ from cns_drake.traffic import (
 from cns_drake.transient import GroundSurface, geometry_by_structure
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
-EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
+_EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
 # The ground is read this far around the places of a trace [m].
 _AROUND_TRACE = 20.0
 
@@ -83,7 +83,7 @@ def plan_traffic_of_drive(
             seed=wanted.seed,
             duration=trajectory.duration,
             ego=ego,
-            ego_box=EGO_BOX,
+            ego_box=_EGO_BOX,
         )
     if wanted.fcd is not None:
         path = Path(wanted.fcd)
@@ -97,7 +97,7 @@ def plan_traffic_of_drive(
             duration=last_frame,
             end=trajectory.duration,
             ego=ego,
-            ego_box=EGO_BOX,
+            ego_box=_EGO_BOX,
         )
     recorded = recorded_traffic(scenario)
     if last_frame > recorded.vehicles.duration:
@@ -113,7 +113,7 @@ def plan_traffic_of_drive(
         seed=wanted.seed,
         duration=trajectory.duration,
         ego=ego,
-        ego_box=EGO_BOX,
+        ego_box=_EGO_BOX,
     )
 
 

@@ -12,7 +12,7 @@ process. A ratio is of the sums of all turns, beside the median of those of
 turns, which a disturbed turn does not change.
 
 Aims, as such ratios: calibrated returns 1.4 of ideal ones, weather 1.2 of
-calibrated returns in clear air, 95 vehicles and 95 walkers 1.2 of no traffic,
+calibrated returns in clear air, 60 vehicles and 60 walkers 1.2 of no traffic,
 a fast IMU and the ride 0.1 of a frame of a drive without them.
 """
 
@@ -83,7 +83,7 @@ def varied(scenario: Scenario, name: str) -> Scenario:
     if name in WEATHER:
         return scenario.with_returns("calibrated", WEATHER[name])
     if name == "traffic":
-        return scenario.with_traffic(95)
+        return scenario.with_traffic(60)
     if name == "slow":
         return _with_lidars(scenario, rate=10)
     if name == "imu":

@@ -4,6 +4,7 @@ import csv
 import os
 import re
 
+from helpers.recorded_traffic import write_rounds
 from helpers.small_city import write_small_city
 import numpy as np
 import pytest
@@ -33,6 +34,7 @@ def town(tmp_path_factory):
     folder = write_small_city(tmp_path_factory.mktemp("age") / "town")
     generate_city(folder)
     (folder / "sequence_02.yaml").write_text(_DRIVE)
+    write_rounds(folder / "traffic.npz")
     return folder
 
 
@@ -57,6 +59,9 @@ def test_histories_are_nested_and_repeatable(town, long):
     few, many = _rows(short), _rows(long)
     assert few == [row for row in many if int(row["year"]) <= 3]
     assert len(few) < len(many)
+    # The roads stay, and so does their traffic.
+    for kept in ("roads.yaml", "traffic.npz"):
+        assert (short / kept).read_bytes() == (town / kept).read_bytes()
     # Instance ids of the shorter history stay.
     ids = {r["name"]: r["instance"] for r in _rows(long, "structures.csv")}
     for row in _rows(short, "structures.csv"):
