@@ -206,6 +206,14 @@ def unrendered_figures(monkeypatch):
 
 
 @pytest.fixture
+def jobs_done(monkeypatch):
+    """See `studies.jobs_here`."""
+    from helpers.internal.studies import jobs_here
+
+    return jobs_here(monkeypatch)
+
+
+@pytest.fixture
 def few_methods(monkeypatch):
     """Has studies compare two methods, whose names it returns.
 

@@ -1,9 +1,10 @@
-"""Programs leave the handlers of signals in a state for their end."""
+"""Signals during programs that run in the process of a test."""
 
 import contextlib
 import signal
 
-from cns_drake.base.interrupts import SIGNALS
+from cns_drake.base import program, progress_display
+from cns_drake.base.interrupts import INTERRUPTED, SIGNALS
 
 
 @contextlib.contextmanager
@@ -15,3 +16,25 @@ def handlers_kept():
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def interrupt_at(patch, count, number):
+    """Has a program interrupted at one of its reports of progress.
+
+    Args:
+        patch: undoes it.
+        count: number of the report.
+        number: number of the signal.
+    """
+    left = [count]
+
+    def doing(*report):
+        left[0] -= 1
+        if left[0] == 0:
+            signal.raise_signal(number)
+
+    def end_interrupted():
+        raise SystemExit(INTERRUPTED)
+
+    patch.setattr(program.interrupts, "end_interrupted", end_interrupted)
+    patch.setattr(progress_display.Display, "doing", doing)

@@ -44,6 +44,48 @@ def run_here(patch, *modules):
         )
 
 
+def jobs_here(patch):
+    """Has studies run their jobs in this process, and write no page.
+
+    Returns:
+        A list that gets the names of the jobs of each run.
+    """
+    from cns_drake.studies import recording, study
+    from cns_drake.studies.maps import map_step
+
+    runs = []
+    for module in (engine, map_step, recording):
+        patch.setattr(
+            module,
+            "run_jobs",
+            lambda jobs, cluster, unit="": runs.append(do(jobs)),
+        )
+    patch.setattr(
+        study,
+        "write_page",
+        lambda results, queries, folder, **options: folder / "index.html",
+    )
+    return runs
+
+
+def asked_studies(patch):
+    """Has `cns-drake study` measure nothing.
+
+    Returns:
+        A list that gets the experiment, the maps and the source of each study.
+    """
+    from cns_drake.studies import study
+
+    calls = []
+
+    def run_study(experiment, output, cluster, maps, **options):
+        calls.append((experiment, tuple(maps), options["source"]))
+        return Path(output) / "index.html"
+
+    patch.setattr(study, "run_study", run_study)
+    return calls
+
+
 def ship_methods(patch, *names):
     """Makes studies believe that these methods are the shipped ones."""
     patch.setattr(chosen_methods, "shipped_methods", lambda: names)
@@ -115,12 +157,3 @@ def leave_figures_unrendered(patch):
     patch.setattr(Figure, "draw_without_rendering", lambda figure: None)
     patch.setattr(Figure, "savefig", write)
     patch.setattr(StageScene, "photograph", blank)
-
-
-def report_files(output):
-    """Returns name -> bytes of all files of a study, except its parts."""
-    return {
-        path.relative_to(output).as_posix(): path.read_bytes()
-        for path in sorted(output.rglob("*"))
-        if path.is_file() and output / "parts" not in path.parents
-    }

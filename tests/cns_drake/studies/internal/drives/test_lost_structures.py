@@ -5,15 +5,13 @@ import itertools
 from xml.etree import ElementTree
 
 from helpers.small_map import box_visual, scenario_values, write_small_map
-import pytest
 import yaml
 
-from cns_drake.base import InputError, validated
+from cns_drake.base import validated
 from cns_drake.scenarios import load_scenario, shipped_maps
 from cns_drake.scene import load_world, structures_in
-from cns_drake.studies import Losses, load_experiment
+from cns_drake.studies import Losses
 from cns_drake.studies.drives.changed_drives import lost_structures
-from cns_drake.studies.pairs.comparisons import PairMaker
 
 SOURCE = "mine.yaml: database"
 
@@ -100,118 +98,3 @@ def test_between_two_stages_lies_what_the_earlier_one_lacks(tmp_path):
     scenario = load_scenario(base).replaced(stage="04")
     world = load_world(scenario.world_file, without=tuple(last - first))
     assert structures_in(world) == first
-
-
-def test_seeds_choose_other_places():
-    a, b, c = (set(lost(missing=0.2, seed=seed)) for seed in (0, 1, 0))
-    assert a == c
-    assert len(a & b) < 0.8 * len(a)
-
-
-def test_structures_missing_here_and_there():
-    parts = {"pole": 0.5, "building": 0.25}
-    one, other = (set(lost(scattered=parts, seed=seed)) for seed in (0, 1))
-    more = set(lost(scattered={"pole": 0.75}))
-    kinds = {name: kind for name, (kind, *_) in places().items()}
-    for kind, part in parts.items():
-        names = {n for n in kinds if kinds[n] == kind and "_lot_" not in n}
-        gone = [found & names for found in (one, other)]
-        assert [len(g) for g in gone] == [round(part * len(names))] * 2
-        assert gone[0] != gone[1]
-    assert {kinds[name] for name in one} == set(parts)
-    # A greater share of a class includes all that a smaller share lacks.
-    poles = {name for name in one if kinds[name] == "pole"}
-    assert poles < more
-    # A seed of its own takes the place of the condition's.
-    again = lost(scattered=parts | {"seed": 1}, seed=7)
-    assert set(again) == other
-
-
-def test_a_map_without_buildings_and_plants_can_lack_scattered_poles(tmp_path):
-    town = write_small_map(tmp_path / "town")
-    table = town / "structures.csv"
-    table.write_text("name,class\npole_1,pole\npole_2,pole\n")
-    base = tmp_path / "base.yaml"
-    base.write_text(yaml.safe_dump(scenario_values(town)))
-    assert lost(base, scattered={"pole": 1.0}) == ("pole_1", "pole_2")
-    with pytest.raises(InputError, match="none of its structures can be"):
-        lost(base, missing=0.5)
-
-
-@pytest.mark.parametrize(
-    ("values", "fault"),
-    [
-        ({"missing": 1.2}, r"database: missing: Input should be less"),
-        ({"missing": -0.1}, r"database: missing: Input should be greater"),
-        ({"scattered": {"palm": 0.5}}, r"scattered: no 'palm' in "),
-        ({"scattered": {"pole": 1.5}}, r"scattered\.pole: 1\.5 is not from 0"),
-        ({"scattered": {"seed": -1}}, r"scattered\.seed: -1\.0 is no whole"),
-        ({"scattered": {"seed": 0.5}}, r"scattered\.seed: 0\.5 is no whole"),
-    ],
-)
-def test_faults_are_named(values, fault):
-    with pytest.raises(InputError, match=fault) as error:
-        lost(**values)
-    assert "\n" not in str(error.value)
-
-
-def test_a_stage_that_lacks_nothing_is_no_aim(small_map, tmp_path):
-    base = tmp_path / "base.yaml"
-    base.write_text(yaml.safe_dump(scenario_values(small_map)))
-    with pytest.raises(
-        InputError, match="towards: stage 04 lacks nothing of stage 04"
-    ):
-        lost(base, towards="04")
-    with pytest.raises(
-        InputError, match=r"stage: map '.*small' has no stage '07'"
-    ):
-        lost(base, towards="07")
-
-
-def test_a_city_needs_a_table_with_places(tmp_path):
-    folder = tmp_path / "town"
-    folder.mkdir()
-    for name in ("roads.yaml", "stage_04.sdf"):
-        (folder / name).symlink_to(shipped_maps()["metropolis"] / name)
-    values = yaml.safe_load(
-        (shipped_maps()["metropolis"] / "sequence_04.yaml").read_text()
-    )
-    drive = folder / "sequence_04.yaml"
-    drive.write_text(yaml.safe_dump(values | {"map": "."}))
-    with pytest.raises(InputError, match=r"structures\.csv: No such file"):
-        lost(drive, missing=0.5)
-    table = folder / "structures.csv"
-    for text in (
-        "name,class\nhut,building\n",
-        "name,class,x,y\nhut,building,1,nan\n",
-        "name,class,x,y\nhut,building,1,1e300\n",
-    ):
-        table.write_text(text)
-        with pytest.raises(InputError, match=r"s\.csv: x, y: every structure"):
-            lost(drive, missing=0.5)
-
-
-@pytest.mark.parametrize("name", ["hard", "hard2"])
-def test_shipped_drives_with_losses(name):
-    folder = shipped_maps()["downtown"]
-    experiment = load_experiment(folder / f"{name}.yaml")
-    (condition,) = experiment.conditions
-    (seed,) = experiment.seeds
-
-    def none(*_):
-        pytest.fail("another city")
-
-    pair = PairMaker(
-        *map(load_scenario, ("downtown_01", "downtown_04")),
-        False,
-        name,
-        none,
-        none,
-        none,
-    )
-    compared = pair.build(condition, seed)
-    database, query = compared.database, compared.query
-    assert (database.stage, query.stage) == ("04", "04")
-    assert len(database.without) == len(query.without) > 500
-    assert set(database.without) - set(query.without)
-    assert set(query.without) - set(database.without)

@@ -3,7 +3,6 @@
 import base64
 import io
 import json
-import pickle
 import re
 
 from helpers import dataset_folders, helipr_drive
@@ -19,14 +18,11 @@ import pytest
 
 from cns_drake.base import Cluster, InputError, run_jobs
 from evaluation.drives import open_drive
-from evaluation.methods import make_method, shipped_methods
-from evaluation.recognition import PROTOCOLS, RetrievalProtocol, costs, search
+from evaluation.methods import make_method
+from evaluation.recognition import PROTOCOLS, RetrievalProtocol
 from evaluation.results import QueryRows, Results
 from evaluation.study import (
-    MethodChoice,
-    StudyFiles,
     choose_methods,
-    chosen_methods,
     drives_by_map,
     find_recordings,
 )
@@ -65,7 +61,7 @@ def some_methods():
     """One of each kind; `test_costs` measures all that ship."""
     names = ("btc", "layered-overlap", "scan-context++", "solid")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(chosen_methods, "shipped_methods", lambda: names)
+        studies.ship_methods(patch, *names)
         yield
 
 
@@ -512,33 +508,6 @@ def test_loops_are_in_the_table_of_results(tmp_path, few_methods):
     assert {row.task for row in loops} <= {"place", "pose"}
     assert {row.method for row in loops} == set(few_methods)
     assert "at least 0.04 s before" in path.read_text()
-
-
-@pytest.mark.night
-@pytest.mark.usefixtures("unrendered_figures")
-def test_costs(recordings, tmp_path, monkeypatch):
-    # A clock that advances by 1 ms whenever it is read.
-    ticks = iter(range(0, 10**12, 10**6))
-    for module in (costs, search):
-        monkeypatch.setattr(module, "process_time_ns", lambda: next(ticks))
-    names = shipped_methods()
-    chosen = [MethodChoice(name) for name in names]
-    found = find_recordings(recordings)
-    *others, last = studies.planned(
-        found, tmp_path / "out", chosen, with_costs=True
-    )
-    # The job runs alone on the machine.
-    assert set(last.needs) == {job.name for job in others}
-    path = studies.report(recordings, tmp_path / "out", chosen, with_costs=True)
-    files = StudyFiles(path.parent)
-    measured = files.part("costs", "costs").read()
-    assert [one.method for one in measured] == [*names]
-    for one in measured:
-        assert one.describe_ms == one.query_ms == 1.0
-        assert one.scans_per_place == (10 if one.method == "btc" else 1)
-        assert one.places > 0
-        assert one.place_bytes > len(pickle.dumps(0))
-    assert section(path.parent, "costs").count("<td class") == len(names)
 
 
 def test_scans_without_points_are_refused(tmp_path):

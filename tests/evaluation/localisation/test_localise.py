@@ -13,10 +13,8 @@ from helpers.internal.eval_program import assert_refused, run
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-import small_gicp
 
 from cns_drake.base import InputError, from_xyz, poses
-from evaluation.alignment import make_surface
 from evaluation.drives import open_drive
 from evaluation.localisation import (
     COLUMNS,
@@ -29,7 +27,6 @@ from evaluation.localisation import (
     Settings,
     Starts,
     default_settings,
-    estimators,
     localise,
     make_estimator,
     make_map,
@@ -39,8 +36,6 @@ from evaluation.localisation import (
     path_axes,
     read_queries,
 )
-from evaluation.localisation.estimators import Estimate, _gauss_newton_step
-from evaluation.localisation.localiser import fit_at
 from evaluation.recognition import auroc, numbers_of
 
 SHIPPED = [name for name in METHODS if name != "kiss-matcher"]
@@ -156,76 +151,6 @@ def test_a_moved_wall_misleads_only_plain_estimators(method, frame):
     assert row["iterations"] > 3
 
 
-@pytest.mark.parametrize("method", ROBUST)
-def test_a_step_is_that_of_weighted_least_squares(method):
-    surface = make_surface(street(density=1.0))
-    X = a_pose(1.0, 2.0, 1.7)
-    scan = poses.transform(poses.inverse(X), street(9, density=0.1)) + 0.05
-    width = 1.5
-    spread = None
-    if method == "robust-gicp":
-        cloud = small_gicp.PointCloud(scan)
-        small_gicp.estimate_covariances(cloud, num_neighbors=10)
-        spread = np.array(cloud.covs())[:, :3, :3]
-    rows, wanted = [], []
-    for k, p in enumerate(scan):
-        arm = X[:3, :3] @ p
-        gaps = np.linalg.norm(surface.points - arm - X[:3, 3], axis=1)
-        near = gaps.argmin()
-        if gaps[near] >= width:
-            continue
-        off = arm + X[:3, 3] - surface.points[near]
-        root = surface.normals[near][None]
-        if spread is not None:
-            C = np.array(surface.cloud.covs()[near])[:3, :3]
-            C = (C + X[:3, :3] @ spread[k] @ X[:3, :3].T) / 2e-3
-            root = np.linalg.cholesky(np.linalg.inv(C)).T
-        kernel = width / 9.0
-        weight = kernel / (kernel + ((root @ off) ** 2).sum())
-        x, y, z = arm
-        turn = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
-        rows.append(weight * root @ np.hstack([turn, np.eye(3)]))
-        wanted.append(-weight * root @ off)
-    least, *_ = np.linalg.lstsq(
-        np.concatenate(rows), np.concatenate(wanted), rcond=None
-    )
-    # The step is held by a little, where nothing else holds it.
-    np.testing.assert_allclose(
-        _gauss_newton_step(surface, scan, X, width, spread), least, atol=1e-6
-    )
-
-
-@pytest.mark.parametrize(
-    ("p", "width", "aligned"), [(1.999, 2.0, True), (2.001, 2.0, False)]
-)
-def test_a_pair_is_within_the_width(p, width, aligned):
-    surface = make_surface(sheet((0, 0, 0), (9, 0, 0), (0, 9, 0), 1, 20.0))
-    scan = surface.points[:40]
-    X = poses.make_pose(np.eye(3), np.array([0.0, 0.0, p]))
-    step = _gauss_newton_step(surface, scan, X, width, None)
-    assert (np.abs(step).max() > 1.0) == aligned
-
-
-def test_the_search_is_narrowed_to_the_last_width(monkeypatch):
-    widths = []
-
-    def still(surface, scan, X, width, spread):
-        widths.append(width)
-        return np.array([0, 0, 0, 0.3, 0, 0]) * (len(widths) == 1)
-
-    monkeypatch.setattr(estimators, "_gauss_newton_step", still)
-    surface = make_surface(street())
-    start = np.eye(4)
-    end, steps = estimators.align_robustly(
-        surface, street(), start, (6.0, 0.5), 50, (1e-4, 1e-5)
-    )
-    # Three times a deviation of 0.3 m, then of none.
-    assert widths == pytest.approx([6.0, 6.0, 0.9, 0.5])
-    assert steps == 4
-    np.testing.assert_allclose(end[:3, 3], [0.3, 0.0, 0.0])
-    np.testing.assert_array_equal(start, np.eye(4))
-
-
 @pytest.mark.parametrize("method", ["icp", "plane-icp", "gicp"])
 def test_two_parallel_walls_lose_along_them(method):
     # The axes of the world are oblique to the walls.
@@ -249,28 +174,6 @@ def test_two_parallel_walls_lose_along_them(method):
     assert along > 1.0
     assert max(across, up) < 0.1
     assert max(deviations[True]) < 0.02
-
-
-def test_covariance_of_planes_in_closed_form():
-    # Three sheets at right angles: each holds one axis. N points, off by s.
-    parts = [
-        sheet((-1.0, -1.0, -1.0), (2, 0, 0), (0, 2, 0), 1, 400.0),
-        sheet((-1.0, -1.0, -1.0), (2, 0, 0), (0, 0, 2), 2, 200.0),
-        sheet((-1.0, -1.0, -1.0), (0, 2, 0), (0, 0, 2), 3, 100.0),
-    ]
-    surface = map_of(np.concatenate(parts), "map", Settings.neighbours).surface
-    middles = np.concatenate(
-        [part[(np.abs(part) < 0.8).sum(axis=1) == 2] for part in parts]
-    )
-    fit = fit_at(surface, middles, np.eye(4))
-    counts = [np.count_nonzero(middles[:, axis] == -1.0) for axis in range(3)]
-    # Nothing is off its plane, so that the least roughness counts: 0.01 m.
-    # Noise of normals takes 0.27 % of all points from each axis.
-    noise = math.sin(math.radians(3.0)) ** 2 * len(middles)
-    held = 0.01**2 / (np.array(counts) - noise)
-    covariance = np.linalg.inv(np.linalg.inv(fit.covariance)[3:, 3:])
-    assert np.diag(covariance) == pytest.approx(held, rel=0.01)
-    assert fit.share == 1.0
 
 
 def test_errors_of_a_start_that_stays(tmp_path):
@@ -497,19 +400,6 @@ def test_auroc_of_scores():
     assert auroc(np.array([1.0, 1.0, 1.0, 1.0]), is_high) == 0.5
     assert auroc(np.array([np.nan, 3.0, 1.0, 2.0]), is_high) == 0.5
     assert math.isnan(auroc(np.zeros(4), np.ones(4, bool)))
-
-
-def test_an_end_without_a_pose_is_a_failure():
-    found = Localiser(
-        map_of(street(), "map", EXACT.neighbours),
-        lambda *_: Estimate(None, -math.inf),
-        EXACT,
-    )
-    row = one_query(found, a_pose(0, 0, 1.7), street(), *np.zeros((2, 3)))
-    values = values_of(np.array([row]))
-    assert values["without_pose"] == 1
-    assert values["success_2m_5deg"] == 0.0
-    assert math.isnan(values["translation_median"])
 
 
 @pytest.mark.parametrize(("number", "is_sparse"), [(9, True), (10, False)])

@@ -2,36 +2,25 @@
 
 from collections import Counter
 import math
-from pathlib import Path
 import shutil
 
-from helpers.internal import studies
-from helpers.internal.eval_program import run_program
 from helpers.measured_pairs import compare_maps, place_scores
 from helpers.small_map import write_town
 import numpy as np
 import pytest
 
-from cns_drake.__main__ import main
 from cns_drake.base import Cluster, InputError
 from cns_drake.scenarios import load_scenario
 from cns_drake.simulation import SimulationSource
 from cns_drake.studies import (
     Experiment,
-    ExperimentRun,
-    load_experiment,
     run_study,
 )
-from cns_drake.studies import study as study_module
-from cns_drake.studies.maps import experiment_maps, map_step
-from cns_drake.studies.maps.experiment_maps import pairs_by_map
-from cns_drake.studies.study import plan_study
 from evaluation.change import DriveMap
 from evaluation.maps import CELL_SIZE, VoxelAccumulator
 from evaluation.methods import make_method
-from evaluation.recognition import RANDOM_YAW_PROTOCOL, RetrievalProtocol
+from evaluation.recognition import RetrievalProtocol
 from evaluation.results import QueryRows, Results
-from evaluation.study import engine
 
 TABLES = ("results.csv", "queries.csv")
 
@@ -41,23 +30,6 @@ def town(tmp_path_factory):
     """Folder of a map with two drives of 24 frames along one route."""
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
     return write_town(tmp_path_factory.mktemp("maps") / "town", routes, 24)
-
-
-@pytest.fixture
-def jobs_done(monkeypatch):
-    """The names of the jobs of each run, which run in this process."""
-    runs = []
-    monkeypatch.setattr(
-        engine,
-        "run_jobs",
-        lambda jobs, cluster, unit="": runs.append(studies.do(jobs)),
-    )
-
-    def page(results, queries, folder, **options):
-        return folder / "index.html"
-
-    monkeypatch.setattr(study_module, "write_page", page)
-    return runs
 
 
 def experiment(town, **fields):
@@ -72,36 +44,12 @@ def measure(wanted, output, **options):
     return Results.read(output / "results.csv")
 
 
-def planned(wanted, output, **options):
-    """The jobs of an experiment, and the comparisons that they measure."""
-    run = ExperimentRun(wanted, output, "mine.yaml", Cluster(), **options)
-    made, _ = plan_study(run)
-    return made.jobs, made.measured
-
-
 def values(results, **columns):
     """Metric -> value of the rows with these values of columns."""
     named = {name.replace("__", "."): one for name, one in columns.items()}
     found = results.where(**named).rows
     assert len({row.metric for row in found}) == len(found)
     return {row.metric: row.value for row in found}
-
-
-@pytest.mark.slow
-def test_a_long_study_says_so_before_its_parts_are_there(
-    town, tmp_path, jobs_done, monkeypatch
-):
-    """A job may need descriptions that another one has yet to write."""
-    monkeypatch.setattr(engine, "_LONG", 1e-9)
-    notes = []
-    wanted = experiment(
-        town,
-        drives="stages",
-        database={"transient": [{}, {"leaves": 0.0}]},
-        protocol={"base": "recorded", "query_spacing": 5},
-    )
-    measure(wanted, tmp_path, on_note=notes.append)
-    assert any("run the same command again" in note for note in notes)
 
 
 def contents(folder):
@@ -221,61 +169,6 @@ def test_finished_work_is_not_repeated(town, tmp_path, jobs_done):
     assert contents(output) == tables
 
 
-class InterruptedHereError(Exception):
-    """An interruption between two jobs."""
-
-
-@pytest.mark.slow
-@pytest.mark.night
-def test_an_interrupted_study_goes_on(town, tmp_path, jobs_done, monkeypatch):
-    wanted = experiment(town, **STAGES, tasks=["place", "change"])
-    measure(wanted, tmp_path / "whole")
-    whole = jobs_done[-1]
-    done = []
-
-    def some(jobs, cluster):
-        for job in jobs:
-            if len(done) == 5:
-                raise InterruptedHereError
-            done.extend(studies.do([job]))
-
-    with monkeypatch.context() as patch:
-        patch.setattr(engine, "run_jobs", some)
-        with pytest.raises(InterruptedHereError):
-            measure(wanted, tmp_path / "parts")
-    assert not (tmp_path / "parts" / "results.csv").exists()
-    measure(wanted, tmp_path / "parts")
-    assert [*done, *jobs_done[-1]] == whole
-    assert contents(tmp_path / "parts") == contents(tmp_path / "whole")
-
-
-@pytest.mark.night
-@pytest.mark.slow
-def test_processes_change_nothing(town, tmp_path, jobs_done, capsys):
-    wanted = experiment(town, **STAGES)
-    measure(wanted, tmp_path / "here")
-    path = tmp_path / "mine.yaml"
-    path.write_text(wanted.text)
-    with pytest.MonkeyPatch.context() as patch:
-        from cns_drake.base import run_jobs
-
-        patch.setattr(engine, "run_jobs", run_jobs)
-        status, out, _ = run_program(
-            capsys,
-            "cns-drake",
-            main,
-            "study",
-            path,
-            "--jobs",
-            "2",
-            "--output",
-            tmp_path / "there",
-        )
-    assert status == 0
-    assert out == f"{tmp_path / 'there' / 'index.html'}\n"
-    assert contents(tmp_path / "there") == contents(tmp_path / "here")
-
-
 @pytest.mark.night
 @pytest.mark.slow
 def test_protocols_are_factors(town, tmp_path, jobs_done):
@@ -339,32 +232,6 @@ def test_queries_are_scored_once_for_all_radii(town, tmp_path, jobs_done):
         assert len(answers) - 1 == 2 * (len(own_answers) - 1)
 
 
-def test_descriptions_are_shared(town, tmp_path):
-    """A drive that several pairs need is described once, and kept."""
-    jobs, measured = planned(
-        experiment(
-            town,
-            query={"transient": {"snow": [0, 0.1, 0.2]}},
-            both={"title": ["a", "b"]},
-            tasks=["place", "pose", "change"],
-        ),
-        tmp_path,
-    )
-    assert len(measured) == 2 * 3
-    kinds = Counter(name.split()[0] for name in jobs)
-    # Each of two databases meets three queries; each query meets one.
-    assert kinds["describe"] == 2
-    # Poses come with places.
-    assert (kinds["place"], kinds["pose"], kinds["change"]) == (6, 0, 6)
-    for name, job in jobs.items():
-        assert jobs.keys() >= set(job.needs)
-        if name.startswith("place"):
-            (need,) = job.needs
-            assert need.startswith("describe town_04_database")
-    outputs = [job.step.output for job in jobs.values()]
-    assert len(set(outputs)) == len(outputs)
-
-
 @pytest.mark.slow
 def test_a_condition_without_draws_is_measured_once(town, tmp_path, jobs_done):
     wanted = experiment(
@@ -425,68 +292,6 @@ def test_each_lidar_is_compared_with_its_own_baseline(
         assert (row.value, math.isnan(row.low)) == (1.0, True)
 
 
-def test_queries_that_are_asked_otherwise_are_no_other_drives(town, tmp_path):
-    """They change no map, and neither do places elsewhere."""
-    _, measured = planned(
-        experiment(
-            town,
-            tasks=["place", "change", "localise"],
-            cases={
-                "hidden": {"query": {"hide_sector": 90}},
-                "size": {"database": {"distractors": 0}},
-                "construction": {"database": {"stage": "first"}},
-            },
-        ),
-        tmp_path,
-    )
-    found = {one.factors["cause"]: set(one.parts) for one in measured}
-    every = {"place", "change", "localise"}
-    assert found == {
-        "none": every,
-        "hidden": {"place"},
-        "size": every,
-        "construction": every,
-    }
-
-
-def test_the_change_is_measured_if_all_queries_are_turned(town, tmp_path):
-    _, measured = planned(
-        experiment(
-            town,
-            tasks=["change"],
-            database={"stage": ["last", "first"]},
-            query={"turn_queries": True},
-        ),
-        tmp_path,
-    )
-    assert [set(one.parts) for one in measured] == [{"change"}, {"change"}]
-
-
-def test_the_sensor_of_a_place_is_no_change_of_the_city(
-    town, tmp_path, jobs_done
-):
-    wanted = experiment(
-        town,
-        tasks=["change"],
-        database={"viewpoint": ["near", "lane"], "stage": ["last", "first"]},
-        query={"lidar": ["vlp-16", "os1-32"]},
-    )
-    jobs, measured = planned(wanted, tmp_path)
-    for one in measured:
-        way, query = (
-            one.way.source.scenario,
-            one.query.source.scenario,
-        )
-        same = one.factors["database.stage"] == "last"
-        assert (one.way == one.query) == same
-        assert way.lidars == query.lidars
-        assert way.stage == ("04" if same else "01")
-        assert (way.route, way.aside) == (query.route, query.aside)
-    # Each way through each stage is mapped once.
-    mapped = [name for name in jobs if name.startswith("mapped ")]
-    assert len(mapped) == 2 * 2
-
-
 def test_an_unchanged_city_has_no_change(town, tmp_path, jobs_done):
     wanted = experiment(
         town,
@@ -501,40 +306,22 @@ def test_an_unchanged_city_has_no_change(town, tmp_path, jobs_done):
     assert {row.method for row in results.rows} == {""}
 
 
-def test_pairs_of_maps_begin_with_the_first_drive(town, tmp_path):
-    _, measured = planned(
-        experiment(town, drives="first-and-last", tasks=["map"]), tmp_path
-    )
-    (one,) = measured
-    stages = [
-        drive.source.scenario.stage for drive in (one.database, one.query)
-    ]
-    assert (one.names, stages) == (("town_01", "town_04"), ["01", "04"])
-
-
 @pytest.mark.slow
-def test_maps_are_labelled(town, tmp_path, jobs_done, monkeypatch):
-    from cns_drake.studies.tasks import map_task as update
-
-    monkeypatch.setattr(update, "find_spec", lambda name: None)
-    notes = []
+def test_maps_are_labelled(town, tmp_path, jobs_done):
+    names = ["truth", "free-space", "distance"]
     results = measure(
         experiment(
             town,
-            tasks={"map": {"spacing": 20}},
+            tasks={"map": {"spacing": 20, "methods": names}},
             both={"lidars": {"lidar": {"columns": 128}}},
             cases={"construction": {"database": {"stage": "first"}}},
         ),
         tmp_path,
-        on_note=notes.append,
     )
-    left_out, told = notes
-    assert left_out == "m3c2 is left out: it needs the extra map-update"
-    assert told.startswith("2 jobs: about ")
     found = {
         (cause, method): values(results, cause=cause, method=method)
         for cause in ("none", "construction")
-        for method in ("truth", "free-space", "distance")
+        for method in names
     }
     assert {(r.factors["cause"], r.method) for r in results.rows} == set(found)
     for cause in ("none", "construction"):
@@ -637,43 +424,6 @@ class Counting(Method):
         (row.method, row.factors["methods.counting.unit"])
         for row in results.rows
     } == {("counting", 1), ("counting", 2)}
-
-
-class PlannedError(Exception):
-    """All maps are known."""
-
-
-def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
-    runs = []
-    monkeypatch.setattr(
-        map_step, "run_jobs", lambda jobs, *_: runs.append([*jobs])
-    )
-
-    def stop(jobs, cluster):
-        runs.append([*jobs])
-        raise PlannedError
-
-    monkeypatch.setattr(engine, "run_jobs", stop)
-    wanted = experiment(
-        town,
-        database={"redraw": [3, 8], "years": [0, 5]},
-        both={"rates": 2},
-        cases={"slow": {"database": {"rates": 1}}},
-        seeds=[1, 2],
-    )
-    with pytest.raises(PlannedError):
-        run_study(wanted, tmp_path / "out", Cluster())
-    cities, measuring = runs
-    made = {job.step.folder: job.name for job in cities}
-    assert len(made) == len(cities) == 2 * 2 + 2
-    used = {
-        Path(job.step.source.scenario.map)
-        for job in measuring
-        if job.name.startswith("describe ")
-    }
-    # Each drive is through the town, or a city that was made.
-    assert used - {town} <= made.keys()
-    assert {path.name for path in made} >= {"town_c3", "town_c8"}
 
 
 @pytest.mark.parametrize(
@@ -804,12 +554,7 @@ def test_faults_before_any_work(town, tmp_path, fields, fault):
         ),
     ],
 )
-def test_faults_before_anything_is_made(
-    town, tmp_path, monkeypatch, fields, fault
-):
-    monkeypatch.setattr(
-        engine, "run_jobs", lambda *_: pytest.fail("a job runs")
-    )
+def test_faults_before_anything_is_made(town, tmp_path, fields, fault):
     with pytest.raises(InputError, match=f"^{fault}"):
         run_study(experiment(town, **fields), tmp_path / "out", Cluster())
     assert not (tmp_path / "out").exists()
@@ -830,29 +575,8 @@ def test_a_case_with_fewer_levels_is_noted(town, tmp_path):
     assert notes == ["measured at their last level: returns (1)"]
 
 
-@pytest.mark.parametrize("given", [[3, 1], 3, [5, 4, 2]])
-def test_fresh_cities_have_their_numbers(tmp_path, monkeypatch, given):
-    monkeypatch.setattr(
-        map_step, "run_jobs", lambda jobs, cluster, unit="": None
-    )
-    wanted = experiment("suburbia", both={"redraw": {"frozen": given}})
-    monkeypatch.setattr(
-        experiment_maps, "_drive_pairs", lambda folder, _: [(folder, folder)]
-    )
-    run = ExperimentRun(wanted, tmp_path, "mine.yaml", Cluster())
-    found = {
-        one.factors["both.redraw.frozen"]: one.pairs[0][0].name
-        for one in pairs_by_map(run, ["suburbia"])
-    }
-    numbers = given if isinstance(given, list) else [given]
-    assert found == {one: f"suburbia_f{one:02d}" for one in numbers}
-
-
 @pytest.mark.parametrize("name", ["results.csv", "queries.csv", "index.html"])
-def test_a_folder_with_the_name_of_a_result(town, tmp_path, monkeypatch, name):
-    monkeypatch.setattr(
-        engine, "run_jobs", lambda *_: pytest.fail("a job runs")
-    )
+def test_a_folder_with_the_name_of_a_result(town, tmp_path, name):
     (tmp_path / name).mkdir()
     with pytest.raises(InputError, match=f"{name}: a folder has this name"):
         run_study(experiment(town), tmp_path, Cluster())
@@ -874,79 +598,16 @@ def test_two_maps_of_one_name(town, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_map_with_one_drive_has_no_stages_to_compare(town, tmp_path):
+def test_a_map_with_one_drive_has_no_stages_to_compare(
+    town, tmp_path, jobs_done
+):
     lonely = shutil.copytree(town, tmp_path / "lonely")
     (lonely / "sequence_01.yaml").unlink()
     notes = []
-    _, measured = planned(
+    results = measure(
         experiment(town, maps=[str(lonely), str(town)], drives="stages"),
         tmp_path / "out",
         on_note=notes.append,
     )
-    assert notes == ["lonely: no two drives to compare"]
-    assert {one.map_name for one in measured} == {"town"}
-
-
-def test_maps_on_the_command_line(town, tmp_path):
-    wanted = experiment(
-        town,
-        maps=["suburbia", {"name": "a", "age": "x", "years": 2, "seed": 1}],
-    )
-    run = ExperimentRun(wanted, tmp_path, "mine.yaml", Cluster())
-    (drives,) = pairs_by_map(run, [str(town)])
-    assert drives.map_name == "town"
-    with pytest.raises(InputError, match="maps: a: no map 'x'"):
-        list(pairs_by_map(run, ["a"]))
-
-
-@pytest.mark.night
-@pytest.mark.slow
-def test_each_part_of_years_has_a_job_of_its_own(tmp_path):
-    """If two have one name, one of them never runs."""
-    wanted = load_experiment(
-        "years",
-        [
-            "database.years=[0, 1, 3]",
-            "query.years=[0, 1, 3]",
-            "seeds=[1, 2]",
-            "methods=[solid]",
-            "tasks=[place, localise, map]",
-            "maps=[riverside]",
-        ],
-    )
-    jobs, measured = planned(wanted, tmp_path)
-    # Today and after two times of two histories each, both ways.
-    assert len(measured) == 1 + 2 * 2 * 2
-    starts = Counter(name.split()[0] for name in jobs)
-    assert starts["place"] == starts["localise"] == starts["map"] == 9
-    outputs = [job.step.output for job in jobs.values()]
-    assert len(set(outputs)) == len(outputs)
-
-
-def test_places_elsewhere_are_described_once(tmp_path):
-    wanted = load_experiment(
-        "size",
-        [
-            "database.distractors=[0, 100, 300]",
-            "methods=[solid]",
-            "maps=[suburbia]",
-        ],
-    )
-    jobs, _ = planned(wanted, tmp_path)
-    described = [name for name in jobs if name.startswith("describe ")]
-    # One or two drives of other cities have 300 places; the database and the
-    # query serve all sizes.
-    assert 3 <= len(described) <= 4
-    place = [job for name, job in jobs.items() if name.startswith("place ")]
-    # The overlaps come first, then the one method.
-    steps = [job.step.steps[1] for job in place]
-    compared = [step.arguments[0] for step in steps]
-    assert [one.num_distractors for one in compared] == [0, 100, 300]
-    assert compared[0].distractors == ()
-    assert len(compared[-1].distractors) == len(described) - 2
-    assert set(place[-1].needs) == set(described)
-
-
-def test_random_yaw_is_the_protocol_of_studies(town, tmp_path):
-    _, (one,) = planned(experiment(town), tmp_path)
-    assert one.protocol == RANDOM_YAW_PROTOCOL
+    assert "lonely: no two drives to compare" in notes
+    assert {row.map for row in results.rows} == {"town"}

@@ -5,7 +5,6 @@ import pytest
 import typer
 
 from cns_drake import command_line as simulator
-from cns_drake.command_line.commands.export import _FORMATS, Format
 from evaluation import command_line as evaluation
 
 PROGRAMS = {"cns-drake": simulator, "cns-eval": evaluation}
@@ -44,23 +43,6 @@ def test_a_word_after_two_dashes_is_no_option(capsys):
     words = ("export", "--format", "cns", "--output", "x", "--", "--sensor")
     _, _, err = run(capsys, "cns-drake", *words)
     assert err == "cns-drake: error: --sensor: no recording (.mcap) there\n"
-
-
-@pytest.mark.parametrize("option", _FORMATS)
-def test_options_of_other_formats_are_refused(capsys, tmp_path, option):
-    formats = _FORMATS[option]
-    words = ["export", "a", "--output", tmp_path / "out"]
-    spelled = f"--{option.replace('_', '-')}"
-    # The least value of some numbers is 1; others are names.
-    words += [spelled, "4"]
-    for one in set(Format) - set(formats):
-        status, out, err = run(
-            capsys, "cns-drake", *words, "--format", one.value
-        )
-        assert (status, out) == (2, "")
-        assert f"{spelled}: not with --format {one.value}; only with " in err
-        assert err.count("\n") == 1
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

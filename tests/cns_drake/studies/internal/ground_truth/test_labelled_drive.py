@@ -1,35 +1,23 @@
 """Labels of two maps by rays: walls, screens, leaves, glass, another caster."""
 
-import json
-import shutil
-
-from helpers.internal import eval_program
-from helpers.internal.eval_program import run_program
-from helpers.small_map import box_visual, scenario_values, world_text
+from helpers.small_map import box_visual, world_text
 from helpers.tiny_drive import tiny_scenario
 import numpy as np
 import pytest
-import yaml
 
-from cns_drake.__main__ import main
-from cns_drake.base import InputError, Reporter
-from cns_drake.scenarios import make_scenario
 from cns_drake.sensors import BeamCoverage
-from cns_drake.simulation import SimulatedDrive, SimulationSource
-from cns_drake.studies import open_labelled, write_truth
-from cns_drake.studies.ground_truth.exact_labels import NEAR, is_there
+from cns_drake.simulation import SimulatedDrive
+from cns_drake.studies import write_truth
+from cns_drake.studies.ground_truth.exact_labels import NEAR
 from cns_drake.studies.ground_truth.labelled_drive import (
     LabelledDrive,
-    simulate_labelled,
 )
-from cns_drake.studies.tasks.map_task import TRUTH, measure_maps
-from evaluation.map_update import Label, read_pair, read_truth, score
+from evaluation.map_update import Label, read_pair, read_truth
 
 GROUND = box_visual("ground/plate", (0, 0, -0.5, 0, 0, 0), (200, 200, 1))
 # Its front is 10 m to the left of the drive.
 WALL = box_visual("wall/body", (0, 15.5, 3, 0, 0, 0), (30, 1, 6))
 HOUSE = box_visual("house/body", (-6, 30, 2, 0, 0, 0), (8, 1, 4))
-HALL = box_visual("hall/body", (25, -5, 3, 0, 0, 0), (8, 6, 6))
 # It hides the house from all of the drive.
 SCREEN = box_visual("screen/body", (-6, 14, 5, 0, 0, 0), (40, 0.2, 12))
 
@@ -96,34 +84,6 @@ def test_a_wall_that_moves_is_gone_and_new_beyond_the_tolerance(
         inner &= (session.points[:, 2] > 0.2) & (session.points[:, 2] < 5.8)
         assert inner.sum() > 1000
         assert (labels[inner] == (changed if changes else Label.KEPT)).all()
-
-
-def test_a_wall_that_moves_far_hides_its_old_place(tmp_path):
-    pair, truth = label(
-        tmp_path, [GROUND, WALL], [GROUND, wall_at(-0.4)], frames=20
-    )
-    inner = on(pair.A, "wall") & (np.abs(pair.A.points[:, 0]) < 14.0)
-    inner &= pair.A.points[:, 2] > 0.2
-    assert (truth.A[inner] == Label.UNOBSERVED).all()
-
-
-def test_swapped_drives_swap_gone_and_new(tmp_path):
-    worlds = [GROUND, WALL, HALL], [GROUND, SCREEN]
-    _, one = label(tmp_path / "one", *worlds)
-    _, other = label(tmp_path / "other", *worlds[::-1])
-    swap = np.zeros(5, np.uint8)
-    swap[[0, 1, 2, 3, 4]] = [4, 1, 3, 2, 0]
-    np.testing.assert_array_equal(swap[one.A], other.B)
-    np.testing.assert_array_equal(swap[one.B], other.A)
-    assert {0, 1, 2} == set(one.A)
-    assert {1, 3} <= set(one.B)
-
-
-def test_a_stage_against_itself_has_no_changes(tmp_path):
-    pair, truth = label(tmp_path, [GROUND, WALL], [GROUND, WALL])
-    for labels in truth:
-        assert (labels == Label.KEPT).all()
-    assert score(pair, truth, truth, {})["miou"] == 1.0
 
 
 def test_a_house_behind_a_screen_is_unobserved(tmp_path):
@@ -211,119 +171,3 @@ def test_labels_are_those_of_another_caster_but_at_edges(tmp_path):
     print(f"another caster: {differs:.2%} of {len(points)} labels differ")
     assert differs < 0.005
     assert set(expected) == {0, 1, 2}
-
-
-@pytest.mark.slow
-def test_recordings_are_labelled_and_scored(short_recording, tmp_path, capsys):
-    output = tmp_path / "pair"
-    command = ("export", *2 * [short_recording], "--format", "map-truth")
-    status, out, err = run_program(
-        capsys, "cns-drake", main, *command, "--output", output
-    )
-    assert (status, out) == (0, f"{output}\n"), err
-    names = {path.name for path in (output / "A").iterdir()}
-    assert names == {
-        "Scans",
-        "map.ply",
-        "poses.txt",
-        "singlesession_posegraph.g2o",
-        "truth.npy",
-    }
-    assert "new" in (output / "index.html").read_text()
-    labels = [f"--labels-{s}={output / s.upper() / 'truth.npy'}" for s in "ab"]
-    status, out, err = eval_program.run(
-        capsys, "map-update", output, *labels, "--json"
-    )
-    assert status == 0, err
-    found = json.loads(out)
-    assert found["miou"] == found["iou_kept"] == 1.0
-    assert found["iou_gone"] is None
-    session = read_pair(output).A
-    assert (session.instances > 0).all()
-    assert (np.load(output / "A" / "truth.npy") == Label.KEPT).all()
-    status, _, err = run_program(
-        capsys, "cns-drake", main, *command, "--output", output
-    )
-    assert status == 2
-    assert "exists already" in err
-
-
-@pytest.mark.slow
-def test_an_aged_city_has_another_name(small_map, tmp_path):
-    aged = shutil.copytree(small_map, tmp_path / "small_s1")
-    drives = []
-    for name, folder, stage in (
-        ("today", small_map, "01"),
-        ("later", aged, "04"),
-    ):
-        values = scenario_values(folder) | {"stage": stage, "frames": 20}
-        values |= {"name": name, "lidars": {"lidar": {"columns": 90}}}
-        drives.append(SimulationSource(make_scenario(values, name)))
-    scores = measure_maps(Reporter(), *drives, (TRUTH,), 1.0)
-    assert scores[TRUTH].scores["miou"] == 1.0
-    labelled = [simulate_labelled(drive.scenario) for drive in drives]
-    with pytest.raises(InputError, match="through small_s1"):
-        write_truth(*labelled, tmp_path / "out")
-
-
-@pytest.mark.slow
-def test_two_worlds_and_changed_worlds_are_refused(
-    short_recording, tmp_path, small_map
-):
-    other = labelled_drive(tmp_path / "elsewhere", [GROUND])
-    with pytest.raises(InputError, match="elsewhere"):
-        write_truth(open_labelled(short_recording), other, tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-    table = small_map / "structures.csv"
-    text = table.read_text()
-    try:
-        table.write_text(text.replace("tower_000", "tower_900"))
-        with pytest.raises(InputError, match="has changed since"):
-            open_labelled(short_recording)
-    finally:
-        table.write_text(text)
-
-
-def test_small_parts_are_there(tmp_path):
-    """Poles of 2 cm, passed in any direction."""
-    poles = [
-        box_visual(
-            f"p{k}/body", (3.0 * k, 5, 3, 0, 0, 0.3 * k), (0.02, 0.02, 6)
-        )
-        for k in range(9)
-    ]
-    scene = labelled_drive(tmp_path / "w", [GROUND, *poles]).still()
-    rng = np.random.default_rng(8)
-    k = rng.integers(0, 9, 4000)
-    # In the axes of a pole.
-    x, y = rng.uniform(-0.15, 0.15, (2, 4000))
-    c, s = np.cos(0.3 * k), np.sin(0.3 * k)
-    z = rng.uniform(1.0, 5.0, 4000)
-    points = np.column_stack([3.0 * k + c * x - s * y, 5.0 + s * x + c * y, z])
-    beside = np.maximum(np.abs([x, y]) - 0.01, 0.0)
-    distance = np.hypot(*beside)
-    found = is_there(points, scene)
-    assert found[distance < 0.09].mean() > 0.99
-    assert not found[distance > 1.25 * NEAR].any()
-
-
-def test_files_beside_a_recording_may_be_those_of_another(
-    short_recording, tmp_path
-):
-    folder = tmp_path / "town" / short_recording.name
-    shutil.copytree(short_recording, folder)
-    file = folder / "scenario.yaml"
-    values = yaml.safe_load(file.read_text())
-    # The folder has moved, not the map.
-    values["map"] = str((short_recording / values["map"]).resolve())
-    file.write_text(yaml.safe_dump(values))
-    open_labelled(folder)
-    (lidar,) = values["lidars"]
-    for change, field in (
-        ({"seed": 77}, "seed"),
-        ({"lidars": {lidar: {"preset": "vlp-16"}}}, "lidars"),
-        ({"without": ["tower_000"]}, "without"),
-    ):
-        file.write_text(yaml.safe_dump(values | change))
-        with pytest.raises(InputError, match=f"{field}: .* of another drive"):
-            open_labelled(folder)

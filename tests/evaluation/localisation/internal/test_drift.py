@@ -1,9 +1,5 @@
 """Tracking of a drive through a map, against closed forms."""
 
-import json
-import math
-
-from helpers.internal.eval_program import run
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -61,21 +57,6 @@ def values_of(rows):
     return {one.metric: one.value for one in numbers}
 
 
-def stay(place, scan, measured, start):
-    return Estimate(start, 1.0)
-
-
-def test_an_exact_odometry_keeps_the_first_error():
-    rows = follow(Line(40), stay)
-    assert rows["translation_error"] == pytest.approx(0.5)
-    assert rows["rotation_error_deg"] == pytest.approx(0.0, abs=1e-6)
-    values = values_of(rows)
-    assert values["way"] == pytest.approx(78.0, abs=0.2)
-    assert values["within_03m"] == 0.0
-    assert values["lost_per_km"] == 0.0
-    assert math.isnan(values["back_after_median"])
-
-
 def test_drift_in_closed_form():
     # Over one stretch of 100 m: all lengths wrong by a, a turn of b deg/m.
     X_WS = np.tile(np.eye(4), (49, 1, 1))
@@ -94,16 +75,6 @@ def test_drift_in_closed_form():
     assert turned.as_euler("ZYX") == pytest.approx([headings[-1], 0, 0])
     exact = drifting_steps(X_WS, way, 0.0, 4)
     assert np.allclose(exact, poses.inverse(X_WS[:-1]) @ X_WS[1:])
-
-
-def test_the_deviation_of_a_drift():
-    X_WS = np.tile(np.eye(4), (10001, 1, 1))
-    X_WS[:, 0, 3] = 10.0 * np.arange(10001)
-    steps = drifting_steps(X_WS, X_WS[:, 0, 3], 0.01, 0)
-    lengths = np.linalg.norm(steps[:, :3, 3], axis=1) / 10.0 - 1.0
-    turns = Rotation.from_matrix(steps[:, :3, :3]).as_rotvec()[:, 2]
-    assert lengths.std() == pytest.approx(0.01, rel=0.1)
-    assert np.degrees(turns).std() / 10.0 == pytest.approx(0.01, rel=0.1)
 
 
 def test_losses_and_returns():
@@ -131,55 +102,3 @@ def test_losses_and_returns():
     assert values["lost_per_km"] == pytest.approx(2.0 / 0.198, rel=1e-3)
     assert values["back_after_median"] == pytest.approx(10.0, abs=0.02)
     assert values["within_03m"] == pytest.approx(84.0 / 99.0, rel=1e-3)
-
-
-def test_a_scan_without_points_is_passed_by_odometry(monkeypatch):
-    line = Line(9)
-    some = {4: CLOUD[:0], 5: CLOUD[:9]}
-    monkeypatch.setattr(line, "scan", lambda k: from_xyz(some.get(k, CLOUD)))
-    rows = follow(line, stay)
-    assert np.flatnonzero(np.isnan(rows["unmapped"])).tolist() == [4, 5]
-    assert rows["track_error"] == pytest.approx(0.5)
-
-
-def test_each_stretch_has_a_start_of_its_own():
-    line = Line(60)
-    mapped = np.ones(60, bool)
-    mapped[20:35] = False
-    rows = follow(line, stay, 0.0, mapped)
-    assert rows["stretch"].tolist() == [0] * 20 + [1] * 25
-    assert rows["translation_error"] == pytest.approx(0.5)
-    first = [rows[f"start_{axis}"][[0, 20]] for axis in "xyz"]
-    assert not np.allclose(*np.transpose(first))
-    assert values_of(rows)["way"] == pytest.approx(86.0, abs=0.2)
-
-
-def test_drift_moves_the_start_and_not_the_truth():
-    line = Line(200)
-    rows = follow(line, stay, 0.02, starts=Starts(1e-9, 0.0))
-    end = rows["translation_error"][-1]
-    # Some 2 % of 400 m, and the turn.
-    assert 1.0 < end < 60.0
-    offsets = [rows[f"start_{axis}"][-1] for axis in "xyz"]
-    assert math.hypot(*offsets) == pytest.approx(end)
-
-
-@pytest.mark.slow
-def test_the_command_tracks(towns, tmp_path, capsys):
-    town = towns / "town_01"
-    command = ["localise", town, town, "--method", "gicp", "--track"]
-    options = ["--output", tmp_path, "--odometry-drift", "0.02", "--json"]
-    status, out, _ = run(capsys, *command, *options)
-    assert status == 0
-    values = json.loads(out)
-    assert values["queries"] == 8
-    assert values["odometry_drift"] == 0.02
-    assert values["way"] == pytest.approx(70.0)
-    assert 0.0 <= values["within_03m"] <= 1.0
-    assert values["lost_per_km"] >= 0.0
-    picture = (tmp_path / "track.png").read_bytes()
-    assert picture.startswith(b"\x89PNG")
-    table = (tmp_path / "localisation.csv").read_text().splitlines()
-    assert table[0].startswith("stretch,way,step,track_error,frame,")
-    status, out, _ = run(capsys, *command)
-    assert "losses of the track [1/km] " in out

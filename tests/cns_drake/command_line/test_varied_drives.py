@@ -1,6 +1,5 @@
 """A study without recordings gives the results of recordings."""
 
-from helpers.internal import studies
 from helpers.measured_pairs import compare_maps, place_outcome, values_of
 from helpers.small_city import write_small_city
 import pytest
@@ -9,13 +8,11 @@ import yaml
 
 from cns_drake.city import generate_city
 from cns_drake.command_line import app
-from cns_drake.studies import recording
 from evaluation.change import read_map
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.results import Results
-from evaluation.study import engine
 
 pytestmark = pytest.mark.slow
 
@@ -26,8 +23,7 @@ def run(*arguments):
 
 
 @pytest.mark.night
-def test_simulated_and_recorded_drives_agree(tmp_path, monkeypatch):
-    studies.run_here(monkeypatch, recording, engine)
+def test_simulated_and_recorded_drives_agree(tmp_path, jobs_done):
     town = write_small_city(tmp_path / "town")
     generate_city(town)
     for stage, aside in (("01", 0.4), ("02", 0.0)):

@@ -10,13 +10,12 @@ import pytest
 
 from cns_drake.base import Cluster, InputError
 from cns_drake.studies import Experiment, run_study
-from cns_drake.studies import study as study_module
 from evaluation.change import read_map
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition import RANDOM_YAW_PROTOCOL, RetrievalProtocol
 from evaluation.results import Results
-from evaluation.study import MethodChoice, Part, engine
+from evaluation.study import MethodChoice, Part
 
 
 @pytest.fixture(scope="module")
@@ -29,10 +28,8 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(autouse=True)
-def in_this_process(monkeypatch):
-    studies.run_here(monkeypatch, engine)
-    studies.leave_figures_unrendered(monkeypatch)
-    monkeypatch.setattr(study_module, "write_page", lambda *_, **options: None)
+def in_this_process(jobs_done, unrendered_figures):
+    pass
 
 
 def measure(output, *maps, on_note=lambda text: None, **fields):

@@ -2,15 +2,10 @@
 
 import json
 import os
-from pathlib import Path
 import signal
 
 from helpers.bag_recordings import contents
 from helpers.generation import Generation
-from helpers.internal import studies
-from helpers.internal.eval_program import run_program
-from helpers.measured_pairs import compare_maps
-from helpers.small_city import write_small_city
 from helpers.tiny_drive import (
     FRAMES,
     long_scenario,
@@ -18,19 +13,11 @@ from helpers.tiny_drive import (
     write_scenario,
 )
 from mcap.reader import make_reader
-import numpy as np
 import pytest
-import yaml
 
-from cns_drake.__main__ import main
 from cns_drake.base import Cluster, InputError
-from cns_drake.city import generate_city
-from cns_drake.scenarios import load_scenario
 from cns_drake.simulation import simulate
-from cns_drake.studies import is_recorded, record_all, recording
-from cns_drake.studies.maps import map_step
-from evaluation.change import read_map
-from evaluation.drives import open_drive
+from cns_drake.studies import is_recorded, record_all
 
 pytestmark = pytest.mark.slow
 
@@ -150,88 +137,3 @@ def test_what_it_was_made_of_is_in_the_file(tmp_path):
     assert inputs.keys() == {"world", "vehicle", "waypoints"}
     names = [entry["name"] for entry in attachments["structures.json"]]
     assert names == ["ground", "hall"]
-
-
-@pytest.fixture(scope="module")
-def town(tmp_path_factory):
-    """Folder of a generated town, with a drive through each of its stages."""
-    folder = write_small_city(tmp_path_factory.mktemp("maps") / "town")
-    generate_city(folder)
-    for stage in ("01", "02"):
-        drive = {
-            "map": ".",
-            "stage": stage,
-            "route": [
-                {"road": name, "direction": "forward", "lane": 1}
-                for name in ("north", "south")
-            ],
-            "speeds": {"cruise": 14.0, "longitudinal_acceleration": 8.0},
-            "lidars": {"lidar": {"columns": 128}},
-            "frames": FRAMES,
-        }
-        (folder / f"sequence_{stage}.yaml").write_text(yaml.safe_dump(drive))
-    return folder
-
-
-@pytest.mark.night
-def test_drives_of_experiments_share_other_cities(
-    town, tmp_path, monkeypatch, capsys
-):
-    output = tmp_path / "output"
-    done = []
-    for module in (recording, map_step):
-        monkeypatch.setattr(
-            module,
-            "run_jobs",
-            lambda jobs, cluster, unit="": done.extend(studies.do(jobs)),
-        )
-
-    def generate(**values):
-        path = tmp_path / "vary.yaml"
-        path.write_text(yaml.safe_dump({"maps": str(town)} | values))
-        words = ("generate", "--vary", path, "--output", output)
-        status, out, err = run_program(capsys, "cns-drake", main, *words)
-        assert status == 0, err
-        return [Path(result) for result in out.splitlines()]
-
-    redrawn = {"drives": "stages", "both": {"redraw": [7]}}
-    drives = generate(**redrawn, database={"stage": "02", "missing": [0, 0.6]})
-    names = [path.name for path in drives]
-    assert len(names) == 3
-    city, *recorded = done
-    assert city.startswith("city town")
-    assert recorded == names
-    stage = next((output / "cities").glob("town_c7/stage_*.sdf"))
-    drawn = stage.stat()
-    plain, query, less = drives
-
-    done.clear()
-    redrawn["both"] = {"redraw": [8, 7]}
-    others = generate(**redrawn, database={"stage": "02"})
-    assert sum(one.startswith("city ") for one in done) == 1
-    assert stage.stat() == drawn
-    other = next(one for one in others if "redraw_8" in one.name)
-    databases = [plain, less]
-
-    # Each city is another place.
-    with pytest.raises(InputError, match=r"through town\w*8\w*, .* town\w*7"):
-        compare_maps(read_map(query), read_map(other))
-    changes = {
-        path.name: compare_maps(
-            read_map(path), read_map(query)
-        ).change.symmetric
-        for path in databases
-    }
-    assert changes[names[0]] == 0.0  # The very same drive.
-    assert changes[names[2]] > 0.1
-
-    # Each member is complete, also after it has been moved.
-    moved = tmp_path / "moved"
-    output.rename(moved)
-    member = load_scenario(moved / "scenarios" / f"{names[2]}.yaml")
-    assert is_recorded(member.model_copy(update={"frames": FRAMES}), moved)
-    again = open_drive(simulate(member, tmp_path).folder)
-    before = open_drive(moved / names[2])
-    assert len(again) == len(before) == FRAMES
-    for scan, scan_before in zip(again, before, strict=True):
-        np.testing.assert_array_equal(scan, scan_before)

@@ -1,13 +1,11 @@
 """`cns-drake study`: what it lists, shows and takes."""
 
-from pathlib import Path
-
 from helpers.internal.eval_program import run_program
+from helpers.internal.studies import asked_studies
 import pytest
 
 from cns_drake.__main__ import main
 from cns_drake.studies import load_experiment, shipped_experiments
-from cns_drake.studies import study as study_module
 from evaluation.methods import shipped_methods
 
 
@@ -18,14 +16,7 @@ def run(capsys, *words):
 @pytest.fixture
 def asked(monkeypatch):
     """The experiments, and maps, of all calls; nothing is measured."""
-    calls = []
-
-    def run_study(experiment, output, cluster, maps, **options):
-        calls.append((experiment, tuple(maps), options["source"]))
-        return Path(output) / "index.html"
-
-    monkeypatch.setattr(study_module, "run_study", run_study)
-    return calls
+    return asked_studies(monkeypatch)
 
 
 def test_all_shipped_experiments_are_listed(capsys):

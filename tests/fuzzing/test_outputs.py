@@ -16,6 +16,7 @@ import signal
 from typing import NamedTuple
 
 from helpers.internal.eval_program import run_program, write_towns
+from helpers.internal.signal_handlers import interrupt_at
 from helpers.small_city import write_small_city
 from helpers.small_map import write_town
 from helpers.small_osm import write_corner
@@ -25,8 +26,6 @@ import pytest
 import typer
 
 from cns_drake import command_line as simulator
-from cns_drake.base import program, progress_display
-from cns_drake.base.interrupts import INTERRUPTED as INTERRUPTED_STATUS
 from cns_drake.scenarios import write_scenarios
 from evaluation import command_line as evaluation
 from evaluation.clouds import read_cloud
@@ -284,7 +283,6 @@ def test_an_interrupt_is_one_line_and_leaves_nothing_half(
     inputs, tmp_path, monkeypatch, capsys, words, number
 ):
     monkeypatch.chdir(inputs)
-    monkeypatch.setattr(program.interrupts, "end_interrupted", end_interrupted)
     # Each signal is used at each second moment.
     offset = number == signal.SIGTERM
     for count in INTERRUPTED[words][offset::2]:
@@ -292,28 +290,12 @@ def test_an_interrupt_is_one_line_and_leaves_nothing_half(
         name, *rest = words.replace("OUT", str(tmp_path / "out")).split()
         main = PROGRAMS[name].main
         status, out, err = run_program(capsys, name, main, *rest)
-        assert (status, out) == (INTERRUPTED_STATUS, ""), err
+        assert (status, out) == (130, ""), err
         assert err.endswith(f"{name}: interrupted\n")
         assert "error" not in err
         assert "Traceback" not in err
         files = {path for path in tmp_path.rglob("*") if not path.is_dir()}
         assert files <= {tmp_path / "out" / MARK}
-
-
-def end_interrupted():
-    raise SystemExit(INTERRUPTED_STATUS)
-
-
-def interrupt_at(monkeypatch, count, number):
-    """Sends a signal to this process at its report of progress `count`."""
-    left = [count]
-
-    def doing(*report):
-        left[0] -= 1
-        if left[0] == 0:
-            signal.raise_signal(number)
-
-    monkeypatch.setattr(progress_display.Display, "doing", doing)
 
 
 def test_scenarios_of_an_earlier_run_are_replaced(tmp_path):

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.study import LongList, Part, parts
-from evaluation.study.features import KeptScans
+from evaluation.study import LongList, Part
 
 # Number of items that are written together.
 BLOCK = 64
@@ -75,33 +74,6 @@ def test_slices_join_lists(tmp_path):
         assert len(found[10:20] + list("ab")) == 12
 
 
-def test_few_items_are_in_memory(tmp_path, monkeypatch):
-    decoded = []
-    decode = parts.decode
-
-    def counting(data, *arguments):
-        found = decode(data, *arguments)
-        decoded.append(len(found))
-        return found
-
-    part = Part(tmp_path / "list.data")
-    part.write({}, [some(1000)])
-    monkeypatch.setattr(parts, "decode", counting)
-    (found,) = part.read()
-    assert decoded == [1]
-    for number in (0, 63, 1, 64, 127, 999, 0):
-        assert_equal(found[number], item(number))
-    assert decoded == [1, BLOCK, BLOCK, 1000 % BLOCK]
-    # Eight blocks stay, of which the first was used last but six.
-    for number in range(128, 128 + 6 * BLOCK, BLOCK):
-        assert_equal(found[number], item(number))
-    assert len(decoded) == 4 + 6
-    assert_equal(found[0], item(0))
-    assert len(decoded) == 4 + 6
-    assert_equal(found[64], item(64))
-    assert len(decoded) == 4 + 7
-
-
 def test_a_part_that_is_replaced_while_it_is_read(tmp_path):
     part = Part(tmp_path / "list.data")
     part.write({}, some(600))
@@ -120,13 +92,6 @@ def test_items_that_cannot_be_stored_stay_in_memory(tmp_path):
     assert list(kept) == things
     with pytest.raises(InputError, match="cannot be kept"):
         Part(tmp_path / "list.data").write({}, kept)
-
-
-def test_a_short_list_needs_no_folder(monkeypatch):
-    monkeypatch.setattr(parts.tempfile, "tempdir", "/nowhere")
-    assert len(some(HELD)) == HELD
-    with pytest.raises(InputError, match="temporary file: No such file"):
-        some(HELD + 1)
 
 
 def test_several_lists_and_other_values_share_a_file(tmp_path):
@@ -213,12 +178,3 @@ def test_nothing_is_left_of_a_temporary_file(tmp_path):
         lost.append(item(number))
     with pytest.raises(InputError, match="nowhere: No such file"):
         lost.append(item(HELD))
-
-
-def test_scans_that_were_not_kept():
-    frames = np.array([2, 5])
-    kept = KeptScans("a", np.eye(4)[None], None, frames, [np.zeros(1)] * 2)
-    assert kept.scan(5).shape == (1,)
-    for missing in (0, 3, 6):
-        with pytest.raises(KeyError):
-            kept.scan(missing)

@@ -6,16 +6,10 @@ import yaml
 from cns_drake.base import InputError
 from cns_drake.studies import (
     Experiment,
-    causes,
-    experiment_text,
     load_experiment,
-    register_cause,
     shipped_experiments,
 )
-from cns_drake.studies.experiments import cause_files
-from cns_drake.studies.experiments.protocol_fields import protocol_from_fields
 from evaluation.methods import shipped_methods
-from evaluation.recognition import RetrievalProtocol
 
 
 def test_a_file_of_few_words_is_enough(read):
@@ -26,27 +20,6 @@ def test_a_file_of_few_words_is_enough(read):
     (only,) = experiment.conditions
     assert (only.factors, only.changes, only.causes) == ({}, {}, ())
     assert only.baseline == {}
-
-
-def test_overrides_replace_single_fields(read):
-    text = """
-    database: {years: [0, 5], rates: 2}
-    protocol: recorded
-    tasks: [place, change]
-    """
-    found = read(
-        text,
-        "database.years=[0, 1, 2]",
-        "protocol.query_spacing=20",
-        "tasks.change.spacing=5",
-    )
-    assert found.database == {"years": [0, 1, 2], "rates": 2}
-    assert found.tasks == {"place": {}, "change": {"spacing": 5}}
-    # The other fields of the protocol stay as they were.
-    protocol = protocol_from_fields(found.protocol, "here")
-    assert protocol == RetrievalProtocol(query_spacing=20)
-    found = read(text, "tasks=[cost]", ("methods", ["solid"]))
-    assert (found.tasks, found.methods) == ({"cost": {}}, {"solid": {}})
 
 
 def test_settings_of_optional_methods_need_no_entry_in_the_file(read):
@@ -101,31 +74,6 @@ def test_shipped_experiments_are_read_and_written(name):
         first = experiment.conditions[0].factors
         assert all(one.baseline == first for one in experiment.conditions)
         assert experiment.about.endswith("?")
-
-
-def test_a_cause_is_a_file(tmp_path, monkeypatch):
-    """It is in the ladder and in the levels, and nothing else is."""
-    before = {name: load_experiment(name) for name in ("ladder", "levels")}
-    members = dict(cause_files._CAUSES._members)
-    monkeypatch.setattr(cause_files._CAUSES, "_members", members)
-    path = tmp_path / "hail.yaml"
-    path.write_text(
-        "title: Hail\nabout: hail\nstrengths:\n"
-        "  ladder: {query: {transient: {snow: [0.01, 0.02]}}}\n"
-        "  levels: {database: {transient: {leaves: [1.0, 0.5]}}}\n"
-    )
-    assert register_cause(path) == causes()["hail"]
-    ladder, levels = load_experiment("ladder"), load_experiment("levels")
-    shown = tmp_path / "shown.yaml"
-    shown.write_text(experiment_text("ladder"))
-    again = load_experiment(shown)
-    old = before["ladder"].cases
-    hail = {"query": {"transient": {"snow": [0.01, 0.02]}}}
-    assert ladder.cases == {**old, "hail": hail, "all": (*old["all"], "hail")}
-    case = levels.cases["all"]
-    assert case["database"].pop("transient") == {"leaves": [1.0, 0.5]}
-    assert case == before["levels"].cases["all"]
-    assert again.conditions == ladder.conditions
 
 
 @pytest.mark.parametrize(
