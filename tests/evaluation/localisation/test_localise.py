@@ -42,7 +42,7 @@ SHIPPED = [name for name in METHODS if name != "kiss-matcher"]
 # Each point of a scan is in a voxel of its own.
 EXACT = Settings(scan_voxel=1e-3)
 P_BS = (0.7, -0.4, 1.9)
-PROJECT = Path(__file__).parents[4]
+PROJECT = Path(__file__).parents[3]
 QUAT_BS = Rotation.from_euler("ZYX", [140.0, 12.0, -7.0], degrees=True)
 
 

@@ -112,17 +112,6 @@ def test_several_lists_and_other_values_share_a_file(tmp_path):
     assert again.path.read_bytes() == part.path.read_bytes()
 
 
-def test_items_that_hardly_take_room_are_stored_as_they_are(
-    tmp_path, monkeypatch
-):
-    monkeypatch.setattr(parts, "_ALWAYS_BYTES", 1 << 12)
-    part = Part(tmp_path / "list.data")
-    part.write({}, LongList.of(np.zeros(4000) for _ in range(600)))
-    found = part.read()
-    assert len(found) == 600
-    assert (found[599] == np.zeros(4000)).all()
-
-
 def test_a_damaged_list_is_named(tmp_path):
     part = Part(tmp_path / "list.data")
     part.write({}, some(600))

@@ -48,18 +48,18 @@ def jobs_here(patch):
     """Has studies run their jobs in this process, and write no page.
 
     Returns:
-        A list that gets the names of the jobs of each run.
+        A list that gets the names of the jobs of each study.
     """
     from cns_drake.studies import recording, study
     from cns_drake.studies.maps import map_step
 
     runs = []
-    for module in (engine, map_step, recording):
-        patch.setattr(
-            module,
-            "run_jobs",
-            lambda jobs, cluster, unit="": runs.append(do(jobs)),
-        )
+    run_here(patch, map_step, recording)
+    patch.setattr(
+        engine,
+        "run_jobs",
+        lambda jobs, cluster, unit="": runs.append(do(jobs)),
+    )
     patch.setattr(
         study,
         "write_page",
