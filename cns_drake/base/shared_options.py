@@ -70,6 +70,7 @@ Columns = Annotated[
         metavar="N",
         min=3,  # x, y, z
         help="Number of float32 values per point in .bin files, including x, y "
-        "and z. By default the program guesses this number from the values.",
+        "and z. By default four, or five in files named *.pcd.bin, as those of "
+        "nuScenes.",
     ),
 ]

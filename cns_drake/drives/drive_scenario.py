@@ -59,8 +59,8 @@ def read_scenario(folder: Path) -> Mapping | None:
 
     Raises:
         InputError: the file is not a mapping in YAML, its field `name` is not a
-            valid name of a drive, or the data sheet or the number of rings of a
-            LiDAR cannot be used.
+            valid name of a drive, `columns` is no number of columns, or the
+            data sheet or the number of rings of a LiDAR cannot be used.
     """
     path = folder / SCENARIO
     if not is_there(path):
@@ -71,6 +71,11 @@ def read_scenario(folder: Path) -> Mapping | None:
     name = scenario.get("name")
     if name is not None and not _NAME.fullmatch(str(name)):
         raise InputError(f"{path}: name: {name!r} is no name of a drive")
+    columns = scenario.get("columns")
+    if columns is not None and (type(columns) is not int or columns < 3):
+        raise InputError(
+            f"{path}: columns: {columns!r} is no whole number from 3 on"
+        )
     lidars = scenario.get("lidars")
     for name, section in lidars.items() if isinstance(lidars, dict) else ():
         if not isinstance(section, dict):

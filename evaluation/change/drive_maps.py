@@ -63,8 +63,7 @@ def maps_in_one_world(
         when: when all other drives are aligned with the first drive: `auto`
             (only if their world frames differ), `always` or `never`.
         lidar: name of the LiDAR, for recordings with several LiDARs.
-        columns: number of columns of `.bin` files; by default guessed from the
-            values.
+        columns: number of columns of `.bin` files, see `read_cloud`.
 
     Returns:
         The maps, in the given order; and reports on alignments.
@@ -115,8 +114,7 @@ def open_source(
     Args:
         path: path of a drive or of a cloud's file.
         lidar: name of the LiDAR, for recordings with several LiDARs.
-        columns: number of columns of `.bin` files; by default guessed from the
-            values.
+        columns: number of columns of `.bin` files, see `read_cloud`.
 
     Raises:
         InputError: if the path cannot be read as a drive or point cloud.
@@ -132,8 +130,7 @@ def _drive_map_of(source: Drive | Path, columns: int | None = None) -> DriveMap:
 
     Args:
         source: the drive, or the path of the file.
-        columns: number of columns of a `.bin` file; by default guessed from the
-            values.
+        columns: number of columns of a `.bin` file, see `read_cloud`.
 
     Raises:
         InputError: a scan or the file cannot be read.

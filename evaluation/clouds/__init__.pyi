@@ -1,6 +1,5 @@
-from evaluation.clouds.bin_columns import BinLayout as BinLayout
-from evaluation.clouds.bin_columns import find_layout as find_layout
 from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES as SCAN_LIMIT_BYTES
+from evaluation.clouds.cloud_files import bin_dtype as bin_dtype
 from evaluation.clouds.cloud_files import is_cloud as is_cloud
 from evaluation.clouds.cloud_files import read_blocks as read_blocks
 from evaluation.clouds.cloud_files import read_cloud as read_cloud

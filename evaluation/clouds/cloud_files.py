@@ -14,7 +14,6 @@ from cns_drake.base import (
     user_errors,
     value_errors,
 )
-from evaluation.clouds.bin_columns import find_layout
 from evaluation.clouds.notes import OnNote, no_note
 from evaluation.clouds.npy_files import read_npy_blocks
 from evaluation.clouds.pcd_files import read_pcd
@@ -26,6 +25,10 @@ _COARSE_STEP = 0.03
 # A function that reads a file; its second argument is the number of points per
 # block.
 _Reader = Callable[[Path, int, OnNote], Iterator[np.ndarray]]
+# Columns of a `.bin` file, and ending of the names that nuScenes gives its own.
+_COLUMNS = ("x", "y", "z", "intensity")
+_NUSCENES = ".pcd.bin"
+_NUSCENES_COLUMNS = 5
 # Number of points of a map that are read at a time.
 _BLOCK = 1 << 18
 # Largest file of a scan [bytes]; a revolution of a LiDAR makes a smaller one.
@@ -39,13 +42,13 @@ def read_cloud(
 
     The ending of the file's name gives the format: `.pcd` and `.ply` in all
     their encodings; `.npy` with an N x 3 or N x 4 array or a structured array;
-    `.bin` with float32 numbers, such as x, y, z and intensity of each point in
-    KITTI.
+    `.bin` with float32 numbers: x, y, z and intensity of each point, as in
+    KITTI, and the ring, as in nuScenes, whose files are named `*.pcd.bin`.
 
     Args:
         path: an existing file of a scan; see `read_blocks` for maps.
         columns: number of float32 numbers for each point in a `.bin`; by
-            default guessed from the values.
+            default four, or five if the name ends in `.pcd.bin`.
         on_note: is called with notes on how the file was read.
 
     Returns:
@@ -124,6 +127,35 @@ def _coarse_note(points: np.ndarray) -> str:
     )
 
 
+def bin_dtype(path: Path, columns: int | None = None) -> np.dtype:
+    """Returns the type of the points in a `.bin` file, which has no header.
+
+    Args:
+        path: an existing file.
+        columns: number of columns, see `read_cloud`.
+
+    Returns:
+        Float32 `x`, `y`, `z`, `intensity`, `column_5`, `column_6` ...
+
+    Raises:
+        ValueError: the file does not contain a whole number of such points.
+    """
+    usual = len(_COLUMNS)
+    if path.name.lower().endswith(_NUSCENES):
+        usual = _NUSCENES_COLUMNS
+    number = columns or usual
+    more = [f"column_{k + 1}" for k in range(len(_COLUMNS), number)]
+    names = [*_COLUMNS[:number], *more]
+    dtype = np.dtype([(name, "<f4") for name in names])
+    size = path.stat().st_size
+    if size % dtype.itemsize:
+        raise ValueError(
+            f"{size} bytes is not a whole number of points of {number} float32"
+            " (cut off, or other columns: --columns N)"
+        )
+    return dtype
+
+
 def is_cloud(path: Path) -> bool:
     """Returns whether a file name has the ending of a point cloud file."""
     return path.suffix.lower() in _READERS
@@ -142,17 +174,9 @@ def _find_reader(path: Path) -> _Reader:
 def _read_bin(
     path: Path, block: int, on_note: OnNote, columns: int | None = None
 ) -> Iterator[np.ndarray]:
-    layout = find_layout([path], columns)
-    if layout.note:
-        on_note(layout.note)
-    dtype = layout.dtype
-    size = path.stat().st_size
-    if size % dtype.itemsize:
-        raise ValueError(
-            f"{size} bytes is not a whole number of points of"
-            f" {layout.columns} float32"
-        )
-    return read_records(path, dtype, 0, size // dtype.itemsize, block)
+    dtype = bin_dtype(path, columns)
+    number = path.stat().st_size // dtype.itemsize
+    return read_records(path, dtype, 0, number, block)
 
 
 _READERS: dict[str, _Reader] = {

@@ -82,8 +82,7 @@ class KittiDrive(BinDrive):
         Args:
             path: its folder; the poses lie in `../../poses/<name>.txt`, or
                 as `poses.txt` beside the scans.
-            columns: number of columns of a scan; by default guessed from the
-                values.
+            columns: number of columns of a scan, see `BinDrive`.
 
         Raises:
             InputError: there is no such drive, its files do not fit together,

@@ -52,8 +52,7 @@ class MulranDrive(BinDrive):
 
         Args:
             path: its folder, with or without a `sensor_data`.
-            columns: number of columns of a scan; by default guessed from the
-                values.
+            columns: number of columns of a scan, see `BinDrive`.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.

@@ -20,7 +20,8 @@ def open_drive(
             `LiDAR/<name>` in a folder of HeLiPR chooses the LiDAR.
         lidar: name of the LiDAR to read, if the recording has several LiDARs.
         columns: number of float32 values per point in `.bin` files of KITTI and
-            MulRan; by default the number is guessed from the values.
+            MulRan; by default the field `columns` of the drive's
+            `scenario.yaml`, or four, or five for files named `*.pcd.bin`.
 
     Raises:
         InputError: if nothing at `path` can be read as a drive, or the drive

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping
 import filecmp
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from cns_drake.base import (
     value_errors,
 )
 from cns_drake.drives import Drive, LidarField, lidar_field
-from evaluation.clouds import SCAN_LIMIT_BYTES, BinLayout, find_layout
+from evaluation.clouds import SCAN_LIMIT_BYTES, bin_dtype
 from evaluation.drives.text_tables import check_increasing, parse_stamps_ns
 
 
@@ -126,24 +125,15 @@ class BinDrive(FileDrive):
         """Describes a drive.
 
         Args:
-            columns: number of float32 values per point; None to guess it from
-                the values.
+            columns: number of float32 values per point; by default the field
+                `columns` of the scenario, or as `read_cloud`.
             drive: all arguments of `FileDrive` except `read`.
         """
         super().__init__(read=self._read_bin, **drive)
-        self._columns = columns
-
-    @cached_property
-    def _layout(self) -> BinLayout:
-        return find_layout(self._files, self._columns)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        note = self._layout.note
-        return (*super().notes, *([note] if note else []))
+        self._columns = columns or (self.scenario or {}).get("columns")
 
     def _read_bin(self, path: Path, stamp_ns: int) -> np.ndarray:
-        return read_packed(path, self._layout.dtype)
+        return read_packed(path, bin_dtype(path, self._columns))
 
 
 def list_stamped(

@@ -109,8 +109,7 @@ def make_map(
     Args:
         source: the drive, or the cloud's file.
         settings: settings for downsampling and for normals.
-        columns: number of columns of a `.bin` file; by default guessed from the
-            values.
+        columns: number of columns of a `.bin` file, see `read_cloud`.
         on_note: is called with notes on how a cloud's file was read, and on
             points that are not finite.
         keep: which frames of a `JoinedDrive` are used, see `map_frames`.

@@ -16,8 +16,7 @@ class OneScan(FileDrive):
 
         Args:
             path: its file.
-            columns: number of columns of a `.bin` file; by default guessed from
-                the values.
+            columns: number of columns of a `.bin` file, see `read_cloud`.
         """
         notes: list[str] = []
         scan = read_cloud(path, columns, notes.append)

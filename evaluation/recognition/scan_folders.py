@@ -7,7 +7,7 @@ import numpy as np
 
 from cns_drake.base import InputError, completing, listed, quoted_cell, track
 from cns_drake.base import points as point_arrays
-from evaluation.clouds import OnNote, find_layout, is_cloud, no_note, read_cloud
+from evaluation.clouds import OnNote, is_cloud, no_note, read_cloud
 from evaluation.drives import cropped, cropped_with_fields
 from evaluation.methods import Method
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -40,8 +40,7 @@ def write_scores(
         verification_radius: radius of geometric verification [m] (see
             `evaluation.recognition.geometric_verification`); None for scores
             without this verification.
-        columns: number of columns of `.bin` files; by default guessed for each
-            folder from the values.
+        columns: number of columns of `.bin` files, see `read_cloud`.
         on_note: is called with notes on how scans were read, one note of each
             kind.
 
@@ -66,14 +65,12 @@ def write_scores(
         )
     place_files = _scan_files(database)
     query_files = _scan_files(query)
-    place_columns = _num_columns(place_files, columns, on_note)
-    query_columns = _num_columns(query_files, columns, on_note)
     reader = _CloudReader(method, _first_of_each_kind(on_note))
     descriptors, clouds = [], []
     for path in track(
         place_files, "describing places", len(place_files), "scans"
     ):
-        cloud = reader.read(path, place_columns)
+        cloud = reader.read(path, columns)
         descriptors.append(method.describe_place(cloud))
         if method.rerank_best:
             clouds.append(cloud)
@@ -87,7 +84,7 @@ def write_scores(
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(["query", "database", "score"])
         for path in track(query_files, "querying", len(query_files), "scans"):
-            cloud = reader.read(path, query_columns)
+            cloud = reader.read(path, columns)
             queries.append(method.describe(cloud))
             values = score_places(
                 method,
@@ -105,28 +102,6 @@ def write_scores(
                 names = quoted_cell(path.stem), quoted_cell(place.stem)
                 writer.writerow([*names, text])
     return reader.num_ignored
-
-
-def _num_columns(
-    files: list[Path], columns: int | None, on_note: OnNote
-) -> int | None:
-    """Returns the number of columns of `.bin` files; None if there are none.
-
-    Args:
-        files: all files of a folder.
-        columns: the number, if the user gives it; otherwise it is guessed.
-        on_note: is called with a note on the guess, if any.
-
-    Raises:
-        InputError: the number cannot be guessed, or does not fit the files.
-    """
-    bins = [path for path in files if path.suffix.lower() == ".bin"]
-    if not bins:
-        return None
-    layout = find_layout(bins, columns)
-    if layout.note:
-        on_note(layout.note)
-    return layout.columns
 
 
 def _first_of_each_kind(on_note: OnNote) -> OnNote:

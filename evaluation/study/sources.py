@@ -50,8 +50,7 @@ class RecordingSource:
     Attributes:
         path: file or folder of the recording.
         lidar: name of the LiDAR, for recordings with several LiDARs.
-        columns: number of values per point in `.bin` files; by default guessed
-            from the values.
+        columns: number of values per point in `.bin` files, see `read_cloud`.
     """
 
     path: Path

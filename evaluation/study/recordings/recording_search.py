@@ -51,8 +51,7 @@ def find_recordings(
         on_note: is called with each note on how recordings are read or left
             out.
         lidar: name of the LiDAR, for recordings with several LiDARs.
-        columns: number of columns of `.bin` files; by default guessed from the
-            values.
+        columns: number of columns of `.bin` files, see `read_cloud`.
 
     Raises:
         InputError: if no recording has a map and a stage, or a recording cannot

@@ -296,29 +296,3 @@ def test_a_scan_that_cannot_be_used(tmp_path):
     path.unlink()
     with pytest.raises(InputError, match=f"^{path}: No such file"):
         drive.scan(1)
-
-
-def test_scans_of_five_columns(tmp_path):
-    folder, X_0S = write_drive(tmp_path)
-    plain = open_drive(folder)
-    assert plain.notes == ()
-    scans = [plain.scan(k) for k in range(NUM_SCANS)]
-    for k, scan in enumerate(scans):
-        cloud = np.column_stack(
-            [scan[name] for name in ("x", "y", "z", "intensity")]
-        )
-        ring = np.arange(len(cloud)) % 32
-        path = folder / "velodyne" / f"{k:06d}.bin"
-        path.write_bytes(np.column_stack([cloud, ring]).astype("<f4").tobytes())
-    for drive in (open_drive(folder), open_drive(folder, columns=5)):
-        np.testing.assert_allclose(drive.X_WS, X_0S, atol=1e-5)
-        for k, scan in enumerate(scans):
-            found = drive.scan(k)
-            for name in ("x", "y", "z", "intensity"):
-                np.testing.assert_array_equal(found[name], scan[name])
-        np.testing.assert_array_equal(found["column_5"], ring)
-    (note,) = open_drive(folder).notes
-    assert "its values show 5 columns" in note
-    assert drive.notes == ()
-    with pytest.raises(InputError, match=r"000002\.bin: .*28 bytes"):
-        open_drive(folder, columns=7).scan(2)

@@ -607,7 +607,7 @@ for _name, _header in {
 
 
 @way(
-    "bin", "x.bin", *CLOUDS, "cloud .bin", "evaluation.clouds.find_layout",
+    "bin", "x.bin", *CLOUDS, "cloud .bin", "evaluation.clouds.bin_dtype",
     use=cloud("x.bin"),
 )  # fmt: skip
 def _(folder):
