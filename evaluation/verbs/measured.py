@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-import math
 from pathlib import Path
 from typing import Any
 
@@ -42,12 +41,8 @@ class Measured:
 
     @property
     def intervals(self) -> dict[str, Interval]:
-        """Name of a metric -> its 95 % interval, where it has one."""
-        return {
-            name: one.interval
-            for name, one in self.numbers.items()
-            if not math.isnan(one.interval.low)
-        }
+        """Name of a metric -> its 95 % interval; its limits can be unknown."""
+        return {name: one.interval for name, one in self.numbers.items()}
 
 
 def pair_key(

@@ -334,6 +334,12 @@ RECIPES = {
         after=("exports",),
         makes=("scores.csv",),
     ),
+    "help: scores": Recipe(
+        "cns-eval scores kitti",
+        changes=(("sequences/04", "sequences/02"),),
+        after=("exports",),
+        makes=("scores.csv",),
+    ),
     "help: report": Recipe(
         "cns-eval report drives",
         changes=(("report drives", "report output"),),
@@ -361,7 +367,7 @@ RECIPES = {
         prints=("('mine', False) 0.895",),
     ),
     "Python": Recipe(
-        "from evaluation import open_drive",
+        "from evaluation import open_drive\n",
         changes=(_LAST,),
         after=("own city",),
         file="read.py",
@@ -785,6 +791,21 @@ RECIPES = {
         after=("method",),
         file="check_heights.py",
         command=".venv/bin/python check_heights.py",
+    ),
+    "own method in Python": Recipe(
+        "from evaluation import recognise",
+        changes=(_FIRST, _LAST),
+        after=("method", "own city"),
+        file="recognise_heights.py",
+        command=".venv/bin/python recognise_heights.py",
+    ),
+    "recognise": Recipe(
+        "from evaluation import open_drive, recognise",
+        changes=(_FIRST, _LAST),
+        after=("own city",),
+        file="recognise.py",
+        command=".venv/bin/python recognise.py",
+        prints=("Interval(low=",),
     ),
     "own method": Recipe(
         ".venv/bin/cns-eval pr output/metropolis_01",

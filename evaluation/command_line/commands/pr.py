@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -159,7 +160,9 @@ def _values(found: Recognition) -> dict[str, Any]:
         "query": outcome.query,
         **metrics,
         "intervals_95": {
-            name: one.to_json() for name, one in found.intervals.items()
+            name: one.to_json()
+            for name, one in found.intervals.items()
+            if not isnan(one.low)
         },
         "recall_at_1": metrics["r1"],
         "recall_at_n": [

@@ -43,8 +43,8 @@ def scores(
         radius: Radius of the geometric verification [m].
 
     Example:
-        cns-eval scores kitti/01/velodyne kitti/04/velodyne \\
-            --method solid --output scores.csv
+        cns-eval scores kitti/sequences/01/velodyne \\
+            kitti/sequences/04/velodyne --method solid --output scores.csv
     """
     from evaluation.drives import NOT_FINITE
     from evaluation.recognition import write_scores

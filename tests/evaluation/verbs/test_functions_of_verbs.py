@@ -78,7 +78,9 @@ def test_places_are_recognised_as_the_command_does(capsys, towns, mode):
     check_printed(found, values, lines)
     assert found.metrics["r1"] == values["recall_at_1"]
     assert values["intervals_95"] == {
-        name: one.to_json() for name, one in found.intervals.items()
+        name: one.to_json()
+        for name, one in found.intervals.items()
+        if not math.isnan(one.low)
     }
     assert {"f1_max", "r5", "r10", "r25", "r1_percent", "mrr"} < {*values}
     assert {"auc_2.5m", "pose_success", "translation_90"} < {*values}
