@@ -42,6 +42,9 @@ from cns_drake.roads import (
 )
 from cns_drake.scene import MESH_FOLDER, check_new_map
 
+# Share of the buildings that usually change between an added first stage and
+# today.
+_CHANGED_SHARE = 0.3
 # A function that gets a map's folder, and the name of each stage -> the numbers
 # of structures and triangles in the stage.
 Finish = Callable[[Path, Mapping[str, tuple[int, int]]], None]
@@ -125,6 +128,25 @@ def import_city(
         )
         finish(draft, sizes)
     return report
+
+
+def with_usual_growth(source: Path, options: ImportOptions) -> ImportOptions:
+    """Returns options by which a dressed city has two stages at least.
+
+    Of a city that would have a single stage, some buildings are missing in an
+    additional first stage.
+
+    Args:
+        source: a file of one of `map_sources`.
+        options: the options; their `grow` stays if it is given.
+
+    Raises:
+        InputError: the file has an unknown ending.
+    """
+    has_stages = bool(options.years) or source_of(source).has_stages
+    if options.grow is not None or has_stages or not options.dressed:
+        return options
+    return replace(options, grow=_CHANGED_SHARE)
 
 
 def _titles_of_stages(

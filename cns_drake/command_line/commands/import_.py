@@ -26,15 +26,11 @@ from cns_drake.imports import (
     ImportReport,
     Undated,
     map_sources,
-    source_of,
 )
 from cns_drake.scene import MapFolder
 
 GROUP = "Make cities"
 
-# Default share of the buildings that change between an added first stage and
-# today.
-_CHANGED_SHARE = 0.3
 # Kinds of structures and of faults that a report names.
 _SHOWN = 5
 
@@ -115,9 +111,6 @@ def import_(
         raise InputError(
             "--grow: not with --plain, which adds nothing at random"
         )
-    has_stages = bool(stages) or source_of(path).has_stages
-    if not plain and not has_stages and grow is None:
-        grow = _CHANGED_SHARE
     options = ImportOptions(
         stages,
         year_attribute,
@@ -131,9 +124,10 @@ def import_(
         dressed=not plain,
     )
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.imports import import_city
+        from cns_drake.imports import import_city, with_usual_growth
         from cns_drake.scenarios import write_table
 
+    options = with_usual_growth(path, options)
     with errors_at_option("--output", "output"):
         report = import_city(
             path,
