@@ -115,10 +115,21 @@ class Localised:
         """Share of the queries whose pose is right."""
         return self.share_within(RIGHT_TRANSLATION, RIGHT_ROTATION_DEG)
 
-    def pose_errors(self, name: str) -> np.ndarray:
-        """Returns the absolute values of a field of the queries with a pose."""
+    @property
+    def num_matched(self) -> int:
+        """Number of queries; each is where the map is."""
+        return len(self)
+
+    num_poses = num_matched
+
+    def pose_error(self, name: str, part: float) -> float:
+        """Returns a quantile of the absolute values of a field.
+
+        Only queries with a pose count; it is NaN without one.
+        """
         is_posed = ~np.isnan(self.rows["translation_error"])
-        return np.abs(self.rows[name][is_posed])
+        values = np.abs(self.rows[name][is_posed])
+        return float(np.quantile(values, part)) if len(values) else math.nan
 
     def auroc(self, name: str) -> float:
         """Returns how well a score tells right from wrong results (AUROC).

@@ -12,6 +12,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 import inspect
 import math
+from operator import methodcaller
 from pathlib import Path
 from typing import Any, Literal
 
@@ -38,8 +39,6 @@ Mode = Literal["all", "filtered"]
 MODES: tuple[Mode, ...] = ("all", "filtered")
 # Sums and quotients of floating-point numbers leave a range by this at most.
 _ROUNDING = 1e-9
-# Overlap below which two scans show different surroundings.
-_ENOUGH_OVERLAP = 0.5
 # Further radii of a match for which AUC is computed [m].
 _RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)
 
@@ -344,24 +343,23 @@ def _metric(
     title: str,
     over: str,
     undefined: str = "",
-    value: str = "",
+    value: str | Callable[..., Any] = "",
     number: str = "",
     **fields: Any,
 ) -> Metric:
     """Returns a metric of this package.
 
     Args:
-        name, title: see `Metric`.
+        name, title, undefined: see `Metric`.
         over: its `over_queries`.
-        undefined: see `Metric`.
-        value: path of the attribute of a task's outcomes that is the value; by
-            default the attribute with the metric's name.
+        value: its `compute`, or the path of the attribute of a task's outcomes
+            that is the value; by default the attribute with the metric's name.
         number: path of the attribute that is the number of items; by default
-            the outcomes have a length.
+            the length of the outcomes.
         fields: further attributes of the metric.
     """
     usual: dict[str, Any] = {
-        "compute": _attribute(value or name),
+        "compute": value if callable(value) else _attribute(value or name),
         "count": _attribute(number) if number else len,
         "has_interval": False,
     }
@@ -370,10 +368,7 @@ def _metric(
 
 
 def _attribute(path: str) -> Callable[[Any], Any]:
-    """Returns a function that returns an attribute of an attribute.
-
-    It is None if there is none on the way.
-    """
+    """Returns a function that returns an attribute of an attribute, or None."""
 
     def get(found: Any) -> Any:
         for name in path.split("."):
@@ -383,18 +378,18 @@ def _attribute(path: str) -> Callable[[Any], Any]:
     return get
 
 
-def _share(*words: str, **fields: Any) -> Metric:
+def _share(*words: Any, **fields: Any) -> Metric:
     """Returns a metric from 0 to 1, of which more is better."""
     usual: dict[str, Any] = {"least": 0.0, "greatest": 1.0, "better": "more"}
     return _metric(*words, **usual | fields)
 
 
-def _count(*words: str, **fields: Any) -> Metric:
+def _count(*words: Any, **fields: Any) -> Metric:
     usual: dict[str, Any] = {"least": 0.0, "is_whole": True}
     return _metric(*words, **usual | fields)
 
 
-def _amount(*words: str, **fields: Any) -> Metric:
+def _amount(*words: Any, **fields: Any) -> Metric:
     """Returns a metric from 0 on, of which less is better."""
     usual: dict[str, Any] = {"least": 0.0, "better": "less"}
     return _metric(*words, **usual | fields)
@@ -402,45 +397,18 @@ def _amount(*words: str, **fields: Any) -> Metric:
 
 def _retained(name: str, of: str, title: str, **fields: Any) -> Metric:
     """Returns the share of another metric that is left of its baseline."""
-    usual: dict[str, Any] = {
-        "least": 0.0,
-        "better": "more",
-        "share_of": of,
-        "compute": lambda *both: _kept(METRICS[of].of, *both),
-        "is_compared": True,
-    }
-    return _metric(
-        name,
-        title,
-        "the value, divided by its value in the baseline",
-        "in the baseline, the value is 0 or undefined",
-        **usual | fields,
-    )
 
+    def compute(now: Any, before: Any) -> float | None:
+        value = METRICS[of].value(now)
+        if value is None:
+            return None
+        return float(kept_share(value, METRICS[of].of(before)))
 
-def _kept(value_of: Callable[[Any], float], now: Any, before: Any) -> float:
-    return float(kept_share(value_of(now), value_of(before)))
-
-
-def _auc_within(outcomes: QueryOutcomes, radius: float) -> float | None:
-    """Returns the AUC if a match lies within another radius [m]."""
-    if not {"distance", "nearest"} <= outcomes.columns.keys():
-        return None
-    found = outcomes.within(radius)
-    return found.curve.auc if found.has_match.any() else math.nan
-
-
-def _num_wrong_by(outcomes: QueryOutcomes, fault: str) -> float | None:
-    """Returns the number of queries that are wrong for a reason."""
-    why = outcomes.columns.get("why")
-    return None if why is None else float(np.sum(why == fault))
-
-
-def _num_hidden(outcomes: QueryOutcomes) -> float | None:
-    shown = outcomes.columns.get("overlap")
-    if shown is None:
-        return None
-    return float(((shown < _ENOUGH_OVERLAP) & ~outcomes.is_right).sum())
+    over = "the value, divided by its value in the baseline"
+    undefined = "in the baseline, the value is 0 or undefined"
+    usual: dict[str, Any] = {"least": 0.0, "better": "more", "share_of": of}
+    fields = {**usual, "is_compared": True, **fields}
+    return _metric(name, title, over, undefined, compute, **fields)
 
 
 def _visible_change(outcomes: QueryOutcomes) -> float | None:
@@ -479,687 +447,338 @@ def _num_right_only_in(
     return float((these.is_right & ~those.is_right).sum())
 
 
-def _success(found: Any) -> float | None:
-    """Returns the share of right poses, of queries or in a map."""
-    if isinstance(found, QueryOutcomes) and not found.estimates_poses:
-        return None
-    return found.success
-
-
-def _success_kept(now: Any, before: Any) -> float | None:
-    value, was = _success(now), _success(before)
-    if value is None:
-        return None
-    return float(kept_share(value, math.nan if was is None else was))
-
-
-def _num_successes(found: Any) -> int:
-    """Returns the number of queries that count as successes or failures."""
-    if isinstance(found, QueryOutcomes):
-        return int(found.has_match.sum())
-    return len(found)
-
-
-def _pose_error(name: str, part: float) -> Callable[[Any], float | None]:
-    """Returns a function that returns a quantile of the errors of poses."""
-
-    def compute(found: Any) -> float | None:
-        if isinstance(found, QueryOutcomes) and not found.estimates_poses:
-            return None
-        errors = found.pose_errors(name)
-        return float(np.quantile(errors, part)) if len(errors) else math.nan
-
-    return compute
-
-
-def _num_poses(found: Any) -> int:
-    if isinstance(found, QueryOutcomes):
-        return len(found.pose_errors("translation_error"))
-    return len(found)
-
-
 _NO_MATCH = "no query has a match"
 _NO_POSE = "there is no pose"
 _NO_RIGHT = "no pose is right"
 _NO_LENGTH = "the drive has no length"
+_NO_VOXEL = "no voxel lies in the hulls of both maps"
+_PLACE: dict[str, Any] = {"main_in": ("place",)}
+_RESAMPLED: dict[str, Any] = {"by_mode": True, "has_interval": True}
+_BY_MODE: dict[str, Any] = {"by_mode": True}
+_POSE: dict[str, Any] = {"tasks": ("pose",), "number": "num_poses"}
+_LOCALISE: dict[str, Any] = {"tasks": ("localise",)}
+_MAP: dict[str, Any] = {"tasks": ("map",), "number": "num_changed"}
+_CHANGE: dict[str, Any] = {"tasks": ("change",), "better": ""}
 
 
+# fmt: off
 def _of_answers() -> Iterator[Metric]:
     """Yields the metrics of place recognition."""
-    place: dict[str, Any] = {"main_in": ("place",)}
-    resampled: dict[str, Any] = {"by_mode": True, "has_interval": True}
     yield _share(
-        "auc",
-        "AUC",
-        "area under the precision-recall curve",
-        value="curve.auc",
-        **place | resampled,
-    )
+        "auc", "AUC", "area under the precision-recall curve",
+        value="curve.auc", **_PLACE, **_RESAMPLED)
     yield _share(
-        "auc_strict",
-        "AUC strict",
+        "auc_strict", "AUC strict",
         "area under the curve in which every query with a match counts",
-        compute=lambda outcomes: outcomes.curve.strict_auc(
-            int(outcomes.has_match.sum())
-        ),
-        **place | resampled,
-    )
+        **_PLACE, **_RESAMPLED)
     yield _share(
-        "r1",
-        "R@1",
-        "share of the queries with a match",
-        _NO_MATCH,
-        compute=lambda outcomes: outcomes.recall_at(1),
-        **place | resampled,
-    )
+        "r1", "R@1", "share of the queries with a match", _NO_MATCH,
+        methodcaller("recall_at", 1), **_PLACE, **_RESAMPLED)
     for rank in (5, 10, 25):
         yield _share(
-            f"r{rank}",
-            f"R@{rank}",
+            f"r{rank}", f"R@{rank}",
             f"share of the queries with a match among the best {rank} places",
-            _NO_MATCH,
-            compute=lambda outcomes, rank=rank: outcomes.recall_at(rank),
-            **resampled,
-        )
+            _NO_MATCH, methodcaller("recall_at", rank), **_RESAMPLED)
     yield _share(
-        "r1_percent",
-        "R@1%",
-        "share of the queries with a match among the best hundredth of the"
-        " places",
-        _NO_MATCH,
-        # 0 stands for unknown, where only the answers are known.
-        compute=lambda outcomes: (
-            outcomes.recall_at(outcomes.one_percent_rank)
-            if outcomes.num_places
-            else None
-        ),
-        **resampled,
-    )
+        "r1_percent", "R@1%", "share of the queries with a match among the best"
+        " hundredth of the places", _NO_MATCH, "recall_at_1_percent",
+        **_RESAMPLED)
     yield _share(
-        "mrr",
-        "mean reciprocal rank",
+        "mrr", "mean reciprocal rank",
         "mean of 1 / rank of the best match, over the queries with a match",
-        _NO_MATCH,
-        value="mean_reciprocal_rank",
-        **resampled,
-    )
+        _NO_MATCH, "mean_reciprocal_rank", **_RESAMPLED)
     yield _share(
-        "f1_max",
-        "F1max",
-        "greatest F1 on the precision-recall curve",
-        value="curve.f1_max",
-        by_mode=True,
-    )
+        "f1_max", "F1max", "greatest F1 on the precision-recall curve",
+        value="curve.f1_max", **_BY_MODE)
     yield _share(
-        "recall_at_full_precision",
-        "recall at full precision",
+        "recall_at_full_precision", "recall at full precision",
         "greatest recall at which no accepted place is wrong",
-        value="curve.recall_at_full_precision",
-        by_mode=True,
-    )
+        value="curve.recall_at_full_precision", **_BY_MODE)
     yield _share(
-        "match_auroc",
-        "match AUROC",
-        "probability that a query with a match has a better best score than a"
-        " query without a match",
-        "all queries have a match, or none",
-    )
+        "match_auroc", "match AUROC", "probability that a query with a match"
+        " has a better best score than a query without a match",
+        "all queries have a match, or none")
     for radius in (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0):
         yield _share(
-            f"auc_{radius:g}m",
-            f"AUC within {radius:g} m",
-            f"AUC if a place is a match within {radius:g} m",
-            _NO_MATCH,
-            compute=lambda one, radius=radius: _auc_within(one, radius),
-        )
-    yield _retained("relative_auc", "auc", "relative AUC", **place | resampled)
-    yield _retained(
-        "relative_auc_strict",
-        "auc_strict",
-        "relative AUC strict",
-        **place | resampled,
-    )
-    yield _retained("relative_r1", "r1", "relative R@1", **resampled)
+            f"auc_{radius:g}m", f"AUC within {radius:g} m",
+            f"AUC if a place is a match within {radius:g} m", _NO_MATCH,
+            methodcaller("auc_within", radius))
+    yield _retained("relative_auc", "auc", "relative AUC",
+                    **_PLACE, **_RESAMPLED)
+    yield _retained("relative_auc_strict", "auc_strict", "relative AUC strict",
+                    **_PLACE, **_RESAMPLED)
+    yield _retained("relative_r1", "r1", "relative R@1", **_RESAMPLED)
     yield _count(
-        "lost",
-        "answers lost",
-        "number of queries that are right in the baseline and wrong in the"
-        " condition",
-        better="less",
-        compute=lambda now, before: _num_right_only_in(before, now),
-        is_compared=True,
-    )
+        "lost", "answers lost", "number of queries that are right in the"
+        " baseline and wrong in the condition", better="less",
+        value=lambda now, before: _num_right_only_in(before, now),
+        is_compared=True)
     yield _count(
-        "found",
-        "answers gained",
-        "number of queries that are wrong in the baseline and right in the"
-        " condition",
-        better="more",
-        compute=_num_right_only_in,
-        is_compared=True,
-    )
-    for name, title, which, compute, by_mode in (
-        ("queries", "queries", "", len, False),
-        (
-            "with_match",
-            "queries with a match",
-            " that have a true match",
-            lambda outcomes: outcomes.has_match.sum(),
-            False,
-        ),
-        (
-            "true_positives",
-            "right answers (TP)",
-            " whose top-ranked place is a match",
-            lambda outcomes: outcomes.is_right.sum(),
-            False,
-        ),
-        (
-            "f1_max_true_positives",
-            "TP at F1max",
-            " whose answer is accepted and right",
-            lambda outcomes: outcomes.is_accepted.sum(),
-            True,
-        ),
-        (
-            "f1_max_counted",
-            "TP + FP + FN at F1max",
-            " that are no true negatives",
-            lambda outcomes: outcomes.curve.f1_max_counted,
-            True,
-        ),
+        "found", "answers gained", "number of queries that are wrong in the"
+        " baseline and right in the condition", better="more",
+        value=_num_right_only_in, is_compared=True)
+    yield _count("queries", "queries", "number of queries", value=len,
+                 tasks=("place", "localise"))
+    yield _count(
+        "with_match", "queries with a match",
+        "number of queries that have a true match", value="num_matched")
+    for name, title, which, by_mode in (
+        ("true_positives", "right answers (TP)",
+         "whose top-ranked place is a match", False),
+        ("f1_max_true_positives", "TP at F1max",
+         "whose answer is accepted and right", True),
+        ("f1_max_counted", "TP + FP + FN at F1max",
+         "that are no true negatives", True),
     ):
+        yield _count(name, title, f"number of queries {which}",
+                     by_mode=by_mode)
+    yield _count("places", "places", "number of places in the database",
+                 value=lambda outcomes: outcomes.num_places or None)
+    for name, title in zip(FAULTS, (
+        "queries without a match", "queries without a candidate",
+        "answers in another city", "answers just too far", "answers elsewhere",
+    ), strict=True):
         yield _count(
-            name,
-            title,
-            f"number of queries{which}",
-            compute=compute,
-            by_mode=by_mode,
-            tasks=("place", "localise") if name == "queries" else ("place",),
-        )
+            name, title, "number of queries whose top-ranked place is wrong for"
+            " this reason", better="less",
+            value=methodcaller("num_wrong_by", name))
     yield _count(
-        "places",
-        "places",
-        "number of places in the database",
-        compute=lambda outcomes: outcomes.num_places or None,
-    )
-    for name, title in zip(
-        FAULTS,
-        (
-            "queries without a match",
-            "queries without a candidate",
-            "answers in another city",
-            "answers just too far",
-            "answers elsewhere",
-        ),
-        strict=True,
-    ):
-        yield _count(
-            name,
-            title,
-            "number of queries whose top-ranked place is wrong for this reason",
-            better="less",
-            compute=lambda outcomes, name=name: _num_wrong_by(outcomes, name),
-        )
-    yield _count(
-        "hidden",
-        "wrong answers with little overlap",
-        "number of wrong answers where no match shows half of the query's scan",
-        compute=_num_hidden,
-    )
-    for name, title, value_of, more in (
+        "hidden", "wrong answers with little overlap",
+        "number of wrong answers where no match shows half of the query's scan")
+    for name, title, value, more in (
         ("visible_change", "visible change", _visible_change, ""),
-        (
-            "visible_change_added",
-            "visible change without parallax",
-            _visible_change_added,
-            ", minus the mean in the baseline",
-        ),
+        ("visible_change_added", "visible change without parallax",
+         _visible_change_added, ", minus the mean in the baseline"),
     ):
         yield _metric(
-            name,
-            title,
-            "mean share of a query's scan that the best of its matches does not"
-            f" show{more}",
-            _NO_MATCH,
-            least=-1.0,
-            greatest=1.0,
-            compute=value_of,
-            is_compared=bool(more),
-        )
+            name, title, "mean share of a query's scan that the best of its"
+            f" matches does not show{more}", _NO_MATCH, value, least=-1.0,
+            greatest=1.0, is_compared=bool(more))
 
 
 def _of_poses() -> Iterator[Metric]:
     """Yields the metrics of poses, at places and in maps."""
-    pose: dict[str, Any] = {"tasks": ("pose",), "main_in": ("pose",)}
-    localise: dict[str, Any] = {
-        "tasks": ("localise",),
-        "main_in": ("localise",),
-    }
+    both = ("pose", "localise")
     yield _share(
-        "pose_success",
-        "pose success",
+        "pose_success", "pose success",
         "share of the queries with a match whose pose is within 2 m and 5 deg",
-        f"{_NO_MATCH}, or the method estimates no pose",
-        compute=_success,
-        count=_num_successes,
-        **pose,
-    )
+        f"{_NO_MATCH}, or the method estimates no pose", "success",
+        "num_matched", tasks=("pose",), main_in=("pose",))
     for name, title, limits in (
         ("success_03m_1deg", "success within 0.3 m and 1 deg", (0.3, 1.0)),
         ("success_2m_5deg", "success within 2 m and 5 deg", (2.0, 5.0)),
     ):
         yield _share(
-            name,
-            title,
-            "share of the queries whose pose is so accurate",
-            compute=lambda found, limits=limits: found.share_within(*limits),
-            **localise,
-        )
-    yield _retained(
-        "relative_success",
-        "pose_success",
-        "relative success rate",
-        compute=_success_kept,
-        count=_num_successes,
-        tasks=("pose", "localise"),
-        main_in=("pose", "localise"),
-    )
+            name, title, "share of the queries whose pose is so accurate",
+            value=methodcaller("share_within", *limits),
+            main_in=("localise",), **_LOCALISE)
+    yield _retained("relative_success", "pose_success", "relative success rate",
+                    number="num_matched", tasks=both, main_in=both)
     for kind, title, unit, end in (
         ("translation", "error of the position", "m", ""),
         ("rotation", "error of the orientation", "deg", "_deg"),
     ):
         column = f"{kind}_error{end}"
         yield _amount(
-            f"{kind}_median{end}",
-            f"median {title}",
-            "median over the poses; in the task `pose`, over the right answers"
-            " that F1max counts",
-            _NO_POSE,
-            unit=unit,
-            main_in=("pose",) if unit == "m" else (),
-            tasks=("pose", "localise"),
-            compute=_pose_error(column, 0.5),
-            count=_num_poses,
-        )
-        for part, task, over in (
-            (90, "pose", "right answers that F1max counts"),
-            (95, "localise", "poses"),
+            f"{kind}_median{end}", f"median {title}", "median over the poses;"
+            " in the task `pose`, over the right answers that F1max counts",
+            _NO_POSE, methodcaller("pose_error", column, 0.5), unit=unit,
+            main_in=() if end else ("pose",), **_POSE | {"tasks": both})
+        for part, of, over in (
+            (90, _POSE, "right answers that F1max counts"),
+            (95, _LOCALISE, "poses"),
         ):
             yield _amount(
-                f"{kind}_{part}{end}",
-                f"{part} % quantile of the {title}",
-                f"{part} % quantile over the {over}",
-                _NO_POSE,
-                unit=unit,
-                tasks=(task,),
-                compute=_pose_error(column, part / 100.0),
-                count=_num_poses,
-            )
+                f"{kind}_{part}{end}", f"{part} % quantile of the {title}",
+                f"{part} % quantile over the {over}", _NO_POSE,
+                methodcaller("pose_error", column, part / 100.0), unit=unit,
+                **of)
 
 
 def _of_localisation() -> Iterator[Metric]:
     """Yields further metrics of scans in a map, and of a tracked drive."""
-    localise: dict[str, Any] = {"tasks": ("localise",)}
-    for name, way in (
-        ("along", "along the car"),
-        ("across", "across the car"),
-        ("up", "of the height"),
-    ):
+    for name, way in (("along", "along the car"), ("across", "across the car"),
+                      ("up", "of the height")):
         for column, title in (
             (name, f"median error {way}"),
             (f"std_{name}", f"median stated deviation {way}"),
         ):
             yield _amount(
-                f"{column}_median",
-                title,
-                "median over the poses",
-                _NO_POSE,
-                unit="m",
-                compute=_pose_error(column, 0.5),
-                **localise,
-            )
+                f"{column}_median", title, "median over the poses", _NO_POSE,
+                methodcaller("pose_error", column, 0.5), unit="m", **_LOCALISE)
     for name, title in (
-        ("own_score", "the estimator's score"),
-        ("fit", "the fit"),
-        ("residual", "the residual"),
-        ("hessian", "the stated deviation"),
+        ("own_score", "the estimator's score"), ("fit", "the fit"),
+        ("residual", "the residual"), ("hessian", "the stated deviation"),
     ):
         yield _share(
-            f"auroc_{name}",
-            f"AUROC of {title}",
+            f"auroc_{name}", f"AUROC of {title}",
             "probability that a right pose scores above a wrong one",
-            "all poses are right, or all wrong",
-            compute=lambda found, name=name: found.auroc(name),
-            **localise,
-        )
-    yield _metric(
-        "believed_from",
-        "threshold of trust",
-        "score that 95 % of the right poses reach",
-        _NO_RIGHT,
-        **localise,
-    )
+            "all poses are right, or all wrong", methodcaller("auroc", name),
+            **_LOCALISE)
+    yield _metric("believed_from", "threshold of trust",
+                  "score that 95 % of the right poses reach", _NO_RIGHT,
+                  **_LOCALISE)
     yield _share(
-        "confident_wrong",
-        "wrong, but confident",
-        "share of the queries that are wrong and reach the threshold of trust",
-        _NO_RIGHT,
-        better="less",
-        **localise,
-    )
+        "confident_wrong", "wrong, but confident", "share of the queries that"
+        " are wrong and reach the threshold of trust", _NO_RIGHT, better="less",
+        **_LOCALISE)
     yield _share(
-        "confident_of_wrong",
-        "wrong poses that are confident",
+        "confident_of_wrong", "wrong poses that are confident",
         "share of the wrong poses that reach the threshold of trust",
-        f"{_NO_RIGHT}, or none is wrong",
-        better="less",
-        **localise,
-    )
+        f"{_NO_RIGHT}, or none is wrong", better="less", **_LOCALISE)
     yield _share(
-        "unmapped_mean",
-        "share of a scan that the map lacks",
-        "mean over the scans with enough points",
-        "no scan has enough points",
-        better="",
-        **localise,
-    )
-    yield _count(
-        "without_pose",
-        "scans without a pose",
-        "number of queries",
-        better="less",
-        **localise,
-    )
-    yield _share(
-        "within_03m",
-        "share of the way within 0.3 m",
-        "share of the length of the drive",
-        _NO_LENGTH,
-        **localise,
-    )
+        "unmapped_mean", "share of a scan that the map lacks",
+        "mean over the scans with enough points", "no scan has enough points",
+        better="", **_LOCALISE)
+    yield _count("without_pose", "scans without a pose", "number of queries",
+                 better="less", **_LOCALISE)
+    yield _share("within_03m", "share of the way within 0.3 m",
+                 "share of the length of the drive", _NO_LENGTH, **_LOCALISE)
     yield _amount(
-        "lost_per_km",
-        "losses of the track",
-        "number, divided by the length of the drive",
-        _NO_LENGTH,
-        unit="1/km",
-        **localise,
-    )
+        "lost_per_km", "losses of the track",
+        "number, divided by the length of the drive", _NO_LENGTH, unit="1/km",
+        **_LOCALISE)
     for name, title, better in (
         ("losses", "number of losses of the track", "less"),
         ("lost_for_good", "losses without a recovery", "less"),
         ("stretches", "sections of the drive in the map", ""),
     ):
-        yield _count(name, title, "number", better=better, **localise)
+        yield _count(name, title, "number", better=better, **_LOCALISE)
     yield _amount(
-        "back_after_median",
-        "way until a recovery",
-        "median over the losses with a recovery",
-        "there is none",
-        unit="m",
-        **localise,
-    )
-    yield _amount(
-        "way",
-        "way in the map",
-        "length of the drive in the map",
-        unit="m",
-        better="",
-        **localise,
-    )
+        "back_after_median", "way until a recovery",
+        "median over the losses with a recovery", "there is none", unit="m",
+        **_LOCALISE)
+    yield _amount("way", "way in the map", "length of the drive in the map",
+                  unit="m", better="", **_LOCALISE)
 
 
 def _of_maps() -> Iterator[Metric]:
     """Yields the metrics of a change detector's labels."""
-
-    def at(*keys: str) -> dict[str, Any]:
-        return {
-            "compute": lambda found: found.score(*keys),
-            "number": "num_changed",
-            "tasks": ("map",),
-        }
-
-    main: dict[str, Any] = {"main_in": ("map",)}
-    over_labels = "mean over the labels that occur", "no label occurs"
-    yield _share("miou", "mean IoU", *over_labels, **at("miou") | main)
+    main = {"main_in": ("map",)}
+    labels = "mean over the labels that occur", "no label occurs"
+    yield _share("miou", "mean IoU", *labels, methodcaller("score", "miou"),
+                 **main, **_MAP)
     for name in ("kept", "gone", "new", "unobserved"):
         yield _share(
-            f"iou_{name}",
-            f"IoU of {name}",
-            "intersection over union of points",
-            "no point has the label",
-            **at(f"iou_{name}"),
-        )
-    for keys, end, title, of in (
-        ((), "", "", "points"),
-        (("within_02m",), "_within_02m", " within 0.2 m", "points"),
-        (("within_05m",), "_within_05m", " within 0.5 m", "points"),
-        (("by_structure",), "_by_structure", " by structure", "structures"),
+            f"iou_{name}", f"IoU of {name}",
+            "intersection over union of points", "no point has the label",
+            methodcaller("score", f"iou_{name}"), **_MAP)
+    for keys, title, of in (
+        ((), "", "point"),
+        (("within_02m",), " within 0.2 m", "point"),
+        (("within_05m",), " within 0.5 m", "point"),
+        (("by_structure",), " by structure", "structure"),
     ):
-        for label in ("gone", "new"):
-            for kind in ("precision", "recall"):
-                yield _share(
-                    f"{kind}_{label}{end}",
-                    f"{kind} of {label}{title}",
-                    f"share of {of}",
-                    f"there is no such {of.removesuffix('s')}",
-                    **at(*keys, f"{kind}_{label}"),
-                )
+        for name in (f"{kind}_{label}" for label in ("gone", "new")
+                     for kind in ("precision", "recall")):
+            yield _share(
+                "_".join((name, *keys)), f"{name.replace('_', ' of ')}{title}",
+                f"share of {of}s", f"there is no such {of}",
+                methodcaller("score", *keys, name), **_MAP)
     yield _share(
-        "right_structures",
-        "structures with the right verdict",
+        "right_structures", "structures with the right verdict",
         "share of the observed structures that get the right label (kept, gone"
-        " or new)",
-        "no structure changed",
-        **at("right_structures") | main,
-    )
+        " or new)", "no structure changed",
+        methodcaller("score", "right_structures"), **main, **_MAP)
     for of, more in (("structures", main), ("points", {})):
         yield _share(
-            f"called_{of}",
-            f"{of} called changed",
+            f"called_{of}", f"{of} called changed",
             f"share of the {of} that are called gone or new",
-            f"there are no {of}",
-            better="",
-            **at(f"called_{of}") | more,
-        )
+            f"there are no {of}", methodcaller("score", f"called_{of}"),
+            better="", **more, **_MAP)
     yield _share(
-        "miou_static",
-        "mean IoU without vehicles and people",
-        *over_labels,
-        **at("without_vehicles_and_people", "miou"),
-    )
+        "miou_static", "mean IoU without vehicles and people", *labels,
+        methodcaller("score", "without_vehicles_and_people", "miou"), **_MAP)
     for name in ("completeness", "accuracy"):
         yield _share(
-            name,
-            f"{name} of the updated map",
+            name, f"{name} of the updated map",
             "share of the points within 0.2 m of the other map",
             "a map has no point to compare",
-            **at("updated_map", name),
-        )
+            methodcaller("score", "updated_map", name), **_MAP)
     yield _amount(
-        "chamfer",
-        "Chamfer distance of the updated map",
+        "chamfer", "Chamfer distance of the updated map",
         "mean of the mean distances between the maps",
         "a map has no point to compare",
-        unit="m",
-        **at("updated_map", "chamfer"),
-    )
+        methodcaller("score", "updated_map", "chamfer"), unit="m", **_MAP)
     for name in ("gone", "new"):
-        yield _count(
-            name,
-            f"points that are {name}",
-            "number of points",
-            number="num_changed",
-            tasks=("map",),
-        )
+        yield _count(name, f"points that are {name}", "number of points",
+                     **_MAP)
 
 
 def _of_change() -> Iterator[Metric]:
     """Yields the metrics of structural change."""
     for name, title, value, main in (
         ("tcr_sym", "TCR_sym", "change.symmetric", ("change",)),
-        (
-            "tcr_sym_masked",
-            "TCR_sym where both drove",
-            "masked.symmetric",
-            ("change",),
-        ),
-        (
-            "tcr_source_to_target",
-            "TCR from first to second",
-            "change.source_to_target.ratio",
-            (),
-        ),
-        (
-            "tcr_target_to_source",
-            "TCR from second to first",
-            "change.target_to_source.ratio",
-            (),
-        ),
-        (
-            "tcr_sym_no_change",
-            "TCR_sym of only the routes",
-            "control.symmetric",
-            (),
-        ),
+        ("tcr_sym_masked", "TCR_sym where both drove", "masked.symmetric",
+         ("change",)),
+        ("tcr_source_to_target", "TCR from first to second",
+         "change.source_to_target.ratio", ()),
+        ("tcr_target_to_source", "TCR from second to first",
+         "change.target_to_source.ratio", ()),
+        ("tcr_sym_no_change", "TCR_sym of only the routes",
+         "control.symmetric", ()),
     ):
-        part = value.rpartition(".")[0]
-        yield _share(
-            name,
-            title,
-            "share of voxels",
-            "no voxel lies in the hulls of both maps",
-            better="",
-            value=value,
-            number=f"{part}.num_in_hull",
-            main_in=main,
-            tasks=("change",),
-        )
+        yield _share(name, title, "share of voxels", _NO_VOXEL, value,
+                     f"{value.rpartition('.')[0]}.num_in_hull", main_in=main,
+                     **_CHANGE)
     for name, title, value in (
         ("registered", "TCR_sym after registration", "registered.symmetric"),
         ("least", "least TCR_sym over shifted grids", "spread.least"),
         ("greatest", "greatest TCR_sym over shifted grids", "spread.greatest"),
     ):
-        yield _share(
-            f"tcr_sym_{name}",
-            title,
-            "share of voxels",
-            "no voxel lies in the hulls of both maps",
-            better="",
-            value=value,
-            number="change.num_in_hull",
-            tasks=("change",),
-        )
+        yield _share(f"tcr_sym_{name}", title, "share of voxels", _NO_VOXEL,
+                     value, "change.num_in_hull", **_CHANGE)
     yield _metric(
-        "registration_yaw_deg",
-        "yaw of the registration",
-        "of the frame of the second map in that of the first",
-        unit="deg",
-        value="registered.yaw_deg",
-        number="change.num_in_hull",
-        tasks=("change",),
-    )
-    for name, title in (
-        ("in_hull", "voxels in the other map's hull"),
-        ("unchanged", "voxels with a counterpart"),
-    ):
-        yield _count(
-            name,
-            title,
-            "number of voxels of both maps",
-            value=f"change.num_{name}",
-            number="change.num_in_hull",
-            tasks=("change",),
-        )
+        "registration_yaw_deg", "yaw of the registration",
+        "of the frame of the second map in that of the first", "",
+        "registered.yaw_deg", "change.num_in_hull", unit="deg", **_CHANGE)
+    for name, title in (("in_hull", "voxels in the other map's hull"),
+                        ("unchanged", "voxels with a counterpart")):
+        yield _count(name, title, "number of voxels of both maps", "",
+                     f"change.num_{name}", "change.num_in_hull", **_CHANGE)
 
 
-def _of_sightings() -> Iterator[Metric]:
-    """Yields the metrics of changes that a map of several drives notices."""
+def _others() -> Iterator[Metric]:
+    """Yields the metrics of sightings of changes, and of costs."""
     for end, where in (("", ""), ("_here", ", of those that the query sees")):
-        of: dict[str, Any] = {"tasks": ("seen",)}
         part = "by_query" if end else "all"
         yield _count(
-            f"changed{end}",
-            f"changed structures{where}",
+            f"changed{end}", f"changed structures{where}",
             "number of structures that were added or removed between the first"
-            " drive and the query",
-            value=f"{part}.changed",
-            number=f"{part}.changed",
-            **of,
-        )
+            " drive and the query", "", f"{part}.changed", f"{part}.changed",
+            tasks=("seen",))
         yield _share(
-            f"seen{end}",
-            f"changes noticed{where}",
-            "share of the changed structures that a drive of the database"
-            " notices",
-            "no structure changed",
-            value=f"{part}.seen",
-            number=f"{part}.changed",
-            **of,
-        )
+            f"seen{end}", f"changes noticed{where}", "share of the changed"
+            " structures that a drive of the database notices",
+            "no structure changed", f"{part}.seen", f"{part}.changed",
+            tasks=("seen",))
         for name, title in (
             ("delay_median", "median delay of a change"),
             ("delay_95", "95 % quantile of the delay of a change"),
         ):
             yield _amount(
-                f"{name}{end}",
-                f"{title}{where}",
+                f"{name}{end}", f"{title}{where}",
                 "quantile of the time to the drive that notices a change",
-                "no change is noticed",
-                unit="years",
-                value=f"{part}.{name}",
-                number=f"{part}.num_delays",
-                **of,
-            )
-
-
-def _others() -> Iterator[Metric]:
-    """Yields the metrics of costs, and of real beside simulated scans."""
+                "no change is noticed", f"{part}.{name}", f"{part}.num_delays",
+                unit="years", tasks=("seen",))
     for name, title, unit, over in (
         ("query_time", "time of a query", "s", "median over the queries"),
-        (
-            "build_time",
-            "time to build the database",
-            "s",
-            "of the whole database",
-        ),
-        (
-            "memory",
-            "memory of the descriptors",
-            "bytes",
-            "of the whole database",
-        ),
+        ("build_time", "time to build the database", "s",
+         "of the whole database"),
+        ("memory", "memory of the descriptors", "bytes",
+         "of the whole database"),
     ):
-        yield _amount(
-            name,
-            title,
-            over,
-            unit=unit,
-            grows=True,
-            number="places",
-            tasks=("cost",),
-            main_in=("cost",),
-        )
+        yield _amount(name, title, over, unit=unit, number="places",
+                      grows=True, tasks=("cost",), main_in=("cost",))
     yield _share(
-        "auc_control",
-        "AUC of the control",
-        "area under the curve of a classifier",
-        better="",
-        tasks=("judge",),
-    )
+        "auc_control", "AUC of the control",
+        "area under the curve of a classifier", better="", tasks=("judge",))
+# fmt: on
 
 
 METRICS: Family[Metric] = Family("metric")
-for _family in (
-    _of_answers,
-    _of_poses,
-    _of_localisation,
-    _of_maps,
-    _of_change,
-    _of_sightings,
-    _others,
-):
+for _family in (_of_answers, _of_poses, _of_localisation, _of_maps, _of_change,
+                _others):  # fmt: skip
     for _one in _family():
         METRICS.add(_one.name, _one, __name__)
 

@@ -117,7 +117,7 @@ def evaluate(
         recall_at_n=np.array(
             [outcomes.recall_at(rank) for rank in range(1, MAX_RANK + 1)]
         ),
-        recall_at_1_percent=outcomes.recall_at(outcomes.one_percent_rank),
+        recall_at_1_percent=METRICS["r1_percent"].of(outcomes),
         num_queries=len(outcomes),
         num_with_match=num_with_match,
         num_right=int(outcomes.is_right.sum()),

@@ -83,12 +83,6 @@ class PrCurve:
         return float(self.f1.max(initial=0.0))
 
     @property
-    def f1_max_counted(self) -> int:
-        """TP + FP + FN at the greatest F1; 0 if nothing is accepted."""
-        best = self.f1_max_index
-        return 0 if best is None else int(self.counted[best])
-
-    @property
     def recall_at_full_precision(self) -> float:
         """Greatest recall at a precision of 1; 0 if no threshold has it."""
         return float(self.recall[self.false_positives == 0].max(initial=0.0))

@@ -16,6 +16,9 @@ from evaluation.recognition.pose_errors import (
 )
 from evaluation.recognition.precision_recall import PrCurve, pr_curve
 
+# Overlap below which two scans show different surroundings.
+_ENOUGH_OVERLAP = 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class QueryOutcomes:
@@ -141,21 +144,67 @@ class QueryOutcomes:
         return auroc(self.best_scores, self.has_match)
 
     @property
-    def one_percent_rank(self) -> int:
-        """The N of R@1%: a hundredth of the number of places, at least 1."""
-        return max(1, round(0.01 * self.num_places))
+    def recall_at_1_percent(self) -> float | None:
+        """R@N, where N is a hundredth of the number of places, at least 1.
 
-    def within(self, radius: float) -> QueryOutcomes:
-        """Returns the outcomes if a match lies within another radius [m].
-
-        The columns `distance` and `nearest` must be known. The ranks of right
-        places stay those of the protocol.
+        It is None if the number of places is unknown, 0.
         """
-        return replace(
-            self,
-            is_right=self.columns["distance"] <= radius,
-            has_match=self.columns["nearest"] <= radius,
-        )
+        if not self.num_places:
+            return None
+        return self.recall_at(max(1, round(0.01 * self.num_places)))
+
+    @property
+    def auc_strict(self) -> float:
+        """Area under the curve with recall = TP / N at each of its points."""
+        return self.curve.strict_auc(self.num_matched)
+
+    @property
+    def num_matched(self) -> int:
+        """N, the number of queries with a match."""
+        return int(self.has_match.sum())
+
+    @property
+    def true_positives(self) -> int:
+        """TP, the number of right answers."""
+        return int(self.is_right.sum())
+
+    @property
+    def f1_max_true_positives(self) -> int:
+        """TP at the greatest F1."""
+        return int(self.is_accepted.sum())
+
+    @property
+    def f1_max_counted(self) -> int:
+        """TP + FP + FN at the greatest F1; 0 if nothing is accepted."""
+        best = self.curve.f1_max_index
+        return 0 if best is None else int(self.curve.counted[best])
+
+    def auc_within(self, radius: float) -> float | None:
+        """Returns the AUC if a match lies within another radius [m].
+
+        It is NaN if no query has such a match, and None if the columns
+        `distance` and `nearest` are unknown.
+        """
+        if not {"distance", "nearest"} <= self.columns.keys():
+            return None
+        has_match = self.columns["nearest"] <= radius
+        if not has_match.any():
+            return math.nan
+        is_right = self.columns["distance"] <= radius
+        return replace(self, is_right=is_right, has_match=has_match).curve.auc
+
+    def num_wrong_by(self, fault: str) -> int | None:
+        """Returns how many queries are wrong for a reason, if it is known."""
+        why = self.columns.get("why")
+        return None if why is None else int(np.sum(why == fault))
+
+    @property
+    def hidden(self) -> int | None:
+        """Number of wrong answers where no match shows half of the scan."""
+        shown = self.columns.get("overlap")
+        if shown is None:
+            return None
+        return int(((shown < _ENOUGH_OVERLAP) & ~self.is_right).sum())
 
     @property
     def is_accepted(self) -> np.ndarray:
@@ -172,32 +221,49 @@ class QueryOutcomes:
         return self.is_right & (self.best_scores >= self.curve.thresholds[best])
 
     @property
-    def estimates_poses(self) -> bool:
+    def _estimates_poses(self) -> bool:
         """Whether the method estimates poses.
 
         A method that finds no place localises no query.
         """
-        if "translation_error" not in self.columns:
-            return False
-        is_known = ~np.isnan(self.columns["translation_error"])
-        return bool(is_known.any() or np.isnan(self.best_scores).all())
+        errors = self.columns.get("translation_error")
+        return errors is not None and bool(
+            (~np.isnan(errors)).any() or np.isnan(self.best_scores).all()
+        )
 
-    def pose_errors(self, name: str) -> np.ndarray:
-        """Returns the errors of the poses of accepted matches, (K,).
+    @property
+    def num_poses(self) -> int:
+        """Number of accepted matches with a pose."""
+        return len(self._errors("translation_error"))
+
+    def pose_error(self, name: str, part: float) -> float | None:
+        """Returns a quantile of the errors of the poses of accepted matches.
+
+        It is NaN without such a pose, and None if the method estimates none.
 
         Args:
             name: `translation_error` [m] or `rotation_error_deg`.
+            part: share of smaller errors.
         """
+        if not self._estimates_poses:
+            return None
+        errors = self._errors(name)
+        return float(np.quantile(errors, part)) if len(errors) else math.nan
+
+    def _errors(self, name: str) -> np.ndarray:
         is_known = ~np.isnan(self.columns["translation_error"])
         return self.columns[name][self.is_accepted & is_known]
 
     @property
-    def success(self) -> float:
+    def success(self) -> float | None:
         """Share of the queries with a match whose pose is a success.
 
         A pose is a success within 2 m and 5 deg of the ground truth. Queries of
-        every score count. NaN if no query has a match.
+        every score count. NaN if no query has a match, and None if the method
+        estimates no poses.
         """
+        if not self._estimates_poses:
+            return None
         is_near = (self.columns["translation_error"] <= SUCCESS_TRANSLATION) & (
             self.columns["rotation_error_deg"] <= SUCCESS_ROTATION_DEG
         )

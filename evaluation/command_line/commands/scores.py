@@ -44,7 +44,8 @@ def scores(
 
     Example:
         cns-eval scores kitti/sequences/01/velodyne \\
-            kitti/sequences/04/velodyne --method solid --output scores.csv
+            kitti/sequences/04/velodyne --method solid \\
+            --output scores.csv
     """
     from evaluation.drives import NOT_FINITE
     from evaluation.recognition import write_scores

@@ -204,11 +204,10 @@ def test_recall_at_n():
     metrics = evaluate(outcomes)
     np.testing.assert_allclose(metrics.recall_at_n, np.arange(1, 26) / 30)
     assert metrics.recall_at_1 == pytest.approx(1 / 30)
-    # A hundredth of 200.
-    assert outcomes.one_percent_rank == 2
+    # A hundredth of 200 is 2.
     assert metrics.recall_at_1_percent == pytest.approx(2 / 30)
     few = judge(scores[:, :40], matches[:, :40])
-    assert few.one_percent_rank == 1
+    assert few.recall_at_1_percent == few.recall_at(1)
 
 
 def test_mean_reciprocal_rank():

@@ -55,8 +55,13 @@ def printed(capsys, *words):
     return json.loads(out), text.splitlines()
 
 
-def check_printed(found, values, lines):
-    """Checks that a command prints the metrics and nothing else."""
+def check_printed(found, values, lines, *tasks):
+    """Checks that a command prints each metric of its tasks."""
+    assert found.metrics.keys() == {
+        name
+        for name, one in METRICS.items()
+        if {*tasks} & {*one.tasks} and not one.is_compared
+    }
     for name, value in found.metrics.items():
         assert values[name] == json_values(value), name
         label = METRICS[name].label
@@ -75,7 +80,7 @@ def test_places_are_recognised_as_the_command_does(capsys, towns, mode):
     found = recognise(
         *map(open_drive, both(towns)), "solid", mode=mode, radius=5.0
     )
-    check_printed(found, values, lines)
+    check_printed(found, values, lines, "place", "pose")
     assert found.metrics["r1"] == values["recall_at_1"]
     assert values["intervals_95"] == {
         name: one.to_json()
@@ -172,7 +177,7 @@ def test_change_is_what_the_command_prints(capsys, tmp_path):
     values, lines = printed(capsys, "tcr", a, b, "--no-change", c)
     first, second, control = map(open_drive, (a, b, c))
     found = change_between(first, second, no_change=control)
-    check_printed(found, values, lines)
+    check_printed(found, values, lines, "change")
     # A third drive, and not the pair once more.
     assert values["no_change"]["between"] == ["town_01_control", "town_02"]
     assert values["no_change"]["tcr_sym"] == 0.0
@@ -186,9 +191,10 @@ def test_change_is_what_the_command_prints(capsys, tmp_path):
 
 def test_localisation_is_what_the_command_prints(capsys, towns):
     words = "localise", *both(towns), "--method", "gicp", "--start", 1
-    values, lines = printed(capsys, *words)
-    found = localise(*map(open_drive, both(towns)), "gicp", start=1.0)
-    check_printed(found, values, lines)
+    values, lines = printed(capsys, *words, "--track")
+    drives = map(open_drive, both(towns))
+    found = localise(*drives, "gicp", start=1.0, track=True)
+    check_printed(found, values, lines, "localise")
     assert len(found.queries) == len(found.rows) == values["queries"]
 
 
@@ -209,6 +215,6 @@ def test_a_map_update_is_what_the_command_prints(capsys, tmp_path):
     words = "map-update", tmp_path, "--baseline", "distance"
     values, lines = printed(capsys, *words)
     found = update_map(tmp_path, baseline="distance")
-    check_printed(found, values, lines)
+    check_printed(found, values, lines, "map")
     with pytest.raises(InputError, match="'near' is none of free-space"):
         update_map(tmp_path, baseline="near")
