@@ -200,22 +200,6 @@ def test_tcr_table(capsys, towns):
         assert text in out
 
 
-def test_a_control_is_compared_itself(capsys, tmp_path):
-    """Not the pair once more, although both have the pair's names in tables."""
-    rng = np.random.default_rng(1)
-    before, after = rng.uniform(-40.0, 40.0, (2, 400, 3))
-    routes = {"town_01": before, "town_02": after, "town_01_control": after}
-    for name, points in routes.items():
-        poses = [yaw_pose(3.0 * i, 0.0, 0.0, 0.0) for i in range(5)]
-        scans = [make_scan(points) for _ in poses]
-        write_recording(tmp_path / name, scans, poses)
-    a, b, c = (tmp_path / name for name in routes)
-    _, out, _ = run(capsys, "tcr", a, b, "--no-change", c, "--json")
-    values = json.loads(out)
-    assert values["no_change"]["between"] == ["town_01_control", "town_02"]
-    assert values["tcr_sym"] > 0.1 > values["no_change"]["tcr_sym"] == 0.0
-
-
 def test_drives_far_apart_say_why_nothing_is_measured_where_both_drove(
     capsys, tmp_path
 ):
