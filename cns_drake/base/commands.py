@@ -37,6 +37,9 @@ class Command(TyperCommand):
             helps[name] = " ".join(meaning.split())
         for param in params:
             param.help = helps.get(param.name, param.help)
+            if param.param_type_name == "argument":
+                # Since 0.29, Typer shows Python's type behind the name.
+                param.display_type_rich = lambda ctx: None
         if lines:
             settings["epilog"] = example(*textwrap.dedent(lines).splitlines())
         super().__init__(*args, help=text, params=params, **settings)

@@ -99,6 +99,8 @@ def helps(program: str, name: str) -> Callable[[Path], dict[str, str]]:
         verbs = _verbs(run(folder, program, "--help"))
         lines = [f"{name} --help", *(f"{name} {verb} --help" for verb in verbs)]
         text = _python(folder, "-I", "-c", _FORKS, program, *lines)
+        # Since 0.28, Typer ends an argument that may be repeated with dots.
+        text = re.sub(r"(?m)^(Usage: .*)\.\.\.$", r"\1", text)
         return {f"{name}-help.txt": text}
 
     return edge

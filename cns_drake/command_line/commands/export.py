@@ -83,9 +83,7 @@ _MAP_SPACING = 1.0
 
 def export(
     context: typer.Context,
-    drives: Annotated[
-        list[str] | None, typer.Argument(metavar="DRIVE ...")
-    ] = None,
+    drives: Annotated[list[str] | None, typer.Argument(metavar="DRIVE")] = None,
     *,
     layout: Annotated[str, typer.Option("--format", metavar="FORMAT")],
     output: Annotated[Path, typer.Option()],

@@ -26,7 +26,7 @@ def study(
     maps: Annotated[list[str] | None, typer.Argument(metavar="MAP")] = None,
     output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     quick: Annotated[bool, typer.Option("--quick")] = False,
-    task: list[str] | None = None,
+    task: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
     method: shared_options.Methods = None,
     override: Annotated[
         list[str] | None,

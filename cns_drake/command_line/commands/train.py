@@ -34,7 +34,9 @@ def train(
     cities: Annotated[int | None, typer.Option(min=1, max=1000)] = None,
     steps: Annotated[int | None, typer.Option(min=1)] = None,
     seed: Annotated[int, typer.Option(min=0, max=10_000)] = 1,
-    without: list[Variation] | None = None,
+    without: Annotated[
+        list[Variation] | None, typer.Option(metavar="|".join(Variation))
+    ] = None,
     drawn_streets: Annotated[bool, typer.Option("--drawn-streets")] = False,
     graded: Annotated[bool, typer.Option("--graded")] = False,
     lidar: Annotated[
