@@ -402,7 +402,7 @@ def taken(path: Path, file: str, below: str = "") -> None:
 
 
 def maps(path: Path, file: str, middle: Sequence[float]) -> None:
-    """Draws a street in the maps of two drives, by the labels of map-truth."""
+    """Draws a street in the maps of two drives, by the labels of `truth`."""
     colours = np.zeros((5, 3))
     colours[[Label.UNOBSERVED, Label.NEWLY_SEEN]] = UNSEEN_RGB
     colours[[Label.KEPT, Label.GONE, Label.NEW]] = (

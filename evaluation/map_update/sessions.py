@@ -333,8 +333,7 @@ def read_pair(folder: Path) -> SessionPair:
     for side in SIDES:
         if not (folder / side).is_dir():
             raise InputError(
-                f"{folder}: no folder {side}; cns-drake export --format"
-                " map-truth makes both"
+                f"{folder}: no folder {side}; cns-drake truth makes both"
             )
     return SessionPair(*(read_session(folder / side) for side in SIDES))
 

@@ -43,15 +43,12 @@ COMMANDS = {
     "scan": f"{DRAKE} scan town/stage_01.sdf --pose 0 0 2 0 0 0 --output o.pcd",
     "city": f"{DRAKE} city town",
     "list": f"{DRAKE} list town",
-    "film": f"{DRAKE} export metropolis_01 --format film --output out.webp",
+    "film": f"{DRAKE} film metropolis_01 --output out.webp",
     "kitti": f"{DRAKE} export drives/metropolis_01 --format kitti --output out",
-    "map-truth": f"{DRAKE} export {PAIR} --format map-truth --output out",
-    "pointnetvlad": (
-        f"{DRAKE} export {' '.join(DRIVES)} --format pointnetvlad --jobs 2"
-        " --output out"
-    ),
-    "overlap-table": (
-        f"{DRAKE} export {' '.join(DRIVES)} --format overlap-table --output out"
+    "truth": f"{DRAKE} truth {PAIR} --output out",
+    "pairs": f"{DRAKE} pairs {' '.join(DRIVES)} --jobs 2 --output out",
+    "overlaps": (
+        f"{DRAKE} truth {' '.join(DRIVES)} --format overlaps --output out"
     ),
     "compare": f"{EVAL} compare tables",
     "tcr": f"{EVAL} tcr {PAIR} --output out",
@@ -76,7 +73,7 @@ WITH_JOBS = (
     "study",
     "reproduce",
     "train",
-    "pointnetvlad",
+    "pairs",
     "report",
     "localise-2",
 )

@@ -91,21 +91,19 @@ WRITERS = [
         Writer(f"{EXPORT} town_01 --format {name} --output OUT", NEW)
         for name in ("cns", "kitti", "mulran", "tum")
     ),
-    Writer(f"{EXPORT} tiny_01.yaml --format pointnetvlad --output OUT", NEW),
+    Writer("cns-drake pairs tiny_01.yaml --output OUT", NEW),
     Writer(
-        f"{EXPORT} --vary vary.yaml --format overlap --output OUT",
+        "cns-drake pairs --vary vary.yaml --format overlap --output OUT",
         ("thesis.tex", "scenarios/mine.yaml"),
     ),
     Writer(
-        f"{EXPORT} tiny_01.yaml tiny_01.yaml --format overlap-table"
+        "cns-drake truth tiny_01.yaml tiny_01.yaml --format overlaps"
         " --output OUT",
         ("overlaps.csv",),
     ),
-    Writer(f"{EXPORT} town_01 town_02 --format map-truth --output OUT", NEW),
+    Writer("cns-drake truth town_01 town_02 --output OUT", NEW),
     Writer(f"{EXPORT} town_01 town_02 --format map-sessions --output OUT", NEW),
-    Writer(
-        f"{EXPORT} tiny_01.yaml --format film --output OUT.webp", ("",), True
-    ),
+    Writer("cns-drake film tiny_01.yaml --output OUT.webp", ("",), True),
     Writer(f"{EVAL} tcr town_01.npy town_02.npy --output OUT", TABLES),
     Writer(f"{EVAL} pr town_01 town_02 --method solid --output OUT", TABLES),
     Writer(
@@ -262,10 +260,7 @@ INTERRUPTED = {
     "cns-drake list town": (2, 3),
     f"{EXPORT} town_01 --format kitti --output OUT": (2, 6),
     f"{EXPORT} town_01 town_02 --format map-sessions --output OUT": (2, 6),
-    f"{EXPORT} tiny_01.yaml tiny_01.yaml --format map-truth --output OUT": (
-        3,
-        9,
-    ),
+    "cns-drake truth tiny_01.yaml tiny_01.yaml --output OUT": (3, 9),
     f"{EVAL} compare tables": (2, 3),
     f"{EVAL} map-update maps --output OUT": (2, 5),
     f"{EVAL} tcr town_01 town_02 --output OUT": (2, 9),

@@ -255,8 +255,7 @@ RECIPES = {
         after=("own city",),
     ),
     "films": Recipe(
-        ".venv/bin/cns-drake export metropolis_01 --format film "
-        "--output film.webp",
+        ".venv/bin/cns-drake film metropolis_01 --output film.webp",
         changes=(
             ("metropolis_01", "town/sequence_01.yaml --size 64x36"),
             (" film.webp", " film.webp --seconds 1 --traffic 0"),
@@ -823,8 +822,7 @@ RECIPES = {
         makes=("overlaps.csv",),
     ),
     "exact overlap": Recipe(
-        ".venv/bin/cns-drake export metropolis_01 metropolis_04 "
-        "--format overlap-table",
+        ".venv/bin/cns-drake truth metropolis_01 metropolis_04 --format",
         changes=(
             (
                 "metropolis_01 metropolis_04",
@@ -861,8 +859,7 @@ RECIPES = {
         makes=("tracked/track.png",),
     ),
     "pairs": Recipe(
-        ".venv/bin/cns-drake export riverside_01 riverside_02 "
-        "--format pointnetvlad",
+        ".venv/bin/cns-drake pairs riverside_01 riverside_02 --output",
         changes=(
             (
                 "riverside_01 riverside_02",
@@ -874,7 +871,7 @@ RECIPES = {
         makes=("pairs/runs/town_0[12]/000000.bin",),
     ),
     "pairs with overlaps": Recipe(
-        ".venv/bin/cns-drake export riverside_01 riverside_02 --format overlap",
+        ".venv/bin/cns-drake pairs riverside_01 riverside_02 --format overlap",
         changes=(
             (
                 "riverside_01 riverside_02",
@@ -885,8 +882,7 @@ RECIPES = {
         prints=("overlaps/overlaps.npz",),
     ),
     "map truth": Recipe(
-        ".venv/bin/cns-drake export metropolis_01 metropolis_04 "
-        "--format map-truth",
+        ".venv/bin/cns-drake truth metropolis_01 metropolis_04 --output",
         changes=(
             (
                 "metropolis_01 metropolis_04",

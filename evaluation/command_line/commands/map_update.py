@@ -32,11 +32,10 @@ def map_update(
     The command compares the labels of a change detector with the ground truth.
     The labels say what changed between map A and map B. You give the labels
     (--labels-a and --labels-b), or choose a shipped change detector that
-    computes them (--baseline). DIR is a folder from cns-drake export --format
-    map-truth, or a folder with the same files for real drives: A/map.ply,
-    A/truth.npy, B/map.ply and B/truth.npy. A shipped change detector also needs
-    the scans and poses in DIR. Points whose ground-truth label is 255 are
-    ignored.
+    computes them (--baseline). DIR is a folder from cns-drake truth, or a
+    folder with the same files for real drives: A/map.ply, A/truth.npy,
+    B/map.ply and B/truth.npy. A shipped change detector also needs the scans
+    and poses in DIR. Points whose ground-truth label is 255 are ignored.
 
     Args:
         folder: Folder with the maps and their ground truth.

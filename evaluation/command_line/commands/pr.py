@@ -82,8 +82,8 @@ def pr(
             match shows at least PART of what the query's scan shows.
         overlaps: CSV file to write: the overlap of each query with each place.
             An existing file is replaced. Needs --truth overlap:PART.
-        exact_overlaps: File with exact overlaps, from cns-drake export --format
-            overlap-table. Without such a file, overlaps are estimated from the
+        exact_overlaps: File with exact overlaps, from cns-drake truth --format
+            overlaps. Without such a file, overlaps are estimated from the
             scans. Needs --truth overlap:PART.
         turn_queries: Whether to rotate each query by a random yaw, as if the
             car had another heading. By default as --protocol says.

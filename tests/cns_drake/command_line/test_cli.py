@@ -18,7 +18,6 @@ from cns_drake.scenarios import recordable_drives
 pytestmark = pytest.mark.slow
 
 DIAGRAMS = ROOT / "diagrams"
-FILM = ("--format", "film")
 POSE = ["--pose", "0", "0", "1.6", "0", "0", "-0.5"]
 
 
@@ -224,33 +223,33 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
         (["simulate", "{files}/drive.yaml", "--bogus"], "--bogus"),
         (["simulate", "{files}/drive.yaml", "--camera", "6x4@2 "], "WxH@RATE"),
         (["simulate", "{files}/drive.yaml", "--camera", "-1x3@2"], "WxH@RATE"),
-        (["export", "atlantis_01", *FILM], "unknown drive 'atlantis_01'"),
+        (["film", "atlantis_01"], "unknown drive 'atlantis_01'"),
         (
-            ["export", "{files}/drive.yaml", *FILM, "--size", "64"],
+            ["film", "{files}/drive.yaml", "--size", "64"],
             "--size: '64'",
         ),
         (
-            ["export", "{files}/drive.yaml", *FILM, "--size", "31x64"],
+            ["film", "{files}/drive.yaml", "--size", "31x64"],
             "--size: '31x64'",
         ),
         (
-            ["export", "{files}/drive.yaml", *FILM, "--size", "64x1921"],
+            ["film", "{files}/drive.yaml", "--size", "64x1921"],
             "--size: ",
         ),
         (
-            ["export", "{files}/drive.yaml", *FILM, "--seconds", "0"],
+            ["film", "{files}/drive.yaml", "--seconds", "0"],
             "--seconds",
         ),
         (
-            ["export", "{files}/drive.yaml", *FILM, "--seconds", "nan"],
+            ["film", "{files}/drive.yaml", "--seconds", "nan"],
             "--seconds",
         ),
         (
-            ["export", "{files}/drive.yaml", *FILM, "--start-time", "-1"],
+            ["film", "{files}/drive.yaml", "--start-time", "-1"],
             "--start-time",
         ),
         (
-            ["export", "{files}/drive.yaml", *FILM, "--start-time", "1e6"],
+            ["film", "{files}/drive.yaml", "--start-time", "1e6"],
             "--start-time: 1e.06 s: ",
         ),
         (["scan", "{files}/gone.sdf", *POSE], "gone.sdf: .*gone.obj"),
@@ -315,15 +314,15 @@ def test_the_name_of_a_new_map(tmp_path, capfd, arguments):
     assert_one_line(result, "--output: 'my town': the folder's name may have")
 
 
-@pytest.mark.parametrize("command", ["simulate", "export", "scan", "generate"])
+@pytest.mark.parametrize("command", ["simulate", "film", "scan", "generate"])
 def test_output_that_cannot_be_written(files, capfd, command):
     arguments = {
         "simulate": ["simulate", files / "drive.yaml"],
-        "export": ["export", files / "drive.yaml", *FILM],
+        "film": ["film", files / "drive.yaml"],
         "scan": ["scan", files / "good.sdf", *POSE],
         "generate": ["generate", files / "drive.yaml"],
     }[command]
-    ending = ".webp" if command == "export" else ".bin"
+    ending = ".webp" if command == "film" else ".bin"
     output = files / "file" / f"below{ending}"
     result = run_here(capfd, *arguments, "--output", output)
     assert_one_line(result, r"file(/[\w./]+)?: \w+")

@@ -1,5 +1,7 @@
 """Commands and options: few, each with one meaning."""
 
+import re
+
 from helpers.internal.eval_program import run_program
 import pytest
 import typer
@@ -46,11 +48,40 @@ def test_a_word_after_two_dashes_is_no_option(capsys):
 
 
 @pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        ("export a --format cns --spacing 4", "--spacing: not with --format "),
+        ("export a --format tum --columns 4", "--columns: not with --format "),
+        (
+            "export a b --format map-sessions --sequence 4",
+            "--sequence: not with --format map-sessions; only with cns, ",
+        ),
+        (
+            "export a b --format map-sessions --absent-in 4",
+            "--absent-in: not with --format map-sessions; only with cns, ",
+        ),
+        ("export a --format film", "film is no .* use cns-drake film"),
+        (
+            "export a b --format map-truth",
+            "map-truth is .* use cns-drake truth",
+        ),
+        ("export a --format ctm", "no format 'ctm' .*did you mean"),
+        ("truth a b --half-extent 9", "--half-extent: only with --format ov"),
+    ],
+)
+def test_what_has_no_effect_is_refused(capsys, tmp_path, words, fault):
+    words = (*words.split(), "--output", tmp_path / "out")
+    status, out, err = run(capsys, "cns-drake", *words)
+    assert (status, out) == (2, "")
+    assert re.search(fault, err)
+    assert err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
     ("layout", "number", "wanted"),
     [
         ("cns", 2, "one drive"),
-        ("film", 0, "one drive"),
-        ("map-truth", 1, "two drives"),
         ("map-sessions", 3, "two drives"),
     ],
 )

@@ -19,7 +19,7 @@ from evaluation.recognition import (
 def test_its_table_is_the_truth(short_recording, tmp_path, capsys):
     scenario = short_recording / "scenario.yaml"
     table = tmp_path / "overlaps.csv"
-    command = ("export", scenario, scenario, "--format", "overlap-table")
+    command = ("truth", scenario, scenario, "--format", "overlaps")
     options = ("--spacing", "0.2", "--output", tmp_path)
     status, out, err = run_program(
         capsys, "cns-drake", main, *command, *options
@@ -46,9 +46,9 @@ def test_its_table_is_the_truth(short_recording, tmp_path, capsys):
 def test_a_folder_that_cannot_be_is_refused_at_once(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     drives = ("metropolis_01", "metropolis_04")
-    options = ("--format", "overlap-table", "--output", tmp_path / "file/here")
+    options = ("--format", "overlaps", "--output", tmp_path / "file/here")
     status, out, err = run_program(
-        capsys, "cns-drake", main, "export", *drives, *options
+        capsys, "cns-drake", main, "truth", *drives, *options
     )
     assert (status, out) == (2, "")
     (line,) = err.splitlines()

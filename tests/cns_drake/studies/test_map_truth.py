@@ -18,7 +18,7 @@ from evaluation.map_update import Label, read_pair
 @pytest.mark.slow
 def test_recordings_are_labelled_and_scored(short_recording, tmp_path, capsys):
     output = tmp_path / "pair"
-    command = ("export", *2 * [short_recording], "--format", "map-truth")
+    command = ("truth", *2 * [short_recording])
     status, out, err = run_program(
         capsys, "cns-drake", main, *command, "--output", output
     )

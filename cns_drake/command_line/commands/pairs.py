@@ -1,0 +1,119 @@
+"""The command `pairs`: data for training place recognition."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cns_drake.base import (
+    InputError,
+    ended_by_interrupts,
+    note,
+    shared_options,
+    show,
+)
+from cns_drake.command_line import options
+from cns_drake.command_line.experiment_drives import varied_drives
+
+if TYPE_CHECKING:
+    from cns_drake.base import Cluster
+    from cns_drake.scenarios import Scenario
+
+GROUP = "Convert for other programs"
+
+
+class Format(str, Enum):
+    """Formats of training data."""
+
+    POINTNETVLAD = "pointnetvlad"
+    OVERLAP = "overlap"
+
+
+def pairs(
+    drives: Annotated[list[str] | None, typer.Argument(metavar="DRIVE")] = None,
+    *,
+    output: Annotated[Path, typer.Option()],
+    layout: Annotated[Format, typer.Option("--format")] = Format.POINTNETVLAD,
+    spacing: Annotated[float, typer.Option(min=0.01, metavar="METRES")] = 10.0,
+    vary: options.Vary = None,
+    held_out: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
+    scans: Annotated[int, typer.Option(min=1, metavar="N")] = 1,
+    half_extent: Annotated[
+        float, typer.Option(min=1.0, max=10_000.0, metavar="METRES")
+    ] = 50.0,
+    jobs: shared_options.Jobs = None,
+    scheduler: shared_options.Scheduler = None,
+    json: shared_options.Json = False,
+) -> None:
+    """Write data for training place recognition.
+
+    The data are point clouds with exact positives and negatives, or overlaps.
+    The drives are simulated but not recorded. To resume after an interruption,
+    run the same command again.
+
+    Args:
+        drives: Shipped drives, or scenario files. If you name none, the drives
+            of the experiment that --vary names are used, or all shipped drives
+            if --vary is not given.
+        output: Folder to write; created if it does not exist. The folder must
+            be new or empty, or contain earlier data of the same format.
+        layout: Format to write: pointnetvlad (clouds and pickle files for
+            PointNetVLAD), or overlap (scans and the exact overlap of each
+            pair).
+        spacing: Distance that the car drives between two clouds [m].
+        held_out: Drive that is used for evaluation only, and never for
+            training, even if DRIVE or --vary names it. May be repeated.
+        scans: Number of consecutive scans that are merged into each cloud (a
+            submap). Only with --format pointnetvlad.
+        half_extent: Largest absolute x, y and z of a point in the LiDAR's frame
+            [m]. Points beyond this limit are left out.
+
+    Example:
+        cns-drake pairs riverside_01 riverside_02 --output pairs
+    """
+    if layout == Format.OVERLAP and scans != 1:
+        raise InputError("--scans: only with --format pointnetvlad")
+    with ended_by_interrupts("cns-drake"):
+        from cns_drake.base import choose_cluster
+        from cns_drake.scenarios import load_scenario
+        from cns_drake.studies import ExportOptions, claim_pairs, export_pairs
+
+    cluster = choose_cluster(jobs, scheduler)
+    if vary is not None:  # Its scenarios are written to the same folder.
+        claim_pairs(output, layout.value)
+    learned = _learned_drives(drives or [], vary, output, cluster)
+    tested = [load_scenario(name) for name in held_out or ()]
+    taken = {drive.name for drive in tested}
+    paths = export_pairs(
+        [drive for drive in learned if drive.name not in taken],
+        tested,
+        output,
+        ExportOptions(layout.value, spacing, scans, half_extent),
+        cluster,
+        note,
+    )
+    texts = [str(path) for path in paths]
+    show({"output": texts}, "\n".join(texts), json=json)
+
+
+def _learned_drives(
+    names: list[str], vary: str | None, output: Path, cluster: Cluster
+) -> list[Scenario]:
+    """Returns the drives of training data, except the drives held out.
+
+    These are the named drives and the drives of the experiment `vary`, or all
+    shipped drives if neither is given.
+    """
+    with ended_by_interrupts("cns-drake"):
+        from cns_drake.scenarios import load_scenario, recordable_drives
+
+    if not names and vary is None:
+        names = list(recordable_drives())
+    learned = [load_scenario(name) for name in names]
+    if vary is not None:
+        varied = varied_drives(vary, output, cluster)
+        learned += [drive for drive in varied if drive not in learned]
+    return learned

@@ -1,0 +1,151 @@
+"""The command `truth`: exact ground truth about two drives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cns_drake.base import (
+    InputError,
+    ended_by_interrupts,
+    next_command,
+    note,
+    shared_options,
+    show,
+)
+from cns_drake.command_line.suggestions import suggest_recognition
+from evaluation.recognition import RetrievalProtocol
+
+GROUP = "Convert for other programs"
+
+
+class Format(str, Enum):
+    """What the command writes."""
+
+    MAPS = "maps"
+    OVERLAPS = "overlaps"
+
+
+# Distance between two scans of a map, and between two places [m].
+_SPACING = {Format.MAPS: 1.0, Format.OVERLAPS: 10.0}
+
+
+def truth(
+    first: Annotated[str, typer.Argument(metavar="A")],
+    second: Annotated[str, typer.Argument(metavar="B")],
+    output: Annotated[Path, typer.Option()],
+    layout: Annotated[Format, typer.Option("--format")] = Format.MAPS,
+    spacing: Annotated[
+        float | None, typer.Option(min=0.01, metavar="METRES")
+    ] = None,
+    half_extent: Annotated[
+        float | None, typer.Option(min=1.0, max=10_000.0, metavar="METRES")
+    ] = None,
+    json: shared_options.Json = False,
+) -> None:
+    """Write exact ground truth about two drives through one city.
+
+    The format maps is the ground truth for change detection: maps of two drives
+    through the same place, with an exact label for each point. The labels of
+    the older map are kept, gone, and unobserved by the newer drive; the labels
+    of the newer map are kept, new, and newly seen. cns-eval map-update compares
+    the labels of your own change detector with this ground truth.
+
+    The format overlaps has the exact overlap of each query of drive B with each
+    place of drive A, for cns-eval pr --exact-overlaps.
+
+    Args:
+        first: Older drive, or database drive: a shipped drive or a scenario
+            file or, with maps, a recording of cns-drake.
+        second: Newer drive, or query drive, in the same way.
+        output: Folder to write; created if it does not exist. It must be new or
+            empty or, with overlaps, contain earlier overlaps.
+        layout: What to write.
+        spacing: Distance that the car drives between two scans of a map (by
+            default 1), or between two places (by default 10) [m].
+        half_extent: Largest absolute x, y and z of a point of which overlaps
+            are computed, in the LiDAR's frame [m]. By default 100. Only with
+            --format overlaps.
+
+    Example:
+        cns-drake truth metropolis_01 metropolis_04 --output maps
+    """
+    spacing = spacing or _SPACING[layout]
+    if layout == Format.OVERLAPS:
+        protocol = RetrievalProtocol(
+            query_spacing=spacing, half_extent=half_extent or 100.0
+        )
+        _write_overlaps((first, second), output, protocol, json=json)
+    elif half_extent is not None:
+        raise InputError("--half-extent: only with --format overlaps")
+    else:
+        _write_maps(first, second, output, spacing, json=json)
+
+
+def _write_overlaps(
+    words: Sequence[str],
+    output: Path,
+    protocol: RetrievalProtocol,
+    *,
+    json: bool,
+) -> None:
+    """Writes the overlaps between a database and a query drive."""
+    with ended_by_interrupts("cns-drake"):
+        from cns_drake.scenarios import load_scenario
+        from cns_drake.studies import write_overlap_table
+
+    drives = [load_scenario(word) for word in words]
+    table = write_overlap_table(drives[0], drives[1], output, protocol)
+    show({"output": [str(table)]}, str(table), json=json)
+    suggest_recognition(drives, words, table, protocol)
+
+
+def _write_maps(
+    a: str, b: str, output: Path, spacing: float, *, json: bool
+) -> None:
+    """Writes maps of two drives with exact labels of what changed.
+
+    Args:
+        a: older drive.
+        b: newer drive.
+        output: folder to write.
+        spacing: distance between two scans of a map [m].
+        json: whether to print the counts of labels as JSON.
+    """
+    with ended_by_interrupts("cns-drake"):
+        from cns_drake.base import check_new_folder
+        from cns_drake.studies import open_labelled, write_truth
+        from evaluation.map_update import Label
+
+    check_new_folder(output)
+    first, second = open_labelled(a), open_labelled(b)
+    counts, table = write_truth(first, second, output, spacing)
+    result: dict[str, Any] = {"output": str(output)}
+    for side, numbers in counts.items():
+        named = {
+            Label(label).name.lower(): number
+            for label, number in sorted(numbers.items())
+        }
+        result[side] = named
+        text = ", ".join(
+            f"{number} {name.replace('_', ' ')}"
+            for name, number in named.items()
+        )
+        note(f"{side}: {text}")
+        alone = [
+            row
+            for row in table
+            if row.side == side and row.alone and not row.moves
+        ]
+        mapped = sum(row.points > 0 for row in alone)
+        right = sum(row.verdict in ("gone", "new") for row in alone)
+        note(
+            f"{side}: {len(alone)} structures are in this drive's world alone;"
+            f" {mapped} are in its map, {right} of them gone or new"
+        )
+    show(result, str(output), json=json)
+    next_command("cns-eval", "map-update", output)
