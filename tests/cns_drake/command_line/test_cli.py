@@ -298,8 +298,8 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
 )
 def test_faults_are_one_line(files, tmp_path, capfd, arguments, fault):
     output = tmp_path / "output"
-    if arguments[0] in ("export", "scan"):
-        output = tmp_path / {"export": "a.webp", "scan": "a.bin"}[arguments[0]]
+    if arguments[0] in ("film", "scan"):
+        output = tmp_path / {"film": "a.webp", "scan": "a.bin"}[arguments[0]]
     arguments = [a.format(files=files) for a in arguments]
     result = run_here(capfd, *arguments, "--output", output)
     assert_one_line(result, fault)
