@@ -1034,9 +1034,12 @@ NOT_RUN = {
     "test_example_diagrams runs the scenario",
     ".venv/bin/python diagrams/hardware_scenario.py": "runs in real time; "
     "test_example_diagrams runs it, too",
-    ".venv/bin/cns-drake export suburbia_01": "drives through a shipped city, "
+    "cns-drake film": "the recipe films runs it",
+    "cns-drake pairs": "the recipe pairs runs it",
+    "cns-drake truth": "the recipe map truth runs it",
+    ".venv/bin/cns-drake truth suburbia_01": "drives through a shipped city, "
     "for minutes",
-    ".venv/bin/cns-drake export aged/sequence_01.yaml": "needs a city that has "
+    ".venv/bin/cns-drake truth aged/sequence_01.yaml": "needs a city that has "
     "aged, and minutes; the recipe map truth has a small one",
     ".venv/bin/cns-drake study docs/examples/nclt_twin": "ages a shipped city "
     "and drives through it, for an hour",

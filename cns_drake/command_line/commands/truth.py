@@ -72,7 +72,8 @@ def truth(
             --format overlaps.
 
     Example:
-        cns-drake truth metropolis_01 metropolis_04 --output maps
+        cns-drake truth metropolis_01 metropolis_04 \\
+            --output maps
     """
     spacing = spacing or _SPACING[layout]
     if layout == Format.OVERLAPS:
