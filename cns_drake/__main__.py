@@ -1,13 +1,9 @@
-"""`python -m cns_drake` is the command `cns-drake`.
-
-The command `cns-eval` starts here as well: where another package `evaluation`
-hides ours, this module is found, and says so.
-"""
+"""The starts of `cns-drake` (`python -m cns_drake`) and of `cns-eval`."""
 
 from collections.abc import Callable
 import sys
 
-from cns_drake.base import check_evaluation, leave_out_folder
+from cns_drake.base import leave_out_folder
 
 leave_out_folder(sys.path)  # Before anything else is imported.
 
@@ -25,14 +21,12 @@ def evaluate() -> None:
 
 
 def _load() -> Callable[[], None]:
-    check_evaluation()
     from cns_drake.command_line import main as run
 
     return run
 
 
 def _load_evaluation() -> Callable[[], None]:
-    check_evaluation()
     from evaluation.command_line import main as run
 
     return run

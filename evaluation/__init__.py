@@ -10,12 +10,6 @@ the module that `__init__.pyi` names. `evaluation.drives` and
 `evaluation.methods` are public as well.
 """
 
-from pkgutil import extend_path
-
 from cns_drake.base import attach
-
-# Python prefers a package to a folder without `__init__`. With this line,
-# modules in a user's folder of the same name can be imported as well.
-__path__ = extend_path(__path__, __name__)
 
 __getattr__, __dir__, __all__ = attach(__name__, __file__)

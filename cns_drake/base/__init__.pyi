@@ -108,7 +108,6 @@ from cns_drake.base.number_format import other_separator as other_separator
 from cns_drake.base.number_format import parse_rows as parse_rows
 from cns_drake.base.number_format import to_number as to_number
 from cns_drake.base.number_format import whole_number as whole_number
-from cns_drake.base.own_packages import check_evaluation as check_evaluation
 from cns_drake.base.points import FARTHEST_RETURN as FARTHEST_RETURN
 from cns_drake.base.points import check_range as check_range
 from cns_drake.base.points import encode_bin as encode_bin

@@ -4,9 +4,6 @@
 the cities that these drives need, and measures the pairs.
 """
 
-from cns_drake.base import attach, check_evaluation
-
-# Checked before a module in here imports `evaluation`.
-check_evaluation()
+from cns_drake.base import attach
 
 __getattr__, __dir__, __all__ = attach(__name__, __file__)
