@@ -2,8 +2,8 @@
 
 `recognise`, `change_between`, `localise` and `update_map` measure two drives or
 maps; the commands of `cns-eval` print what they return. The package imports
-neither Drake nor anything of `cns_drake` but `cns_drake.base` and
-`cns_drake.drives`.
+neither Drake nor anything of `cns_drake` but `cns_drake.base`,
+`cns_drake.drives` and `cns_drake.units`.
 
 `__all__` lists the public names. Each is imported when it is first used, from
 the module that `__init__.pyi` names. `evaluation.drives` and

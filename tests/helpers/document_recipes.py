@@ -971,6 +971,10 @@ NOT_RUN = {
         "simulates a shipped city for minutes; the workflow `site.yml` runs it"
     ),
     ".ci/drake_ends": "installs from the network; the workflow runs it",
+    "[build-system]\nrequires": "test_plugins installs it",
+    "import numpy as np\n\nfrom cns_drake import register_cause": (
+        "test_plugins installs it"
+    ),
     ".ci/oldest": "installs from the network; the workflow runs it",
     "rko_lio output/odometry": "test_rko_lio runs it in its own environment",
     "npm ci": "installs from the network; `.ci/run` does it",
