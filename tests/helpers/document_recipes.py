@@ -972,6 +972,9 @@ NOT_RUN = {
     ),
     ".ci/drake_ends": "installs from the network; the workflow runs it",
     "[build-system]\nrequires": "test_plugins installs it",
+    "pip install ./mine": "test_plugins installs it",
+    "cns-eval pr --method mean-heights": "test_plugins finds the method",
+    "pip uninstall mine": "test_plugins uninstalls it",
     "import numpy as np\n\nfrom cns_drake import register_cause": (
         "test_plugins installs it"
     ),
