@@ -18,6 +18,12 @@ app = program.make_program(
         "Study what change costs",
         "Convert for other programs",
     ),
+    gone={
+        "pairs --format": (
+            "pairs without it (PointNetVLAD's format), or "
+            "cns-drake truth --format overlaps"
+        ),
+    },
 )
 
 

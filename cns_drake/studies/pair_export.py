@@ -5,14 +5,14 @@ same city can match each other. Cities are put far apart, so that their scans
 never match.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import itertools
 from pathlib import Path
 import pickle
 import sys
 import types
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -23,7 +23,6 @@ from cns_drake.base import (
     Job,
     Reporter,
     completing,
-    encode_bin,
     make_folder,
     repeated,
     run_jobs,
@@ -44,22 +43,12 @@ from evaluation.recognition import (
 )
 from evaluation.study import MakePart, Part
 
-Format = Literal["pointnetvlad", "overlap"]
-# Format -> file or folder in the output -> content.
+# File or folder of a set of training data -> content.
 _EXPLAINED = {
-    "pointnetvlad": {
-        "runs/NAME/NUMBER.bin": "clouds of the drive NAME, float64 x y z",
-        "runs/NAME/poses.txt": "poses of the LiDAR at the clouds, 3 x 4",
-        "*.pickle": "positives and negatives of each cloud",
-        "parts": "what another run need not compute again",
-    },
-    "overlap": {
-        "runs/NAME/NUMBER.bin": "scans of the drive NAME",
-        "runs/NAME/poses.txt": "poses of the LiDAR at the scans, 3 x 4",
-        "overlaps.npz": "overlap of each pair of scans",
-        "parts": "what another run need not compute again",
-    },
-    "overlap-table": {"overlaps.csv": "overlap of each query with each place"},
+    "runs/NAME/NUMBER.bin": "clouds of the drive NAME, float64 x y z",
+    "runs/NAME/poses.txt": "poses of the LiDAR at the clouds, 3 x 4",
+    "*.pickle": "positives and negatives of each cloud",
+    "parts": "what another run need not compute again",
 }
 
 # As in PointNetVLAD (Uy and Lee, CVPR 2018): number of points of a cloud.
@@ -69,8 +58,6 @@ _VOXEL = 0.3
 _GROUND = np.array(sorted(CLASS_IDS[name] for name in GROUND_CLASSES))
 # Expected time to export a drive [s].
 _DRIVE_COST = 20.0
-# Expected time to compare two drives [s].
-_PAIR_COST = 60.0
 
 
 @dataclass(frozen=True)
@@ -78,32 +65,28 @@ class ExportOptions:
     """Settings of the export of each drive.
 
     Attributes:
-        format: program that reads the data: `pointnetvlad`, or `overlap` for
-            OverlapNet and similar programs.
         spacing: distance between two clouds, along the path [m].
         scans: number of consecutive scans that are merged into a cloud.
         half_extent: largest absolute x, y and z of a point [m]; points beyond
             this limit are left out.
     """
 
-    format: Format = "pointnetvlad"
     spacing: float = 10.0
     scans: int = 1
     half_extent: float = 50.0
 
 
-def claim_pairs(output: Path, format_name: str) -> None:
+def claim_pairs(output: Path) -> None:
     """Makes the folder of a set of training data, before minutes of work.
 
     Args:
         output: the folder.
-        format_name: `pointnetvlad`, `overlap` or `overlap-table`.
 
     Raises:
-        InputError: the folder contains anything but an earlier export of this
-            format, or cannot be written.
+        InputError: the folder contains anything but an earlier set, or cannot
+            be written.
     """
-    claim_folder(output, format_name, _EXPLAINED[format_name])
+    claim_folder(output, "pointnetvlad", _EXPLAINED)
 
 
 def write_overlap_table(
@@ -125,9 +108,11 @@ def write_overlap_table(
 
     Raises:
         InputError: the drives are through different maps or cannot be
-            simulated, or the folder is refused by `claim_pairs`.
+            simulated, or the folder contains anything but an earlier table, or
+            cannot be written.
     """
-    claim_pairs(output, "overlap-table")
+    content = {"overlaps.csv": "overlap of each query with each place"}
+    claim_folder(output, "overlap-table", content)
     places, queries = (SimulationSource(one)() for one in (database, query))
     found = exact_overlaps(places, queries, protocol)
     path = output / "overlaps.csv"
@@ -146,15 +131,15 @@ def export_pairs(
 ) -> list[Path]:
     """Writes training data for other programs; returns the index files.
 
-    The index files name the pairs of scans. Finished drives are not simulated
-    again.
+    The index files are PointNetVLAD's pickles, as `write_pickles` writes them.
+    Finished drives are not simulated again.
 
     Args:
         scenarios: the drives to learn from.
         held_out: drives for evaluation only. If there are none, all drives are
             used for training and evaluation.
         output: the folder of the set.
-        options: format and spacing of the exported clouds.
+        options: spacing and extent of the exported clouds.
         cluster: runs the work.
         on_note: is called with notes on missing parts of the set.
 
@@ -169,7 +154,7 @@ def export_pairs(
     names = [one.name for one in every]
     for name in repeated(names):
         raise InputError(f"export: two drives are named {name}")
-    claim_pairs(output, options.format)
+    claim_pairs(output)
     output = output.absolute()
     parts = {name: Part(output / "parts" / f"{name}.data") for name in names}
     jobs = [
@@ -184,22 +169,9 @@ def export_pairs(
         )
         for one in every
     ]
-    pairs = {}
     cities = [(one.map, one.world) for one in every]
-    if options.format == "overlap":
-        for i, j in itertools.permutations(range(len(every)), 2):
-            if cities[i] == cities[j]:
-                name = f"{names[i]} in {names[j]}"
-                part = Part(output / "parts" / f"{name}.data")
-                both = SimulationSource(every[i]), SimulationSource(every[j])
-                step = MakePart(part, compare_runs, (*both, options))
-                jobs.append(Job(f"overlap {name}", step, cost=_PAIR_COST))
-                pairs[names[i], names[j]] = part
     run_jobs(jobs, cluster)
     runs = {name: np.array(part.read()) for name, part in parts.items()}
-    if options.format == "overlap":
-        found = {key: part.read() for key, part in pairs.items()}
-        return [_write_overlaps(output, runs, found)]
     numbers = list(dict.fromkeys(cities))
     placed = [
         ExportedDrive(f"runs/{name}", runs[name], numbers.index(city))
@@ -221,7 +193,7 @@ def export_run(
         reporter: reports progress.
         simulation: object that simulates the drive when it is called.
         folder: folder for the files.
-        options: format and spacing of the clouds.
+        options: spacing and extent of the clouds.
 
     Returns:
         (N, 4, 4) poses X_WS of the LiDAR at the clouds.
@@ -233,18 +205,15 @@ def export_run(
     for number, frame in enumerate(
         track(frames, f"writing {drive.name}", len(frames), "scans")
     ):
-        if options.format == "overlap":
-            data = encode_bin(drive.scan(int(frame)))
-        else:
-            cloud = cloud_at(
-                drive,
-                int(frame),
-                options.scans,
-                options.half_extent,
-                ("label",),
-                before,
-            )
-            data = _training_cloud(cloud, options.half_extent, number).tobytes()
+        cloud = cloud_at(
+            drive,
+            int(frame),
+            options.scans,
+            options.half_extent,
+            ("label",),
+            before,
+        )
+        data = _training_cloud(cloud, options.half_extent, number).tobytes()
         with user_errors(folder):
             (folder / f"{number:06d}.bin").write_bytes(data)
     X_WS = drive.X_WS[frames]
@@ -266,64 +235,6 @@ def _training_cloud(
     few = len(xyz) < _POINTS
     chosen = xyz[rng.choice(len(xyz), _POINTS, replace=few)]
     return (chosen - chosen.mean(axis=0)) / (2.0 * half_extent)
-
-
-def compare_runs(
-    reporter: Reporter,
-    query: SimulationSource,
-    database: SimulationSource,
-    options: ExportOptions,
-) -> np.ndarray:
-    """Returns the exact overlap of Q queries with D places, (Q, D).
-
-    The overlap is the share of a query's points that the LiDAR at the place
-    sees.
-
-    Args:
-        reporter: reports progress.
-        query: the drive of the queries.
-        database: the drive of the places.
-        options: the spacing of queries and places, and the greatest range.
-    """
-    protocol = RetrievalProtocol(
-        query_spacing=options.spacing,
-        place_spacing=options.spacing,
-        half_extent=options.half_extent,
-    )
-    return exact_overlaps(database(), query(), protocol)
-
-
-def _write_overlaps(
-    output: Path,
-    runs: Mapping[str, np.ndarray],
-    found: Mapping[tuple[str, str], np.ndarray],
-) -> Path:
-    """Writes all overlaps that are not zero, as in OverlapNet's training data.
-
-    A row of the array `overlaps` (N, 4) contains the query's number, the
-    place's number, their overlap and the query's yaw in the place's frame
-    [rad]. A row of `seq` (N, 2) contains the names of the two drives.
-    """
-    rows, drives = [], []
-    for (query, database), overlaps in found.items():
-        asked, placed = np.nonzero(overlaps > 0.0)
-        R_PQ = np.einsum(
-            "nji,njk->nik",
-            runs[database][placed, :3, :3],
-            runs[query][asked, :3, :3],
-        )
-        yaw = np.arctan2(R_PQ[:, 1, 0], R_PQ[:, 0, 0])
-        values = overlaps[asked, placed]
-        rows.append(np.stack([asked, placed, values, yaw], axis=1))
-        drives += [(query, database)] * len(asked)
-    path = output / "overlaps.npz"
-    with completing(path) as part, open(part, "wb") as stream:
-        np.savez_compressed(
-            stream,
-            overlaps=np.concatenate(rows) if rows else np.zeros((0, 4)),
-            seq=np.array(drives, dtype=str).reshape(-1, 2),
-        )
-    return path
 
 
 # Added to the northing of each further city [m].

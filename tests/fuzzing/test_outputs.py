@@ -93,7 +93,7 @@ WRITERS = [
     ),
     Writer("cns-drake pairs tiny_01.yaml --output OUT", NEW),
     Writer(
-        "cns-drake pairs --vary vary.yaml --format overlap --output OUT",
+        "cns-drake pairs --vary vary.yaml --output OUT",
         ("thesis.tex", "scenarios/mine.yaml"),
     ),
     Writer(

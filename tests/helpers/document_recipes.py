@@ -870,17 +870,6 @@ RECIPES = {
         prints=("pairs/training_queries_baseline2.pickle",),
         makes=("pairs/runs/town_0[12]/000000.bin",),
     ),
-    "pairs with overlaps": Recipe(
-        ".venv/bin/cns-drake pairs riverside_01 riverside_02 --format overlap",
-        changes=(
-            (
-                "riverside_01 riverside_02",
-                "town/sequence_01.yaml town/sequence_02.yaml",
-            ),
-        ),
-        after=("own city",),
-        prints=("overlaps/overlaps.npz",),
-    ),
     "map truth": Recipe(
         ".venv/bin/cns-drake truth metropolis_01 metropolis_04 --output",
         changes=(

@@ -39,7 +39,7 @@ _ONLY_WITH: Mapping[str, tuple[str, ...]] = {
 # A format of earlier versions -> the command that took its place.
 _MOVED = {
     "pointnetvlad": "pairs",
-    "overlap": "pairs --format overlap",
+    "overlap": "truth --format overlaps",
     "overlap-table": "truth --format overlaps",
     "map-truth": "truth",
     "film": "film",

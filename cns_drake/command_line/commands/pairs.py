@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cns_drake.base import (
-    InputError,
     ended_by_interrupts,
     note,
     shared_options,
@@ -25,18 +23,10 @@ if TYPE_CHECKING:
 GROUP = "Convert for other programs"
 
 
-class Format(str, Enum):
-    """Formats of training data."""
-
-    POINTNETVLAD = "pointnetvlad"
-    OVERLAP = "overlap"
-
-
 def pairs(
     drives: Annotated[list[str] | None, typer.Argument(metavar="DRIVE")] = None,
     *,
     output: Annotated[Path, typer.Option()],
-    layout: Annotated[Format, typer.Option("--format")] = Format.POINTNETVLAD,
     spacing: Annotated[float, typer.Option(min=0.01, metavar="METRES")] = 10.0,
     vary: options.Vary = None,
     held_out: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
@@ -50,32 +40,27 @@ def pairs(
 ) -> None:
     """Write data for training place recognition.
 
-    The data are point clouds with exact positives and negatives, or overlaps.
-    The drives are simulated but not recorded. To resume after an interruption,
-    run the same command again.
+    The data are point clouds and pickle files in the format of PointNetVLAD,
+    with exact positives and negatives. The drives are simulated but not
+    recorded. To resume after an interruption, run the same command again.
 
     Args:
         drives: Shipped drives, or scenario files. If you name none, the drives
             of the experiment that --vary names are used, or all shipped drives
             if --vary is not given.
         output: Folder to write; created if it does not exist. The folder must
-            be new or empty, or contain earlier data of the same format.
-        layout: Format to write: pointnetvlad (clouds and pickle files for
-            PointNetVLAD), or overlap (scans and the exact overlap of each
-            pair).
+            be new or empty, or contain earlier data of this command.
         spacing: Distance that the car drives between two clouds [m].
         held_out: Drive that is used for evaluation only, and never for
             training, even if DRIVE or --vary names it. May be repeated.
         scans: Number of consecutive scans that are merged into each cloud (a
-            submap). Only with --format pointnetvlad.
+            submap).
         half_extent: Largest absolute x, y and z of a point in the LiDAR's frame
             [m]. Points beyond this limit are left out.
 
     Example:
         cns-drake pairs riverside_01 riverside_02 --output pairs
     """
-    if layout == Format.OVERLAP and scans != 1:
-        raise InputError("--scans: only with --format pointnetvlad")
     with ended_by_interrupts("cns-drake"):
         from cns_drake.base import choose_cluster
         from cns_drake.scenarios import load_scenario
@@ -83,7 +68,7 @@ def pairs(
 
     cluster = choose_cluster(jobs, scheduler)
     if vary is not None:  # Its scenarios are written to the same folder.
-        claim_pairs(output, layout.value)
+        claim_pairs(output)
     learned = _learned_drives(drives or [], vary, output, cluster)
     tested = [load_scenario(name) for name in held_out or ()]
     taken = {drive.name for drive in tested}
@@ -91,7 +76,7 @@ def pairs(
         [drive for drive in learned if drive.name not in taken],
         tested,
         output,
-        ExportOptions(layout.value, spacing, scans, half_extent),
+        ExportOptions(spacing, scans, half_extent),
         cluster,
         note,
     )

@@ -28,15 +28,16 @@ def options(program, command):
 @pytest.mark.parametrize(
     ("words", "names"),
     [
-        (("pr", "a", "b", "--scores", "s"), "cns-eval scores"),
-        (("tcr", "a", "b", "--paths"), "cns-drake export --format tum"),
-        (("localise", "a", "--estimate", "e"), "evo_ape"),
-        (("localise", "a", "--estimate=e"), "evo_ape"),
-        (("real", "scans"), "docs/real.md"),
+        ("cns-eval pr a b --scores s", "cns-eval scores"),
+        ("cns-eval tcr a b --paths", "cns-drake export --format tum"),
+        ("cns-eval localise a --estimate e", "evo_ape"),
+        ("cns-eval localise a --estimate=e", "evo_ape"),
+        ("cns-eval real scans", "docs/real.md"),
+        ("cns-drake pairs --format overlap", "truth --format overlaps"),
     ],
 )
 def test_what_is_gone_names_what_to_use(capsys, words, names):
-    status, out, err = run(capsys, "cns-eval", *words)
+    status, out, err = run(capsys, *words.split())
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert names in err
 

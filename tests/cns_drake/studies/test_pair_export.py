@@ -1,4 +1,4 @@
-"""Sets for other trainers: pickles, clouds, exact overlaps."""
+"""Sets for other trainers: what is refused."""
 
 from helpers.tiny_drive import tiny_scenario
 import pytest

@@ -1,13 +1,9 @@
-"""Sets for other trainers: pickles, clouds, exact overlaps."""
+"""Sets for other trainers: pickles, positives, negatives."""
 
 import pickle
 
-from helpers.internal import studies
-from helpers.tiny_drive import tiny_scenario
 import numpy as np
-import pytest
 
-from cns_drake.studies import ExportOptions, export_pairs, pair_export
 from cns_drake.studies.pair_export import (
     ExportedDrive,
     training_tuples,
@@ -37,42 +33,6 @@ def test_positives_and_non_negatives_by_distances():
         # Northing is y; the other city lies elsewhere.
         shift = 100_000.0 * city[number]
         assert one.position.tolist() == [xy[number, 1] + shift, xy[number, 0]]
-
-
-@pytest.fixture
-def in_this_process(monkeypatch):
-    def run(jobs, cluster):
-        studies.do(jobs)
-
-    monkeypatch.setattr(pair_export, "run_jobs", run)
-
-
-def drives(folder, lidar=None):
-    lidar = lidar or {"preset": "vlp-16", "columns": 360}
-    return [
-        tiny_scenario(
-            folder, name=name, lidars={"lidar": lidar}, frames=30, seed=seed
-        )
-        for seed, name in enumerate(("one", "two"))
-    ]
-
-
-def test_exact_overlaps_of_a_drive_with_itself(tmp_path, in_this_process):
-    options = ExportOptions("overlap", spacing=1.0)
-    (path,) = export_pairs(
-        drives(tmp_path), [], tmp_path / "set", options, None
-    )
-    with np.load(path) as file:
-        overlaps, seq = file["overlaps"], file["seq"]
-    assert set(map(tuple, seq)) == {("one", "two"), ("two", "one")}
-    number = (tmp_path / "set/runs/one/poses.txt").read_text().count("\n")
-    same = overlaps[overlaps[:, 0] == overlaps[:, 1]]
-    assert len(same) == 2 * number
-    assert same[:, 2] == pytest.approx(1.0, abs=1e-9)
-    assert same[:, 3] == pytest.approx(0.0, abs=1e-9)
-    scan = np.fromfile(tmp_path / "set/runs/one/000000.bin", "<f4")
-    assert len(scan) % 4 == 0
-    assert len(scan) > 0
 
 
 def line(name, number, city=0, start=0.0):
