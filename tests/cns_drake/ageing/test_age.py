@@ -192,8 +192,9 @@ def test_faulty_maps(town, tmp_path):
     bare.mkdir()
     for path in town.iterdir():
         if path.is_file():
-            text = path.read_text().replace(",building,", ",other-structure,")
-            (bare / path.name).write_text(text)
+            data = path.read_bytes()
+            data = data.replace(b",building,", b",other-structure,")
+            (bare / path.name).write_bytes(data)
     (bare / "meshes").symlink_to(town / "meshes")
     with pytest.raises(InputError, match="without lots"):
         age(bare)

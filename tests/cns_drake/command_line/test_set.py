@@ -119,7 +119,7 @@ def test_paths_start_at_the_working_directory(drive, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("wether.rain=2", "wether: .*; did you mean weather"),
+        ("weathr.rain=2", "weathr: .*; did you mean weather"),
         ("weather.rane=2", "weather.rane: .*; did you mean rain"),
         ("lidars.lidar.ring=2", "lidars.lidar.ring: .*; did you mean rings"),
         ("lidars.lidar.rings=many", "lidars.lidar.rings: .*integer"),

@@ -607,7 +607,7 @@ for _name, _header in {
 
 
 @way(
-    "bin", "x.bin", *CLOUDS, "cloud .bin", "evaluation.clouds.bin_dtype",
+    "bin", "x.bin", *CLOUDS, "cloud .bin",
     use=cloud("x.bin"),
 )  # fmt: skip
 def _(folder):
