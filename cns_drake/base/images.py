@@ -23,14 +23,11 @@ _MOST_PIXELS = 1 << 25
 _LEAST_SPREAD = 1e-300
 
 
-def open_image(
-    source: Path | bytes, formats: tuple[str, ...] = _FORMATS
-) -> Image:
+def open_image(source: Path | bytes) -> Image:
     """Opens an image, whose pixels are decoded when they are used.
 
     Args:
         source: the file, or its content.
-        formats: names of the formats that are read, as Pillow has them.
 
     Returns:
         The image, which is a context manager.
@@ -46,7 +43,7 @@ def open_image(
         # Pillow warns of more pixels than are allowed here.
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)
         try:
-            picture = Image.open(file, formats=formats)
+            picture = Image.open(file, formats=_FORMATS)
         except Image.DecompressionBombError as error:
             raise ValueError(str(error)) from error
     width, height = picture.size

@@ -8,13 +8,12 @@ instances are recorded in a second message.
 """
 
 from collections.abc import Callable
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
 LayoutName = Literal["cns", "ouster", "velodyne", "autoware"]
-LAYOUT_NAMES: tuple[str, ...] = get_args(LayoutName)
 _NS_PER_S = 1e9
 _MM_PER_M = 1e3
 # Limit of times that are stored as uint32 [ns].
@@ -75,7 +74,7 @@ def to_layout(
 
     Args:
         points: (N,) with the fields x y z intensity ring t.
-        layout: one of `LAYOUT_NAMES`; `cns` is the layout that the points
+        layout: a `LayoutName`; `cns` is the layout that the points
             have.
         num_rings: number of rings of the LiDAR. If given, the layout `velodyne`
             counts rings from the lowest ring, as Velodyne's driver does.

@@ -75,11 +75,13 @@ def load_world(
     sdf: Path | str,
     *,
     vehicle: Path | str | None = None,
-    structures: Path | str | None = None,
     without: Collection[str] = (),
     model_paths: Collection[Path | str] = (),
 ) -> World:
     """Reads a world and, if given, a vehicle.
+
+    Names, classes and labels come from `structures.csv` in the world's folder,
+    if it exists.
 
     From an SDF world, only the visuals are kept, at their initial places, and
     nothing moves; the notes list what is left out. The visuals of URDF are read
@@ -88,8 +90,6 @@ def load_world(
     Args:
         sdf: SDF or URDF (`.urdf`) file of the world or model.
         vehicle: file of the vehicle's model; None for no vehicle.
-        structures: structure table; by default `structures.csv` in the world's
-            folder, if it exists.
         without: names of structures to leave out.
         model_paths: folders in which `model://` and `package://` are searched,
             before the folders in GZ_SIM_RESOURCE_PATH and SDF_PATH.
@@ -126,9 +126,9 @@ def load_world(
         vehicle_model = _parse_models(plant, Path(vehicle))[0]
     plant.Finalize()
 
-    file = Path(structures or MapFolder(sdf.parent).structures)
+    file = MapFolder(sdf.parent).structures
     table = StructureTable(())
-    if structures is not None or is_there(file):
+    if is_there(file):
         table = load_structure_table(file)
         notes += _mismatch_notes(file, {entry.name for entry in table}, found)
     with errors_at(sdf):

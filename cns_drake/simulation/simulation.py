@@ -75,7 +75,6 @@ class FinishedSimulation:
         num_frames: number of frames in the recording.
         simulated_s: simulated time from the first to the last frame [s].
         wall_s: wall time of the simulation, without loading [s].
-        loading_s: time to load the stage and plan the drive [s].
 
     Example:
         from cns_drake import load_scenario, simulate
@@ -89,7 +88,6 @@ class FinishedSimulation:
     num_frames: int
     simulated_s: float
     wall_s: float
-    loading_s: float
 
     @property
     def real_time_factor(self) -> float:
@@ -137,7 +135,6 @@ def simulate(
 
         run = simulate(load_scenario("downtown_01"), "recordings")
     """
-    start = time.perf_counter()
     folder = Path(output) / scenario.name
     page_file = None if page_file is None else Path(page_file)
     if graphviz_file is not None:
@@ -202,7 +199,6 @@ def simulate(
         num_frames=drive.num_frames,
         simulated_s=simulated_s,
         wall_s=finished - loaded,
-        loading_s=loaded - start,
     )
 
 

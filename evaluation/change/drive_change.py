@@ -9,7 +9,6 @@ of two drives gives a TCR_sym of about 0.2 in a city that has not changed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -180,22 +179,18 @@ def change_of_maps(source: DriveMap, target: DriveMap) -> ChangeReport:
 
 
 def spread_over_grids(
-    source: DriveMap,
-    target: DriveMap,
-    change: TemporalChange,
-    grids: Sequence[tuple[float, float, float]] = GRIDS,
+    source: DriveMap, target: DriveMap, change: TemporalChange
 ) -> Spread:
     """Returns the least and the greatest TCR_sym over positions of the grid.
 
-    The positions are the unshifted grid and each of the shifts.
+    The positions are the unshifted grid and each shift of `GRIDS`.
 
     Args:
         source, target: the two maps.
         change: their change on the unshifted grid.
-        grids: shifts of the grid [m].
     """
     values = [change.symmetric]
-    values += [_change_on_grid(source, target, at)[0].symmetric for at in grids]
+    values += [_change_on_grid(source, target, at)[0].symmetric for at in GRIDS]
     return Spread(float(np.min(values)), float(np.max(values)))
 
 

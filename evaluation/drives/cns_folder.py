@@ -130,7 +130,7 @@ class CnsFolderDrive(FileDrive):
         if not is_there(self._imu_path):
             return None
         stamps_ns, values = read_stamped_rows(
-            self._imu_path, 10, ",", names=_IMU_COLUMNS
+            self._imu_path, 10, ",", _IMU_COLUMNS
         )
         imu = np.empty(len(values), dtype=IMU_DTYPE)
         imu["stamp_ns"] = stamps_ns

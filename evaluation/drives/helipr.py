@@ -126,7 +126,7 @@ class HeliprDrive(FileDrive):
         )
 
 
-def _read_scan(lidar: str, path: Path, stamp_ns: int = 2**63) -> np.ndarray:
+def _read_scan(lidar: str, path: Path, stamp_ns: int) -> np.ndarray:
     """Returns the points of a scan file as a structured array (N,).
 
     Args:

@@ -1,6 +1,6 @@
 """Tables of numbers as text, and the times in them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from decimal import Decimal
 import io
 import itertools
@@ -29,7 +29,6 @@ def read_stamped_rows(
     path: Path,
     width: int,
     separator: str | None,
-    parse: Callable[[np.ndarray], np.ndarray] | None = None,
     names: Sequence[str] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reads a table whose rows are a time and `width` numbers.
@@ -38,7 +37,6 @@ def read_stamped_rows(
         path: the file.
         width: number of values after the time.
         separator: text between columns; None for white space.
-        parse: function that reads times; by default `parse_stamps_ns`.
         names: names of the columns, see `read_numbers`.
 
     Returns:
@@ -52,7 +50,7 @@ def read_stamped_rows(
         path, [("stamp", "U40"), ("values", "f8", width)], separator, names
     )
     with value_errors(f"{path}: time"):
-        stamps_ns = (parse or parse_stamps_ns)(rows["stamp"])
+        stamps_ns = parse_stamps_ns(rows["stamp"])
     check_finite(path, rows["values"])
     return stamps_ns, rows["values"]
 

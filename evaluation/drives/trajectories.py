@@ -1,6 +1,5 @@
 """Trajectories and poses from tables of text."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -133,24 +132,18 @@ def read_matrices(path: Path) -> StampedPoses:
     return _increasing_poses(path, stamps_ns, pose_matrices(path, values))
 
 
-def read_quaternions(
-    path: Path,
-    separator: str | None,
-    parse: Callable[[np.ndarray], np.ndarray] | None = None,
-) -> StampedPoses:
+def read_quaternions(path: Path, separator: str | None) -> StampedPoses:
     """Reads a trajectory: rows with a time, x y z [m] and quaternion x y z w.
 
     Args:
         path: the file.
         separator: text between columns; None for white space.
-        parse: function that converts an array of texts to times [ns]; by
-            default `parse_stamps_ns`.
 
     Raises:
         InputError: if the table does not have that form, a quaternion is not of
             unit length, or the poses are out of order.
     """
-    stamps_ns, values = read_stamped_rows(path, 7, separator, parse, _COLUMNS)
+    stamps_ns, values = read_stamped_rows(path, 7, separator, _COLUMNS)
     with np.errstate(over="ignore"):
         lengths = np.linalg.norm(values[:, 3:], axis=1)
     bad = np.flatnonzero(np.abs(lengths - 1.0) > _ROTATION_TOLERANCE)

@@ -14,7 +14,6 @@ from evaluation.recognition.descriptors import (
 from evaluation.recognition.descriptors import joined_scans as joined_scans
 from evaluation.recognition.faults import FAULTS as FAULTS
 from evaluation.recognition.metrics import METRICS as METRICS
-from evaluation.recognition.metrics import MODES as MODES
 from evaluation.recognition.metrics import Metric as Metric
 from evaluation.recognition.metrics import Mode as Mode
 from evaluation.recognition.metrics import choose_metrics as choose_metrics

@@ -16,7 +16,7 @@ SOFTNESS = 0.05
 
 
 def verification_weight(
-    distance: np.ndarray | float, radius: float, softness: float = SOFTNESS
+    distance: np.ndarray | float, radius: float
 ) -> np.ndarray:
     """Returns the factor by which geometric verification scales a score.
 
@@ -26,10 +26,9 @@ def verification_weight(
         distance: distances from query to place according to the method's own
             pose [m], an array of any shape.
         radius: radius of a match [m].
-        softness: half the width of the transition, as a fraction of the radius.
     """
     far = np.asarray(distance, dtype=np.float64) / radius
-    return np.clip((1.0 + softness - far) / (2.0 * softness), 0.0, 1.0)
+    return np.clip((1.0 + SOFTNESS - far) / (2.0 * SOFTNESS), 0.0, 1.0)
 
 
 def verified_scores(

@@ -36,11 +36,8 @@ from evaluation.recognition.sign_flips import (
 
 # Which queries count in the precision-recall curve.
 Mode = Literal["all", "filtered"]
-MODES: tuple[Mode, ...] = ("all", "filtered")
 # Sums and quotients of floating-point numbers leave a range by this at most.
 _ROUNDING = 1e-9
-# Further radii of a match for which AUC is computed [m].
-_RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)
 
 
 @dataclass(frozen=True)

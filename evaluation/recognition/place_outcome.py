@@ -51,8 +51,6 @@ class PlaceOutcome:
         query: name of the drive of the queries.
         protocol: protocol with the method's own choices. The radius and the
             geometric verification of this protocol apply to the outcome.
-        protocol_name: name of the protocol in tables, see
-            `RetrievalProtocol.name_with`.
         outcomes: outcomes of Q queries, with all columns of `queries.csv`. An
             unknown value is -1 for a frame, infinite for a rank, and NaN for
             other numbers.
@@ -69,7 +67,6 @@ class PlaceOutcome:
     database: str
     query: str
     protocol: RetrievalProtocol
-    protocol_name: str
     outcomes: QueryOutcomes
     place_frames: np.ndarray
     best_places: np.ndarray
@@ -136,7 +133,6 @@ class PlaceOutcome:
             database=drives[0],
             query=query.name,
             protocol=protocol.of(method),
-            protocol_name=protocol.name_with(method),
             outcomes=replace(outcomes, columns=columns),
             place_frames=retrieval.database_frames,
             best_places=best_places,

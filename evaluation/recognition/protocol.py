@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 import math
 from typing import TYPE_CHECKING, Any
@@ -216,22 +215,8 @@ class RetrievalProtocol:
         or a spacing, differs from the shipped protocol. Geometric verification
         does not count, because tables have a column for it.
         """
-        return self._named(lambda one: one)
-
-    def name_with(self, method: Method) -> str:
-        """Returns the name of the protocol for the results of one method.
-
-        A shipped protocol is not renamed to `own` if the method chooses some
-        options itself (see `of`).
-        """
-        return self._named(lambda one: one.of(method))
-
-    def _named(
-        self, filled: Callable[[RetrievalProtocol], RetrievalProtocol]
-    ) -> str:
-        mine = filled(self)._counted_fields
         for name, shipped in PROTOCOLS.items():
-            if filled(shipped)._counted_fields == mine:
+            if shipped._counted_fields == self._counted_fields:
                 return name
         return "own"
 

@@ -36,15 +36,13 @@ def test_static_models_are_anchored_and_the_vehicle_is_not(small_map):
 
 def test_files_may_be_named_by_text(small_map):
     path = small_map / "stage_04.sdf"
-    table = small_map / "structures.csv"
     world = load_world(
         str(path),
         vehicle=str(vehicle_file()),
-        structures=str(table),
         model_paths=[str(small_map)],
     )
     assert world.vehicle is not None
-    same = load_world(path, structures=table)
+    same = load_world(path)
     assert world.structures["tower_003"] == same.structures["tower_003"]
     with pytest.raises(InputError, match=r"^nowhere\.sdf: no such file$"):
         load_world("nowhere.sdf")

@@ -302,11 +302,6 @@ def test_protocols_have_names():
         {"seed": 1},
     ):
         assert replace(RANDOM_YAW_PROTOCOL, **changed).name == "own", changed
-    # A method's own number of scans is no change of the protocol.
-    btc = make_method("btc", {})
-    assert RANDOM_YAW_PROTOCOL.of(btc).name_with(btc) == "random-yaw"
-    fewer = replace(RANDOM_YAW_PROTOCOL, scans_per_place=2)
-    assert fewer.of(btc).name_with(btc) == "own"
     assert RetrievalProtocol().name == "recorded"
     assert RetrievalProtocol(hide_sector=30.0).name == "own"
 
