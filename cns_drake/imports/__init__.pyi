@@ -3,7 +3,6 @@ from cns_drake.imports.import_map import import_city as import_city
 from cns_drake.imports.import_map import with_usual_growth as with_usual_growth
 from cns_drake.imports.map_files import YEAR_COLUMN as YEAR_COLUMN
 from cns_drake.imports.map_source import map_sources as map_sources
-from cns_drake.imports.map_source import source_of as source_of
 from cns_drake.imports.named_randomness import (
     random_generator as random_generator,
 )

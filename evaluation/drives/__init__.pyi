@@ -20,7 +20,6 @@ from evaluation.drives.scan_clouds import (
     cropped_with_fields as cropped_with_fields,
 )
 from evaluation.drives.scan_clouds import within_cube as within_cube
-from evaluation.drives.scan_files import BinDrive as BinDrive
 from evaluation.drives.scan_files import FileDrive as FileDrive
 from evaluation.drives.text_tables import parse_seconds as parse_seconds
 from evaluation.drives.trajectories import read_poses as read_poses

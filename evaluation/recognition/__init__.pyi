@@ -47,12 +47,6 @@ from evaluation.recognition.place_outcome import (
 from evaluation.recognition.place_selection import KEEP_ALL as KEEP_ALL
 from evaluation.recognition.place_selection import checked_keep as checked_keep
 from evaluation.recognition.place_selection import kept_places as kept_places
-from evaluation.recognition.pose_errors import (
-    SUCCESS_ROTATION_DEG as SUCCESS_ROTATION_DEG,
-)
-from evaluation.recognition.pose_errors import (
-    SUCCESS_TRANSLATION as SUCCESS_TRANSLATION,
-)
 from evaluation.recognition.pose_errors import PoseErrors as PoseErrors
 from evaluation.recognition.pose_errors import pose_error as pose_error
 from evaluation.recognition.precision_recall import pr_curve as pr_curve
@@ -99,7 +93,6 @@ from evaluation.recognition.scoring import score_places as score_places
 from evaluation.recognition.search import Search as Search
 from evaluation.recognition.seen_surfaces import TOLERANCE as TOLERANCE
 from evaluation.recognition.seen_surfaces import SeenSurfaces as SeenSurfaces
-from evaluation.recognition.sign_flips import LEAST_BLOCKS as LEAST_BLOCKS
 from evaluation.recognition.sign_flips import LEAST_CITIES as LEAST_CITIES
 from evaluation.recognition.sign_flips import SIGNIFICANT as SIGNIFICANT
 from evaluation.recognition.sign_flips import UNKNOWN as UNKNOWN
