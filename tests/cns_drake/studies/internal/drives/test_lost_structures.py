@@ -5,9 +5,10 @@ import itertools
 from xml.etree import ElementTree
 
 from helpers.small_map import box_visual, scenario_values, write_small_map
+import pytest
 import yaml
 
-from cns_drake.base import validated
+from cns_drake.base import InputError, validated
 from cns_drake.scenarios import load_scenario, shipped_maps
 from cns_drake.scene import load_world, structures_in
 from cns_drake.studies import Losses
@@ -98,3 +99,39 @@ def test_between_two_stages_lies_what_the_earlier_one_lacks(tmp_path):
     scenario = load_scenario(base).replaced(stage="04")
     world = load_world(scenario.world_file, without=tuple(last - first))
     assert structures_in(world) == first
+
+
+def test_structures_missing_here_and_there():
+    parts = {"pole": 0.5, "building": 0.25}
+    one, other = (set(lost(scattered=parts, seed=seed)) for seed in (0, 1))
+    more = set(lost(scattered={"pole": 0.75}))
+    kinds = {name: kind for name, (kind, *_) in places().items()}
+    for kind, part in parts.items():
+        names = {n for n in kinds if kinds[n] == kind and "_lot_" not in n}
+        gone = [found & names for found in (one, other)]
+        assert [len(g) for g in gone] == [round(part * len(names))] * 2
+        assert gone[0] != gone[1]
+    assert {kinds[name] for name in one} == set(parts)
+    # A greater share of a class includes all that a smaller share lacks.
+    poles = {name for name in one if kinds[name] == "pole"}
+    assert poles < more
+    # A seed of its own takes the place of the condition's.
+    again = lost(scattered=parts | {"seed": 1}, seed=7)
+    assert set(again) == other
+
+
+@pytest.mark.parametrize(
+    ("values", "fault"),
+    [
+        ({"missing": 1.2}, r"database: missing: Input should be less"),
+        ({"missing": -0.1}, r"database: missing: Input should be greater"),
+        ({"scattered": {"palm": 0.5}}, r"scattered: no 'palm' in "),
+        ({"scattered": {"pole": 1.5}}, r"scattered\.pole: 1\.5 is not from 0"),
+        ({"scattered": {"seed": -1}}, r"scattered\.seed: -1\.0 is no whole"),
+        ({"scattered": {"seed": 0.5}}, r"scattered\.seed: 0\.5 is no whole"),
+    ],
+)
+def test_faults_are_named(values, fault):
+    with pytest.raises(InputError, match=fault) as error:
+        lost(**values)
+    assert "\n" not in str(error.value)
