@@ -1,6 +1,7 @@
 """Polyhedra about curved shapes: around them, and close to them."""
 
 from helpers.closed_forms import capsule, cylinder, ellipsoid
+from helpers.points_on_shapes import points_on
 from helpers.surface_geometry import make_geometry
 import numpy as np
 from pydrake.geometry import FrameId
@@ -17,23 +18,6 @@ from cns_drake.scene import (
 
 WORLD = FrameId.get_new_id()
 X_WG = RigidTransform(RollPitchYaw(0.3, -0.5, 1.1), [4.0, -3.0, 2.0])
-
-
-def points_on(surface, rng, num=3000):
-    """Points on a shape, in its frame."""
-    d = rng.normal(size=(num, 3))
-    d /= np.linalg.norm(d, axis=1, keepdims=True)
-    if isinstance(surface, EllipsoidSurface):
-        return d * surface.semi_axes
-    if isinstance(surface, CapsuleSurface):
-        side = np.sign(d[:, 2:]) * surface.length / 2.0
-        return d * surface.radius + side * [0.0, 0.0, 1.0]
-    around = rng.uniform(0.0, 2.0 * np.pi, num)
-    r = surface.radius * np.where(np.arange(num) % 2, 1.0, rng.random(num))
-    z = np.where(
-        np.arange(num) % 2, rng.uniform(-1, 1, num), np.sign(d[:, 2])
-    ) * (surface.length / 2.0)
-    return np.column_stack([r * np.cos(around), r * np.sin(around), z])
 
 
 def geometry(surface, X_FG):
