@@ -112,3 +112,28 @@ def write_blocks(path, years=True):
                 **values,
             )
     return city.write(path)
+
+
+def house(attributes):
+    """Returns a CityJSON file of one house, as a dictionary."""
+    corners = [[x, y, z] for z in (0, 5) for y in (0, 8) for x in (0, 10)]
+    faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3],
+             [0, 4, 6, 2], [1, 3, 7, 5]]  # fmt: skip
+    geometry = {
+        "type": "Solid",
+        "lod": "2",
+        "boundaries": [[[face] for face in faces]],
+    }
+    return {
+        "type": "CityJSON",
+        "version": "2.0",
+        "transform": {"scale": [1, 1, 1], "translate": [0, 0, 0]},
+        "CityObjects": {
+            "a": {
+                "type": "Building",
+                "attributes": attributes,
+                "geometry": [geometry],
+            }
+        },
+        "vertices": corners,
+    }

@@ -8,6 +8,7 @@ changes no shape.
 import json
 
 from helpers.imported_osm import import_osm, volume
+from helpers.small_cityjson import house
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
@@ -274,30 +275,6 @@ def test_a_demolished_house_of_cityjson_has_an_end(tmp_path):
     path.write_text(json.dumps(house(dates)))
     (one,) = import_cityjson(path, None, None).objects
     assert (one.year, one.until) == (1900, 1950)
-
-
-def house(attributes):
-    corners = [[x, y, z] for z in (0, 5) for y in (0, 8) for x in (0, 10)]
-    faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3],
-             [0, 4, 6, 2], [1, 3, 7, 5]]  # fmt: skip
-    geometry = {
-        "type": "Solid",
-        "lod": "2",
-        "boundaries": [[[face] for face in faces]],
-    }
-    return {
-        "type": "CityJSON",
-        "version": "2.0",
-        "transform": {"scale": [1, 1, 1], "translate": [0, 0, 0]},
-        "CityObjects": {
-            "a": {
-                "type": "Building",
-                "attributes": attributes,
-                "geometry": [geometry],
-            }
-        },
-        "vertices": corners,
-    }
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
+from helpers.small_cityjson import house
 import pytest
 import yaml
 
@@ -19,31 +20,6 @@ from cns_drake.imports import (
 )
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.road_reader import read_roads
-
-
-def house(attributes):
-    corners = [[x, y, z] for z in (0, 5) for y in (0, 8) for x in (0, 10)]
-    faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3],
-             [0, 4, 6, 2], [1, 3, 7, 5]]  # fmt: skip
-    geometry = {
-        "type": "Solid",
-        "lod": "2",
-        "boundaries": [[[face] for face in faces]],
-    }
-    return {
-        "type": "CityJSON",
-        "version": "2.0",
-        "transform": {"scale": [1, 1, 1], "translate": [0, 0, 0]},
-        "CityObjects": {
-            "a": {
-                "type": "Building",
-                "attributes": attributes,
-                "geometry": [geometry],
-            }
-        },
-        "vertices": corners,
-    }
-
 
 # The most used attributes of OpenDRIVE, and some of none of its versions.
 ATTRIBUTES = (
