@@ -7,6 +7,7 @@ import sys
 
 from helpers import job_functions
 from helpers.documents import ROOT
+from helpers.internal.listening import listening
 from helpers.job_functions import Call
 import psutil
 import pytest
@@ -22,7 +23,6 @@ from cns_drake.base import (
     num_cores,
     run_jobs,
     run_process,
-    show_progress,
 )
 
 pytestmark = pytest.mark.slow
@@ -35,7 +35,7 @@ def job(
     return Job(name, step, tuple(needs), cost)
 
 
-def test_finished_steps_start_no_process(tmp_path, monkeypatch, capsys):
+def test_finished_steps_start_no_process(tmp_path, monkeypatch):
     """No cluster starts if all is done; jobs that need other work do start."""
     old, path = tmp_path / "old", tmp_path / "path"
     old.write_text("old")
@@ -62,12 +62,12 @@ def test_finished_steps_start_no_process(tmp_path, monkeypatch, capsys):
         "unknown", job_functions.join, [], tmp_path / "unknown",
         is_done=job_functions.cannot_check,
     )  # fmt: skip
-    with show_progress():
+    with listening() as heard:
         run_jobs([done, new, again, unknown], Cluster(num_workers=1))
     assert (tmp_path / "unknown").is_file()
     assert path.read_text() == "path"
     # The number is that of all jobs, however many were done before.
-    assert "of 4 jobs" in capsys.readouterr().err
+    assert heard.numbers == [(3, 1, "jobs")]
 
 
 def test_a_job_checks_again_before_its_output(tmp_path):

@@ -11,10 +11,16 @@ class Heard(Listener):
 
     Attributes:
         said: activity, done, total and unit of each message.
+        numbers: jobs left, jobs done before and unit, of each run of jobs.
     """
 
     def __init__(self):
         self.said = []
+        self.numbers = []
+
+    def jobs(self, costs, num_done, unit):
+        self.numbers.append((len(costs), num_done, unit))
+        return super().jobs(costs, num_done, unit)
 
     def doing(self, activity, done=0, total=0, unit=""):
         self.said.append((activity, done, total, unit))
