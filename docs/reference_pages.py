@@ -274,7 +274,7 @@ def _causes() -> str:
         "## Causes of change",
         "The experiment [`ladder`](../ladder.md) measures each cause by itself,"
         " at up to four levels, and all of them together. The"
-        " [levels](../levels.md) combine weaker causes.",
+        " [levels](../ladder.md#levels) combine weaker causes.",
         _table(
             (
                 "cause",

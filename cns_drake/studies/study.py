@@ -544,7 +544,7 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
 
     Returns:
         (map, level) -> fingerprint, a hash of the drives that are compared. The
-        level is the degree of difficulty, see `docs/levels.md`.
+        level is the degree of difficulty, see `docs/ladder.md`.
 
     Raises:
         InputError: there is no such file, or a level is not a number.
@@ -599,7 +599,7 @@ def check_frozen(
         table: name of a file in the folder of the shipped worlds; see
             `frozen_drives`.
         compared: (map, level) -> fingerprints of the compared drives. Levels
-            are degrees of difficulty, see `docs/levels.md`.
+            are degrees of difficulty, see `docs/ladder.md`.
 
     Raises:
         InputError: a fingerprint differs from the table's.

@@ -2,7 +2,7 @@
 
     python docs/examples/gnss.py
 
-It records a second of Downtown. `docs/how-to/new_sensor.md` explains it.
+It records a second of Downtown. CONTRIBUTING.md explains it.
 """
 
 from __future__ import annotations

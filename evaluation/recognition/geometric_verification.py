@@ -9,7 +9,7 @@ from evaluation.methods import Method, check_number, checked_pose
 from evaluation.recognition.ranking import ranked_places
 
 # Number of places with the best scores that are tested. This value and the next
-# were chosen on development worlds, see docs/notes/fitting.md.
+# were chosen on development worlds, see docs/notes/cities.md.
 NUM_VERIFIED = 30
 # Half the width of the transition of a weight, as a share of the radius.
 SOFTNESS = 0.05

@@ -8,7 +8,7 @@ four returns.
 
 A comparison with rays cast in the simulated world shows the error of shares of
 shown points: some hundredths for scans up to 30 m apart, and more for scans
-farther apart (docs/notes/fitting.md).
+farther apart (docs/notes/cities.md).
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ LEAST_BLOCKS = 6
 LEAST_CITIES = 8
 # Distance between the centres of neighbouring blocks of street [m]. The answers
 # to queries 60 m apart are hardly correlated any more, and with shorter blocks
-# the intervals are too narrow; see docs/notes/coverage.md.
+# the intervals are too narrow; see docs/verification.md.
 BLOCK_LENGTH = 80.0
 # How far imaginary cities lie beyond all others, see `city_interval`.
 _BEYOND = 2.0

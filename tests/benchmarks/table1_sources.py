@@ -4,7 +4,7 @@
 
 For each pair of drives, a row for each choice that the paper leaves open (hull,
 grid, spacing of scans, voxel centres) and for each small difference between the
-frames of the two drives (yaw, offset). `docs/notes/metropolis.md` shows the
+frames of the two drives (yaw, offset). `docs/notes/cities.md` shows the
 result for Metropolis.
 """
 

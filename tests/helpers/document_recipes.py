@@ -959,7 +959,6 @@ NOT_RUN = {
     ".venv/bin/cns-drake simulate suburbia_01 --frames 200": (
         "simulates a shipped city for minutes; the workflow `site.yml` runs it"
     ),
-    ".ci/drake_ends": "installs from the network; the workflow runs it",
     "[build-system]\nrequires": "test_plugins installs it",
     "pip install ./mine": "test_plugins installs it",
     "cns-eval pr --method mean-heights": "test_plugins finds the method",
@@ -996,8 +995,6 @@ NOT_RUN = {
     "minutes; the recipe map truth has a small one",
     ".venv/bin/cns-drake study trend --set": "measures 58 versions of a "
     "shipped city; the recipe trend has two of a small one",
-    ".venv/bin/cns-drake study size": "describes shipped drives, for many "
-    "minutes",
     ".venv/bin/cns-drake study fresh": "draws shipped cities and drives "
     "through them, for many minutes; test_fresh_cities draws a small one",
     "cns-drake study levels": "takes hours",
@@ -1053,7 +1050,6 @@ NOT_RUN = {
     ".venv/bin/python tests/benchmarks/real_or_simulated.py": "likewise",
     "evo_rpe tum": "a program of its own",
     ".venv/bin/cns-drake import neukolln": "needs the file that is not shipped",
-    "/** A batch of rays": "C++ of a design",
     "lidars: typing.Mapping": "lines of an example of Drake's",
     "for _, lidar in scenario": "likewise",
     "@misc{song2025city": "a citation",

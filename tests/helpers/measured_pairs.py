@@ -1,7 +1,7 @@
 """Numbers of a pair of drives from their definitions, without an engine.
 
 They are oracles for the engine's tables: each is a plain sequence of the steps
-that `docs/explanation/structure.md` names.
+that CONTRIBUTING.md names.
 """
 
 from dataclasses import replace
