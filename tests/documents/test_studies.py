@@ -44,12 +44,6 @@ def test_experiments_that_pages_name_ship():
     assert named <= shipped_experiments().keys()
 
 
-def test_all_fields_of_an_experiment_are_listed():
-    fields = first_codes("## Fields of an experiment")
-    # `causes` becomes `cases` when a file is read.
-    assert sorted(fields) == sorted({*Experiment.model_fields, "causes"})
-
-
 def test_tasks_and_their_settings_are_listed():
     rows = documents.table(PAGE, "## Tasks and metrics")
     assert [codes(row[0])[0] for row in rows] == list(TASKS)
