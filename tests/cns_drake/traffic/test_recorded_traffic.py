@@ -55,6 +55,37 @@ def test_a_file_gives_the_places_that_were_written(tmp_path):
     assert (np.diff(phase[:, 1]) == 0.0).all()
 
 
+def test_between_places_of_a_file_are_smooth_cubics(tmp_path):
+    """Gauss and Legendre's rule, which is exact for cubics, is the oracle."""
+    rng = np.random.default_rng(5)
+    path = tmp_path / "traffic.npz"
+    values = np.cumsum(rng.uniform(0.0, 1.0, (20, 3, 5)), axis=0)
+    write_recorded(path, values, values[..., :4])
+    tracks = read_recorded(path).vehicles
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    for k in range(19):
+        for low, high in np.array([(0.0, 1.0), (0.3, 0.8)]) * PERIOD:
+            t = PERIOD * k + low + (high - low) * (nodes + 1) / 2
+            moved = np.tensordot(weights, tracks.at(t)[1], 1) * (high - low) / 2
+            a, b = (tracks.at(PERIOD * k + end)[0] for end in (low, high))
+            np.testing.assert_allclose(b - a, moved, atol=1e-9)
+    for k in range(1, 19):
+        value, rate = tracks.at(PERIOD * k)
+        np.testing.assert_allclose(value, tracks.values[k], atol=1e-9)
+        before = tracks.at(PERIOD * k - 1e-9)[1]
+        np.testing.assert_allclose(rate, before, atol=1e-5)
+    # Straight on before the first and after the last place.
+    for t, end in ((-1.3, 0.0), (9.9, 9.5)):
+        (value, rate), (expected, speed) = tracks.at(t), tracks.at(end)
+        np.testing.assert_allclose(rate, speed)
+        np.testing.assert_allclose(value, expected + (t - end) * speed)
+    t = np.arange(-0.1, 10.0, 0.37)
+    for many, each in zip(
+        tracks.at(t), zip(*map(tracks.at, t), strict=True), strict=True
+    ):
+        np.testing.assert_array_equal(many, each)
+
+
 @pytest.mark.parametrize(
     "name", ["downtown", "metropolis", "riverside", "suburbia"]
 )

@@ -2,13 +2,12 @@
 
 import re
 
+from helpers.traffic_diagrams import TrafficDiagram
 import numpy as np
-from pydrake.geometry import SceneGraph
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.traffic import EgoBox, fcd_traffic, play_trace, read_fcd
-from cns_drake.traffic.traffic_motion import make_traffic
+from cns_drake.traffic import EgoBox, play_trace, read_fcd
 
 # Time step of the trace [s].
 DT = 0.1
@@ -185,34 +184,40 @@ def test_what_meets_the_ego_car_after_its_drive_stays(trace):
     assert play(trace, ego=ego, duration=2.5, end=3.5).left_out == 1
 
 
+@pytest.mark.parametrize("acceleration", [0.0, -3.0])
 @pytest.mark.parametrize("dt", [0.1, 1.0])
-def test_a_constant_speed_is_constant_from_first_to_last(tmp_path, dt):
-    """A car at 10 m/s on a straight lane."""
-    rows = [
-        f'<timestep time="{k * dt:.2f}"><vehicle id="c" '
-        f'x="{10 * k * dt - 20:g}" y="30" angle="90"/></timestep>'
-        for k in range(5)
-    ]
-    path = tmp_path / "straight.xml"
-    path.write_text(f"<fcd-export>{''.join(rows)}</fcd-export>")
+def test_a_constant_acceleration_is_exact_from_first_to_last(
+    tmp_path, dt, acceleration
+):
+    """A car on a straight lane, at first at 10 m/s."""
+
+    def front(t):
+        return 10.0 * t + acceleration / 2 * t**2 - 20.0
+
+    path = write_moves(
+        tmp_path / "a.xml", "vehicle", "", dt, [front(k * dt) for k in range(5)]
+    )
     plan = play(path, duration=4 * dt, end=0.0)
     half = plan.kinds[0].size[0] / 2
-    for t in np.append(np.linspace(0.0, 4 * dt, 37), 4 * dt + 0.05):
-        (place,), (rate,) = plan.vehicles.at(t)
-        x = 10 * t - 20 - half
-        np.testing.assert_allclose(place[:2], [x, 30], atol=1e-9)
-        np.testing.assert_allclose(rate[:2], [10.0, 0.0], atol=1e-9)
+    for t in np.linspace(0.0, 4 * dt, 37):
+        place, rate = (one[0] for one in plan.vehicles.at(t))
+        np.testing.assert_allclose(
+            place[:2], [front(t) - half, -RADIUS], atol=1e-9
+        )
+        speed = 10.0 + acceleration * t
+        np.testing.assert_allclose(rate[:2], [speed, 0.0], atol=1e-9)
+    # It goes straight on.
+    later, _ = plan.vehicles.at(4 * dt + 0.05)
+    assert later[0, 0] == pytest.approx(place[0] + 0.05 * rate[0])
 
 
 def test_a_lidar_that_turns_sees_bodies_come_and_go_in_motion(trace):
     """The traced car is there from 2 s to 4 s, at 7 m/s."""
     plan = play(trace)
-    traffic = make_traffic(SceneGraph(), plan, turn=0.05)
-    context = traffic.CreateDefaultContext()
-    port = traffic.GetOutputPort("body_spatial_velocities")
+    diagram = TrafficDiagram(plan, turn=0.05)
     for t in (2.001, 3.0, 3.97, 3.999):
-        context.SetTime(t)
-        velocity = port.Eval(context)[1].translational()
+        velocities = diagram.output("body_spatial_velocities", t)
+        velocity = velocities[1].translational()
         np.testing.assert_allclose(velocity[:2], [0, 7], atol=1e-6)
         assert abs(velocity[2]) < 1e-6
 
@@ -281,17 +286,13 @@ def test_what_jumps_is_absent_meanwhile(tmp_path, tag, kind, fastest, dt):
         assert tag == "person" or plan.kinds[0] == plan.kinds[1]
 
 
-def test_a_trace_of_jumps_has_other_units(tmp_path, monkeypatch):
-    monkeypatch.setattr(fcd_traffic, "_MOST_JUMPS", 3)
-    for number in (4, 5):
-        xs = [1000.0 * k for k in range(number)]
-        path = write_moves(tmp_path / "a.xml", "vehicle", "", 1.0, xs)
-        if number == 4:
-            assert len(read_fcd(path, no_degrees).vehicles) == 4 + 1
-            continue
-        fault = r"4 jumps from .* in seconds"
-        with pytest.raises(InputError, match=fault):
-            read_fcd(path, no_degrees)
+def test_a_trace_of_jumps_has_other_units(tmp_path):
+    xs = [1000.0 * k for k in range(1002)]
+    path = write_moves(tmp_path / "a.xml", "vehicle", "", 1.0, xs[:-1])
+    assert len(read_fcd(path, no_degrees).vehicles) == 1001 + 1
+    path = write_moves(tmp_path / "a.xml", "vehicle", "", 1.0, xs)
+    with pytest.raises(InputError, match=r"1001 jumps from .* in seconds"):
+        read_fcd(path, no_degrees)
 
 
 @pytest.mark.parametrize("tag", ["vehicle", "person"])

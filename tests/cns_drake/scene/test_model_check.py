@@ -2,14 +2,13 @@
 
 from pathlib import Path
 
+from helpers.mesh_worlds import read_mesh
 from helpers.small_map import box_visual, world_text
 from pydrake.geometry import ReadObjToTriangleSurfaceMesh
 import pytest
 
 from cns_drake.base import InputError
 from cns_drake.scene import load_world, read_perception_geometry
-from cns_drake.scene.model_check import check_model
-from cns_drake.scene.obj_check import check_obj
 
 _SHAPES = {
     "sphere": "<sphere><radius>{}</radius></sphere>",
@@ -121,29 +120,31 @@ def test_other_text_of_a_world(tmp_path, old, new, fault):
     assert len(str(refusal.value)) < 2000
 
 
-def test_what_a_model_includes_is_checked(tmp_path):
-    inner = tmp_path / "inner"
-    inner.mkdir()
-    path = write(tmp_path, _SHAPES["box"].format(1))
-    (inner / "model.sdf").write_text(
-        path.read_text().replace("1 1 1", "1 -1 1")
+def test_what_a_vehicle_includes_is_checked(tmp_path):
+    world = write(tmp_path, _SHAPES["box"].format(1))
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner" / "model.sdf").write_text(
+        world.read_text().replace("1 1 1", "1 -1 1")
     )
+    vehicle = tmp_path / "car.sdf"
     for uri in ("inner", "inner/model.sdf"):
-        path.write_text(
+        vehicle.write_text(
             '<sdf version="1.9"><model name="m"><include>'
             f"<uri>{uri}</uri></include></model></sdf>"
         )
         with pytest.raises(InputError, match=r"model\.sdf: line .*: -1|1 -1 1"):
-            check_model(path)
+            load_world(world, vehicle=vehicle)
 
 
-def test_a_model_that_includes_itself(tmp_path):
-    path = tmp_path / "world.sdf"
-    path.write_text(
+def test_a_vehicle_that_includes_itself(tmp_path):
+    vehicle = tmp_path / "car.sdf"
+    vehicle.write_text(
         '<sdf version="1.9"><model name="m"><include>'
-        "<uri>world.sdf</uri></include></model></sdf>"
+        "<uri>car.sdf</uri></include></model></sdf>"
     )
-    check_model(path)
+    world = write(tmp_path, _SHAPES["box"].format(1))
+    with pytest.raises(InputError, match=r"car\.sdf: "):
+        load_world(world, vehicle=vehicle)
 
 
 _FACES = [
@@ -190,7 +191,7 @@ def test_faces_without_their_vertices(tmp_path, face, kind):
 def test_faces_that_drake_reads(tmp_path, face):
     path = tmp_path / "wedge.obj"
     path.write_text(f"{_TETRAHEDRON}vn 0 0 1\n{face}\n")
-    check_obj(path)
+    assert len(read_mesh(path).triangles) >= 1
     assert ReadObjToTriangleSurfaceMesh(path).num_triangles() >= 1
 
 

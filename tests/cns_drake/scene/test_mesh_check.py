@@ -4,13 +4,10 @@ import json
 import struct
 
 from helpers.mesh_texts import L_TRIANGLES, gltf_text
-from helpers.small_map import world_text
+from helpers.mesh_worlds import notes_of, read_mesh, world_of
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.scene import load_world, read_perception_geometry
-from cns_drake.scene.mesh_check import check_mesh_file
-from cns_drake.scene.obj_check import check_obj
 
 
 def write(tmp_path, change, suffix=".gltf"):
@@ -49,8 +46,8 @@ def test_extensions_that_change_shapes_are_refused(
     tmp_path, name, required, suffix
 ):
     path = write(tmp_path, extension(name, required), suffix)
-    with pytest.raises(ValueError, match=f"needs the extension {name} of glTF"):
-        check_mesh_file(path)
+    with pytest.raises(InputError, match=f"needs the extension {name} of glTF"):
+        notes_of(path)
 
 
 @pytest.mark.parametrize(
@@ -67,15 +64,15 @@ def test_extensions_that_change_shapes_are_refused(
     ],
 )
 def test_other_extensions_are_no_matter(tmp_path, name, required):
-    assert check_mesh_file(write(tmp_path, extension(name, required))) == ()
+    assert notes_of(write(tmp_path, extension(name, required))) == ()
 
 
 def test_numbers_that_are_no_floats_are_refused(tmp_path):
     def change(top):
         top["accessors"][0] |= {"componentType": 5122, "normalized": True}
 
-    with pytest.raises(ValueError, match="no floats"):
-        check_mesh_file(write(tmp_path, change))
+    with pytest.raises(InputError, match="no floats"):
+        notes_of(write(tmp_path, change))
 
 
 @pytest.mark.parametrize(
@@ -106,10 +103,7 @@ def test_numbers_that_are_no_floats_are_refused(tmp_path):
 )
 def test_what_is_not_read_is_named(tmp_path, change, note):
     path = write(tmp_path, change)
-    mesh = "<geometry><mesh><uri>thing.gltf</uri></mesh></geometry>"
-    sdf = tmp_path / "world.sdf"
-    sdf.write_text(world_text([f'<visual name="thing">{mesh}</visual>']))
-    (found,) = load_world(sdf).notes
+    (found,) = world_of(path).notes
     assert found.startswith(f"{path}: {note}")
 
 
@@ -120,17 +114,14 @@ def test_what_is_not_read_is_named(tmp_path, change, note):
 def test_files_that_are_no_gltf(tmp_path, text):
     path = tmp_path / "thing.gltf"
     path.write_bytes(text)
-    with pytest.raises(ValueError, match=r"\w"):
-        check_mesh_file(path)
+    with pytest.raises(InputError, match=r"\w"):
+        notes_of(path)
 
 
 def test_a_world_names_the_file_and_the_extension(tmp_path):
     path = write(tmp_path, extension("KHR_mesh_quantization"))
-    mesh = "<geometry><mesh><uri>thing.gltf</uri></mesh></geometry>"
-    sdf = tmp_path / "world.sdf"
-    sdf.write_text(world_text([f'<visual name="thing">{mesh}</visual>']))
     with pytest.raises(InputError, match="KHR_mesh_quantization") as refusal:
-        load_world(sdf)
+        world_of(path)
     assert str(refusal.value).startswith(str(path))
 
 
@@ -148,7 +139,7 @@ def test_what_is_not_read_of_collada_is_named(tmp_path, element, note):
     path = tmp_path / "thing.dae"
     path.write_text(f"<COLLADA>{element}</COLLADA>")
     expected = () if note is None else (f"{note} ignored",)
-    assert check_mesh_file(path) == expected
+    assert notes_of(path) == expected
 
 
 SQUARE = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
@@ -223,8 +214,8 @@ def test_surfaces_that_would_be_missing_are_refused(
     tmp_path, name, text, fault
 ):
     (tmp_path / name).write_text(text)
-    with pytest.raises(ValueError, match=fault):
-        check_mesh_file(tmp_path / name)
+    with pytest.raises(InputError, match=fault):
+        notes_of(tmp_path / name)
 
 
 @pytest.mark.parametrize(
@@ -259,7 +250,7 @@ def test_surfaces_that_would_be_missing_are_refused(
 )
 def test_what_is_read_as_a_whole_is_not_refused(tmp_path, name, text, notes):
     (tmp_path / name).write_text(text)
-    assert check_mesh_file(tmp_path / name) == notes
+    assert notes_of(tmp_path / name) == notes
 
 
 def binary_ply(order, faces, size="uchar", end="\n", more=b""):
@@ -294,11 +285,11 @@ def test_faces_of_ply_have_three_corners(tmp_path, corners):
         texts.append(binary_ply(order, [few], "int", "\r\n", b"more"))
     for text in texts:
         path.write_bytes(text)
-        with pytest.raises(ValueError, match=f"PLY with {corners} corners"):
-            check_mesh_file(path)
+        with pytest.raises(InputError, match=f"PLY with {corners} corners"):
+            notes_of(path)
     for order in "<>":
         path.write_bytes(binary_ply(order, [good, (2, 1, 0)]))
-        assert check_mesh_file(path) == ()
+        assert notes_of(path) == ()
 
 
 def test_a_binary_stl_may_begin_like_a_text(tmp_path):
@@ -306,7 +297,7 @@ def test_a_binary_stl_may_begin_like_a_text(tmp_path):
     facets = [struct.pack("<12fH", *(0.0,) * 3, *A, *B, *C, 0)] * 2
     head = b"solid made by a program".ljust(80)
     path.write_bytes(head + struct.pack("<I", len(facets)) + b"".join(facets))
-    assert check_mesh_file(path) == ()
+    assert notes_of(path) == ()
 
 
 def test_a_mode_that_is_none_of_gltf_is_refused(tmp_path):
@@ -315,8 +306,8 @@ def test_a_mode_that_is_none_of_gltf_is_refused(tmp_path):
             {"attributes": {"POSITION": 0}, "mode": 7}
         )
 
-    with pytest.raises(ValueError, match="mode is none of glTF"):
-        check_mesh_file(write(tmp_path, change))
+    with pytest.raises(InputError, match="mode is none of glTF"):
+        notes_of(write(tmp_path, change))
 
 
 @pytest.mark.parametrize(
@@ -333,11 +324,11 @@ def test_surfaces_of_obj_that_would_be_missing_are_refused(
 ):
     path = tmp_path / "thing.obj"
     path.write_text(f"{VERTICES}f 1 2 3\n{lines}")
-    with pytest.raises(ValueError, match=fault):
-        check_obj(path)
+    with pytest.raises(InputError, match=fault):
+        read_mesh(path)
     # Lines and points have no surface, and names are no statements.
     path.write_text(f"{VERTICES}o surf\ng call me\nf 1 2 3\nl 1 2\np 1\n")
-    check_obj(path)
+    read_mesh(path)
 
 
 @pytest.mark.parametrize(
@@ -345,8 +336,8 @@ def test_surfaces_of_obj_that_would_be_missing_are_refused(
 )
 def test_other_formats_are_refused(tmp_path, name):
     (tmp_path / name).write_text("OFF\n")
-    with pytest.raises(ValueError, match="no mesh of a format that is read"):
-        check_mesh_file(tmp_path / name)
+    with pytest.raises(InputError, match="no mesh of a format that is read"):
+        notes_of(tmp_path / name)
 
 
 @pytest.mark.parametrize(
@@ -371,14 +362,14 @@ def test_other_formats_are_refused(tmp_path, name):
 def test_collada_whose_places_would_be_wrong_is_refused(tmp_path, text, fault):
     path = tmp_path / "thing.dae"
     path.write_text(f"<COLLADA>{text}</COLLADA>")
-    with pytest.raises(ValueError, match=fault):
-        check_mesh_file(path)
+    with pytest.raises(InputError, match=fault):
+        notes_of(path)
     # A camera may have any place.
     path.write_text(
         "<COLLADA><library_nodes><node><lookat>1 2 3 0 0 0 0 0 1</lookat>"
         "<instance_camera url='#c'/></node></library_nodes></COLLADA>"
     )
-    assert check_mesh_file(path) == ()
+    assert notes_of(path) == ()
 
 
 @pytest.mark.parametrize(
@@ -394,8 +385,8 @@ def test_ply_with_other_names_is_refused(tmp_path, old, new):
     text = ply(BY_INDEX, "3 0 1 2\n")
     path = tmp_path / "thing.ply"
     path.write_text(text.replace(old, new))
-    with pytest.raises(ValueError, match=r"of PLY with .* export it again"):
-        check_mesh_file(path)
+    with pytest.raises(InputError, match=r"of PLY with .* export it again"):
+        notes_of(path)
 
 
 def test_triangles_that_are_not_read_are_missed(tmp_path):
@@ -407,12 +398,8 @@ def test_triangles_that_are_not_read_are_missed(tmp_path):
         "".join(f"v {x} {y} 0\n" for x, y in corners)
         + "f 1 2 3 4 5 6 7 8 9 10\n"
     )
-    sdf = tmp_path / "world.sdf"
-    mesh = "<geometry><mesh><uri>thing.obj</uri></mesh></geometry>"
-    sdf.write_text(world_text([f'<visual name="thing">{mesh}</visual>']))
-    inspector = load_world(sdf).scene_graph.model_inspector()
     with pytest.raises(InputError, match="only 5 of 8 triangles"):
-        read_perception_geometry(inspector)
+        read_mesh(path)
 
 
 @pytest.mark.parametrize(
@@ -423,8 +410,8 @@ def test_a_vertex_of_obj_that_is_no_numbers_is_refused(tmp_path, vertex):
     """Drake's reader takes such a coordinate for 0."""
     path = tmp_path / "thing.obj"
     path.write_text(f"v 0 0 0\nv {vertex}\nv 0 1 0\nf 1 2 3\n")
-    with pytest.raises(ValueError, match="line 2: a vertex that is not three"):
-        check_obj(path)
+    with pytest.raises(InputError, match="line 2: a vertex that is not three"):
+        read_mesh(path)
 
 
 @pytest.mark.parametrize(
@@ -433,7 +420,7 @@ def test_a_vertex_of_obj_that_is_no_numbers_is_refused(tmp_path, vertex):
 def test_vertices_of_obj_in_other_forms_are_read(tmp_path, vertex):
     path = tmp_path / "thing.obj"
     path.write_text(f"v 0 0 0\n  v {vertex}\r\nv 0 1 0\nf 1 2 3\nv {vertex}")
-    check_obj(path)
+    read_mesh(path)
 
 
 def in_chunk(top, data):
@@ -466,12 +453,8 @@ def test_a_binary_gltf_has_its_buffer_at_any_place(tmp_path, place):
     )
     head = struct.pack("<4sII", b"glTF", 2, 12 + len(body))
     (tmp_path / "thing.glb").write_bytes(head + body)
-    sdf = tmp_path / "world.sdf"
-    mesh = "<geometry><mesh><uri>thing.glb</uri></mesh></geometry>"
-    sdf.write_text(world_text([f'<visual name="thing">{mesh}</visual>']))
-    inspector = load_world(sdf).scene_graph.model_inspector()
-    (one,) = read_perception_geometry(inspector)
-    assert len(one.surface.triangles) == len(L_TRIANGLES)
+    surface = read_mesh(tmp_path / "thing.glb")
+    assert len(surface.triangles) == len(L_TRIANGLES)
 
 
 @pytest.mark.parametrize("suffix", [".gltf", ".glb"])
@@ -480,5 +463,5 @@ def test_a_binary_gltf_has_its_buffer_at_any_place(tmp_path, place):
 )
 def test_buffers_of_gltf_that_are_none_are_refused(tmp_path, buffers, suffix):
     path = write(tmp_path, lambda top: top.update(buffers=buffers), suffix)
-    with pytest.raises(ValueError, match="no valid glTF"):
-        check_mesh_file(path)
+    with pytest.raises(InputError, match="no valid glTF"):
+        notes_of(path)

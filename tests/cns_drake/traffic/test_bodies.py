@@ -1,20 +1,23 @@
 """Bodies of traffic: they fill their boxes, stand, and hold together."""
 
+from helpers.recorded_traffic import write_recorded
+from helpers.traffic_diagrams import TrafficDiagram
 import numpy as np
-from pydrake.geometry import SceneGraph
 import pytest
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from cns_drake.base import InputError
 from cns_drake.scene import MAX_INSTANCE, read_perception_geometry
-from cns_drake.traffic import TrafficPlan, traffic_structures
-from cns_drake.traffic.tracks import Tracks
-from cns_drake.traffic.traffic_motion import bodies_at, make_traffic
-from cns_drake.traffic.traffic_plan import WALKER_SIZE
-from cns_drake.traffic.vehicle_kinds import KINDS
+from cns_drake.traffic import read_recorded, traffic_structures
 
+KINDS = [
+    "city_car", "hatchback", "saloon", "estate", "suv", "van", "box_truck",
+    "bus", "motorcycle", "bicycle",
+]  # fmt: skip
 NUM_WALKERS = 6
+# Height of the box of a pedestrian [m].
+WALKER_HEIGHT = 1.8
 ENDS = np.linspace(-0.5, 0.5, 10)
 
 
@@ -41,24 +44,32 @@ def surface_points(geometry):
     return (X_FG @ points.T).T
 
 
-@pytest.fixture(scope="module")
-def bodies():
-    """The places on each shape of one body of each kind, and of walkers."""
-    plan = TrafficPlan(
-        KINDS,
-        Tracks(0.1, np.zeros((2, len(KINDS), 5))),
-        Tracks(0.1, np.zeros((2, NUM_WALKERS, 5))),
+def plan_of(folder, kinds, walkers):
+    """All stand at the origin."""
+    path = folder / "traffic.npz"
+    write_recorded(
+        path, np.zeros((2, len(kinds), 5)), np.zeros((2, walkers, 4)), kinds
     )
-    scene_graph = SceneGraph()
-    traffic = make_traffic(scene_graph, plan, seed=1)
-    X_WLs = traffic._limbs.poses(bodies_at(plan, 0.0))
-    found = {frame: [] for frame in traffic.moving_frames}
-    for geometry in read_perception_geometry(scene_graph.model_inspector()):
-        p_WL = X_WLs[traffic.moving_frames[geometry.frame_id], :3, 3]
+    return read_recorded(path)
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    return plan_of(tmp_path_factory.mktemp("traffic"), KINDS, NUM_WALKERS)
+
+
+@pytest.fixture(scope="module")
+def bodies(plan):
+    """The places on each shape of one body of each kind, and of walkers."""
+    diagram = TrafficDiagram(plan, seed=1)
+    X_WLs = diagram.limb_poses(0.0)
+    found = {frame: [] for frame in X_WLs}
+    for geometry in read_perception_geometry(diagram.inspector):
+        p_WL = X_WLs[geometry.frame_id].translation()
         found[geometry.frame_id].append(surface_points(geometry) + p_WL)
     return [
         [one for frame in body.frames for one in found[frame]]
-        for body in traffic.bodies
+        for body in diagram.traffic.bodies
     ]
 
 
@@ -69,9 +80,12 @@ def extent(body):
 
 
 @pytest.mark.parametrize("number", range(len(KINDS)))
-def test_vehicles_stand_on_the_ground_and_fill_their_boxes(bodies, number):
+def test_vehicles_stand_on_the_ground_and_fill_their_boxes(
+    plan, bodies, number
+):
     """And the wheels are below the axles with which they stand in lanes."""
-    kind = KINDS[number]
+    kind = plan.kinds[number]
+    assert kind.name == KINDS[number]
     body = bodies[number]
     low, high = extent(body)
     length, width, height = kind.size
@@ -93,7 +107,7 @@ def test_walkers_stand_and_are_alike_on_both_sides(bodies):
     for body in bodies[len(KINDS) :]:
         low, high = extent(body)
         assert 0.0 <= low[2] < 0.03
-        assert 1.5 < high[2] < WALKER_SIZE[2]
+        assert 1.5 < high[2] < WALKER_HEIGHT
         np.testing.assert_allclose(-low[1], high[1])
         heights.append(high[2])
     assert np.ptp(heights) > 0.1
@@ -114,9 +128,8 @@ def test_riders_and_walkers_hold_together(bodies):
         assert connected_components(joined)[0] == 1
 
 
-def test_bodies_have_the_last_instance_ids():
-    tracks = Tracks(0.1, np.zeros((2, 3, 5)))
-    plan = TrafficPlan(KINDS[:3], tracks, tracks)
+def test_bodies_have_the_last_instance_ids(tmp_path):
+    plan = plan_of(tmp_path, KINDS[:3], 3)
     entries = list(traffic_structures(plan, MAX_INSTANCE - 5))
     assert [e.instance for e in entries] == [
         *range(MAX_INSTANCE - 5, MAX_INSTANCE + 1)

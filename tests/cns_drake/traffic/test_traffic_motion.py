@@ -1,7 +1,6 @@
 """Traffic in a diagram: poses, labels, and points on the bodies."""
 
-from dataclasses import replace
-
+from helpers.traffic_diagrams import TrafficDiagram
 import numpy as np
 from pydrake.geometry import Role, SceneGraph
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
@@ -12,89 +11,128 @@ from scipy.spatial.transform import Rotation
 from cns_drake.scene import read_perception_geometry
 from cns_drake.sensors import Lidar, connect_lidar, make_beam_pattern
 from cns_drake.traffic import (
-    TrafficPlan,
+    EgoBox,
     add_traffic,
     connect_traffic,
+    play_trace,
+    read_fcd,
     traffic_structures,
 )
-from cns_drake.traffic.body_shapes import Limb
-from cns_drake.traffic.tracks import Tracks
-from cns_drake.traffic.traffic_motion import (
-    MOVING_SPEED,
-    BodyStates,
-    LimbTable,
-    bodies_at,
-    make_traffic,
-)
-from cns_drake.traffic.traffic_plan import WALKER_SIZE
-from cns_drake.traffic.vehicle_kinds import KINDS
 
 T = 2.0
+# Time between two steps of a trace [s].
+DT = 0.1
+# Length of a bus [m].
+BUS = 11.26
+# A pedestrian's box: length, width, height [m].
+WALKER_SIZE = (0.84, 0.6, 1.8)
 
 
-def test_limbs_swing_about_their_joints():
-    joints = np.array([(0.3, -0.2, 1.1), (-0.4, 0.5, 0.8), (0.1, 0.2, 0.9)])
-    swings = 0.6, -0.35, 0.2
-    one, two, gone = (
-        Limb(f"limb_{k}", tuple(joint), swing, ())
-        for k, (joint, swing) in enumerate(zip(joints, swings, strict=True))
-    )
-    p_WBs = np.array([(4.0, -7.0, 0.2), (1.0, 2.0, 3.0)])
-    states = BodyStates(
-        p_WBs,
-        np.zeros((2, 3)),
-        yaw=np.array([0.9, -2.0]),
-        pitch=np.array([-0.15, 0.1]),
-        yaw_rate=np.zeros(2),
-        present=np.array([True, False]),
-        swing=np.array([0.7, -1.0]),
-    )
-    table = LimbTable([(one, two), (gone,)])
-    assert table.body.tolist() == [0, 0, 1]
-    X_WLs = table.poses(states)
-    X_WB = RigidTransform(RollPitchYaw(0.0, -0.15, 0.9), p_WBs[0])
-    for X_WL, joint, swing in zip(X_WLs, joints, swings[:2], strict=False):
-        X_BL = RigidTransform(RollPitchYaw(0.0, -0.7 * swing, 0.0), joint)
-        np.testing.assert_allclose(
-            X_WL, (X_WB @ X_BL).GetAsMatrix4(), atol=1e-12
-        )
-    # A body that is not there lies deep under the ground.
-    assert X_WLs[2, 2, 3] < -1_000.0
+def play(path, steps, zs):
+    """Plays a trace without an ego car near.
+
+    Args:
+        path: the trace to write.
+        steps: the rows of each step: tag, id, type, x, y, yaw, slope [deg].
+        zs: height of roads, and of other ground [m].
+    """
+    rows = []
+    for k, step in enumerate(steps):
+        rows.append(f'<timestep time="{k * DT:.1f}">')
+        rows += [
+            f'<{tag} id="{name}" type="{kind}" x="{x:.9f}" y="{y:.9f}"'
+            f' angle="{90 - np.degrees(yaw):.9f}" slope="{slope}"/>'
+            for tag, name, kind, x, y, yaw, slope in step
+        ]
+        rows.append("</timestep>")
+    path.write_text(f"<fcd-export>{''.join(rows)}</fcd-export>")
+
+    def levels(xy, of_road):
+        return np.arange(len(xy)), np.full(len(xy), zs[not of_road])
+
+    return play_trace(
+        read_fcd(path, None), path, levels, seed=1, duration=5.0, end=5.0,
+        ego=lambda t: (np.full((len(t), 2), 900.0), np.zeros(len(t))),
+        ego_box=EgoBox(-1.0, 3.0, 1.0),
+    )  # fmt: skip
 
 
-def make_plan():
-    """A bus that turns, a slow car, a bicycle, a walker and one who stands."""
-    t = 0.1 * np.arange(60)
-    zero = np.zeros_like(t)
-    kinds = [
-        next(k for k in KINDS if k.name == n) for n in ("bus", "suv", "bicycle")
-    ]
-    angle = 0.3 * t
-    bus = [20 * np.sin(angle), 30 - 20 * np.cos(angle), zero, angle, zero]
-    car = [12 + 0.9 * MOVING_SPEED * t, zero - 8, zero, zero, zero - 0.05]
-    bicycle = [zero - 9, 4 * t - 4, zero + 0.2, zero + np.pi / 2, zero]
-    walker = [5 - 1.3 * t, zero + 4, zero, zero + np.pi, 6 * t]
-    stands = [zero + 3, zero - 3, zero, zero + 1, zero + 1.5]
-    return TrafficPlan(
-        tuple(kinds),
-        Tracks(0.1, np.array([bus, car, bicycle]).transpose(2, 0, 1)),
-        Tracks(0.1, np.array([walker, stands]).transpose(2, 0, 1)),
-    )
+def make_plan(folder, suv_from_to=(0.0, 9.0)):
+    """A bus that turns, a bicycle, a slow car, a walker and one who stands.
+
+    The car exists for some time only.
+    """
+    steps = []
+    for k in range(60):
+        t = DT * k
+        yaw = 0.3 * t
+        ahead = np.array([np.cos(yaw), np.sin(yaw)])
+        bus = np.array([20 * np.sin(yaw), 30 - 20 * np.cos(yaw)])
+        bus += BUS / 2 * ahead
+        step = [
+            ("vehicle", "a", "bus", *bus, yaw, 0.0),
+            ("vehicle", "b", "bicycle", -9, 4 * t - 3, np.pi / 2, 0.0),
+            ("vehicle", "c", "suv", 14.3 + 0.45 * t, -8.0, 0.0, 3.0),
+            ("person", "p", "", 5 - 1.3 * t, 4.0, np.pi, 0.0),
+            ("person", "q", "", 3.0, -3.0, 1.0, 0.0),
+        ]
+        if not suv_from_to[0] <= t <= suv_from_to[1]:
+            del step[2]
+        steps.append(step)
+    return play(folder / "trace.xml", steps, (0.2, 0.1))
 
 
-def test_slow_walkers_swing_their_limbs_less():
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    return make_plan(tmp_path_factory.mktemp("trace"))
+
+
+def test_limbs_swing_about_their_joints(tmp_path):
     """By the part of 1.2 m/s at which they walk, and all faster ones alike."""
-    t = 0.1 * np.arange(30)
-    zero = np.zeros(30)
-    rows = [[speed * t, zero, zero, zero, 5.0 * t] for speed in (0.6, 0.3, 1.5)]
-    rows.append([zero, 0.6 * t, zero, zero, 5.0 * t])
-    none = Tracks(0.1, np.zeros((30, 0, 5)))
-    plan = TrafficPlan((), none, Tracks(0.1, np.transpose(rows, (2, 0, 1))))
-    for time in (0.0, 0.2, 2.9):
-        expected = np.sin(5.0 * time) * np.array([0.5, 0.25, 1.0, 0.5])
-        np.testing.assert_allclose(
-            bodies_at(plan, time).swing, expected, atol=1e-12
-        )
+    speeds = (0.6, 0.3, 1.5, 0.0)
+    steps = [
+        [
+            ("person", name, "", speed * DT * k, 0.6 * DT * k * (not speed),
+             0.5, 0.0)
+            for name, speed in zip("pqrs", speeds, strict=True)
+        ]
+        for k in range(60)
+    ]  # fmt: skip
+    plan = play(tmp_path / "walkers.xml", steps, (0.0, 0.3))
+    diagram = TrafficDiagram(plan)
+    joints = {}
+    for t in (0.0, 0.2, 2.9):
+        values, _ = plan.walkers.at(t)
+        X_WLs = diagram.limb_poses(t)
+        for row, body, share in zip(
+            values, diagram.traffic.bodies, (0.5, 0.25, 1, 0.5), strict=True
+        ):
+            X_WB = RigidTransform(RollPitchYaw(0, 0, 0.5), row[:3])
+            for frame, side in zip(body.frames, (0, 1, -1, -1, 1), strict=True):
+                X_BL = X_WB.inverse() @ X_WLs[frame]
+                # A swing forwards is a rotation about -y.
+                expected = RotationMatrix.MakeYRotation(
+                    -0.36 * side * share * np.sin(row[4])
+                )
+                np.testing.assert_allclose(
+                    X_BL.rotation().matrix(), expected.matrix(), atol=1e-9
+                )
+                joint = joints.setdefault(frame, X_BL.translation())
+                np.testing.assert_allclose(X_BL.translation(), joint, atol=1e-9)
+
+
+def test_vehicles_stand_on_slopes_and_are_away_before_they_come(tmp_path):
+    """What is not there lies deep under the ground."""
+    plan = make_plan(tmp_path, (2.0, 4.0))
+    diagram = TrafficDiagram(plan)
+    (suv,) = diagram.traffic.bodies[2].frames
+    middle = 14.3 + 0.45 * 3.05 - plan.kinds[2].size[0] / 2
+    X_WB = RigidTransform(
+        RollPitchYaw(0.0, -np.radians(3.0), 0.0), (middle, -8.0, 0.2)
+    )
+    assert X_WB.IsNearlyEqualTo(diagram.limb_poses(3.05)[suv], 1e-6)
+    for t in (1.5, 4.5):
+        assert diagram.limb_poses(t)[suv].translation()[2] < -1_000.0
 
 
 def make_diagram(plan, goes_on, is_posed=True):
@@ -135,14 +173,14 @@ def make_diagram(plan, goes_on, is_posed=True):
 
 
 @pytest.fixture(scope="module", params=[False, True])
-def scanned(request):
-    return (*make_diagram(make_plan(), request.param), request.param)
+def scanned(request, plan):
+    return (*make_diagram(plan, request.param), request.param)
 
 
 def test_labels_and_instances(scanned):
     """Only objects faster than the threshold have a moving class."""
     scan = scanned[0]
-    expected = {101: 257, 102: 10, 103: 253, 104: 254, 105: 30}
+    expected = {101: 257, 102: 253, 103: 10, 104: 254, 105: 30}
     found = {
         int(i): set(scan["label"][scan["instance"] == i].tolist())
         for i in np.unique(scan["instance"])
@@ -150,7 +188,7 @@ def test_labels_and_instances(scanned):
     assert found == {i: {label} for i, label in expected.items()}
 
 
-def test_points_lie_on_the_bodies_at_their_own_time(scanned):
+def test_points_lie_on_the_bodies_at_their_own_time(plan, scanned):
     """In the frame of its limb, each point is on a surface of the limb."""
     scan, traffic, scene_graph, X_WS, _, _, goes_on = scanned
     inspector = scene_graph.model_inspector()
@@ -160,16 +198,18 @@ def test_points_lie_on_the_bodies_at_their_own_time(scanned):
     p_SR = np.stack([scan[c] for c in "xyz"], axis=1).astype(float)
     p_WR = X_WS.multiply(p_SR.T).T
     limbs = list(traffic.moving_frames)
+    diagram = TrafficDiagram(plan, seed=4)
+    # The same limbs in the other diagram.
+    others = dict(zip(limbs, diagram.traffic.moving_frames, strict=True))
     owner = np.repeat(
         np.arange(101, 106), [1, 1, 1, *([len(limbs[3:]) // 2] * 2)]
     )
     worst = {}
     for row in np.random.default_rng(1).choice(len(scan), 300, replace=False):
         t = T + (scan["t"][row] * 1e-9 if goes_on else 0.0)
-        X_WLs = traffic._limbs.poses(bodies_at(make_plan(), t))
-        R_WL, p_WL = X_WLs[:, :3, :3], X_WLs[:, :3, 3]
+        X_WLs = diagram.limb_poses(t)
         distances = [
-            _distance(geometry, R_WL[k].T @ (p_WR[row] - p_WL[k]))
+            _distance(geometry, X_WLs[others[frame]].inverse() @ p_WR[row])
             for k, frame in enumerate(limbs)
             if owner[k] == scan["instance"][row]
             for geometry in by_frame[frame]
@@ -235,43 +275,35 @@ def test_points_in_boxes_are_those_of_instances(scanned):
         own = scan["instance"] == instance
         np.testing.assert_array_equal(inside, own)
     moving = objects.instance[objects.is_moving].tolist()
-    assert moving == [101, 103, 104]
+    assert moving == [101, 102, 104]
     np.testing.assert_allclose(np.linalg.norm(objects.v_WO[0]), 6.0, rtol=2e-4)
     assert objects.yaw_rate[0] == pytest.approx(0.3, rel=1e-6)
 
 
-def test_objects_come_and_go():
-    plan = make_plan()
-    # The second vehicle is there from 0.8 to 3.0 s alone.
-    present = np.ones((60, 3), bool)
-    present[:8, 1] = present[31:, 1] = False
-    vehicles = Tracks(plan.vehicles.dt, plan.vehicles.values, present)
-    traffic = make_traffic(SceneGraph(), replace(plan, vehicles=vehicles))
-    context = traffic.CreateDefaultContext()
-    port = traffic.GetOutputPort("objects")
+def test_objects_come_and_go(tmp_path):
+    """The car is there from 0.8 to 3.0 s alone."""
+    plan = make_plan(tmp_path, (0.75, 3.05))
+    diagram = TrafficDiagram(plan)
     ids = {}
     for time in (0.5, 1.0, 2.9, 3.2, 2.0):
-        context.SetTime(time)
-        objects = port.Eval(context)
+        objects = diagram.output("objects", time)
         ids[time] = objects.instance.tolist()
         assert len(objects.names) == len(objects.semantic_classes)
-        assert objects.sizes.tolist() == [
-            [*plan.kinds[k - 1].size] if k < 4 else [*WALKER_SIZE]
-            for k in ids[time]
-        ]
+        sizes = [plan.kinds[k].size if k < 3 else WALKER_SIZE for k in range(5)]
+        assert objects.sizes.tolist() == [[*sizes[k - 1]] for k in ids[time]]
         assert objects.p_WO.shape == (len(ids[time]), 3)
-        # The bicycle keeps its line, whichever row it has.
-        assert objects.p_WO[ids[time].index(3), 0] == pytest.approx(-9)
+        # The walker keeps his line, whichever row he has.
+        assert objects.p_WO[ids[time].index(4), 1] == pytest.approx(4)
     assert ids == {
-        0.5: [1, 3, 4, 5],
+        0.5: [1, 2, 4, 5],
         1.0: [1, 2, 3, 4, 5],
         2.9: [1, 2, 3, 4, 5],
-        3.2: [1, 3, 4, 5],
+        3.2: [1, 2, 4, 5],
         2.0: [1, 2, 3, 4, 5],
     }
 
 
-def test_poses_as_one_array_are_those_of_the_scene_graph(scanned):
+def test_poses_as_one_array_are_those_of_the_scene_graph(plan, scanned):
     """A LiDAR measures the same with either of them."""
     scan, traffic, scene_graph, _, _, context, goes_on = scanned
     query_object = scene_graph.get_query_output_port().Eval(
@@ -286,31 +318,28 @@ def test_poses_as_one_array_are_those_of_the_scene_graph(scanned):
             known.X_WFs[row],
             atol=1e-13,
         )
-    other, *_ = make_diagram(make_plan(), goes_on, is_posed=False)
+    other, *_ = make_diagram(plan, goes_on, is_posed=False)
     np.testing.assert_array_equal(other["instance"], scan["instance"])
     for axis in "xyz":
         np.testing.assert_allclose(other[axis], scan[axis], atol=2e-3)
 
 
-def test_limbs_stay_in_the_walkers_box():
-    plan = make_plan()
-    scene_graph = SceneGraph()
-    traffic = make_traffic(scene_graph, plan, seed=9)
-    inspector = scene_graph.model_inspector()
+def test_limbs_stay_in_the_walkers_box(plan):
+    diagram = TrafficDiagram(plan, seed=9)
+    inspector = diagram.inspector
     half = np.array(WALKER_SIZE) / 2
     for t in np.linspace(1, 2, 21):
-        states = bodies_at(plan, t)
-        R_WB = Rotation.from_quat(states.quat_xyzw).as_matrix()
-        X_WLs = traffic._limbs.poses(states)
-        R_WL, p_WL = X_WLs[:, :3, :3], X_WLs[:, :3, 3]
-        for frame, k in traffic.moving_frames.items():
-            body = traffic._limbs.body[k]
-            if body < 3:
-                continue
-            for g in inspector.GetGeometries(frame, Role.kPerception):
-                shape, X = inspector.GetShape(g), inspector.GetPoseInFrame(g)
-                for end in (-1, 1):
-                    p_L = X @ np.array([0, 0, end * shape.length() / 2])
-                    p_W = p_WL[k] + R_WL[k] @ p_L - states.p_WB[body]
-                    p_B = R_WB[body].T @ p_W - (0, 0, half[2])
-                    assert (np.abs(p_B) + shape.radius() <= half + 1e-9).all()
+        X_WLs = diagram.limb_poses(t)
+        walkers, _ = plan.walkers.at(t)
+        for row, body in zip(walkers, diagram.traffic.bodies[3:], strict=True):
+            X_BW = RigidTransform(RollPitchYaw(0, 0, row[3]), row[:3]).inverse()
+            for frame in body.frames:
+                for g in inspector.GetGeometries(frame, Role.kPerception):
+                    shape = inspector.GetShape(g)
+                    X_BG = X_BW @ X_WLs[frame] @ inspector.GetPoseInFrame(g)
+                    for end in (-1, 1):
+                        p_B = X_BG @ (0.0, 0.0, end * shape.length() / 2)
+                        p_B -= (0, 0, half[2])
+                        assert (
+                            np.abs(p_B) + shape.radius() <= half + 1e-9
+                        ).all()

@@ -6,15 +6,15 @@ from pathlib import Path
 import re
 
 from helpers.mesh_texts import L_TRIANGLES, L_VERTICES, gltf_text, obj_text
+from helpers.mesh_worlds import notes_of
 import numpy as np
 from pydrake.geometry import Mesh
 import pytest
 
 from cns_drake.base import InputError
 from cns_drake.scene import ForeignMeshes, MeshFiles
-from cns_drake.scene.mesh_check import check_mesh_file
 
-PAGE = Path(__file__).parents[4] / "docs" / "formats.md"
+PAGE = Path(__file__).parents[3] / "docs" / "formats.md"
 
 
 @pytest.fixture(scope="module")
@@ -302,7 +302,7 @@ def test_elements_are_treated_as_the_tables_say(
             files.read("g", shape)
         assert "\n" not in str(error.value)
         return
-    notes = check_mesh_file(path)
+    notes = notes_of(path)
     assert bool(notes) == (treated == "noted"), notes
     if tag == "skins":
         return  # Open3D needs a whole skin.
