@@ -1,6 +1,7 @@
 import base64
 from dataclasses import replace
 import io
+from types import SimpleNamespace
 
 from helpers.browser import chromium, has_chromium
 from helpers.small_page import QUERIES, make_content
@@ -8,7 +9,7 @@ import numpy as np
 from PIL import Image
 import pytest
 
-from evaluation.results.sections.camera_images import CameraImages
+from evaluation.results import nearest_images
 
 pytestmark = [
     pytest.mark.slow,
@@ -386,19 +387,19 @@ def test_images_of_query_and_match(browser, content, tmp_path, size):
     images = []
     for number in range(3):
         stream = io.BytesIO()
-        Image.new("RGB", (320 + number, 240)).save(stream, "JPEG")
+        Image.new("RGB", (300 + number, 240)).save(stream, "JPEG")
         images.append(stream.getvalue())
-    drives = {
-        name: replace(
-            drive,
-            images=CameraImages(
-                np.arange(len(drive.frames)),
-                np.array([0, 4]),
-                images[k : k + 2],
-            ),
+    drives = {}
+    for k, (name, drive) in enumerate(sorted(content.drives.items())):
+        camera = SimpleNamespace(
+            name=name,
+            image_stamps_ns=np.array([0, 4]),
+            image=images[k : k + 2].__getitem__,
         )
-        for k, (name, drive) in enumerate(sorted(content.drives.items()))
-    }
+        stamps_ns = np.arange(len(drive.frames))
+        drives[name] = replace(
+            drive, images=nearest_images(camera, stamps_ns, pytest.fail)
+        )
     path = replace(content, drives=drives).write(tmp_path)
     browser.open(path.as_uri(), *size)
     shown(browser, 0, 1, 0, 0)
@@ -417,7 +418,7 @@ def test_images_of_query_and_match(browser, content, tmp_path, size):
         )
         browser.press("ArrowRight")
     # Scan Context++ takes places 0 and 9, and has no candidate for the third.
-    assert widths == [[321, 320], [321, 321], [321, 0]]
+    assert widths == [[301, 300], [301, 301], [301, 0]]
     wide = browser.evaluate("document.scrollingElement.scrollWidth")
     assert wide <= size[0]
     assert browser.complaints == []

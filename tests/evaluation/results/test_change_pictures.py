@@ -1,3 +1,4 @@
+from helpers.driven_walls import ROUTE, driven_map, wall
 from matplotlib.colors import rgb_to_hsv
 from matplotlib.figure import Figure
 from matplotlib.image import imread
@@ -5,56 +6,19 @@ from matplotlib.patches import Patch
 import numpy as np
 import pytest
 
-from cns_drake.base import GONE_RGB, NEW_RGB, from_xyz
-from evaluation.maps import VoxelAccumulator
+from cns_drake.base import GONE_RGB, NEW_RGB
 from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.results import (
     LAST,
     OWN,
     STAGE,
     ChangePicture,
-    DrivenMap,
     Results,
     Row,
     change_section,
     made_by,
     save_figure,
 )
-from evaluation.results.figure_files import PIXELS
-from evaluation.results.sections.change_pictures import is_in_sight
-
-
-def driven_map(cloud, positions):
-    accumulator = VoxelAccumulator(5.0, 10)
-    accumulator.add(from_xyz(cloud))
-    return DrivenMap(cloud, accumulator.to_map(), np.array(positions))
-
-
-def wall(x, half_width, height=10.0):
-    """A wall across the x axis, of points 0.5 m apart."""
-    y, z = np.meshgrid(
-        np.arange(-half_width, half_width, 0.5), np.arange(0.0, height, 0.5)
-    )
-    return np.stack([np.full(y.size, x), y.ravel(), z.ravel()], axis=1)
-
-
-ROUTE = [[0.0, y, 2.0] for y in np.arange(-10.0, 10.0, 1.0)]
-
-
-@pytest.mark.parametrize("distance", [5.0, 12.0, 20.0, 50.0])
-def test_a_wall_hides_what_is_behind_it(distance):
-    other = driven_map(wall(distance, 40.0), ROUTE)
-    points = np.array(
-        [
-            [distance + 3.0, 0.0, 2.0],  # Behind.
-            [distance - 3.0, 0.0, 2.0],  # In front.
-            [distance, 3.0, 2.0],  # In the wall itself.
-            [-distance, 0.0, 2.0],  # On the other side of the car.
-            [-85.0, 0.0, 2.0],  # Too far.
-        ]
-    )
-    seen = is_in_sight(points, other)
-    assert seen.tolist() == [False, True, True, True, False]
 
 
 def test_new_gone_and_hidden_points_have_colours_of_their_own(tmp_path):
@@ -82,7 +46,7 @@ def test_legend_of_a_figure_is_not_in_the_picture_of_the_page(tmp_path):
     figure = Figure(figsize=(2, 1))
     handle = Patch(color="red", label="gone")
     legend = figure.legend(handles=[handle], loc="lower center")
-    save_figure(figure, tmp_path / "figure", PIXELS)
+    save_figure(figure, tmp_path / "figure", ("png", "webp"))
     printed = imread(tmp_path / "figure.png")[..., :3]
     on_page = imread(tmp_path / "figure.webp")[..., :3] / 255.0
     red = [1.0, 0.0, 0.0]

@@ -9,9 +9,7 @@ import numpy as np
 from PIL import Image
 import pytest
 
-from evaluation.results import nearest_images
-from evaluation.results.sections.browser import browser_data
-from evaluation.results.sections.camera_images import CameraImages
+from evaluation.results import browser_section, nearest_images
 
 NAMES = "metropolis_01", "metropolis_04"
 SAID = "has room for one of {} camera images"
@@ -33,22 +31,22 @@ def picture(width, height, level=0, form="JPEG"):
     return stream.getvalue()
 
 
-def with_images(counts):
+def with_images(counts, draw=lambda k: picture(8, 8, 10 * k)):
     """Returns a page whose drives have images a second apart."""
     content = make_content()
     for name, count in zip(NAMES, counts, strict=True):
         drive = content.drives[name]
         stamps_ns = np.arange(len(drive.frames)) * 500_000_000
         times_ns = np.arange(count) * 1_000_000_000 + 10_000_000
-        files = [bytes([k]) * 100 for k in range(count)]
-        images = CameraImages(stamps_ns, times_ns, files)
-        content.drives[name] = replace(drive, images=images if count else None)
+        camera = Camera(times_ns, [draw(k) for k in range(count)])
+        images = nearest_images(camera, stamps_ns, pytest.fail)
+        content.drives[name] = replace(drive, images=images)
     return content
 
 
 def shown(content):
-    data = browser_data(content.outcomes, content.drives, {})
-    return [data["drives"][name]["images"] for name in NAMES]
+    section = browser_section(content.outcomes, content.drives, {})
+    return [section.data["drives"][name]["images"] for name in NAMES]
 
 
 def test_nearest_images_are_taken_and_reduced():
@@ -87,22 +85,38 @@ def test_no_camera():
 def test_each_scan_shows_the_nearest_image():
     first, second = shown(with_images((2, 0)))
     assert second is None
-    files = [base64.b64decode(one) for one in first["files"]]
-    assert files == [b"\0" * 100, b"\1" * 100]
+    levels = [
+        Image.open(io.BytesIO(base64.b64decode(one))).getpixel((4, 4))[0]
+        for one in first["files"]
+    ]
+    assert levels == pytest.approx([0, 10], abs=3)
     assert first["nearest"] == [0, 0, *[1] * 8]
     assert first["later"][:4] == [0.01, -0.49, 0.01, -0.49]
 
 
-def test_many_images_are_thinned_and_the_page_says_so(tmp_path, monkeypatch):
-    content = with_images((5, 3))
-    limit = "evaluation.results.sections.browser._IMAGES_OF_A_PAGE"
-    for most, left, step in ((801, (5, 3), 1), (799, (3, 2), 2), (1, None, 0)):
-        monkeypatch.setattr(limit, most)
-        images = shown(content)
-        if left is not None:
-            assert tuple(len(one["files"]) for one in images) == left
+def test_many_images_are_thinned_and_the_page_says_so(tmp_path):
+    """A page has 6 MB of images."""
+    noise = np.random.default_rng(1).integers(
+        256, size=(320, 320, 3), dtype="u1"
+    )
+    stream = io.BytesIO()
+    Image.fromarray(noise).save(stream, "JPEG", quality=100)
+    content = with_images((5, 3), lambda k: stream.getvalue())
+    (size,) = {
+        len(base64.b64decode(file))
+        for one in shown(content)
+        for file in one["files"]
+    }
+    for number, step in ((6_000_000 // size, 1), (12_000_000 // size, 2)):
+        images = replace(
+            content.drives[NAMES[0]].images,
+            files=content.drives[NAMES[0]].images.files[:1] * (number - 3),
+            times_ns=np.arange(number - 3) * 100_000_000,
+        )
+        content.drives[NAMES[0]] = replace(
+            content.drives[NAMES[0]], images=images
+        )
+        lengths = [len(one["files"]) for one in shown(content)]
+        assert lengths == [-(-(number - 3) // step), -(-3 // step)]
         text = content.write(tmp_path).read_text()
         assert (SAID.format(step) in text) == (step > 1)
-    # One image is left of each drive, however few there is room for.
-    assert [len(one["files"]) for one in images] == [1, 1]
-    assert images[0]["later"][-1] == pytest.approx(0.01 - 4.5)

@@ -1,14 +1,15 @@
 """Sections with what only recordings have: routes, changes and queries."""
 
 import base64
+from dataclasses import replace
 import re
 
 from helpers.small_page import make_content
 import numpy as np
 import pytest
 
-from evaluation.results import make_page_drive, routes_section
-from evaluation.results.sections.browser import browser_data
+from evaluation.maps import thumbnail
+from evaluation.results import browser_section, make_page_drive, routes_section
 
 PAGES = {"metropolis_04": "../pages/metropolis_04.html?a=1&b"}
 
@@ -78,13 +79,13 @@ def test_recordings_are_linked(tmp_path):
     # The browser makes its own link.
     address = "../pages/metropolis_04.html?a=1&amp;b"
     assert text.count(f'<a href="{address}">') == 1
-    data = browser_data(content.outcomes, content.drives, PAGES)
+    data = browser_section(content.outcomes, content.drives, PAGES).data
     assert data["drives"]["metropolis_04"]["page"] == PAGES["metropolis_04"]
     assert data["drives"]["metropolis_01"]["page"] is None
 
 
 def test_browser_data(content):
-    data = browser_data(content.outcomes, content.drives, {})
+    data = browser_section(content.outcomes, content.drives, {}).data
     pair, back = data["pairs"]
     assert pair["label"] == "metropolis_01 → metropolis_04"
     assert back["label"] == "metropolis_04 → metropolis_01"
@@ -117,11 +118,23 @@ def test_reasons_are_offered(text):
     ]
 
 
-def test_many_scans_are_thinned(content, monkeypatch):
-    limit = "evaluation.results.sections.browser._POINTS_OF_A_PAGE"
-    monkeypatch.setattr(limit, 150)
-    data = browser_data(content.outcomes, content.drives, {})
-    assert data["drives"]["metropolis_01"]["counts"] == [10] * 10
+def test_many_scans_are_thinned(content):
+    """A page has 5 million points."""
+    name, number = "metropolis_01", 4_000
+    points = np.random.default_rng(2).uniform(-60.0, 60.0, (4_000, 3))
+    scan = thumbnail(points, 61.0, 0)
+    drive = replace(
+        content.drives[name],
+        frames=np.arange(number),
+        X_WS=np.tile(np.eye(4), (number, 1, 1)),
+        thumbnails=[scan] * number,
+    )
+    data = browser_section(
+        content.outcomes, {**content.drives, name: drive}, {}
+    ).data
+    most = 5_000_000 // (number + 5)
+    assert len(scan) > most
+    assert data["drives"][name]["counts"] == [most] * number
 
 
 def test_maps_are_held_once(content, text):

@@ -25,10 +25,10 @@ from evaluation.results import (
     summary_lines,
     write_page,
 )
-from evaluation.results.charts.chart import NARROW, ROW, WIDE
-from evaluation.results.charts.words import value_words
-from evaluation.results.page import marker_corners
 
+# Width of a chart on a screen and on a phone [px].
+WIDE = 860
+NARROW = 358
 YEARS = "database.years"
 PARTS = {"ring++": 0.9, "solid": 0.5, "mine": 0.7}
 
@@ -171,7 +171,7 @@ def test_long_settings_leave_room_for_the_matrix(tmp_path, values, shown):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         save_figure(drawn.figure, tmp_path / "chart", ("png",))
-    assert axes.get_window_extent().height > 2 * ROW
+    assert axes.get_window_extent().height > 40
 
 
 @pytest.mark.parametrize(
@@ -245,19 +245,38 @@ def test_a_loss_that_is_certain_is_bold():
 
 
 @pytest.mark.parametrize(
-    ("value", "factor", "text"),
+    ("factor", "words"),
     [
-        ("hidden", "cause", "occluded sector"),
-        ("lateral", "cause", "lateral offset"),
-        ("turn", "cause", "random yaw"),
-        ("parked_cars", "cause", "parked cars"),
         # Only a cause has a word of its own.
-        ("hidden", "map", "hidden"),
-        (2.0, "cause", "2"),
+        (
+            "cause",
+            {
+                "hidden": "occluded sector",
+                "lateral": "lateral offset",
+                "turn": "random yaw",
+                "parked_cars": "parked cars",
+            },
+        ),
+        ("query.kind", {"hidden": "hidden", "own": "own"}),
+        ("both.stage", {"own": "with the change"}),
+        ("query.origin", {"[0,0,2.8]": "0, 0, 2.8"}),
+        ("query.size", {0.30: "0.3", 2.0: "2"}),
+        (
+            "query.without",
+            {
+                ",".join(
+                    f"tree_{k:03d}" for k in range(450)
+                ): "tree 000, tree 001 and 448 more"
+            },
+        ),
     ],
 )
-def test_causes_have_the_words_of_the_field(value, factor, text):
-    assert value_words(value, factor) == text
+def test_values_of_factors_are_words(factor, words):
+    rows = Results.of(row(0.5, {factor: value}) for value in words)
+    chart = {"kind": "matrix", "over": factor, "metric": "auc"}
+    (axes,) = draw_chart(chart, rows).figure.axes
+    found = [label.get_text() for label in axes.get_yticklabels()]
+    assert [" ".join(one.split()) for one in found] == list(words.values())
 
 
 def test_a_dumbbell_joins_both_ends():
@@ -580,17 +599,6 @@ def test_no_chart_shows_what_cannot_be(tmp_path, chart, results, value):
     assert not list(tmp_path.iterdir())
 
 
-def test_values_of_factors_are_words():
-    assert value_words("[0,0,2.8]") == "0, 0, 2.8"
-    assert value_words("parked_cars") == "parked cars"
-    assert value_words(0.30) == "0.3"
-    assert value_words("own", "both.stage") == "with the change"
-    assert value_words("own", "query.kind") == "own"
-    many = [f"tree_{k:03d}" for k in range(450)]
-    assert value_words(many) == "'tree 000', 'tree 001' and 448 more"
-    assert value_words(",".join(many)) == "tree 000, tree 001 and 448 more"
-
-
 def test_a_picture_for_print_has_its_legend(tmp_path):
     keys = {"kind": "lines", "over": YEARS, "metric": "auc"}
     figure = draw_chart(keys, aged(), alone=True).figure
@@ -598,15 +606,22 @@ def test_a_picture_for_print_has_its_legend(tmp_path):
     assert figure.legends[0].get_visible()
 
 
-def test_a_page_shows_the_markers_of_its_charts():
+def test_a_page_shows_the_markers_of_its_charts(tmp_path):
     """The legend of the page has the outlines of matplotlib's markers."""
-    names = ["btc", "scan-context++", "mine"]
-    styles = method_styles(names)
-    corners = [
-        np.array([c.split(",") for c in marker_corners(marker).split()], float)
-        for _, _, marker in styles.values()
+    rows = [
+        row(0.5, {YEARS: year}, name)
+        for name in ("btc", "scan-context++", "mine")
+        for year in (0, 10)
     ]
-    square, triangle, cross = corners
+    chart = {"kind": "lines", "over": YEARS, "metric": "auc"}
+    page = write_page(
+        Results.of(rows), None, tmp_path, title="age", charts=[chart]
+    ).read_text()
+    corners = [
+        np.array([c.split(",") for c in points.split()], float)
+        for points in re.findall(r'<polygon[^>]*points="([^"]+)"', page)
+    ]
+    triangle, square, cross = sorted(corners, key=len)[-3:]
     # Closed polygons; the triangle points up.
     np.testing.assert_allclose(np.ptp(square, axis=0), 8.0)
     assert {*map(tuple, square.tolist())} == {

@@ -2,10 +2,6 @@ import numpy as np
 import pytest
 
 from evaluation.results import OrthographicView, render
-from evaluation.results.sections.point_rendering import (
-    colour_by_height,
-    shade_by_height,
-)
 
 RED = (200, 0, 0)
 GREEN = (0, 200, 0)
@@ -78,27 +74,3 @@ def test_pixels_and_coordinates_agree():
     rows = np.minimum(rows, height - 1)
     hit = picture.image[rows.astype(int), columns.astype(int), 0]
     assert np.count_nonzero(hit == 255) <= 1
-
-
-def test_lower_points_are_darker():
-    colours = np.full((101, 3), 200, dtype=np.uint8)
-    shaded = shade_by_height(colours, np.linspace(0.0, 50.0, 101), darkest=0.5)
-    assert (np.diff(shaded[:, 0].astype(int)) >= 0).all()
-    assert shaded[0].tolist() == [100] * 3
-    assert shaded[-1].tolist() == [200] * 3
-    level = shade_by_height(colours, np.full(101, 3.0), darkest=0.5)
-    assert (level == 100).all()
-
-
-def test_colours_between_two():
-    heights = np.linspace(0.0, 50.0, 101)
-    low, high = (200, 100, 0), (0, 100, 200)
-    rgb = colour_by_height(heights, low, high).astype(int)
-    assert rgb[0].tolist() == list(low)
-    assert rgb[-1].tolist() == list(high)
-    assert (np.diff(rgb[:, 0]) <= 0).all()
-    # From the 5 % to the 99 % quantile.
-    part = ((25.0 - 2.5) / (49.5 - 2.5)) ** 0.5
-    assert rgb[50].tolist() == pytest.approx(
-        [200 * (1 - part), 100, 200 * part], abs=1.0
-    )

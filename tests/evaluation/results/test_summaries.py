@@ -1,6 +1,8 @@
 """Summaries of tables whose numbers are known in closed form."""
 
+import csv
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +14,10 @@ from evaluation.results import (
     QueryRows,
     Results,
     Row,
+    excesses,
+    means,
     rank_methods,
-    summaries,
+    write_page,
 )
 
 YEARS = "database.years"
@@ -61,6 +65,33 @@ def answers(right, factors, **names):
     )
 
 
+def summarised(folder, rows, charts, queries=None):
+    """The summaries beside a page."""
+    write_page(Results.of(rows), queries, folder, title="town", charts=charts)
+    file = folder / "summaries.csv"
+    if not file.exists():
+        return []
+
+    def number(text):
+        return float(text or "nan")
+
+    with file.open(newline="") as lines:
+        return [
+            SimpleNamespace(
+                what=line["what"],
+                method=line["method"],
+                verified=line["verified"] == "1",
+                n=line["n"],
+                **{k: number(line[k]) for k in ("value", "low", "high")},
+            )
+            for line in csv.DictReader(lines)
+        ]
+
+
+def lines_over(factor, metric):
+    return [{"kind": "lines", "over": factor, "metric": metric}]
+
+
 def firsts(number):
     return np.arange(20) < number
 
@@ -73,7 +104,7 @@ def test_means_stand_between_the_least_and_the_greatest():
     ]
     rows.append(row(math.nan, {YEARS: 5}, seed=5))
     rows.append(row(math.nan, {YEARS: 9}))
-    first, second, third = summaries.means(rows, YEARS, "method")
+    first, second, third = means(rows, YEARS, "method")
     assert first.key == (0, "btc")
     assert first[1:] == pytest.approx((0.7 / 3.0, 0.1, 0.4, 3))
     assert second[1:] == pytest.approx((0.7 / 3.0 + 0.05, 0.15, 0.45, 3))
@@ -94,21 +125,21 @@ def test_two_causes_cost_more_than_the_product():
             answers(firsts(4), {cause: "snow+rain", "level": 2}),
         ]
     )
-    (one,) = summaries.excesses(queries)
+    (one,) = excesses(queries)
     assert one.what == "excess of snow and leaves"
     # 50 % and 80 % are left of it alone, and 20 % of both.
     assert one.value == pytest.approx(0.5 * 0.8 - 0.2)
     assert one.low < 0.2 < one.high
 
 
-def test_lifetimes_of_seeds_surround_that_of_the_mean():
+def test_lifetimes_of_seeds_surround_that_of_the_mean(tmp_path):
     kept = {0: {0: 1.0}, 10: {1: 0.8, 2: 0.6}, 20: {1: 0.4, 2: 0.2}}
     rows = [
         row(value, {YEARS: year}, metric="relative_auc", seed=seed)
         for year, some in kept.items()
         for seed, value in some.items()
     ]
-    tenth, half = summaries.lifetimes(Results.of(rows), YEARS)
+    tenth, half = summarised(tmp_path, rows, lines_over(YEARS, "relative_auc"))
     assert tenth.what == f"{YEARS} until 90 % is left (of 20)"
     assert half.what == f"{YEARS} until 50 % is left (of 20)"
     # Means are 1, 0.7 and 0.3.
@@ -116,18 +147,27 @@ def test_lifetimes_of_seeds_surround_that_of_the_mean():
     assert (tenth.low, tenth.high) == pytest.approx((2.5, 5.0))
     assert half.value == pytest.approx(15.0)
     assert (half.low, half.high) == pytest.approx((12.5, 17.5))
-    (never,) = summaries.lifetimes(Results.of(rows), YEARS, [0.1])
-    assert math.isinf(never.value)
 
 
-def test_a_lifetime_needs_all_shares():
-    times = [0.0, 1.0, 2.0]
-    assert summaries.lifetime(times, [1.0, 0.5, 0.2], 0.5) == 1.0
-    assert summaries.lifetime(times, [1.0, 0.5 + 1e-9, 0.2], 0.5) > 1.0
-    assert math.isnan(summaries.lifetime(times, [1.0, math.nan, 0.2], 0.5))
+def test_a_lifetime_needs_all_shares(tmp_path):
+    kept = {
+        "a": (1.0, 0.5, 0.2),
+        "b": (1.0, 0.5001, 0.2),
+        "c": (1, math.nan, 0.2),
+    }
+    rows = [
+        row(value, {YEARS: year}, metric="relative_auc", method=method)
+        for method, values in kept.items()
+        for year, value in enumerate(values)
+    ]
+    found = summarised(tmp_path, rows, lines_over(YEARS, "relative_auc"))
+    half = {one.method: one.value for one in found if "50 %" in one.what}
+    assert half["a"] == 1.0
+    assert half["b"] > 1.0
+    assert math.isnan(half["c"])
 
 
-def test_growth_of_a_power_law():
+def test_growth_of_a_power_law(tmp_path):
     rows = []
     for number in (100, 200, 800):
         at = {"database.distractors": number - 50}
@@ -136,13 +176,15 @@ def test_growth_of_a_power_law():
             row(float(number), at, metric="places", verified=True),
             row(3.0 * number**1.5, at, metric="query_time", task="cost"),
         ]
-    found = summaries.growths(Results.of(rows), "places", "query_time")
+    found = summarised(
+        tmp_path, rows, lines_over("database.distractors", "query_time")
+    )
     what = "exponent of query_time over places, at"
     assert [one.what for one in found] == [f"{what} 200", f"{what} 800"]
     assert [one.value for one in found] == pytest.approx([1.5, 1.5])
 
 
-def test_rank_correlations_are_those_of_scipy():
+def test_rank_correlations_are_those_of_scipy(tmp_path):
     rng = np.random.default_rng(3)
     rows, drawn = [], []
     for k in range(25):
@@ -158,28 +200,30 @@ def test_rank_correlations_are_those_of_scipy():
         ]
     # A condition without one of them does not count.
     rows.append(row(0.5, {"both.stage": "alone"}))
-    results = Results.of(rows)
     tcr, seen, failure = np.transpose(drawn)
     for name, x in (("tcr_sym", tcr), ("visible_change", seen)):
-        (one,) = summaries.correlations(results, name)
+        chart = {"kind": "scatter", "x": name, "y": "auc"}
+        (one,) = summarised(tmp_path, rows, [chart])
         expected = spearmanr(failure, x).statistic
         assert one.value == pytest.approx(expected)
         assert math.isnan(one.low)
-        assert one.n == 25
+        assert one.n == "25"
 
 
 @pytest.mark.parametrize(("number", "is_shown"), [(4, False), (5, True)])
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_a_trend_needs_five_points(number, is_shown, sign):
+def test_a_trend_needs_five_points(tmp_path, number, is_shown, sign):
     rows = [row(0.5 + 0.1 * sign * k, {YEARS: k}) for k in range(number)]
-    found = summaries.correlations(Results.of(rows), YEARS)
+    chart = {"kind": "scatter", "x": YEARS, "y": "auc"}
+    found = summarised(tmp_path, rows, [chart])
     assert bool(found) == is_shown
     for one in found:
         # Not 1.0000000000000002, which rounding would make of it.
         assert one.value == -sign
 
 
-def test_summaries_of_charts():
+@pytest.mark.slow
+def test_summaries_of_charts(tmp_path):
     rows = [
         *(
             row(value, {YEARS: year}, metric="relative_auc")
@@ -202,16 +246,13 @@ def test_summaries_of_charts():
         for cause, (number, level) in causes.items()
     )
     lines = {"kind": "lines", "over": YEARS}
-    found = summaries.summarised(
-        Results.of(rows),
-        queries,
-        [
-            {**lines, "metric": "relative_auc"},
-            {**lines, "metric": "query_time"},
-            {"kind": "scatter", "x": "query.nth", "y": "auc"},
-            {"kind": "matrix", "over": "method", "metric": "auc"},
-        ],
-    )
+    charts = [
+        {**lines, "metric": "relative_auc"},
+        {**lines, "metric": "query_time"},
+        {"kind": "scatter", "x": "query.nth", "y": "auc"},
+        {"kind": "matrix", "over": "method", "metric": "auc"},
+    ]
+    found = summarised(tmp_path, rows, charts, queries)
     numbers = {one.what: one.value for one in found}
     assert numbers == pytest.approx(
         {
@@ -291,7 +332,7 @@ def maintained(values, year=5, **names):
     ]
 
 
-def test_a_detector_is_worth_its_share_of_the_way_to_the_truth():
+def test_a_detector_is_worth_its_share_of_the_way_to_the_truth(tmp_path):
     """Two conditions: (0.1 + 0.2) of (0.2 + 0.4); harm is negative."""
     rows = [
         *maintained({"none": 0.5, "truth": 0.7, "distance": 0.6}),
@@ -303,10 +344,10 @@ def test_a_detector_is_worth_its_share_of_the_way_to_the_truth():
         *maintained({"none": 0.5, "truth": 0.9, "m3c2": math.nan}, year=7),
     ]
     charts = [{"kind": "matrix", "over": MAINTAIN, "metric": "r1"}]
-    found = summaries.summarised(Results.of(rows), None, charts)
+    found = summarised(tmp_path, rows, charts)
     assert [(one.method, one.verified, one.n) for one in found] == [
-        ("btc", False, 2),
-        ("solid", False, 1),
+        ("btc", False, "2"),
+        ("solid", False, "1"),
     ]
     assert [one.value for one in found] == pytest.approx([0.5, -1.0])
     assert found[0].what == "worth of distance, of the way to truth: r1"
