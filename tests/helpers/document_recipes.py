@@ -930,12 +930,6 @@ RECIPES = {
         prints=("my_report/index.html", "my_study/index.html"),
         all_methods=True,
     ),
-    "own data, layered overlap": Recipe(
-        ".venv/bin/cns-eval pr kitti",
-        changes=(("sequences/04", "sequences/02"),),
-        after=("exports",),
-        prints=("layered-overlap", "AUC"),
-    ),
 }
 
 # Pieces that cannot run here: first words -> reason.

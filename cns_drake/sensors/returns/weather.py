@@ -17,8 +17,7 @@ Fog is a homogeneous medium. With the meteorological visibility V [m], its
 extinction is alpha = ln 20 / V [1/m], and its back-scatter coefficient is 0.046
 / V [1/(m sr)] (Rasshofer et al., 2011).
 
-The section "Limits" of docs/notes/calibrated_returns.md lists what the model
-lacks.
+docs/scenarios.md, "The model of calibrated returns", lists what it lacks.
 """
 
 from dataclasses import dataclass
