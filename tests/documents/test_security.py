@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.scene import ForeignMeshes, foreign_meshes
 from evaluation.clouds import read_cloud
 from evaluation.methods import load_method
 
@@ -56,18 +55,6 @@ def test_an_array_of_objects_is_not_unpickled(tmp_path):
     assert not (tmp_path / "ran").exists()
     pickle.loads(pickle.dumps(Trap(tmp_path / "ran"))).close()
     assert (tmp_path / "ran").exists()
-
-
-@pytest.mark.slow
-def test_a_mesh_reader_that_crashes_is_a_fault(tmp_path, monkeypatch):
-    (tmp_path / "crashing.py").write_text("import os\nos.abort()\n")
-    monkeypatch.setattr(foreign_meshes, "__name__", "crashing")
-    monkeypatch.syspath_prepend(tmp_path)
-    with (
-        ForeignMeshes() as meshes,
-        pytest.raises(ValueError, match="Open3D cannot read it"),
-    ):
-        meshes.read(tmp_path / "a.stl")
 
 
 def test_a_method_file_is_a_program(tmp_path, own_methods):

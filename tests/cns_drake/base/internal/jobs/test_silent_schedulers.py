@@ -1,0 +1,30 @@
+"""Schedulers that do not answer within half a second, instead of ten."""
+
+import socket
+
+import pytest
+
+from cns_drake.base import Cluster, InputError
+from cns_drake.base.jobs import cluster
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "tcp://127.0.0.1:1", "nonsense://here", "nonsense", "tls://127.0.0.1:1",
+        None,
+    ],
+)  # fmt: skip
+def test_a_scheduler_that_does_not_answer(monkeypatch, address):
+    monkeypatch.setattr(cluster, "_ANSWER_TIMEOUT", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = address or f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        with (
+            pytest.raises(
+                InputError, match=f"^--scheduler: {address}: no answer"
+            ),
+            Cluster(scheduler=address).connect(print),
+        ):
+            pass
