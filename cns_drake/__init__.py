@@ -4,6 +4,6 @@ The public names are in `__all__`. A name is imported when it is first used;
 `__init__.pyi` says from where.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

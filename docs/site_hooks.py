@@ -170,13 +170,6 @@ def _in_site(path: str) -> str:
     return own if own != path else f"{_PROJECT}/{path}"
 
 
-def _offers(module: str, home: str, name: str) -> bool:
-    """Returns whether the package above a module offers a name of it."""
-    top = module.partition(".")[0]
-    stub = (ROOT / top / "__init__.pyi").read_text(encoding="utf-8")
-    return f"from {home} import {name} as {name}\n" in stub
-
-
 def _reference(package: str) -> dict[str, str]:
     """Returns the pages that explain the public names, one for each module.
 
@@ -187,7 +180,7 @@ def _reference(package: str) -> dict[str, str]:
     text = (folder / "__init__.py").read_text(encoding="utf-8")
     stub = (folder / "__init__.pyi").read_text(encoding="utf-8")
     homes = {
-        alias.name: node.module or ""
+        alias.name: f"{package}.{node.module}"
         for node in ast.parse(stub).body
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
@@ -200,10 +193,8 @@ def _reference(package: str) -> dict[str, str]:
         module = ".".join(home.split(".")[:2])
         path = module.replace(".", "/") + ".md"
         rows.append(f"| [{name}]({path}#{home}.{name}) | `{module}` |")
-        if module.startswith(package) or not _offers(module, home, name):
-            # A name has one place in the site.
-            pages.setdefault(path, f"# {module}\n")
-            pages[path] += f"\n::: {home}.{name}\n"
+        pages.setdefault(path, f"# {module}\n")
+        pages[path] += f"\n::: {home}.{name}\n"
     lines = [f"# {package}", "", ast.get_docstring(ast.parse(text)) or "", ""]
     lines += ["| name | module |", "|---|---|", *rows, ""]
     return {f"{package}.md": "\n".join(lines), **pages}

@@ -10,6 +10,6 @@ the module that `__init__.pyi` names. `evaluation.drives` and
 `evaluation.methods` are public as well.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

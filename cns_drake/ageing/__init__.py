@@ -4,6 +4,6 @@ Future events happen at the rates of change of real cities. Past years show the
 buildings that had been built by then.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,6 +4,6 @@ Errors, files, numbers, jobs, progress and the frame of command lines. Nothing
 here imports Drake.
 """
 
-from cns_drake.base.public_names import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,6 +4,6 @@ The city is written as stages in SDF. Buildings, small objects and trees are
 families, one file each; imported cities and changes between drives use them.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,4 +1,4 @@
-from cns_drake.command_line.cli import app as app
-from cns_drake.command_line.cli import main as main
-from cns_drake.command_line.drive_script import run_drive as run_drive
-from cns_drake.command_line.drive_script import run_script as run_script
+from .cli import app as app
+from .cli import main as main
+from .drive_script import run_drive as run_drive
+from .drive_script import run_script as run_script

@@ -4,6 +4,6 @@ The result is a map with drives. This package is also a wall: it alone needs
 osmium, pyproj and the readers of formats, and it does without Drake.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

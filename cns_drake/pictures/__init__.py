@@ -1,5 +1,5 @@
 """Pictures: public nouns, `StageScene` and `MeshcatRecorder`, show cities."""
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

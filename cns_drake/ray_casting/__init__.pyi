@@ -1,23 +1,23 @@
-from cns_drake.ray_casting.embree import load as load
-from cns_drake.ray_casting.embree_hierarchy import (
+from .embree import load as load
+from .embree_hierarchy import (
     EmbreeHierarchy as EmbreeHierarchy,
 )
-from cns_drake.ray_casting.embree_primitives import SOLID as SOLID
-from cns_drake.ray_casting.embree_primitives import merge_first as merge_first
-from cns_drake.ray_casting.embree_primitives import merge_second as merge_second
-from cns_drake.ray_casting.known_poses import NOTHING_KNOWN as NOTHING_KNOWN
-from cns_drake.ray_casting.known_poses import KnownPoses as KnownPoses
-from cns_drake.ray_casting.moving_groups import EVERYWHERE as EVERYWHERE
-from cns_drake.ray_casting.moving_groups import Ball as Ball
-from cns_drake.ray_casting.ray_casting_scene import (
+from .embree_primitives import SOLID as SOLID
+from .embree_primitives import merge_first as merge_first
+from .embree_primitives import merge_second as merge_second
+from .known_poses import NOTHING_KNOWN as NOTHING_KNOWN
+from .known_poses import KnownPoses as KnownPoses
+from .moving_groups import EVERYWHERE as EVERYWHERE
+from .moving_groups import Ball as Ball
+from .ray_casting_scene import (
     RayCastingScene as RayCastingScene,
 )
-from cns_drake.ray_casting.ray_casting_scene import SceneHits as SceneHits
-from cns_drake.ray_casting.ray_casting_scene import (
+from .ray_casting_scene import SceneHits as SceneHits
+from .ray_casting_scene import (
     SurfaceFrames as SurfaceFrames,
 )
-from cns_drake.ray_casting.ray_groups import Motion as Motion
-from cns_drake.ray_casting.ray_groups import (
+from .ray_groups import Motion as Motion
+from .ray_groups import (
     group_geometries as group_geometries,
 )
-from cns_drake.ray_casting.rays import rotate as rotate
+from .rays import rotate as rotate

@@ -5,6 +5,6 @@ recorded traffic or a trace of SUMO. During the drive, the poses are
 interpolated.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,6 +4,6 @@ Parked cars, leaves, snow, roadworks, furniture, scaffolds and height limits are
 changed in a loaded world, before it becomes part of a diagram.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

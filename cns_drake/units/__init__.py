@@ -5,6 +5,6 @@ user's own sheet is the same kind of file. All other packages take the rings,
 ranges and errors of a LiDAR from here. Nothing here imports Drake.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

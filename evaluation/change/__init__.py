@@ -4,6 +4,6 @@ The temporal change ratio (TCR) of two clouds, and the maps of drives and files
 from which it is computed.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

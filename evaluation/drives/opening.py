@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Family, InputError, doing, import_modules, listed
-from cns_drake.drives import Drive
+from cns_drake.base import Family, doing, import_modules, listed
+from cns_drake.base import InputError as InputError
+from cns_drake.drives import Drive as Drive
 from evaluation.drives.data_set import DataSet
 
 

@@ -5,6 +5,6 @@ registers many scans independently of each other; `track_drive` registers the
 scans of a drive one after another.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,6 +4,6 @@ Baselines predict labels; `score` compares predicted labels with the ground
 truth. An `UpkeptMap` is updated by several drives.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,6 +5,6 @@ own method is a file. What several methods share, or what is large enough to be
 read alone (parts of BTC), is in modules beside them.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,6 +4,6 @@ The rest of the evaluation does not know the paper. The section of a study's
 page compares the shipped cities with the paper's numbers.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

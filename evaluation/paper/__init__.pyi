@@ -1,2 +1,2 @@
-from evaluation.paper.paper_values import paper as paper
-from evaluation.paper.section import paper_section as paper_section
+from .paper_values import paper as paper
+from .section import paper_section as paper_section

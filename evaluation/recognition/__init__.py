@@ -5,6 +5,6 @@ them; `retrieve` ranks the places of each query; a `PlaceOutcome` holds the
 answers, from which metrics are computed.
 """
 
-from cns_drake.base import attach
+import lazy_loader
 
-__getattr__, __dir__, __all__ = attach(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -30,16 +30,23 @@ def package_of(module: str) -> str | None:
     return ".".join(parts[:2]) if inside else None
 
 
+def listed(package: str) -> dict[str, str]:
+    """Returns name -> module, or package, of what a package's stub lists."""
+    stub = ROOT / package.replace(".", "/") / "__init__.pyi"
+    return {
+        alias.name: f"{package}.{node.module}" if node.module else package
+        for node in ast.parse(stub.read_text()).body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+        if alias.asname == alias.name  # Others are no names for type checkers.
+    }
+
+
 @functools.cache
 def offered_modules(package: str) -> set[str]:
     """Returns the modules that a package's door offers as a whole."""
-    stub = ROOT / package.replace(".", "/") / "__init__.pyi"
-    return {
-        f"{package}.{alias.name}"
-        for node in ast.parse(stub.read_text()).body
-        if isinstance(node, ast.ImportFrom) and node.module == package
-        for alias in node.names
-    }
+    names = listed(package).items()
+    return {f"{package}.{name}" for name, home in names if home == package}
 
 
 def inner_imports(code: str) -> Iterator[str]:

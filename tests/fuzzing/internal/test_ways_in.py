@@ -30,6 +30,7 @@ import traceback
 import zipfile
 import zlib
 
+from helpers.door_contract import listed
 import numpy as np
 import pytest
 import zstandard
@@ -1279,10 +1280,7 @@ NO_FILES = {
     "evaluation.methods.load_method": "runs the user's program",
     "evaluation.recognition.load_metrics": "runs the user's program",
 }
-_READER = re.compile(
-    r" (?:import )?((?:load|read|open|import|parse|find|decode|start)_\w+)"
-    r" as \1\b"
-)
+_READER = re.compile("(load|read|open|import|parse|find|decode|start)_")
 
 
 # Functions that unpack or decode a file whole -> modules that may use them.
@@ -1331,8 +1329,9 @@ def offered_readers():
     found = set()
     for package in ("cns_drake", "evaluation"):
         for door in sorted((ROOT / package).glob("*/__init__.pyi")):
-            names = _READER.findall(door.read_text())
-            found |= {f"{package}.{door.parent.name}.{name}" for name in names}
+            home = f"{package}.{door.parent.name}"
+            names = filter(_READER.match, listed(home))
+            found |= {f"{home}.{name}" for name in names}
     found |= {f"data set {name}" for name in data_sets()}
     found |= {f"source {one.title}" for one in map_sources()}
     found |= {f"cloud {ending}" for ending in cloud_files._READERS}
