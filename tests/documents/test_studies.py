@@ -113,7 +113,7 @@ def test_inline_examples_load(tmp_path):
                 path.write_text(piece.text)
                 assert load_experiment(path).tasks
                 found += 1
-    assert found >= 2
+    assert found
     line = next(
         piece.text
         for piece in documents.inline(PAGE)
