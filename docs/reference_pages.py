@@ -8,9 +8,11 @@ the input files, tables of options from the programs themselves.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import is_dataclass
 import inspect
+import itertools
 from pathlib import Path
 import typing
 from typing import Any
@@ -87,7 +89,7 @@ from evaluation.methods import (
     optional_methods,
     shipped_methods,
 )
-from evaluation.recognition import METRICS
+from evaluation.recognition import METRICS, Metric
 from evaluation.results import in_table_order
 
 FOLDER = Path(__file__).resolve().parent / "reference"
@@ -496,32 +498,53 @@ def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
 
 
 def _metrics_page() -> str:
+    arrows = {"more": " ↑", "less": " ↓"}
+
+    def explained(metric: Metric) -> tuple[str, ...]:
+        values = metric.range_text.removeprefix("a number ")
+        better = arrows.get(metric.better, "")
+        return metric.over_queries, f"{values}{better}", metric.undefined
+
+    # Metrics of which the same is said stand together.
     rows = [
-        (
-            f"`{metric.name}`",
-            metric.label,
-            metric.range_text,
-            metric.better or "-",
-            metric.over_queries,
-            metric.undefined or "never",
-        )
-        for metric in METRICS.values()
+        (", ".join(f"`{one.name}` ({one.label})" for one in alike), *words)
+        for words, alike in itertools.groupby(METRICS.values(), explained)
     ]
-    head = ("metric", "title", "values", "better", "what", "undefined if")
+    head = ("metrics (titles)", "what", "values", "undefined if")
     parts = (
         _heading("Metrics"),
         "The values of the column `metric` in [results.csv]"
-        "(../studies.md#the-table-of-results). Over conditions, a metric is"
-        " averaged by the arithmetic mean of its defined values; an undefined"
-        " value is an empty cell, and is left out with a note. [A metric of"
-        " your own](../how-to/own_method.md#a-metric-of-your-own) is a function"
-        " in a file.",
+        "(../studies.md#the-table-of-results). ↑: more is better; ↓: less is."
+        " Over conditions, a metric is averaged by the arithmetic mean of its"
+        " defined values; an undefined value is an empty cell, and is left out"
+        " with a note. [A metric of your own]"
+        "(../how-to/own_method.md#a-metric-of-your-own) is a function in a"
+        " file.",
         _table(head, rows),
     )
     return "\n\n".join(parts) + "\n"
 
 
 def _commands_page() -> str:
+    commands = {
+        f"{program} {name}": command
+        for program, app in (
+            ("cns-drake", cli.app),
+            ("cns-eval", evaluation_cli.app),
+        )
+        for name, command in typer.main.get_command(app).commands.items()
+    }
+    rows = {
+        name: [
+            (_option(each), _option_default(each), each.help or "")
+            for each in command.params
+            if each.name != "help"
+        ]
+        for name, command in commands.items()
+    }
+    uses = Counter(row for some in rows.values() for row in some)
+    shared = [row for row, number in uses.items() if number > 2]
+    head = ("argument or option", "default", "meaning")
     parts = [
         _heading("Commands"),
         "Commands print results to stdout, and progress and messages to "
@@ -530,23 +553,19 @@ def _commands_page() -> str:
         "`--traceback` to any command to see where in the code an error comes "
         "from.",
     ]
-    for program, app in (
-        ("cns-drake", cli.app),
-        ("cns-eval", evaluation_cli.app),
-    ):
-        group = typer.main.get_command(app)
-        for name, command in group.commands.items():
-            rows = [
-                (_option(each), _option_default(each), each.help or "")
-                for each in command.params
-                if each.name != "help"
-            ]
-            parts += [
-                f"## {program} {name}",
-                _prose(command.help or ""),
-                _example(command.epilog),
-                _table(("argument or option", "default", "meaning"), rows),
-            ]
+    for name, command in commands.items():
+        own = [row for row in rows[name] if row not in shared]
+        others = [row[0] for row in rows[name] if row in shared]
+        parts += [
+            f"## {name}",
+            _prose(command.help or ""),
+            _example(command.epilog),
+            _table(head, own),
+        ]
+        if others:
+            link = "[options of many commands](#options-of-many-commands)"
+            parts.append(f"And these {link}: {', '.join(others)}.")
+    parts += ["## Options of many commands", _table(head, shared)]
     return "\n\n".join(parts) + "\n"
 
 

@@ -767,9 +767,6 @@ def _others() -> Iterator[Metric]:
     ):
         yield _amount(name, title, over, unit=unit, number="places",
                       grows=True, tasks=("cost",), main_in=("cost",))
-    yield _share(
-        "auc_control", "AUC of the control",
-        "area under the curve of a classifier", better="", tasks=("judge",))
 # fmt: on
 
 
