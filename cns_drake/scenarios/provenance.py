@@ -59,9 +59,9 @@ def digest_inputs(
 
     Returns:
         Kind of file -> hexadecimal digest. The kinds are `world` and `vehicle`
-        and, if used, `structures`, `suspension`, `roads`, `lanes`, `waypoints`,
-        `fcd` and `kalibr`. The digests depend only on contents and relative
-        names, not on the folder of the files.
+        and, if used, `structures`, `suspension`, `roads`, `traffic`,
+        `waypoints`, `fcd` and `kalibr`. The digests depend only on contents and
+        relative names, not on the folder of the files.
 
     Raises:
         InputError: a file cannot be read.

@@ -566,24 +566,23 @@ def drives_fingerprint(
 
     Args:
         compared: the drives.
-        worlds: cache, world file and folders of models -> digest of the files
-            of the world. This function adds the digests of the worlds of these
-            drives.
+        worlds: cache: world file, folders of models and traffic -> digest of
+            these files. This function adds the digests of these drives.
 
     Raises:
         InputError: a file of a world cannot be read.
     """
-    for drive in compared.drives:
-        world = drive.world_file, drive.model_paths
-        if world not in worlds:
-            worlds[world] = combined_digest(digest_inputs(drive))
+    keys = [
+        (drive.world_file, drive.model_paths, drive.traffic)
+        for drive in compared.drives
+    ]
+    for drive, key in zip(compared.drives, keys, strict=True):
+        if key not in worlds:
+            worlds[key] = combined_digest(digest_inputs(drive))
     return fingerprint(
         {
             "drives": compared.fingerprint(),
-            "worlds": [
-                worlds[one.world_file, one.model_paths]
-                for one in compared.drives
-            ],
+            "worlds": [worlds[key] for key in keys],
         }
     )
 

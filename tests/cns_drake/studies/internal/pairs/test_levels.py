@@ -2,6 +2,7 @@
 
 import csv
 
+from helpers.recorded_traffic import write_rounds
 from helpers.small_map import scenario_values, write_small_map
 import pytest
 
@@ -95,6 +96,18 @@ def test_a_rebuilt_city_is_not_the_frozen_one(tmp_path):
     assert world != drive.world_file
     world.write_text(world.read_text().replace("<world", "<!-- new --><world"))
     assert drives_fingerprint(several, {}) != before
+
+
+def test_other_traffic_of_a_map_is_not_the_frozen_one(tmp_path):
+    """Also where the database, of the same world, has none."""
+    folder = write_small_map(tmp_path / "small")
+    drive = make_scenario(scenario_values(folder), "test")
+    compared = ComparedDrives(drive, drive.with_traffic(3), RECORDED_PROTOCOL)
+    found = set()
+    for vehicles in (20, 30):
+        write_rounds(drive.folder.traffic, vehicles)
+        found.add(drives_fingerprint(compared, {}))
+    assert len(found) == 2
 
 
 def test_maps_of_ones_own_are_not_frozen():
