@@ -187,16 +187,6 @@ def cities_of_this_run(tmp_path_factory, pytestconfig):
         yield
 
 
-@pytest.fixture(scope="session", autouse=True)
-def machine_of_this_run():
-    """See `forecasts.measure_in_no_time`."""
-    from helpers.internal.forecasts import measure_in_no_time
-
-    with pytest.MonkeyPatch.context() as patch:
-        measure_in_no_time(patch)
-        yield
-
-
 @pytest.fixture
 def unrendered_figures(monkeypatch):
     """See `studies.leave_figures_unrendered`."""

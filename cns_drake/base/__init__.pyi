@@ -82,8 +82,6 @@ from .interrupts import (
 )
 from .interrupts import interrupts_wait as interrupts_wait
 from .interrupts import uninterrupted as uninterrupted
-from .jobs.cluster import Cluster as Cluster
-from .jobs.cluster import choose_cluster as choose_cluster
 from .jobs.digests import file_digests as file_digests
 from .jobs.digests import fingerprint as fingerprint
 from .jobs.forecast import Space as Space
@@ -93,7 +91,9 @@ from .jobs.processes import JobError as JobError
 from .jobs.processes import ProcessDiedError as ProcessDiedError
 from .jobs.processes import nothing_left as nothing_left
 from .jobs.processes import run_process as run_process
+from .jobs.running import Cluster as Cluster
 from .jobs.running import Job as Job
+from .jobs.running import choose_cluster as choose_cluster
 from .jobs.running import run_jobs as run_jobs
 from .jobs.step import Reporter as Reporter
 from .jobs.step import Step as Step

@@ -99,8 +99,10 @@ def ended_by_interrupts(program: str) -> Iterator[None]:
     """
 
     def end(number: int, frame: FrameType | None) -> None:
+        # The last line may be a bar, without a cursor.
+        begin = "\r\x1b[2K\x1b[?25h" if os.isatty(_STDERR) else ""
         # What is interrupted may hold the lock of `sys.stderr`.
-        os.write(_STDERR, f"{program}: interrupted\n".encode())
+        os.write(_STDERR, f"{begin}{program}: interrupted\n".encode())
         end_interrupted()
 
     with _handled_by(end):

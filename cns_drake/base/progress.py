@@ -32,13 +32,20 @@ class Listener:
         """
 
     def jobs(
-        self, costs: Mapping[str, float], num_done: int, unit: str
+        self,
+        costs: Mapping[str, float],
+        titles: Mapping[str, str],
+        num_done: int,
+        unit: str,
     ) -> contextlib.AbstractContextManager[JobsListener]:
         """Returns a context manager whose value receives reports of jobs.
+
+        The value may be called from any thread.
 
         Args:
             costs: name of each job that is left -> expected time on one core
                 [s].
+            titles: name of each of these jobs -> what it works on, in words.
             num_done: number of jobs that are not in `costs`, because they were
                 done before.
             unit: what the jobs are, such as `cities`.

@@ -92,7 +92,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
             not depend on other places, except through `shortlist`. A method
             with a second stage cannot divide.
         describe_time: typical CPU time to describe a cloud [s], from which a
-            study forecasts its own duration, as from the next two.
+            study estimates its time left, as from the next two.
         query_time: typical CPU time to answer a query, with geometric
             verification [s].
         place_time: typical CPU time to compare a query with one more place [s].

@@ -6,12 +6,27 @@ import sys
 
 import pytest
 
-# A log that says at once what is done.
+# The program, with the names of all that its jobs do.
 _PROGRAM = """
-from cns_drake.base import progress_display
-progress_display._INTERVAL = 0.0
-from cns_drake.__main__ import main
-main()
+import sys
+from cns_drake.base import program
+from cns_drake.base.progress import JobsListener, Listener, heard_by
+from cns_drake.command_line.cli import app
+
+class Printing(Listener, JobsListener):
+    def jobs(self, *args):
+        return self
+
+    def doing(self, name, activity="", *args):
+        print(name, activity, file=sys.stderr, flush=True)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        pass
+
+program.run(app, "cns-drake", heard_by(Printing()))
 """
 
 

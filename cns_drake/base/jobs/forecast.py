@@ -1,74 +1,15 @@
-"""Forecasts how long jobs take on this machine, and the space they need."""
+"""Tells, before jobs run, how many they are and the space that they need."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-import math
 from pathlib import Path
 import shutil
-import time
 
-import numpy as np
-from scipy.spatial import KDTree
-
-from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.processes import nothing_left
-from cns_drake.base.jobs.running import Job
-from cns_drake.base.progress import doing
+from cns_drake.base.jobs.running import Cluster, Job
 
-# Number of points in the KD-tree of the benchmark, and of its queries.
-_POINTS = 100_000
-# Time of the benchmark on the machine to which the costs of jobs refer [s].
-_REFERENCE = 0.43
-# Number of runs of the benchmark, which are averaged.
-_REPEATS = 3
 # Most memory of a job [bytes].
 _JOB_MEMORY = 1.2e9
-
-
-def measure_slowness() -> float:
-    """Returns how many times slower this machine is than `Job.cost` assumes.
-
-    A fixed piece of work is timed, which takes about a second. Other load on
-    the machine during this second makes the result greater.
-    """
-    doing("measuring this machine")
-    points, queries = np.random.default_rng(1).random((2, _POINTS, 3))
-    begin = time.perf_counter()
-    for _ in range(_REPEATS):
-        KDTree(points).query(queries)
-    return (time.perf_counter() - begin) / _REPEATS / _REFERENCE
-
-
-def shortest_time(jobs: Sequence[Job], num_workers: int) -> float:
-    """Returns the time in which jobs can be done, at best [s].
-
-    Args:
-        jobs: the jobs. If a job needs a job that is not listed, the latter
-            counts as done.
-        num_workers: number of jobs that run at a time.
-    """
-    ends: Mapping[str, float] = _end_times({job.name: job for job in jobs})
-    even = sum(job.cost for job in jobs) / num_workers
-    return max(even, *ends.values(), 0.0)
-
-
-def _end_times(jobs: Mapping[str, Job]) -> dict[str, float]:
-    """Returns when each job ends, if no job waits for a worker [s]."""
-    ends: dict[str, float] = {}
-
-    def end(name: str) -> float:
-        if name not in ends:
-            needed = [
-                end(needed_name)
-                for needed_name in jobs[name].needs
-                if needed_name in jobs
-            ]
-            ends[name] = jobs[name].cost + max(needed, default=0.0)
-        return ends[name]
-
-    for name in jobs:
-        end(name)
-    return ends
 
 
 @dataclass(frozen=True)
@@ -101,13 +42,16 @@ def forecast(
     space: Space | None = None,
     least: float = 0.0,
 ) -> str | None:
-    """Returns how long jobs take on this machine, and what space they need.
+    """Returns how many jobs are left, and what space they need.
+
+    How long they take depends on the machine and its load, so the time left is
+    shown only when some of them are done.
 
     Args:
         jobs: the jobs, of which some may be done.
         cluster: runs the jobs.
         space: space on the disk that the jobs need, if it is known.
-        least: shortest time that is worth a message [s].
+        least: shortest time of all jobs that is worth a message [s].
 
     Returns:
         One line of text; None if all jobs are done, if they take less than
@@ -118,31 +62,16 @@ def forecast(
     if sum(job.cost for job in jobs) < least:
         return None
     left = [job for job in jobs if not nothing_left(job.step)]
-    number = min(cluster.slots or len(left), len(left))
-    seconds = shortest_time(left, number) if left else 0.0
-    if not left or seconds < least:
+    if not left or sum(job.cost for job in left) < least:
         return None
     parts = []
     if cluster.slots is not None:
-        seconds *= measure_slowness()
-        parts += [
-            f"about {_time_text(seconds)} with {number} at a time, as this"
-            " machine was measured just now",
-            f"{_gigabytes_text(number * _JOB_MEMORY)} of memory",
-        ]
+        number = min(cluster.slots, len(left))
+        memory = _gigabytes_text(number * _JOB_MEMORY)
+        parts.append(f"{memory} of memory with {number} at a time")
     if space is not None:
         parts.append(str(space))
     return f"{len(left)} jobs: {'; '.join(parts)}" if parts else None
-
-
-def _time_text(seconds: float) -> str:
-    """Returns a time as text, with one or two digits."""
-    if seconds < 100.0:
-        return f"{max(math.ceil(seconds / 10.0), 1) * 10} s"
-    minutes = seconds / 60.0
-    if minutes < 100.0:
-        return f"{round(minutes)} minutes"
-    return f"{minutes / 60.0:.1f} h"
 
 
 def _gigabytes_text(number: float) -> str:

@@ -1,4 +1,4 @@
-"""The process in which a job runs, and its messages to its parent process.
+"""The process in which a job runs, and the `Executor` of such processes.
 
 Each job runs in a process of its own, with its own interpreter. When the
 process ends, its memory is freed (Python systems in a Drake diagram are not
@@ -6,14 +6,20 @@ freed otherwise), and a crash does not affect other jobs. Imports take seconds.
 On Linux, job processes are therefore forked from the fork server of
 `multiprocessing`, which has already imported the parent's modules. On other
 systems the libraries do not support forks.
+
+`ProcessPoolExecutor` does not do this. Measured with Python 3.11: one killed
+worker breaks the futures of all running and waiting jobs, workers survive a
+parent that was killed, and without `/dev/shm` nothing starts. It has no method
+that ends running jobs before Python 3.14, and before Python 3.11 it cannot
+give each job a new process.
 """
 
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 import contextlib
 from contextlib import nullcontext
 import gc
 import importlib
-import math
 import multiprocessing
 from multiprocessing import util
 from multiprocessing.connection import Connection, Pipe, wait
@@ -79,6 +85,47 @@ class ProcessDiedError(Exception):
     """The process of a job was killed, crashed or was terminated."""
 
 
+class ProcessExecutor(ThreadPoolExecutor):
+    """Runs steps in processes of this machine, which end with this process.
+
+    Submit the method `run`. A thread waits for the end of each process. No port
+    is opened, since anyone who reached it could run programs here.
+    """
+
+    def __init__(self, num_workers: int, hear: Callable[..., None]):
+        """Makes an executor.
+
+        Args:
+            num_workers: number of jobs that run at a time.
+            hear: called with the kind of each message of a job, the job's name,
+                and values, from any thread.
+        """
+        super().__init__(num_workers)
+        self._hear = hear
+        self._ended = threading.Event()
+
+    def run(self, name: str, step: bytes) -> None:
+        """Runs a job; see `run_process`."""
+        self._hear("started", name)
+        run_process(
+            step,
+            lambda kind, *values: self._hear(kind, name, *values),
+            lambda: not self._ended.is_set(),
+        )
+
+    def shutdown(
+        self, wait: bool = True, *, cancel_futures: bool = False
+    ) -> None:
+        """Ends the executor, and all jobs unless they are waited for.
+
+        If they are not waited for, each future has its result as soon as the
+        process of the job has ended.
+        """
+        if not wait:
+            self._ended.set()
+        super().shutdown(wait, cancel_futures=cancel_futures or not wait)
+
+
 def run_process(
     job: bytes,
     on_message: Callable[..., None],
@@ -118,28 +165,19 @@ def run_process(
 
 def _start_process(connection: Connection, job: bytes) -> BaseProcess:
     process = _context.Process(target=_process_main, args=(connection, job))
+    # Ctrl-C would end the process with a traceback, until it has a session of
+    # its own: processes inherit the blocked signals of the thread.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        with _starting, _environment_of_jobs(), _beyond_ctrl_c():
+        with _starting, _environment_of_jobs():
             process.start()
     except (EOFError, OSError) as error:
         # A new fork server starts only after the dead one has disappeared.
         time.sleep(_DEATH_TIME)
         raise ProcessDiedError("the process that starts jobs died") from error
-    return process
-
-
-@contextlib.contextmanager
-def _beyond_ctrl_c() -> Iterator[None]:
-    """Blocks SIGINT in the processes that this thread starts.
-
-    Ctrl-C would otherwise end them with a traceback, until each has a session
-    of its own.
-    """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    return process
 
 
 @contextlib.contextmanager
@@ -197,30 +235,22 @@ def _last_message(
 
 
 def _end_process(process: BaseProcess) -> int:
-    """Ends a process and returns its status."""
-    process.terminate()
-    status = _status_within(process, PATIENCE)
-    if status is None:
-        process.kill()
-        status = _status_within(process, math.inf)
-    assert status is not None  # It has ended.
-    return status
-
-
-def _status_within(process: BaseProcess, seconds: float) -> int | None:
-    """Returns the status of a process, or None if it runs longer than a time.
+    """Ends a process and returns its status.
 
     A status can be read only once. The start of a process reads the statuses of
     all others, too, and could take one from a thread that waits for it.
     Threads therefore ask for statuses, and start processes, in turns.
     """
-    deadline = time.monotonic() + seconds
+    process.terminate()
+    deadline = time.monotonic() + PATIENCE
     while True:
+        wait([process.sentinel], _LOOK_INTERVAL)
         with _starting:
             status = process.exitcode
-        if status is not None or time.monotonic() > deadline:
+        if status is not None:
             return status
-        wait([process.sentinel], _LOOK_INTERVAL)
+        if time.monotonic() > deadline:
+            process.kill()
 
 
 def _describe_status(status: int) -> str:
@@ -248,7 +278,7 @@ def _process_main(connection: Connection, job: bytes) -> None:
             connection.send(message)
 
     try:
-        threading.Thread(target=end_with_parent, daemon=True).start()
+        threading.Thread(target=_end_with_parent, daemon=True).start()
         last = _run_job(job, Reporter(send))
     except KeyboardInterrupt:
         interrupts.end_interrupted()
@@ -298,7 +328,7 @@ def nothing_left(step: Step) -> bool:
         return False
 
 
-def end_with_parent() -> None:
+def _end_with_parent() -> None:
     """Makes this process end with its parent, even if the parent is killed."""
     parent = multiprocessing.parent_process()
     assert parent is not None

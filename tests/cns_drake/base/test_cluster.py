@@ -52,7 +52,7 @@ def test_a_worker_that_is_killed_costs_nothing(
     dask.add_workers(2)
     output = tmp_path / "output"
     run = Generation(files[:2], output, "--scheduler", dask.address)
-    run.wait_for("simulating frames")
+    run.wait_for("first simulating")
     worker, job = dask.job_processes()[0]
     worker.send_signal(signal.SIGKILL)
     status, results = run.end()

@@ -97,7 +97,7 @@ def test_local_jobs_open_no_port(tmp_path):
         "import sys\n"
         "from pathlib import Path\n"
         "from helpers import job_functions\n"
-        "from cns_drake.base.jobs.cluster import Cluster\n"
+        "from cns_drake.base.jobs.running import Cluster\n"
         "from cns_drake.base.jobs.running import Job, run_jobs\n"
         "path = Path(sys.argv[1])\n"
         "step = job_functions.Call(job_functions.note_ports, (path,))\n"
@@ -295,8 +295,8 @@ def test_commands_that_need_no_cluster_do_not_load_it():
     script = (
         "import sys\n"
         "import cns_drake.command_line.cli\n"
-        "import cns_drake.studies.recordings.recording\n"
-        "import cns_drake.studies.recordings.reproduction\n"
+        "import cns_drake.studies.recording\n"
+        "import cns_drake.studies.reproduction\n"
         "import evaluation.command_line.cli, cns_drake.base.jobs.running\n"
         "assert not {'dask', 'distributed'} & sys.modules.keys()\n"
     )

@@ -44,7 +44,7 @@ def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):
     # Ctrl-C reaches every process of the terminal.
     output = tmp_path / "output"
     run = Generation(files, output, "--jobs", "2")
-    run.wait_for("simulating frames")
+    run.wait_for("long simulating")
     os.killpg(run.process.pid, signal.SIGINT)
     status, results = run.end()
     assert (status, results) == (130, [])
@@ -54,7 +54,7 @@ def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):
 
     # A parent that is killed cannot end its processes; they do so themselves.
     run = Generation(files, output, "--jobs", "2")
-    run.wait_for("simulating frames")
+    run.wait_for("long simulating")
     run.process.kill()
     status, _ = run.end()
     assert status == -signal.SIGKILL

@@ -35,7 +35,6 @@ from cns_drake.base.compilation import start_compiler
 from cns_drake.base.jobs import processes
 from cns_drake.simulation import simulate
 from evaluation.study import chosen_methods
-from helpers.internal.forecasts import measure_in_no_time
 from helpers.internal.studies import leave_figures_unrendered
 from helpers.tiny_drive import tiny_scenario
 
@@ -141,7 +140,6 @@ def _serve(listener: socket.socket) -> None:
     # Forks need not load the compiled loops of each recording.
     with tempfile.TemporaryDirectory() as folder:
         simulate(tiny_scenario(Path(folder), frames=2), folder)
-    measure_in_no_time(MonkeyPatch())
     # Jobs are forks, too: else each command would import all modules again.
     processes._context = multiprocessing.get_context("fork")
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)

@@ -1,7 +1,7 @@
 """Running `cns-eval` in the process of a test, on two small drives."""
 
-import math
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -53,7 +53,8 @@ def run_program(capture, name, main, *arguments):
     try:
         with handlers_kept(), pytest.MonkeyPatch.context() as patch:
             # No lines of progress appear, even on a slow machine.
-            patch.setattr(progress_display, "PATIENCE", math.inf)
+            longest = threading.TIMEOUT_MAX
+            patch.setattr(progress_display, "PATIENCE", longest)
             with pytest.raises(SystemExit) as info:
                 main()
     finally:

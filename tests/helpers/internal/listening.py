@@ -18,9 +18,9 @@ class Heard(Listener):
         self.said = []
         self.numbers = []
 
-    def jobs(self, costs, num_done, unit):
+    def jobs(self, costs, titles, num_done, unit):
         self.numbers.append((len(costs), num_done, unit))
-        return super().jobs(costs, num_done, unit)
+        return super().jobs(costs, titles, num_done, unit)
 
     def doing(self, activity, done=0, total=0, unit=""):
         self.said.append((activity, done, total, unit))

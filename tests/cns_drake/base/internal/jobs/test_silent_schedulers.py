@@ -5,7 +5,7 @@ import socket
 import pytest
 
 from cns_drake.base import Cluster, InputError
-from cns_drake.base.jobs import cluster
+from cns_drake.base.jobs import running
 
 pytestmark = pytest.mark.slow
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
     ],
 )  # fmt: skip
 def test_a_scheduler_that_does_not_answer(monkeypatch, address):
-    monkeypatch.setattr(cluster, "_ANSWER_TIMEOUT", 0.5)
+    monkeypatch.setattr(running, "_ANSWER_TIMEOUT", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = address or f"tcp://127.0.0.1:{silent.getsockname()[1]}"
         with (
