@@ -32,9 +32,6 @@ class MethodConfig(InputModel):
         place: which of several merged scans gives a place its pose: the scan in
             the `middle`, or the `first`. By default the protocol decides.
             Methods that describe single scans do not use this parameter.
-        sequence: length of the path before a query [m]. Earlier queries on this
-            path also vote for the place of the query, as in SeqSLAM. With 0,
-            each query is recognised by itself.
         center_scores: whether each place's mean score over all queries is
             subtracted from its scores. This lowers hubs: places that score high
             with every query. It needs all queries at once, and no second stage.
@@ -50,7 +47,6 @@ class MethodConfig(InputModel):
 
     sensor_height: NonNegativeFloat = 1.6
     place: PlaceScan | None = None
-    sequence: NonNegativeFloat = 0.0
     center_scores: bool = False
 
 

@@ -48,16 +48,11 @@ def write_scores(
         The number of points left out because they are not finite.
 
     Raises:
-        InputError: if the method combines queries (`sequence` needs the poses
-            of scans, `center_scores` all queries at once), a folder or a scan
-            cannot be read, a scan has no point within the limits of the
-            protocol, or the output cannot be written.
+        InputError: if the method combines queries (`center_scores` needs all
+            queries at once), a folder or a scan cannot be read, a scan has no
+            point within the limits of the protocol, or the output cannot be
+            written.
     """
-    if method.config.sequence:
-        raise InputError(
-            f"{method.name}: sequence: needs the poses of scans, which a"
-            " folder of scans does not have"
-        )
     if method.config.center_scores:
         raise InputError(
             f"{method.name}: center_scores: needs all queries at once, and"

@@ -30,15 +30,18 @@ SIGNIFICANT = 0.05
 LEAST_BLOCKS = 6
 # Least number of cities that give a mean over cities an interval.
 LEAST_CITIES = 8
-# Distance between the centres of neighbouring blocks of street [m]. The answers
-# to queries 60 m apart are hardly correlated any more, and with shorter blocks
-# the intervals are too narrow; see docs/verification.md.
-BLOCK_LENGTH = 80.0
+# Distances between the centres of neighbouring blocks of street [m]. Queries on
+# both sides of a border are alike, so that the units are independent only if
+# blocks are long; see docs/verification.md.
+_BLOCK_LENGTHS = range(320, 79, -20)
+# Least number of blocks for which a drive gets blocks of more than 80 m.
+_ENOUGH_BLOCKS = 8
 # How far imaginary cities lie beyond all others, see `city_interval`.
 _BEYOND = 2.0
-# Up to this number of blocks, all splits of the blocks are counted.
-_MOST_ENUMERATED = 13
-# Number of random splits of more blocks.
+# Up to this number of units, all splits of the units are counted: 14 cities or
+# blocks, and two imaginary ones.
+_MOST_ENUMERATED = 16
+# Number of random splits of more units.
 _SPLITS = 9999
 # A right answer in all conditions is this number, so that sums are exact.
 _UNIT = 2.0**40
@@ -94,7 +97,7 @@ def sign_flip_test(
     if and only if m lies between the means of the two halves. This gives the
     limits of the interval without a search.
 
-    All patterns are counted up to 13 blocks. For more blocks, 9,999 random
+    All patterns are counted up to 16 blocks. For more blocks, 9,999 random
     patterns and the measured one are counted. The patterns depend only on the
     number of blocks. Therefore more evidence in a block never raises the
     p-value of a difference, also for random patterns.
@@ -136,7 +139,7 @@ def sign_flip_test(
 
 
 def route_blocks(
-    positions: np.ndarray, frames: np.ndarray, length: float = BLOCK_LENGTH
+    positions: np.ndarray, frames: np.ndarray, length: float | None = None
 ) -> np.ndarray:
     """Returns the block (Q,) of street in which each query lies.
 
@@ -150,7 +153,10 @@ def route_blocks(
     Args:
         positions: (N, 3) positions of the sensor along the drive [m].
         frames: (Q,) frame numbers of the queries.
-        length: least distance between the centres of blocks [m].
+        length: least distance between the centres of blocks [m]. By default
+            the greatest of 320, 300, ..., 80 m that gives at least 8 blocks, or
+            80 m. Few long blocks are less alike than many short ones (Canay,
+            Romano and Shaikh, Econometrica 85, 2017).
 
     Example:
         from evaluation import evaluate, judge, route_blocks
@@ -158,6 +164,16 @@ def route_blocks(
         blocks = route_blocks(query.X_WS[:, :3, 3], queries)
         print(evaluate(judge(scores, matches, blocks)).auc_interval)
     """
+    block = np.zeros(len(positions), dtype=np.int64)
+    for shortest in _BLOCK_LENGTHS if length is None else (length,):
+        block = _nearest_centres(positions, shortest)
+        if block.max(initial=0) + 1 >= _ENOUGH_BLOCKS:
+            break
+    return block[frames]
+
+
+def _nearest_centres(positions: np.ndarray, length: float) -> np.ndarray:
+    """Returns the block (N,) of each position, see `route_blocks`."""
     block = np.zeros(len(positions), dtype=np.int64)
     distance = np.full(len(positions), np.inf)
     centre, number = 0, 0
@@ -169,7 +185,7 @@ def route_blocks(
         if not is_far.any():
             break
         centre, number = int(is_far.argmax()), number + 1
-    return block[frames]
+    return block
 
 
 @lru_cache(maxsize=8)
@@ -250,7 +266,8 @@ def city_interval(
     cities of mean weight are added. They lie as far beyond the least and the
     greatest result of a city as twice the distance between these two results,
     but not beyond the ends of the range. An imaginary city at each end of the
-    range, as for blocks, would hide what ten cities show.
+    range, as for blocks, would hide what ten cities show. The order of the
+    cities does not matter.
 
     Args:
         sums: (N,) sum of the results in each city.
@@ -262,6 +279,9 @@ def city_interval(
     """
     if len(sums) < LEAST_CITIES:
         return UNKNOWN
+    # Random patterns of signs depend on the order.
+    order = np.lexsort((sums, weights))
+    sums, weights = sums[order], weights[order]
     value = sums.sum() / weights.sum()
     means = sums / weights
     beyond = _BEYOND * np.ptp(means)

@@ -57,14 +57,15 @@ def rank_methods(rows: Iterable[Row]) -> list[Ranked]:
         intervals = [Interval(row.low, row.high) for row in first]
     else:
         is_in = (map_of_row == np.arange(len(maps))[:, None]).astype(float)
-        intervals = [
-            city_interval(
-                is_in @ column,
-                is_in.sum(axis=1),
-                (metric.least, metric.greatest),
-            )
-            for column in values.T
-        ]
+        weights = is_in.sum(axis=1)
+        intervals = []
+        for column in values.T:
+            greatest = metric.greatest
+            if metric.share_of:
+                # Where no map retains more, no map is taken to.
+                greatest = max(1.0, float((is_in @ column / weights).max()))
+            ends = metric.least, greatest
+            intervals.append(city_interval(is_in @ column, weights, ends))
     found = [
         Ranked(*columns)
         for columns in zip(

@@ -2,11 +2,12 @@
 
 python tests/benchmarks/interval_coverage.py [PART...] [--runs N]
 
-Answers to queries and results of cities are made up at random. The table on
-stdout says for each quantity: in which share of the runs its interval is shown;
-in which share of these it contains the true value; and, where there is no
-difference, how often a test finds one nevertheless. Redirect it to
-`docs/notes/coverage.csv`. On one core, this takes five minutes.
+Answers to queries and results of cities are made up at random; answers along a
+street are as alike as `street_blocks.py` measures. The table on stdout says for
+each quantity: in which share of the runs its interval is shown; in which share
+of these it contains the true value; and, where there is no difference, how
+often a test finds one nevertheless. Redirect it to `docs/notes/coverage.csv`.
+On one core, this takes five minutes.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ import sys
 import tempfile
 
 import numpy as np
+from scipy.signal import lfilter
+from scipy.stats import norm
 
 from evaluation.recognition import (
     METRICS,
@@ -29,12 +32,14 @@ from evaluation.recognition import (
     QueryOutcomes,
     compared_by_right_answers,
     numbers_of,
+    route_blocks,
 )
 from evaluation.results import (
     Answers,
     QueryRows,
     Results,
     Row,
+    Survival,
     compare_tables,
     excesses,
     judge_survival,
@@ -78,14 +83,23 @@ CITIES = (
 ALIKE = (0.13, 0.5, 0.75)
 # Steps between the mean results of methods.
 STEPS = (0.01, 0.05, 0.15)
-# Queries of a block: from 1 to twice the mean less 1.
-MEAN_QUERIES = 5
-# Correlation of the answers in a block.
-IN_BLOCK = 0.2
+# Lengths of straight routes [m].
+ROUTES = (400, 1000, 1700, 3000, 7000)
+# Distance between queries [m].
+SPACING = 10
+# Correlation of the normal variables behind two answers of a method: this times
+# exp(-d / SCALE), at a distance of d [m]. By the arcsine law, it gives what
+# `street_blocks.py` measures in the shipped cities: .36, .26, .17 and .10 at 7,
+# 22, 40 and 60 m, and of the difference of two methods .25, .15, .09 and .05.
+CLOSE = {"answers": 0.65, "differences": 0.43}
+SCALE = {"answers": 45.0, "differences": 40.0}
 # Share of the queries that have a match.
 WITH_MATCH = 0.9
-# Number of blocks from which true values are computed.
-MANY = 20000
+# Length of the route from which true values are computed [m].
+MANY = 1_000_000
+# Probabilities with which a city loses half of what it had; in all others
+# nothing is lost.
+RARE = (0.2, 0.25, 0.3)
 
 
 class Count:
@@ -123,20 +137,46 @@ def beta(
     return rng.beta(mean * total, (1.0 - mean) * total, size=size)
 
 
+def luck(
+    rng: np.random.Generator, number: int, what: str = "answers"
+) -> np.ndarray:
+    """Returns the part (number,) of normal variables that is alike nearby."""
+    kept = np.exp(-SPACING / SCALE[what])
+    noise = rng.normal(size=number)
+    # The first one has the variance of all others.
+    noise[1:] *= np.sqrt(1.0 - kept**2)
+    return np.sqrt(CLOSE[what]) * lfilter([1.0], [1.0, -kept], noise)
+
+
+def right_answers(
+    rng: np.random.Generator,
+    along: np.ndarray,
+    share: float,
+    what: str = "answers",
+) -> np.ndarray:
+    """Returns which queries (Q,) are right, from the `luck` along a street."""
+    noise = rng.normal(size=len(along))
+    return along + np.sqrt(1.0 - CLOSE[what]) * noise < norm.ppf(share)
+
+
+def blocks_of(length: int) -> np.ndarray:
+    """Returns the block (Q,) of each query along a straight route."""
+    positions = np.arange(length)[:, None] * [1.0, 0.0, 0.0]
+    return route_blocks(positions, np.arange(0, length, SPACING))
+
+
 def answers(
-    rng: np.random.Generator, shares: Sequence[float], num_blocks: int
+    rng: np.random.Generator, shares: Sequence[float], blocks: np.ndarray
 ) -> list[QueryOutcomes]:
     """Returns answers to the same queries with several shares of right ones.
 
-    All share the luck of a block; right answers tend to have better scores.
+    Right answers tend to have better scores.
     """
-    sizes = rng.integers(1, 2 * MEAN_QUERIES, size=num_blocks)
-    blocks = np.repeat(np.arange(num_blocks), sizes)
     has_match = rng.random(len(blocks)) < WITH_MATCH
     found = []
     for share in shares:
-        chance = beta(rng, share, IN_BLOCK, num_blocks)
-        right = (rng.random(len(blocks)) < chance[blocks]) & has_match
+        along = luck(rng, len(blocks))
+        right = right_answers(rng, along, share) & has_match
         scores = right + rng.normal(size=len(blocks))
         ranks = np.where(right, 1.0, 2.0)
         found.append(
@@ -153,23 +193,25 @@ def drives(
     kept = ("relative_auc", "relative_auc_strict", "relative_r1")
     for before, after in scenarios:
         rng = np.random.default_rng(0)
-        control, changed = answers(rng, (before, after), MANY)
+        many = np.zeros(MANY // SPACING, dtype=int)
+        control, changed = answers(rng, (before, after), many)
         truth = {n: METRICS[n].of(changed) for n in names}
         for name, of in zip(kept, names, strict=True):
             truth[name] = truth[of] / METRICS[of].of(control)
-        for num_blocks in (4, 10, 24):
+        for length in ROUTES:
             counts = {name: Count(truth[name]) for name in (*names, *kept)}
+            blocks = blocks_of(length)
             for _ in range(runs):
-                then, now = answers(rng, (before, after), num_blocks)
+                then, now = answers(rng, (before, after), blocks)
                 for one in numbers_of("place", now, then):
                     if one.metric in counts:
                         counts[one.metric].add(one.interval)
             for name, count in counts.items():
                 yield {
                     "part": "drives",
-                    "units": num_blocks,
+                    "units": blocks[-1] + 1,
                     "conditions": 1,
-                    "scenario": f"{before:g} right, then {after:g}",
+                    "scenario": f"{length} m, {before:g} right, then {after:g}",
                     "quantity": name,
                     **count.columns(),
                 }
@@ -182,20 +224,25 @@ def two_causes(
     for shares in scenarios:
         whole, *kept = (
             METRICS["auc"].of(one)
-            for one in answers(np.random.default_rng(0), shares, MANY)
+            for one in answers(
+                np.random.default_rng(0),
+                shares,
+                np.zeros(MANY // SPACING, dtype=int),
+            )
         )
         first, second, both = np.array(kept) / whole
         truth = first * second - both
-        for num_blocks in (4, 10, 24):
-            rng = np.random.default_rng(num_blocks)
+        for length in ROUTES[1::2]:
+            rng = np.random.default_rng(length)
             count = Count(truth)
+            blocks = blocks_of(length)
             for _ in range(runs):
-                count.add(_interval(answers(rng, shares, num_blocks)))
+                count.add(_interval(answers(rng, shares, blocks)))
             yield {
                 "part": "excesses",
-                "units": num_blocks,
+                "units": blocks[-1] + 1,
                 "conditions": 4,
-                "scenario": " and ".join(f"{s:g}" for s in shares) + " right",
+                "scenario": f"{length} m, {_of_all(shares)}",
                 "quantity": "excess of two causes",
                 **count.columns(),
             }
@@ -230,44 +277,53 @@ def _interval(some: Sequence[QueryOutcomes]) -> Interval:
     return Interval(found.low, found.high)
 
 
+def _of_all(shares: Sequence[float]) -> str:
+    return " and ".join(f"{share:g}" for share in shares) + " right"
+
+
 def differences(
     runs: int, scenarios: Sequence[Sequence[float]] = METHODS
 ) -> Iterator[dict[str, object]]:
-    """Differences of R@1 between methods, under several conditions."""
+    """Differences of R@1 between methods, on several drives or conditions."""
     for shares in scenarios:
-        for conditions in (1, 2, 4, 12):
-            yield _differences(shares, conditions, 10, runs)
+        for conditions in (2, 4, 12):
+            yield _differences(shares, 1000, [0] * conditions, runs)
         if len(shares) == 2:
-            yield _differences(shares, 1, 24, runs)
+            for length in ROUTES[1:]:
+                yield _differences(shares, length, [0], runs)
+                yield _differences(shares, length, [0, 1], runs)
 
 
 def _differences(
-    shares: Sequence[float], conditions: int, num_blocks: int, runs: int
+    shares: Sequence[float], length: int, drives: Sequence[int], runs: int
 ) -> dict[str, object]:
-    """Returns the row of a scenario. All differences count together."""
-    rng = np.random.default_rng(conditions)
+    """Returns the row of a scenario. All differences count together.
+
+    Conditions of one drive share the luck along its streets.
+    """
+    what = "differences"
+    rng = np.random.default_rng(len(drives))
     count = Count(0.0)
+    blocks = blocks_of(length)
     for _ in range(runs):
-        chances = [beta(rng, s, IN_BLOCK, num_blocks) for s in shares]
         asked: dict[int, list[QueryOutcomes]] = {}
-        for _ in range(conditions):
-            # Other queries in each condition, along the same streets.
-            sizes = rng.integers(1, 2 * MEAN_QUERIES, size=num_blocks)
-            blocks = np.repeat(np.arange(num_blocks), sizes)
-            has_match = rng.random(len(blocks)) < WITH_MATCH
-            for k, chance in enumerate(chances):
-                right = rng.random(len(blocks)) < chance[blocks]
-                ranks = np.where(right & has_match, 1.0, 2.0)
-                some = QueryOutcomes(
-                    np.zeros(len(blocks)),
-                    right & has_match,
-                    has_match,
-                    ranks,
-                    100,
-                    blocks,
-                )
-                asked.setdefault(k, []).append(some)
-        found = compared_by_right_answers(asked, [0] * conditions)
+        for drive in sorted(set(drives)):
+            along = [luck(rng, len(blocks), what) for _ in shares]
+            for _ in range(drives.count(drive)):
+                has_match = rng.random(len(blocks)) < WITH_MATCH
+                for k, share in enumerate(shares):
+                    right = right_answers(rng, along[k], share, what)
+                    right &= has_match
+                    some = QueryOutcomes(
+                        np.zeros(len(blocks)),
+                        right,
+                        has_match,
+                        np.where(right, 1.0, 2.0),
+                        100,
+                        blocks,
+                    )
+                    asked.setdefault(k, []).append(some)
+        found = compared_by_right_answers(asked, drives)
         is_hit = all(
             np.isnan(one.interval.low)
             or one.interval.low <= shares[a] - shares[b] <= one.interval.high
@@ -279,11 +335,13 @@ def _differences(
             first if np.isnan(first.low) else shown,
             any(one.p_value < SIGNIFICANT for one in found.values()),
         )
+    number = len(set(drives))
+    where = f"{number} drives of {length} m" if number > 1 else f"{length} m"
     return {
         "part": "differences",
-        "units": num_blocks,
-        "conditions": conditions,
-        "scenario": " and ".join(f"{share:g}" for share in shares) + " right",
+        "units": number * (blocks[-1] + 1),
+        "conditions": len(drives),
+        "scenario": f"{where}, {_of_all(shares)}",
         "quantity": "difference of r1",
         **count.columns(has_size=len(set(shares)) == 1),
     }
@@ -377,6 +435,34 @@ def _cities(
                 }
 
 
+def rare_failures(
+    runs: int, scenarios: Sequence[float] = RARE
+) -> Iterator[dict[str, object]]:
+    """Survival of cities of which few lose half, and the others nothing.
+
+    Twelve independent cities, or three on each of four networks, which fail
+    together.
+    """
+    for chance, networks in itertools.product(scenarios, (12, 4)):
+        rng = np.random.default_rng(networks)
+        loss = 0.5 * chance
+        count = Count(loss)
+        for _ in range(runs):
+            fails = rng.random(networks) < chance
+            losses = np.repeat(0.5 * fails, 12 // networks)
+            one = Survival.of("solid", losses)
+            count.add(one.interval, one.verdict == "survives")
+        yield {
+            "part": "rare",
+            "units": 12,
+            "conditions": "",
+            "scenario": f"half lost with probability {chance:g},"
+            f" {networks} independent networks",
+            "quantity": "loss, and survival",
+            **count.columns(has_size=True),
+        }
+
+
 def rankings(
     runs: int, steps: Sequence[float] = STEPS
 ) -> Iterator[dict[str, object]]:
@@ -429,6 +515,7 @@ PARTS = {
     "differences": differences,
     "cities": cities,
     "networks": networks,
+    "rare": rare_failures,
     "rankings": rankings,
 }
 

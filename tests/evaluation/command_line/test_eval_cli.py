@@ -384,16 +384,3 @@ def test_parameters_of_several_numbers(capsys, towns):
     assert json.loads(out)["parameters"]["cart_cell"] == [10.0, 4.0]
     for value in ("10", "10,4,2", "10,x", ","):
         assert_refused(capsys, [*both, "--set", f"cart_cell={value}"], "cart")
-
-
-def test_a_method_matches_sequences(capsys, towns, tmp_path):
-    both = ["pr", towns / "town_01", towns / "town_02", "--method", "solid"]
-    both += ["--json", "--set"]
-    status, out, _ = run(capsys, *both, "sequence=20")
-    assert status == 0
-    assert json.loads(out)["parameters"]["sequence"] == 20.0
-    assert_refused(capsys, [*both, "sequence=-1"], "solid: sequence")
-    (tmp_path / "scans").mkdir()
-    scores = ["scores", *2 * [tmp_path / "scans"], "--method", "solid"]
-    scores += ["--set", "sequence=20", "--output", tmp_path / "scores.csv"]
-    assert_refused(capsys, scores, "solid: sequence: needs the poses of scans")

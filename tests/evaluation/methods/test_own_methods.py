@@ -35,7 +35,6 @@ def test_the_method_in_the_documents(capsys, towns, tmp_path):
     assert values["parameters"] == {
         "sensor_height": 1.6,
         "place": None,
-        "sequence": 0.0,
         "center_scores": False,
         "rings": 30,
     }

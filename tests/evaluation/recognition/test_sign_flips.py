@@ -155,7 +155,7 @@ def test_a_lead_without_spread_is_the_strongest_evidence(num_blocks):
     assert (found.value, found.interval.high) == (1.0, 1.0)
     assert 0.0 < found.interval.low < 1.0
     # All patterns, or 9,999 random ones.
-    least = 2.0 ** (1 - num_blocks) if num_blocks < 13 else 1e-4
+    least = 2.0 ** (1 - num_blocks) if num_blocks < 16 else 1e-4
     assert found.p_value == pytest.approx(least)
 
 
@@ -187,6 +187,8 @@ def test_blocks_follow_the_street():
     positions = np.concatenate([there, back])
     every = np.arange(len(positions))
     blocks = route_blocks(positions, every)
+    # Too few for more than 80 m.
+    np.testing.assert_array_equal(blocks, route_blocks(positions, every, 80.0))
     np.testing.assert_array_equal(blocks[:351], blocks[351:][::-1])
     # Centres are 80 m apart; ends are halfway between them.
     edges = np.flatnonzero(np.diff(blocks[:351]))
@@ -195,6 +197,20 @@ def test_blocks_follow_the_street():
     np.testing.assert_array_equal(
         route_blocks(positions, every[5::40]), blocks[5::40]
     )
+
+
+@pytest.mark.parametrize(
+    ("route", "length", "number"),
+    [(600, 80, 8), (1000, 140, 8), (1700, 240, 8), (7000, 320, 22)],
+)
+def test_blocks_are_long_where_at_least_eight_remain(route, length, number):
+    positions = np.arange(route + 1.0)[:, None] * [1.0, 0.0, 0.0]
+    every = np.arange(len(positions))
+    blocks = route_blocks(positions, every)
+    np.testing.assert_array_equal(
+        blocks, route_blocks(positions, every, float(length))
+    )
+    assert blocks.max() + 1 == number
 
 
 def test_a_street_that_is_driven_twice_says_nothing_twice():
@@ -300,6 +316,35 @@ def test_the_interval_over_cities():
     # Twice the range, 0.5, below the least; and the end of the range.
     padded = np.append(values, [0.2, 1.0])
     expected, _ = sign_flip_test(padded, np.ones(10))
-    assert found.low == expected.low
-    assert found.high == max(expected.high, values.mean())
+    assert found.low == pytest.approx(expected.low)
+    assert found.high == pytest.approx(max(expected.high, values.mean()))
     assert np.isnan(city_interval(values[:7], np.ones(7)).low)
+
+
+@pytest.mark.parametrize("number", [12, 13, 14])
+def test_intervals_over_cities_count_all_patterns(number):
+    """Of the cities and two imaginary ones, by hand."""
+    rng = np.random.default_rng(number)
+    values = rng.beta(2.0, 1.0, size=number)
+    found = city_interval(values, np.ones(number), (0.0, 1.0))
+    beyond = 2.0 * np.ptp(values)
+    padded = np.append(
+        values, np.clip([values.min() - beyond, values.max() + beyond], 0, 1)
+    )
+    ones = np.ones(number + 2)
+    for limit, outwards in ((found.low, -1.0), (found.high, 1.0)):
+        inside, outside = (
+            p_by_hand(padded, ones, limit + shift * outwards)
+            for shift in (-1e-6, 1e-6)
+        )
+        assert outside < SIGNIFICANT <= inside
+
+
+@pytest.mark.parametrize("number", [12, 30])
+def test_the_order_of_cities_does_not_matter(number):
+    rng = np.random.default_rng(number)
+    sums, weights = rng.random(number), rng.integers(1, 4, number) + 0.0
+    order = rng.permutation(number)
+    assert city_interval(sums, weights) == city_interval(
+        sums[order], weights[order]
+    )

@@ -8,6 +8,7 @@ from evaluation.results import (
     Row,
     judge_survival,
     largest_loss_shown,
+    rank_methods,
 )
 
 
@@ -57,6 +58,19 @@ def test_cities_decide_and_not_their_pairs():
 def test_verdicts(shares, verdict):
     (found,) = judge_survival(rows([[share] for share in shares]))
     assert found.verdict == found.to_json()["verdict"] == verdict
+
+
+def test_what_is_retained_and_what_is_lost_have_one_interval():
+    """Unless a city retains more than all: then this is a gain."""
+    shares = [0.22, 0.18, 0.2, 0.46, 0.06, 0.06, 0.8, 0.9, 0.9, 0.15, 0.56]
+    some = rows([[share] for share in shares])
+    (kept,), (lost,) = rank_methods(some), judge_survival(some)
+    assert kept.value == pytest.approx(1.0 - lost.loss)
+    assert kept.interval.low == pytest.approx(1.0 - lost.interval.high)
+    assert kept.interval.high == pytest.approx(1.0 - lost.interval.low)
+    some += rows([*[[]] * len(shares), [1.5]])
+    (kept,), (lost,) = rank_methods(some), judge_survival(some)
+    assert kept.interval.high > 1.0 - lost.interval.low
 
 
 def test_only_conditions_of_all_methods_count():

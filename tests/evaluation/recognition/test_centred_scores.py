@@ -1,4 +1,4 @@
-"""Matching of sequences against sums by hand, and what it is for."""
+"""Scores from which each place's mean score is subtracted."""
 
 import numpy as np
 import pytest
