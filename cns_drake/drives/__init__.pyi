@@ -39,8 +39,6 @@ from .ros_types import message_class as message_class
 from .ros_types import message_definition as message_definition
 from .ros_types import message_hash as message_hash
 from .ros_types import serialize as serialize
-from .same_world import DriveNames as DriveNames
-from .same_world import Placed as Placed
 from .same_world import check_same_map as check_same_map
 from .same_world import check_same_world as check_same_world
 from .sensor_names import BASE_FRAME as BASE_FRAME
@@ -50,3 +48,4 @@ from .sensor_names import check_sensor_name as check_sensor_name
 from .sensor_names import (
     check_sensor_names as check_sensor_names,
 )
+from .stamped_poses import StampedPoses as StampedPoses

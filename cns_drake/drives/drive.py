@@ -6,7 +6,7 @@ import abc
 from collections.abc import Iterator, Mapping
 import os
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -55,6 +55,9 @@ class ImuSamples(NamedTuple):
     specific_force: np.ndarray
 
 
+_Made = TypeVar("_Made", bound="Drive")
+
+
 class Drive(abc.ABC):
     """A recorded drive: the scans of one LiDAR, with their poses and times.
 
@@ -67,6 +70,8 @@ class Drive(abc.ABC):
     Attributes:
         name: short name for tables and messages, e.g. `metropolis_04`.
         world_frame: name of W, as stated in the recording.
+        placing: how drives of this format get a common world frame, for errors;
+            in brackets, after a space.
 
     Example:
         from evaluation import open_drive
@@ -77,6 +82,17 @@ class Drive(abc.ABC):
 
     name: str
     world_frame: str
+    placing: str = ""
+    _made_of: tuple[tuple, dict]
+
+    def __new__(cls: type[_Made], *args: Any, **kwargs: Any) -> _Made:
+        """Keeps the arguments, with which other processes open it again."""
+        drive = super().__new__(cls)
+        drive._made_of = args, kwargs
+        return drive
+
+    def __reduce__(self) -> tuple:
+        return _opened_again, (type(self), *self._made_of)
 
     @abc.abstractmethod
     def __len__(self) -> int:
@@ -230,6 +246,10 @@ class Drive(abc.ABC):
         points of the scans carry the same instance ids and labels.
         """
         return None
+
+
+def _opened_again(kind: type[Drive], args: tuple, kwargs: dict) -> Drive:
+    return kind(*args, **kwargs)
 
 
 def as_given(path: Path) -> Path:

@@ -1,6 +1,7 @@
 from .align import AlignmentReport as AlignmentReport
 from .align import When as When
 from .align import in_one_world as in_one_world
+from .opening import open_in_one_world as open_in_one_world
 from .registration import NUM_NEIGHBOURS as NUM_NEIGHBOURS
 from .registration import Surface as Surface
 from .registration import covariances as covariances

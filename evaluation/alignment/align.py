@@ -19,13 +19,15 @@ robust:
    needs.
 """
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from cns_drake.base import InputError, poses
-from cns_drake.drives import Drive, check_same_map
+from cns_drake.base import InputError, doing, poses
+from cns_drake.drives import Drive, check_same_map, check_same_world
 from evaluation.alignment.loop_search import (
     SAME_PLACE,
     LoopSearch,
@@ -162,34 +164,50 @@ class Alignment:
 
 
 def in_one_world(
-    first: Drive,
-    second: Drive,
-    when: When,
+    opened: Sequence[Drive | Path],
+    when: When = "auto",
     *,
-    hold_first: bool = False,
     across_maps: bool = False,
-) -> Alignment | None:
-    """Aligns two drives, so that both are in one world, if `when` allows it.
+) -> tuple[list[Drive | Path], list[AlignmentReport]]:
+    """Returns drives in one world, for all commands and studies.
 
     Args:
-        first, second: the drives.
-        when: `auto` to align the drives only if the names of their world frames
-            differ, `always` or `never`.
-        hold_first: whether the first drive must stay where it is, see `align`.
+        opened: the drives. Paths of maps stay as they are; they must be in the
+            world of the first drive.
+        when: when all other drives are aligned with the first drive: `auto`
+            (only if the names of their world frames differ), `always` or
+            `never`.
         across_maps: whether the drives may be from maps with different names.
 
     Returns:
-        Both drives in one world; None if they were not aligned.
+        The drives in the given order, and a report on each alignment.
 
     Raises:
-        InputError: the drives cannot be aligned, or are from different maps.
+        InputError: a drive cannot be aligned, is of another map or, with
+            `never`, of another world; or a map should be aligned. The error
+            says how recordings of this format get a common world.
     """
-    if not across_maps:
-        check_same_map(first, second)
-    differ = first.world_frame != second.world_frame
-    if when == "never" or (when == "auto" and not differ):
-        return None
-    return align(first, second, hold_first=hold_first)
+    found = list(opened)
+    drives = [i for i, one in enumerate(found) if isinstance(one, Drive)]
+    if when == "always" and len(drives) < len(found):
+        (path, *_) = (one for one in found if not isinstance(one, Drive))
+        raise InputError(f"--align always: {path} is no drive, and stays")
+    reports: list[AlignmentReport] = []
+    for number, i in enumerate(drives[1:]):
+        first, other = found[drives[0]], found[i]
+        assert isinstance(first, Drive)
+        assert isinstance(other, Drive)
+        if not across_maps:
+            check_same_map(first, other)
+        differ = first.world_frame != other.world_frame
+        if when == "never" or (when == "auto" and not differ):
+            check_same_world(first, other, across_maps=True)
+            continue
+        doing(f"aligning {other.name} to {first.name}")
+        pair = align(first, other, hold_first=number > 0)
+        found[drives[0]], found[i] = pair.first, pair.second
+        reports.append(pair.report)
+    return found, reports
 
 
 def align(
@@ -285,8 +303,8 @@ def _search_from_a_guess(
             break
     if len(best.loops) < _FEWEST_FITS:
         raise InputError(
-            f"{source.name}: cannot be aligned to {target.name}: no place of "
-            "either drive was found in the other"
+            f"{source.name}: cannot be aligned to {target.name}: no place of"
+            f" either drive was found in the other{source.drive.placing}"
         )
     return best, "places that look alike", len(candidates.turn)
 
@@ -413,7 +431,7 @@ def _check_agreement(search: LoopSearch, num_agreeing: int) -> None:
         raise InputError(
             f"{search.source.name}: cannot be aligned to {search.target.name}:"
             f" of {num_tried} tried places {num_loops} fit, and only"
-            f" {num_agreeing} of these agree"
+            f" {num_agreeing} of these agree{search.source.drive.placing}"
         )
 
 

@@ -10,8 +10,7 @@ from .drive_change import (
     spread_over_grids as spread_over_grids,
 )
 from .drive_maps import DriveMap as DriveMap
-from .drive_maps import maps_in_one_world as maps_in_one_world
-from .drive_maps import open_source as open_source
+from .drive_maps import map_source as map_source
 from .drive_maps import read_map as read_map
 from .tcr import COVERAGE_RADIUS as COVERAGE_RADIUS
 from .tcr import TemporalChange as TemporalChange

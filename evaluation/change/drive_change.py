@@ -267,9 +267,7 @@ def same_stage_partner(
             world, or the control follows neither route.
     """
     if (
-        source.drive is None
-        or control.drive is None
-        or source.positions is None
+        source.positions is None
         or target.positions is None
         or control.positions is None
     ):
@@ -277,7 +275,6 @@ def same_stage_partner(
             f"{control.name}: a control needs three recorded drives, not"
             " map files"
         )
-    check_same_world(source.drive, control.drive)
     on_source = _route_distance(control.positions, source.positions)
     on_target = _route_distance(control.positions, target.positions)
     if min(on_source, on_target) > _SAME_ROUTE:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -30,6 +30,46 @@ MethodName = Annotated[
         "or a Python file with your own method.",
     ),
 ]
+# Options of commands that compare drives: each once for all drives, or once for
+# each, in order.
+Lidars = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--lidar",
+        metavar="NAME",
+        help="LiDAR whose scans are read, if a recording has several LiDARs: "
+        "NAME of the topic /NAME/points, or the whole topic. Give it once for "
+        "all drives, or once for each, in order.",
+    ),
+]
+Odometry = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="TOPIC",
+        help="Topic of the poses, if a recording has several. Give it once for "
+        "all drives, or once for each, in order.",
+    ),
+]
+Poses = Annotated[
+    list[Path] | None,
+    typer.Option(
+        metavar="FILE",
+        help="File with poses of the LiDAR that are used instead of those of "
+        "the recording, in the form of TUM (seconds, x y z, quaternion x y z "
+        "w) or of KITTI (a 3 x 4 matrix for each scan). Give it once for all "
+        "drives, or once for each, in order.",
+    ),
+]
+Columns = Annotated[
+    list[int] | None,
+    typer.Option(
+        metavar="N",
+        min=3,  # x, y, z
+        help="Number of float32 values per point in .bin files, including x, y "
+        "and z; by default four, or five in files named *.pcd.bin. Give it "
+        "once for all drives, or once for each, in order.",
+    ),
+]
 Tables = Annotated[
     Path | None,
     typer.Option(
@@ -41,6 +81,22 @@ Tables = Annotated[
 SensorHeight = Annotated[
     float, typer.Option(help="Height of the LiDAR above the ground [m].")
 ]
+
+
+def readings(
+    lidar: list[str] | None,
+    odometry: list[str] | None,
+    poses: list[Path] | None,
+    columns: list[int] | None,
+) -> dict[str, Any]:
+    """Returns the arguments of a verb from the options that were given."""
+    given = {
+        "lidar": lidar,
+        "odometry": odometry,
+        "poses": poses,
+        "columns": columns,
+    }
+    return {name: values for name, values in given.items() if values}
 
 
 def write_tables(found: Measured, output: Path) -> None:

@@ -9,6 +9,7 @@ from .drive_views import RecentScans as RecentScans
 from .joined_drive import JoinedDrive as JoinedDrive
 from .opening import Drive as Drive
 from .opening import InputError as InputError
+from .opening import Reading as Reading
 from .opening import data_sets as data_sets
 from .opening import find_data_sets as find_data_sets
 from .opening import open_drive as open_drive

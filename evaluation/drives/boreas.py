@@ -20,8 +20,8 @@ from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
-    keep_spanned,
     list_stamped,
+    posed,
     read_packed,
 )
 from evaluation.drives.text_tables import parse_microseconds
@@ -58,22 +58,22 @@ class BoreasDrive(FileDrive):
         files, stamps_ns = list_stamped(
             path / _SCANS, ".bin", parse_microseconds
         )
-        trajectory, unknown = read_angles(path / _POSES, num_velocities=3)
+        poses_path = path / _POSES
+        trajectory, unknown = read_angles(poses_path, num_velocities=3)
         X_WS = trajectory.X_WB
         X_WS[:, :3, :3] = np.swapaxes(X_WS[:, :3, :3], 1, 2)
         local = is_local(X_WS)
         if not local:
             X_WS[:, :3, 3] -= _ORIGIN
-        X_WS, spanned = trajectory.interpolate(stamps_ns)
-        kept, notes = keep_spanned(files, spanned, trajectory.path)
+        files, stamps_ns, X_WS, notes = posed(files, stamps_ns, trajectory)
         super().__init__(
             name=as_given(path).name,
             world_frame=f"boreas/{'enu' if local else 'utm-17n'}",
-            files=kept,
-            stamps_ns=stamps_ns[spanned],
+            files=files,
+            stamps_ns=stamps_ns,
             X_WS=X_WS,
             read=_read_scan,
-            tables=[trajectory.path],
+            tables=[poses_path],
             notes=unknown + notes,
             unit="alpha-prime",
         )

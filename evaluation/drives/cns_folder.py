@@ -30,7 +30,12 @@ from cns_drake.base import (
 from cns_drake.drives import IMU_DTYPE, SCENARIO, as_given, read_scenario
 from evaluation.clouds import read_cloud
 from evaluation.drives.data_set import DataSet
-from evaluation.drives.scan_files import FileDrive, first_existing, list_stamped
+from evaluation.drives.scan_files import (
+    FileDrive,
+    first_existing,
+    list_stamped,
+    posed,
+)
 from evaluation.drives.text_tables import read_stamped_rows
 from evaluation.drives.trajectories import pose_matrices, read_quaternions
 
@@ -55,10 +60,6 @@ _MOUNT = "transformation_lidar.yaml"
 # Height of the LiDAR above the vehicle's origin, from the data set's drawing
 # [m].
 _LIDAR_HEIGHT = 1.6
-
-# Scans and poses have the same times, but their notation can differ: a double
-# rounds nanoseconds since 1970.
-_TOLERANCE_NS = 1000
 
 
 class CnsFolderDrive(FileDrive):
@@ -88,8 +89,9 @@ class CnsFolderDrive(FileDrive):
                 f"{path}: CNS: neither {' nor '.join(_FOLDERS)} in it"
             )
         files, stamps_ns = list_stamped(folder, ".pcd")
-        trajectory = read_quaternions(path / _POSES, ",")
-        X_WB = trajectory.at(stamps_ns, _TOLERANCE_NS)
+        files, stamps_ns, X_WB, notes = posed(
+            files, stamps_ns, read_quaternions(path / _POSES, ",")
+        )
         self._imu_path = path / _IMU
         mount = _find_mount(path, chosen)
         place = as_given(path)
@@ -109,12 +111,12 @@ class CnsFolderDrive(FileDrive):
             X_WS=X_WB @ _read_mount(mount),
             read=lambda path, stamp_ns: read_cloud(path),
             tables=[
-                trajectory.path,
+                path / _POSES,
                 self._imu_path,
                 path / SCENARIO,
                 *([] if mount is None else [mount]),
             ],
-            notes=tuple(chosen),
+            notes=(*chosen, *notes),
             scenario=scenario,
             unit="cns",
         )

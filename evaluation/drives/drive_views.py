@@ -29,6 +29,13 @@ class DriveView(Drive):
         return self._drive.X_WS
 
     @property
+    def image_stamps_ns(self) -> np.ndarray:
+        return self._drive.image_stamps_ns
+
+    def image(self, index: int) -> bytes:
+        return self._drive.image(index)
+
+    @property
     def scenario(self) -> Mapping | None:
         return self._drive.scenario
 

@@ -18,8 +18,8 @@ from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
-    keep_spanned,
     list_stamped,
+    posed,
     read_packed,
 )
 from evaluation.drives.trajectories import read_quaternions
@@ -106,20 +106,20 @@ class HeliprDrive(FileDrive):
         files, stamps_ns = list_stamped(drive / _SCANS / lidar, ".bin")
         in_utm = (drive / _POSES / f"global_{lidar}_gt.txt").is_file()
         poses_name = f"global_{lidar}_gt.txt" if in_utm else f"{lidar}_gt.txt"
-        trajectory = read_quaternions(drive / _POSES / poses_name, None)
-        X_US, spanned = trajectory.interpolate(stamps_ns)
-        kept, notes = keep_spanned(files, spanned, trajectory.path)
-        X_WS = to_world(X_US, trajectory.path) if in_utm else X_US
+        poses_path = drive / _POSES / poses_name
+        trajectory = read_quaternions(poses_path, None)
+        files, stamps_ns, X_US, notes = posed(files, stamps_ns, trajectory)
+        X_WS = to_world(X_US, poses_path) if in_utm else X_US
         session = as_given(drive).name
         super().__init__(
             name=f"{session}_{lidar}",
             session=session,
             world_frame=f"helipr{f'/{DATUM}' if in_utm else drive.resolve()}",
-            files=kept,
-            stamps_ns=stamps_ns[spanned],
+            files=files,
+            stamps_ns=stamps_ns,
             X_WS=X_WS,
             read=partial(_read_scan, lidar),
-            tables=[trajectory.path],
+            tables=[poses_path],
             notes=chosen + notes,
             datum=DATUM if in_utm else None,
             unit=_UNITS.get(lidar),

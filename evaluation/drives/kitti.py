@@ -43,18 +43,28 @@ from cns_drake.base import (
 )
 from cns_drake.drives import SCENARIO, as_given, index_instances, read_scenario
 from evaluation.drives.data_set import DataSet
-from evaluation.drives.scan_files import BinDrive, first_existing, read_packed
+from evaluation.drives.scan_files import (
+    BinDrive,
+    first_existing,
+    posed,
+    read_packed,
+)
 from evaluation.drives.text_tables import (
     check_increasing,
     parse_seconds,
     read_numbers,
 )
-from evaluation.drives.trajectories import pose_matrices, read_poses
+from evaluation.drives.trajectories import (
+    pose_matrices,
+    read_poses,
+    read_trajectory,
+)
 
 _SCANS = "velodyne"
 _LABELS = "labels"
 _FRAMES = "frames.txt"
 _FIRST_POSE = "first_pose.txt"
+_CALIBRATION = "calib.txt"
 _STRUCTURES = "structures.json"
 # Least focal length of a camera [pixels]. KITTI's cameras have 707 or more; in
 # other files the projection is the identity.
@@ -76,13 +86,24 @@ class KittiDrive(BinDrive):
     `label` and `instance`.
     """
 
-    def __init__(self, path: Path, columns: int | None = None):
+    placing = (
+        " (a first_pose.txt in a drive's folder says where in the map its first"
+        " scan was taken)"
+    )
+
+    def __init__(
+        self,
+        path: Path,
+        columns: int | None = None,
+        poses: Path | None = None,
+    ):
         """Opens a drive.
 
         Args:
             path: its folder; the poses lie in `../../poses/<name>.txt`, or
                 as `poses.txt` beside the scans.
             columns: number of columns of a scan, see `BinDrive`.
+            poses: file with poses of the LiDAR, which is read instead.
 
         Raises:
             InputError: there is no such drive, its files do not fit together,
@@ -95,11 +116,28 @@ class KittiDrive(BinDrive):
             stamps_ns = parse_seconds(times)
         check_increasing(times_path, stamps_ns, "row")
         notes: list[str] = []
-        poses_path = _poses_path(path, notes)
-        X_C0C = read_poses(poses_path)
-        counts = len(stamps_ns), len(X_C0C)
+        poses_path = poses or _poses_path(path, notes)
+        calibration, first_pose = path / _CALIBRATION, path / _FIRST_POSE
+        X_CS, unit = np.eye(4), None
+        if is_there(calibration):
+            X_CS, unit = _calibrated(calibration)
+        elif poses is None:
+            notes.append(
+                f"{calibration}: not there; the poses in {poses_path.name} are"
+                " taken as those of the LiDAR"
+            )
+        # Drives of one name in two folders have two world frames.
+        world_frame = f"kitti{path.resolve()}"
+        counts = len(stamps_ns), len(stamps_ns)
         stamps_ns = _rows_of_scans(times_path, stamps_ns, numbers, notes)
-        X_C0C = _rows_of_scans(poses_path, X_C0C, numbers, notes)
+        if poses is None:
+            X_C0C = read_poses(poses_path)
+            counts = counts[0], len(X_C0C)
+            X_C0C = _rows_of_scans(poses_path, X_C0C, numbers, notes)
+            X_WS = _lidar_poses(X_C0C, X_CS)
+            if is_there(first_pose):
+                X_WS = _read_first_pose(first_pose) @ X_WS
+                world_frame = "map"
         # If scans are missing, one table may have a row for each number and the
         # other table a row for each existing scan.
         gaps = numbers != list(range(len(files)))
@@ -108,23 +146,12 @@ class KittiDrive(BinDrive):
                 f"{poses_path}: {counts[1]} rows, but {counts[0]} in"
                 f" {times_path}"
             )
-        calibration = path / "calib.txt"
-        X_CS, unit = np.eye(4), None
-        if is_there(calibration):
-            X_CS, unit = _calibrated(calibration)
-        else:
-            notes.append(
-                f"{calibration}: not there; the poses in {poses_path.name} are"
-                " taken as those of the LiDAR"
-            )
-        X_WS = poses.inverse(X_CS) @ X_C0C @ X_CS
+        if poses is not None:
+            trajectory = read_trajectory(poses, stamps_ns)
+            files, stamps_ns, X_WS, told = posed(files, stamps_ns, trajectory)
+            notes += told
+            world_frame = f"poses{poses.resolve()}"
         name = as_given(path).name
-        # Drives of one name in two folders have two world frames.
-        world_frame = f"kitti{path.resolve()}"
-        first_pose = path / _FIRST_POSE
-        if is_there(first_pose):
-            X_WS = _read_first_pose(first_pose) @ X_WS
-            world_frame = "map"
         scenario = read_scenario(path)
         self._structures = path / _STRUCTURES
         labels = path / _LABELS
@@ -181,6 +208,11 @@ class KittiDrive(BinDrive):
         names = list(_LABEL.names or ())
         columns = [labels[name] for name in names]
         return append_fields(stored, names, columns, usemask=False)
+
+
+def _lidar_poses(X_C0C: np.ndarray, X_CS: np.ndarray) -> np.ndarray:
+    """Returns poses of the LiDAR (N, 4, 4) from poses of the camera."""
+    return poses.inverse(X_CS) @ X_C0C @ X_CS
 
 
 def _label_path(labels: Path, scan: Path) -> Path:

@@ -17,8 +17,8 @@ from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     BinDrive,
     first_existing,
-    keep_spanned,
     list_stamped,
+    posed,
 )
 from evaluation.drives.trajectories import read_matrices
 from evaluation.drives.utm_poses import DATUM, is_local, to_world
@@ -64,27 +64,27 @@ class MulranDrive(BinDrive):
                 f"{path}: MulRan: neither {' nor '.join(_FOLDERS)} in it"
             )
         files, stamps_ns = list_stamped(folder, ".bin")
-        trajectory = read_matrices(path / _POSES)
-        X_UB, spanned = trajectory.interpolate(stamps_ns)
-        kept, notes = keep_spanned(files, spanned, trajectory.path)
+        poses_path = path / _POSES
+        trajectory = read_matrices(poses_path)
+        files, stamps_ns, X_UB, notes = posed(files, stamps_ns, trajectory)
         notes = (*chosen, *notes)
         name = as_given(path).name
         local = is_local(trajectory.X_WB)
         if local:
             notes += (
-                f"{trajectory.path}: no UTM coordinates; taken for those of a"
+                f"{poses_path}: no UTM coordinates; taken for those of a"
                 f" frame of {name} alone",
             )
-        X_WB = X_UB if local else to_world(X_UB, trajectory.path)
+        X_WB = X_UB if local else to_world(X_UB, poses_path)
         scenario = read_scenario(path)  # cns-drake exports one.
         super().__init__(
             columns,
             name=name,
             world_frame=f"mulran{path.resolve() if local else f'/{DATUM}'}",
-            files=kept,
-            stamps_ns=stamps_ns[spanned],
+            files=files,
+            stamps_ns=stamps_ns,
             X_WS=X_WB @ X_BS,
-            tables=[trajectory.path, path / SCENARIO],
+            tables=[poses_path, path / SCENARIO],
             notes=notes,
             datum=None if local else DATUM,
             scenario=scenario,

@@ -21,8 +21,8 @@ from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
     first_existing,
-    keep_spanned,
     list_stamped,
+    posed,
     read_packed,
 )
 from evaluation.drives.text_tables import parse_microseconds
@@ -81,17 +81,17 @@ class NcltDrive(FileDrive):
         )
         name = as_given(path).name
         chosen: list[str] = []
-        trajectory, unknown = read_angles(_poses_path(path, chosen))
-        X_NB, spanned = trajectory.interpolate(stamps_ns)
-        kept, notes = keep_spanned(files, spanned, trajectory.path)
+        poses_path = _poses_path(path, chosen)
+        trajectory, unknown = read_angles(poses_path)
+        files, stamps_ns, X_NB, notes = posed(files, stamps_ns, trajectory)
         super().__init__(
             name=name,
             world_frame="nclt",
-            files=kept,
-            stamps_ns=stamps_ns[spanned],
+            files=files,
+            stamps_ns=stamps_ns,
             X_WS=_X_WN @ X_NB @ _X_BS,
             read=lambda path, stamp_ns: _read_scan(path),
-            tables=[trajectory.path],
+            tables=[poses_path],
             notes=(*chosen, *unknown, *notes),
             unit="hdl-32e-upside-down",
         )

@@ -1,17 +1,83 @@
 """Opening a recorded drive with the reader for its format."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
+from dataclasses import dataclass
+import inspect
 from pathlib import Path
 from typing import Any
 
 from cns_drake.base import Family, doing, import_modules, listed
 from cns_drake.base import InputError as InputError
 from cns_drake.drives import Drive as Drive
+from evaluation.clouds import is_cloud
 from evaluation.drives.data_set import DataSet
+from evaluation.drives.posed_drive import PosedDrive
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a recording does not say itself: how it is read.
+
+    Attributes:
+        lidar, columns, odometry, poses: see `open_drive`.
+    """
+
+    lidar: str | None = None
+    columns: int | None = None
+    odometry: str | None = None
+    poses: Path | None = None
+
+    @classmethod
+    def each(cls, count: int, **options: Any) -> list[Reading]:
+        """Returns how each of some drives is read.
+
+        Args:
+            count: number of drives.
+            options: field -> value for all drives, or a list of a value for
+                each drive, in their order.
+
+        Raises:
+            InputError: a list has another length.
+        """
+        columns = {}
+        for name, value in options.items():
+            values = value if isinstance(value, list | tuple) else [value]
+            if len(values) not in (1, count):
+                raise InputError(
+                    f"--{name}: given {len(values)} times; give it once for"
+                    f" all drives, or {count} times, in their order"
+                )
+            columns[name] = values * (count // len(values))
+        return [
+            cls(**{name: values[k] for name, values in columns.items()})
+            for k in range(count)
+        ]
+
+    def open(self, path: Path) -> Drive:
+        """Opens a recorded drive, as `open_drive` does."""
+        return open_drive(path, **vars(self))
+
+    def open_source(self, path: Path) -> Drive | Path:
+        """Opens a recorded drive; returns the path of a point cloud.
+
+        Raises:
+            InputError: the path can be read as neither.
+        """
+        path = Path(path)
+        if path.is_file() and is_cloud(path):
+            return path
+        return self.open(path)
 
 
 def open_drive(
-    path: Path, lidar: str | None = None, columns: int | None = None
+    path: Path,
+    lidar: str | None = None,
+    columns: int | None = None,
+    *,
+    odometry: str | None = None,
+    poses: Path | None = None,
 ) -> Drive:
     """Opens a recorded drive with the reader for its format.
 
@@ -23,10 +89,14 @@ def open_drive(
         columns: number of float32 values per point in `.bin` files of KITTI and
             MulRan; by default the field `columns` of the drive's
             `scenario.yaml`, or four, or five for files named `*.pcd.bin`.
+        odometry: topic of the poses, if a recording of ROS has several.
+        poses: file with the poses of the LiDAR, which are used instead of those
+            of the recording: in the form of TUM (seconds, x y z, quaternion
+            x y z w), or in that of KITTI (3 x 4 matrices, one for each scan).
 
     Raises:
         InputError: if nothing at `path` can be read as a drive, or the drive
-            has no such LiDAR.
+            has no such LiDAR or topic, or no poses.
 
     Example:
         from evaluation import open_drive
@@ -46,7 +116,25 @@ def open_drive(
         found: Any = fitting[0]
         if not found.has_lidars and lidar is not None:
             raise InputError(f"{path}: has one LiDAR, not a '{lidar}'")
-        return found.open(path, lidar if found.has_lidars else columns)
+        arguments = inspect.signature(found.open).parameters
+        if odometry is not None and "odometry" not in arguments:
+            raise InputError(
+                f"{path}: {found.title}: has no topics of poses, as --odometry"
+                " names one"
+            )
+        named: dict[str, Any] = {"odometry": odometry, "poses": poses}
+        drive = found.open(
+            path,
+            lidar if found.has_lidars else columns,
+            **{
+                name: value
+                for name, value in named.items()
+                if name in arguments
+            },
+        )
+        if poses is not None and "poses" not in arguments:
+            drive = PosedDrive(drive, poses)
+        return drive
     if path.is_dir() and any(path.glob("*.mcap.part")):
         raise InputError(
             f"{path}: the recording was not finished; simulate the drive again"

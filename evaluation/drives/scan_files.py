@@ -16,7 +16,7 @@ from cns_drake.base import (
     user_errors,
     value_errors,
 )
-from cns_drake.drives import Drive, LidarField, lidar_field
+from cns_drake.drives import Drive, LidarField, StampedPoses, lidar_field
 from evaluation.clouds import SCAN_LIMIT_BYTES, bin_dtype
 from evaluation.drives.text_tables import check_increasing, parse_stamps_ns
 
@@ -190,28 +190,25 @@ def _are_alike(first: Path, second: Path) -> bool:
     return both and filecmp.cmp(first, second, shallow=False)
 
 
-def keep_spanned(
-    files: list[Path], spanned: np.ndarray, poses_path: Path
-) -> tuple[list[Path], tuple[str, ...]]:
-    """Leaves out the scan files that lie outside the time of the poses.
+def posed(
+    files: list[Path], stamps_ns: np.ndarray, trajectory: StampedPoses
+) -> tuple[list[Path], np.ndarray, np.ndarray, tuple[str, ...]]:
+    """Gives scan files their poses.
 
     Args:
         files: files of N scans.
-        spanned: (N,) bool, whether a scan is between the first and the last
-            pose.
-        poses_path: file of the poses, for the note.
+        stamps_ns: (N,) their stamps [ns].
+        trajectory: the poses of the drive.
 
     Returns:
-        The remaining files; a note if scans were left out.
+        The K files between the first and the last pose, their stamps (K,) [ns],
+        their poses (K, 4, 4), and notes, see `StampedPoses.at_scans`.
+
+    Raises:
+        InputError: a scan has no pose.
     """
-    if spanned.all():
-        return files, ()
-    kept = [file for file, inside in zip(files, spanned, strict=True) if inside]
-    missing = len(files) - len(kept)
-    return kept, (
-        f"{poses_path}: no pose for {missing} of {len(files)} scans at the"
-        " ends of the drive; they are left out",
-    )
+    kept, X_WB, notes = trajectory.at_scans(stamps_ns)
+    return files[kept], stamps_ns[kept], X_WB, notes
 
 
 def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:

@@ -1,16 +1,17 @@
 """Trajectories and poses from tables of text."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base import InputError, poses, value_errors
+from cns_drake.drives import StampedPoses
 from evaluation.drives.text_tables import (
     check_finite,
     check_increasing,
     parse_microseconds,
+    parse_seconds,
     read_numbers,
     read_stamped_rows,
 )
@@ -18,104 +19,8 @@ from evaluation.drives.text_tables import (
 # Greatest error of a rotation matrix or quaternion, as in numbers that are
 # written with four digits.
 _ROTATION_TOLERANCE = 1e-3
-# Greatest time between two poses that are interpolated [ns].
-_LONGEST_GAP_NS = 1_000_000_000
 # Columns of a table of poses.
 _COLUMNS = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")
-
-
-@dataclass(frozen=True)
-class StampedPoses:
-    """Poses at increasing times.
-
-    Attributes:
-        path: the file it comes from, for messages.
-        stamps_ns: (N,) int64 [ns], strictly increasing.
-        X_WB: (N, 4, 4) float64 poses.
-    """
-
-    path: Path
-    stamps_ns: np.ndarray
-    X_WB: np.ndarray
-
-    def interpolate(
-        self,
-        stamps_ns: np.ndarray,
-        wanted_for: str = "the scan",
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns interpolated poses at given times (SLERP and linear).
-
-        Args:
-            stamps_ns: (M,) int64 times of the wanted poses [ns].
-            wanted_for: what the poses are for, such as `the scan`; named in
-                error messages.
-
-        Returns:
-            (K, 4, 4) poses at those K of the given times that lie between the
-            first and the last pose of the table; (M,) bool, which of the given
-            times these are.
-
-        Raises:
-            InputError: the table spans none of the times, or a time lies in a
-                gap of more than a second.
-        """
-        own = self.stamps_ns
-        spanned = (stamps_ns >= own[0]) & (stamps_ns <= own[-1])
-        if not spanned.any():
-            raise InputError(
-                f"{self.path}: time: no pose for any scan: the poses span"
-                f" {own[0]} to {own[-1]} ns, the scans {stamps_ns[0]} to"
-                f" {stamps_ns[-1]} ns"
-            )
-        wanted = stamps_ns[spanned]
-        after = np.searchsorted(own, wanted)
-        exact = own[after] == wanted
-        before = np.where(exact, after, after - 1)
-        gaps = own[after] - own[before]
-        if (gaps > _LONGEST_GAP_NS).any():
-            worst = int(gaps.argmax())
-            raise InputError(
-                f"{self.path}: time: no pose for {wanted_for} at"
-                f" {wanted[worst]} ns: the poses there are"
-                f" {gaps[worst] * 1e-9:.2f} s apart, more than"
-                f" {_LONGEST_GAP_NS * 1e-9:g} s"
-            )
-        # Differences of int64 are exact, and small enough for a double.
-        fraction = (wanted - own[before]) / np.where(exact, 1, gaps)
-        return (
-            poses.interpolate(self.X_WB[before], self.X_WB[after], fraction),
-            spanned,
-        )
-
-    def at(self, stamps_ns: np.ndarray, tolerance_ns: int) -> np.ndarray:
-        """Returns the stored poses at given times, without interpolation.
-
-        Args:
-            stamps_ns: (M,) int64 [ns].
-            tolerance_ns: greatest difference between a given time and the time
-                of a stored pose [ns].
-
-        Returns:
-            (M, 4, 4) poses.
-
-        Raises:
-            InputError: there is no pose at one of the times.
-        """
-        own = self.stamps_ns
-        after = np.clip(np.searchsorted(own, stamps_ns), 0, len(own) - 1)
-        before = np.maximum(after - 1, 0)
-        off_after = np.abs(own[after] - stamps_ns)
-        off_before = np.abs(own[before] - stamps_ns)
-        nearest = np.where(off_before < off_after, before, after)
-        missing = np.minimum(off_before, off_after) > tolerance_ns
-        if missing.any():
-            first = int(np.flatnonzero(missing)[0])
-            raise InputError(
-                f"{self.path}: time: no pose for the scan at"
-                f" {stamps_ns[first]} ns ({missing.sum()} of {len(missing)}"
-                " scans have none)"
-            )
-        return self.X_WB[nearest]
 
 
 def read_matrices(path: Path) -> StampedPoses:
@@ -144,6 +49,13 @@ def read_quaternions(path: Path, separator: str | None) -> StampedPoses:
             unit length, or the poses are out of order.
     """
     stamps_ns, values = read_stamped_rows(path, 7, separator, _COLUMNS)
+    return _turned_poses(path, stamps_ns, values)
+
+
+def _turned_poses(
+    path: Path, stamps_ns: np.ndarray, values: np.ndarray
+) -> StampedPoses:
+    """Returns poses from times (N,) and positions with quaternions (N, 7)."""
     with np.errstate(over="ignore"):
         lengths = np.linalg.norm(values[:, 3:], axis=1)
     bad = np.flatnonzero(np.abs(lengths - 1.0) > _ROTATION_TOLERANCE)
@@ -155,6 +67,38 @@ def read_quaternions(path: Path, separator: str | None) -> StampedPoses:
     R = poses.rotation_from_quaternion(values[:, 3:])
     _check_positions(path, values[:, :3])
     return _increasing_poses(path, stamps_ns, poses.make_pose(R, values[:, :3]))
+
+
+def read_trajectory(path: Path, stamps_ns: np.ndarray) -> StampedPoses:
+    """Returns the poses of a file in the form of TUM or of KITTI.
+
+    Args:
+        path: rows of seconds, x y z [m] and quaternion x y z w (TUM); or of
+            3 x 4 matrices, one for each scan (KITTI).
+        stamps_ns: (N,) stamps of the scans [ns].
+
+    Raises:
+        InputError: the file has neither form, or another number of matrices.
+    """
+    columns = read_numbers(path, float).shape[1]
+    if columns == len(_COLUMNS):
+        rows = read_numbers(path, [("stamp", "U40"), ("values", "f8", 7)])
+        with value_errors(f"{path}: time"):
+            own_ns = parse_seconds(rows["stamp"])
+        check_finite(path, rows["values"])
+        return _turned_poses(path, own_ns, rows["values"])
+    if columns != 12:
+        raise InputError(
+            f"{path}: rows of {columns} numbers; TUM has 8 (seconds x y z qx qy"
+            " qz qw), KITTI 12"
+        )
+    X_WS = read_poses(path)
+    if len(X_WS) != len(stamps_ns):
+        raise InputError(
+            f"{path}: {len(X_WS)} poses without times, for {len(stamps_ns)}"
+            " scans"
+        )
+    return StampedPoses(path, stamps_ns, X_WS)
 
 
 def read_angles(

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from cns_drake.base import InputError, Reporter, Step, doing, make_folder
-from cns_drake.drives import Drive, DriveNames
+from cns_drake.drives import Drive
 from evaluation.change import DriveMap
 from evaluation.drives import RecentScans, cropped, sample_frames
 from evaluation.maps import CELL_SIZE, MappedDrive, map_drive, thumbnail
@@ -90,9 +90,8 @@ def extract_features(
     coarse, fine = mapped.finish()
     if len(coarse) == 0:
         raise InputError(f"{mapped.name}: no scan holds a point")
-    placed = DriveNames.of(recording)
     summary = DriveSummary(
-        placed=placed,
+        name=mapped.name,
         stamps_ns=mapped.stamps_ns,
         X_WS=mapped.X_WS,
         coarse=coarse,
@@ -109,7 +108,7 @@ def extract_features(
             np.array(frames, np.int64),
             kept,
         )
-    return MappedFeatures(placed, described, summary, fine, scans)
+    return MappedFeatures(described, summary, fine, scans)
 
 
 def map_source(
@@ -152,7 +151,7 @@ def describe_recording(
         seen.append(cloud.astype(np.float32))
 
     described = _described(drive, roles, asked, protocol, keep, folder)
-    return ScannedFeatures(DriveNames.of(recording), described, seen)
+    return ScannedFeatures(described, seen)
 
 
 def _most_scans(asked: Mapping[str, Request]) -> int:
@@ -261,7 +260,7 @@ class FeatureExtraction(Step):
             found = describe_recording(*arguments, folder=folder)
             values = {self.files.scans: found.shown_scans}
         for key, described in found.described.items():
-            values[self.files.described(key)] = found.placed, described
+            values[self.files.described(key)] = described
         doing("writing maps and descriptors")
         for part, made_of in missing.items():
             part.write(made_of, values[part])

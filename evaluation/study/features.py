@@ -8,7 +8,6 @@ import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
 from cns_drake.base import fingerprint, xyz
-from cns_drake.drives import DriveNames
 from evaluation.change import DriveMap
 from evaluation.drives import within_cube
 from evaluation.maps import VoxelMap
@@ -23,7 +22,7 @@ class DriveSummary:
     """A drive with its map, and with its scans reduced to small pictures.
 
     Attributes:
-        placed: names of the drive, its world frame and its map.
+        name: name of the drive.
         stamps_ns: (N,) int64 time stamps of all frames [ns].
         X_WS: (N, 4, 4) poses of the sensor at all frames.
         coarse: the map, in voxels of 1 m from which the change ratio (TCR) is
@@ -34,16 +33,12 @@ class DriveSummary:
             `evaluation.maps.thumbnails`.
     """
 
-    placed: DriveNames
+    name: str
     stamps_ns: np.ndarray
     X_WS: np.ndarray
     coarse: VoxelMap
     frames: np.ndarray
     thumbnails: list[np.ndarray]
-
-    @property
-    def name(self) -> str:
-        return self.placed.name
 
     @property
     def positions(self) -> np.ndarray:
@@ -53,7 +48,7 @@ class DriveSummary:
     @property
     def drive_map(self) -> DriveMap:
         """The voxel map of the drive, with the drive's name and positions."""
-        return DriveMap(self.name, self.coarse, self.positions, self.placed)
+        return DriveMap(self.name, self.coarse, self.positions)
 
 
 @dataclass(frozen=True)
@@ -110,15 +105,13 @@ def kept_points(scan: np.ndarray, half_extent: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class ExtractedFeatures:
-    """What every reading of a recording yields: its names and descriptors.
+    """What every reading of a recording yields: its descriptors.
 
     Attributes:
-        placed: names of the drive, its world frame and its map.
         described: key of a method -> its descriptors of the places and
             queries; empty if the drive has neither.
     """
 
-    placed: DriveNames
     described: dict[str, DriveDescriptors]
 
 

@@ -261,11 +261,7 @@ def _draw_drives(
 ) -> Part:
     """Adds the job that makes pictures of drives; returns its file."""
     compared = {name for one in pairs for name in one.names}
-    shown = [
-        one.named
-        for one in (*city.stages.values(), *city.others)
-        if one.name in compared
-    ]
+    shown = [one.named for one in city.recordings if one.name in compared]
     features = [planned.features(one, []) for one in shown]
     part = planned.files.part("pages", city.name)
     step = MakePart(

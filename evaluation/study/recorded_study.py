@@ -136,7 +136,7 @@ def study_recordings(
         on_note,
     )
     conditions = _conditions(protocols)
-    cities = drives_by_map(recordings)
+    cities = drives_by_map(recordings, on_note)
     with_itself = conditions[0].protocol.exclude_recent is not None
     shown: list[ShownCity] = []
     for city in cities:
@@ -213,7 +213,7 @@ def recorded_sections(
     stages = {
         drive.name: drive.stage
         for one in cities
-        for drive in (*one.city.stages.values(), *one.city.others)
+        for drive in one.city.recordings
     }
     beside_paper = paper_section(results, queries, stages)
     return [

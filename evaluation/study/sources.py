@@ -5,13 +5,16 @@ before or after the drive is recorded. The job therefore gets the source of the
 drive, a function that opens the drive, instead of the drive.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+import hashlib
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
 from cns_drake.base import file_digests
 from cns_drake.drives import Drive
-from evaluation.drives import JoinedDrive, open_drive
+from evaluation.drives import JoinedDrive, MovedDrive, open_drive
 
 
 class DriveSource(Protocol):
@@ -42,6 +45,27 @@ class DriveSource(Protocol):
 
 
 @dataclass(frozen=True)
+class Placement:
+    """Poses of a drive that was aligned to another.
+
+    Attributes:
+        X_WS: (N, 4, 4) poses of the LiDAR in the common world.
+        world_frame: name of the common world.
+        digest: digest of the poses.
+    """
+
+    X_WS: np.ndarray = field(compare=False)
+    world_frame: str
+    digest: str
+
+    @classmethod
+    def of(cls, drive: Drive) -> "Placement":
+        """Returns where a drive is."""
+        digest = hashlib.sha256(drive.X_WS.tobytes()).hexdigest()
+        return cls(drive.X_WS, drive.world_frame, digest)
+
+
+@dataclass(frozen=True)
 class RecordingSource:
     """The source of a recorded drive, in any format that `open_drive` reads.
 
@@ -51,14 +75,20 @@ class RecordingSource:
         path: file or folder of the recording.
         lidar: name of the LiDAR, for recordings with several LiDARs.
         columns: number of values per point in `.bin` files, see `read_cloud`.
+        placement: where the drive is, if it was aligned to another.
     """
 
     path: Path
     lidar: str | None = None
     columns: int | None = None
+    placement: Placement | None = None
 
     def __call__(self) -> Drive:
-        return open_drive(self.path, self.lidar, self.columns)
+        drive = open_drive(self.path, self.lidar, self.columns)
+        to = self.placement
+        if to is None:
+            return drive
+        return MovedDrive(drive, to.X_WS, to.world_frame, drive.datum)
 
     def identity(self) -> list[list]:
         """Returns what identifies the recording: its options and its files.
@@ -68,8 +98,15 @@ class RecordingSource:
         """
         drive = self()
         names = [file.name for file in drive.files]
+        of_poses = [self.placement.digest] if self.placement else []
         return [
-            [drive.name, drive.world_frame, self.lidar, self.columns],
+            [
+                drive.name,
+                drive.world_frame,
+                self.lidar,
+                self.columns,
+                *of_poses,
+            ],
             *map(list, zip(names, file_digests(drive.files), strict=True)),
         ]
 

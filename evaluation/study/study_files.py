@@ -45,7 +45,7 @@ class FeatureFiles:
     def described(self, key: str) -> Part:
         """Returns the file with a method's descriptors of the drive.
 
-        The file contains a `DriveNames` and a `DriveDescriptors`.
+        The file contains a `DriveDescriptors`.
 
         Args:
             key: `MethodChoice.key` of the method; for descriptors by a second

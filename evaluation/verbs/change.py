@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cns_drake.base import note
 from cns_drake.drives import Drive
-from evaluation.alignment import When
+from evaluation.alignment import When, open_in_one_world
 from evaluation.change import (
     ChangeReport,
     DriveMap,
     change_of_maps,
-    maps_in_one_world,
+    map_source,
     registered_change,
     same_stage_partner,
     spread_over_grids,
 )
-from evaluation.drives import NOT_FINITE
+from evaluation.drives import NOT_FINITE, Reading
 from evaluation.recognition import numbers_of
 from evaluation.results import LAST, OWN, STAGE, QueryRows, Results
 from evaluation.verbs.measured import Measured, map_of, pair_key, rows_of
@@ -41,8 +41,10 @@ def change_between(
     *,
     no_change: Drive | Path | str | None = None,
     align: When = "auto",
-    lidar: str | None = None,
-    columns: int | None = None,
+    lidar: str | Sequence[str] | None = None,
+    odometry: str | Sequence[str] | None = None,
+    poses: Path | Sequence[Path] | None = None,
+    columns: int | Sequence[int] | None = None,
     on_note: Callable[[str], None] = note,
 ) -> Change:
     """Measures how much changed between two drives, as `cns-eval tcr` does.
@@ -54,7 +56,10 @@ def change_between(
             route in A's stage.
         align: whether to align the drives: `auto` (if their world frames
             differ), `always` or `never`.
-        lidar: name of the LiDAR, for recordings with several LiDARs.
+        lidar: name of the LiDAR, for recordings with several LiDARs; like the
+            next three, one value for all drives, or a list with one for each.
+        odometry: topic of the poses, for recordings with several.
+        poses: file with the poses of the LiDAR, see `open_drive`.
         columns: number of columns of `.bin` files.
         on_note: is called with notes for the user.
 
@@ -68,7 +73,14 @@ def change_between(
         print(change_between("before.pcd", "after.pcd").metrics["tcr_sym"])
     """
     given = [one for one in (a, b, no_change) if one is not None]
-    maps, alignments = maps_in_one_world(given, align, lidar, columns)
+    readings = Reading.each(
+        len(given), lidar=lidar, odometry=odometry, poses=poses, columns=columns
+    )
+    opened, alignments = open_in_one_world(given, readings, align, on_note)
+    maps = [
+        map_source(one, reading.columns)
+        for one, reading in zip(opened, readings, strict=True)
+    ]
     before, after, *controls = maps
     report = change_of_maps(before, after)
     compared = {OWN: (report, after)}
@@ -89,8 +101,6 @@ def change_between(
             on_note(text)
         if ignored := drive_map.voxels.num_ignored:
             on_note(f"{drive_map.name}: {ignored} {NOT_FINITE}")
-    for alignment in alignments:
-        on_note(alignment.to_text())
     if report.note is not None:
         on_note(report.note)
     names = before.name, after.name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base import InputError, note
-from cns_drake.drives import Drive, check_same_world
-from evaluation.alignment import When, in_one_world
-from evaluation.change import open_source
+from cns_drake.drives import Drive
+from evaluation.alignment import When, open_in_one_world
+from evaluation.drives import Reading
 from evaluation.localisation import (
     FEWEST_POINTS,
     OneScan,
@@ -29,7 +29,6 @@ from evaluation.study import NOT_LOCALISED, LocaliseTask, measure_localisation
 from evaluation.verbs.measured import (
     Measured,
     map_of,
-    noted,
     noting,
     pair_key,
     rows_of,
@@ -73,8 +72,10 @@ def localise(
     track: bool = False,
     odometry_drift: float | None = None,
     align: When = "auto",
-    lidar: str | None = None,
-    columns: int | None = None,
+    lidar: str | Sequence[str] | None = None,
+    odometry: str | Sequence[str] | None = None,
+    poses: Path | Sequence[Path] | None = None,
+    columns: int | Sequence[int] | None = None,
     processes: int = 1,
     on_note: Callable[[str], None] = note,
 ) -> Localisation:
@@ -96,7 +97,10 @@ def localise(
             as a share of the distance; by default 0.01. Only with `track`.
         align: whether to align the drives: `auto` (if their world frames
             differ), `always` or `never`.
-        lidar: name of the LiDAR, for recordings with several LiDARs.
+        lidar: name of the LiDAR, for recordings with several LiDARs; like the
+            next three, one value for all drives, or a list with one for each.
+        odometry: topic of the poses, for recordings with several.
+        poses: file with the poses of the LiDAR, see `open_drive`.
         columns: number of columns of `.bin` files.
         processes: number of processes that localise single scans.
         on_note: is called with notes for the user.
@@ -120,7 +124,19 @@ def localise(
     values = tuple((settings or {}).items())
     chosen = default_settings(str(method)).with_values(values, str(method))
     make_estimator(str(method), chosen)
-    source, drive = _opened(place, query, align, lidar, columns, on_note)
+    readings = Reading.each(
+        2, lidar=lidar, odometry=odometry, poses=poses, columns=columns
+    )
+    (source, asked), _ = open_in_one_world(
+        (place, query), readings, align, on_note
+    )
+    # A point cloud is a drive of one scan.
+    if isinstance(asked, Drive):
+        drive = asked
+    else:
+        drive = OneScan(asked, readings[1].columns)
+        for text in drive.notes:
+            on_note(text)
     notes: list[str] = []
     found = measure_localisation(
         noting(notes.append),
@@ -137,7 +153,7 @@ def localise(
         values,
         odometry_drift,
         processes,
-        columns,
+        readings[0].columns,
     )
     if not found:
         raise InputError(notes[-1].removesuffix(NOT_LOCALISED))
@@ -201,42 +217,3 @@ def _check(
         raise InputError(
             f"--odometry-drift: {odometry_drift:g} is not from 0 to 1"
         )
-
-
-def _opened(
-    place: Drive | Path | str,
-    query: Drive | Path | str,
-    align: When,
-    lidar: str | None,
-    columns: int | None,
-    on_note: Callable[[str], None],
-) -> tuple[Drive | Path, Drive]:
-    """Returns the map and the drive of the queries, and notes on them.
-
-    Two drives are in one world. A point cloud as the map stays a path; a point
-    cloud as the query becomes a drive of one scan.
-
-    Raises:
-        InputError: a path cannot be opened, or the drives cannot be aligned.
-    """
-    source, asked = (
-        one
-        if isinstance(one, Drive)
-        else open_source(Path(one), lidar, columns)
-        for one in (place, query)
-    )
-    drive = asked if isinstance(asked, Drive) else OneScan(asked, columns)
-    for opened in (source, drive):
-        noted(opened, on_note)
-    if not isinstance(source, Drive):
-        if align == "always":
-            raise InputError(
-                f"--align: {place} is no drive, and stays as it is"
-            )
-        return source, drive
-    alignment = in_one_world(source, drive, align)
-    if alignment is not None:
-        on_note(alignment.report.to_text())
-        source, drive = alignment.first, alignment.second
-    check_same_world(source, drive)
-    return source, drive

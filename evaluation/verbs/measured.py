@@ -9,7 +9,6 @@ from typing import Any
 
 from cns_drake.base import Reporter, one_line
 from cns_drake.drives import Drive
-from evaluation.drives import open_drive
 from evaluation.recognition import (
     RANDOM_YAW_PROTOCOL,
     Interval,
@@ -92,31 +91,6 @@ def map_of(opened: Drive | Path) -> str:
     if named is not None:
         return one_line(Path(str(named)).name)
     return opened.world_frame.partition("/")[0] or opened.name
-
-
-def noted(opened: Any, on_note: Callable[[str], None]) -> Any:
-    """Returns a drive or a path; notes how a drive was read."""
-    if isinstance(opened, Drive):
-        for text in opened.notes:
-            on_note(text)
-    return opened
-
-
-def opened_drive(
-    given: Drive | Path | str,
-    lidar: str | None,
-    columns: int | None,
-    on_note: Callable[[str], None],
-) -> Drive:
-    """Returns a drive that may be open already; notes how it was read.
-
-    Raises:
-        InputError: the drive cannot be read.
-    """
-    if isinstance(given, Drive):
-        return given
-    drive: Drive = noted(open_drive(Path(given), lidar, columns), on_note)
-    return drive
 
 
 def noting(on_note: Callable[[str], None]) -> Reporter:

@@ -15,9 +15,9 @@ from cns_drake.base import (
     did_you_mean,
     note,
 )
-from cns_drake.drives import Drive, check_same_map, check_same_world
-from evaluation.alignment import When, in_one_world
-from evaluation.drives import NOT_FINITE, CountedDrive
+from cns_drake.drives import Drive
+from evaluation.alignment import When, open_in_one_world
+from evaluation.drives import NOT_FINITE, CountedDrive, Reading
 from evaluation.methods import Method
 from evaluation.recognition import (
     PROTOCOLS,
@@ -47,7 +47,6 @@ from evaluation.verbs.measured import (
     Measured,
     map_of,
     noting,
-    opened_drive,
     pair_key,
     rows_of,
 )
@@ -94,8 +93,10 @@ def recognise(
     metrics: Iterable[Path | str] = (),
     align: When = "auto",
     across_maps: bool = False,
-    lidar: str | None = None,
-    columns: int | None = None,
+    lidar: str | Sequence[str] | None = None,
+    odometry: str | Sequence[str] | None = None,
+    poses: Path | Sequence[Path] | None = None,
+    columns: int | Sequence[int] | None = None,
     exact_overlaps: Path | None = None,
     on_note: Callable[[str], None] = note,
     **fields: Any,
@@ -120,7 +121,10 @@ def recognise(
         align: whether to align the drives: `auto` (if their world frames
             differ), `always` or `never`.
         across_maps: whether the drives may be through maps of different names.
-        lidar: name of the LiDAR, for recordings with several LiDARs.
+        lidar: name of the LiDAR, for recordings with several LiDARs; like the
+            next three, one value for all drives, or a list with one for each.
+        odometry: topic of the poses, for recordings with several.
+        poses: file with the poses of the LiDAR, see `open_drive`.
         columns: number of columns of `.bin` files.
         exact_overlaps: file with exact overlaps; by default overlaps are
             estimated from the scans. It needs the field `overlap`.
@@ -153,12 +157,14 @@ def recognise(
             f"--exclude-recent: it is for a drive against itself, but"
             f" {_named(query)} is not {_named(database)}"
         )
-    opened = [
-        opened_drive(one, lidar, columns, on_note) for one in (database, query)
-    ]
-    drives = _in_one_world(opened, align, on_note, across_maps=across_maps)
-    overlaps = _overlaps(*drives, protocol, exact_overlaps)
-    places, queries = drives
+    readings = Reading.each(
+        2, lidar=lidar, odometry=odometry, poses=poses, columns=columns
+    )
+    opened, _ = open_in_one_world(
+        (database, query), readings, align, on_note, across_maps=across_maps
+    )
+    places, queries = drives = [_scans_of(one) for one in opened]
+    overlaps = _overlaps(places, queries, protocol, exact_overlaps)
     outcomes = measure_places(
         noting(on_note),
         PlaceComparison(
@@ -262,6 +268,17 @@ def _choice(
     return choice, columns
 
 
+def _scans_of(opened: Drive | Path) -> CountedDrive:
+    """Returns a drive that counts what is ignored of it.
+
+    Raises:
+        InputError: it is a point cloud.
+    """
+    if isinstance(opened, Path):
+        raise InputError(f"{opened}: a point cloud, not a recorded drive")
+    return CountedDrive(opened)
+
+
 def _is_itself(database: Drive | Path | str, query: Drive | Path | str) -> bool:
     if isinstance(database, Drive) or isinstance(query, Drive):
         return database is query
@@ -270,35 +287,6 @@ def _is_itself(database: Drive | Path | str, query: Drive | Path | str) -> bool:
 
 def _named(given: Drive | Path | str) -> str:
     return given.name if isinstance(given, Drive) else str(given)
-
-
-def _in_one_world(
-    drives: Sequence[Drive],
-    align: When,
-    on_note: Callable[[str], None],
-    *,
-    across_maps: bool,
-) -> tuple[CountedDrive, CountedDrive]:
-    """Returns both drives in one world, and counts what is ignored of them.
-
-    Raises:
-        InputError: the drives are not of one map, or cannot be aligned.
-    """
-    database, query = drives
-    if not across_maps:
-        try:
-            check_same_map(database, query)
-        except InputError as error:
-            raise InputError(
-                f"{error} (--across-maps allows this, for cities along the same"
-                " streets)"
-            ) from None
-    alignment = in_one_world(database, query, align, across_maps=across_maps)
-    if alignment is not None:
-        on_note(alignment.report.to_text())
-        database, query = alignment.first, alignment.second
-    check_same_world(database, query, across_maps=across_maps)
-    return CountedDrive(database), CountedDrive(query)
 
 
 def _overlaps(

@@ -31,7 +31,6 @@ import time
 import numpy as np
 from processes import in_process
 
-from cns_drake.drives import DriveNames
 from evaluation.methods import Method, make_method
 from evaluation.recognition import (
     MOST_BYTES,
@@ -121,9 +120,7 @@ def recorded(
     files = sorted(features.glob(f"*/described_{name}.data"))
     drives = []
     for file in files:
-        names, drive = Part(file).read()
-        assert isinstance(names, DriveNames)
-        drives.append(drive)
+        drives.append(Part(file).read())
     of_places = [one for d in drives for one in d.places.descriptors]
     asked = drives[-1].queries.descriptors
     if num_places > len(of_places):

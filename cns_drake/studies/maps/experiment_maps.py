@@ -61,11 +61,7 @@ class MapPairs:
     @property
     def drive_names(self) -> set[str]:
         """The names of all drives."""
-        recordings = (
-            (*self.city.stages.values(), *self.city.others)
-            if self.city is not None
-            else ()
-        )
+        recordings = self.city.recordings if self.city is not None else ()
         names = {one.name for one in recordings}
         return names | {one.name for pair in self.pairs for one in pair}
 
@@ -145,7 +141,9 @@ def _pairs_of(
         return
     if path.is_dir() and not MapFolder(path).drives():
         with errors_at(place) if place else nullcontext():
-            recorded = drives_by_map(find_recordings(path, run.on_note))
+            recorded = drives_by_map(
+                find_recordings(path, run.on_note), run.on_note
+            )
         for city in recorded:
             yield MapPairs(city.name, {}, city=city)
         return

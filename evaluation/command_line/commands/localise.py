@@ -31,8 +31,10 @@ def localise(
         float | None, typer.Option(metavar="PART")
     ] = None,
     align: options.Align = "auto",
-    lidar: shared_options.LidarName = None,
-    columns: shared_options.Columns = None,
+    lidar: options.Lidars = None,
+    odometry: options.Odometry = None,
+    poses: options.Poses = None,
+    columns: options.Columns = None,
     jobs: shared_options.Jobs = None,
     output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     json: shared_options.Json = False,
@@ -99,8 +101,7 @@ def localise(
         track=track,
         odometry_drift=odometry_drift,
         align=align,
-        lidar=lidar,
-        columns=columns,
+        **options.readings(lidar, odometry, poses, columns),
         processes=choose_cluster(jobs, None).num_workers,
     )
     values: dict = {

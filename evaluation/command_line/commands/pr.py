@@ -39,8 +39,10 @@ def pr(
     parameter: shared_options.MethodSettings = None,
     sensor_height: options.SensorHeight = 1.6,
     align: options.Align = "auto",
-    lidar: shared_options.LidarName = None,
-    columns: shared_options.Columns = None,
+    lidar: options.Lidars = None,
+    odometry: options.Odometry = None,
+    poses: options.Poses = None,
+    columns: options.Columns = None,
     across_maps: Annotated[bool, typer.Option("--across-maps")] = False,
     truth: Annotated[
         str, typer.Option(metavar="radius|overlap:PART")
@@ -129,8 +131,7 @@ def pr(
             metrics=metric or (),
             align=align,
             across_maps=across_maps,
-            lidar=lidar,
-            columns=columns,
+            **options.readings(lidar, odometry, poses, columns),
             exact_overlaps=exact_overlaps,
             hide_sector=hide_sector,
             seed=seed,

@@ -22,8 +22,10 @@ def tcr(
     target: Annotated[Path, typer.Argument(metavar="B")],
     no_change: Annotated[Path | None, typer.Option(metavar="C")] = None,
     align: options.Align = "auto",
-    lidar: shared_options.LidarName = None,
-    columns: shared_options.Columns = None,
+    lidar: options.Lidars = None,
+    odometry: options.Odometry = None,
+    poses: options.Poses = None,
+    columns: options.Columns = None,
     output: options.Tables = None,
     json: shared_options.Json = False,
 ) -> None:
@@ -58,8 +60,7 @@ def tcr(
         target,
         no_change=no_change,
         align=align,
-        lidar=lidar,
-        columns=columns,
+        **options.readings(lidar, odometry, poses, columns),
     )
     report = found.report
     if output is not None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 
 from cns_drake.base import InputError, natural_key
-from cns_drake.drives import LidarField
-from evaluation.study.sources import DriveSource, RecordingSource
+from cns_drake.drives import Drive, LidarField
+from evaluation.alignment import in_one_world
+from evaluation.study.sources import DriveSource, Placement, RecordingSource
 from evaluation.study.tasks.pair import USUAL_LENGTH, NamedDrive
 
 _GUESSED = (
@@ -37,6 +38,8 @@ class RecordingInfo:
             unknown.
         is_guessed: whether map and stage come from the name of the drive.
         length, num_scans: see `NamedDrive`.
+        world_frame: name of the world frame of its poses; None if the recording
+            does not exist yet.
     """
 
     name: str
@@ -50,6 +53,7 @@ class RecordingInfo:
     is_guessed: bool = False
     length: float = USUAL_LENGTH
     num_scans: float = math.inf
+    world_frame: str | None = None
 
     @property
     def source(self) -> DriveSource:
@@ -90,6 +94,11 @@ class MapDrives:
     name: str
     stages: dict[str, RecordingInfo]
     others: tuple[RecordingInfo, ...]
+
+    @property
+    def recordings(self) -> tuple[RecordingInfo, ...]:
+        """All drives through the map."""
+        return (*self.stages.values(), *self.others)
 
     @property
     def last(self) -> RecordingInfo:
@@ -152,6 +161,35 @@ class MapDrives:
         return None
 
 
+def _aligned(city: MapDrives, on_note: Callable[[str], None]) -> MapDrives:
+    """Returns a map's recordings in the world of the last stage's drive."""
+    last = city.last
+    there = [last, *(one for one in city.recordings if one is not last)]
+    frames = {one.world_frame for one in there} - {None}
+    if len(frames) <= 1 or not city.change_pairs():
+        return city
+    drives, reports = in_one_world([one.source() for one in there])
+    for report in reports:
+        on_note(report.to_text())
+    placed = {
+        one.name: replace(one, made_by=_placed(one, drive))
+        for one, drive in zip(there, drives, strict=True)
+    }
+    return replace(
+        city,
+        stages={key: placed[one.name] for key, one in city.stages.items()},
+        others=tuple(placed[one.name] for one in city.others),
+    )
+
+
+def _placed(one: RecordingInfo, drive: Drive | Path) -> RecordingSource:
+    """Returns the source of a recording at the poses of an aligned drive."""
+    source = one.source
+    assert isinstance(source, RecordingSource)
+    assert isinstance(drive, Drive)
+    return replace(source, placement=Placement.of(drive))
+
+
 def nothing_to_compare(cities: Iterable[MapDrives]) -> list[str]:
     """Returns a note for the user on each map with drives in only one stage."""
     return [
@@ -172,12 +210,22 @@ def nothing_to_compare(cities: Iterable[MapDrives]) -> list[str]:
     ]
 
 
-def drives_by_map(recordings: Iterable[RecordingInfo]) -> list[MapDrives]:
+def drives_by_map(
+    recordings: Iterable[RecordingInfo],
+    on_note: Callable[[str], None] = lambda text: None,
+) -> list[MapDrives]:
     """Groups recordings by map, and sorts the maps by name.
+
+    The recordings of a map are then in one world: if their world frames differ,
+    they are aligned.
+
+    Args:
+        recordings: the recordings.
+        on_note: is called with a note on each alignment.
 
     Raises:
         InputError: if two recordings have the same name, or the same map and
-            stage.
+            stage; or they cannot be aligned.
     """
     recordings = list(recordings)
     paths: dict[str, Path] = {}
@@ -189,7 +237,10 @@ def drives_by_map(recordings: Iterable[RecordingInfo]) -> list[MapDrives]:
             )
         paths[one.name] = one.path
     return [
-        _drives_of_map(name, [r for r in recordings if r.map_name == name])
+        _aligned(
+            _drives_of_map(name, [r for r in recordings if r.map_name == name]),
+            on_note,
+        )
         for name in sorted({recording.map_name for recording in recordings})
     ]
 

@@ -13,12 +13,10 @@ from typing import Any, NamedTuple
 from cns_drake.base import (
     InputError,
     did_you_mean,
-    errors_at,
     fingerprint,
     natural_key,
     repeated,
 )
-from cns_drake.drives import check_same_world
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol
 from evaluation.results import OWN
 from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
@@ -124,10 +122,10 @@ def chosen_recordings(
         where: file and field of the names, for errors.
 
     Raises:
-        InputError: a recording is unknown, is named twice, is in another world,
-            is the query, or is later than the query.
+        InputError: a recording is unknown, is named twice, is the query, or
+            is later than the query.
     """
-    known = {one.name: one for one in (*city.stages.values(), *city.others)}
+    known = {one.name: one for one in city.recordings}
     for name in repeated(names):
         raise InputError(f"{where}: {name}: the same drive twice")
     query = city.last
@@ -141,8 +139,6 @@ def chosen_recordings(
         if name == query.name:
             raise InputError(f"{where}: {name}: this drive is the query")
         recording = known[name].source()
-        with errors_at(where):
-            check_same_world(recording, placed)
         start_ns, query_start_ns = recording.stamps_ns[0], placed.stamps_ns[0]
         is_dated = start_ns > _DATED_NS and query_start_ns > _DATED_NS
         if is_dated and start_ns > query_start_ns:

@@ -202,4 +202,5 @@ def _recording_info(
         is_guessed=is_guessed,
         length=float(travelled(drive.X_WS[:, :3, 3])[-1]),
         num_scans=len(drive),
+        world_frame=drive.world_frame,
     )

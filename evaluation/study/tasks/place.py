@@ -214,7 +214,7 @@ def measure_costs(
     ):
         method = choice.make()
         searched = compared.searched(k, database[k], method)
-        asked = query[k].read()[1]
+        asked = query[k].read()
         found[choice.key] = measure_search(
             method, searched.described.places, asked
         )

@@ -1,4 +1,6 @@
 import json
+import pickle
+from types import SimpleNamespace
 
 from helpers.dataset_folders import (
     T0_NS,
@@ -24,10 +26,11 @@ import pytest
 
 from cns_drake.base import InputError, poses, xyz
 from cns_drake.drives import Drive
-from evaluation.alignment import in_one_world
-from evaluation.change import maps_in_one_world, temporal_change
-from evaluation.drives import open_drive
+from evaluation.alignment import in_one_world, open_in_one_world
+from evaluation.change import temporal_change
+from evaluation.drives import Reading, open_drive
 from evaluation.maps import map_drive
+from evaluation.study import RecordingInfo, RecordingSource, drives_by_map
 
 pytestmark = pytest.mark.slow
 
@@ -76,12 +79,19 @@ def apart(X, Y):
     return np.linalg.norm((X - Y)[:, :3, 3], axis=1).max()
 
 
+def aligned(first: Drive, second: Drive, when: str) -> SimpleNamespace:
+    """Returns two drives in one world, with the report."""
+    (first, second), (report,) = in_one_world([first, second], when)
+    return SimpleNamespace(first=first, second=second, report=report)
+
+
 def test_a_wrong_datum(drives, truth):
     """The datum is wrong by tens of metres and more than a quarter turn."""
     recorded = ELSEWHERE @ drives.X_second
     first, second = drives.first(), drives.second(recorded, frame="odom")
-    assert in_one_world(first, second, "never") is None
-    result = in_one_world(first, second, "auto")
+    with pytest.raises(InputError, match="second: poses in frame 'odom', th"):
+        in_one_world([first, second], "never")
+    result = aligned(first, second, "auto")
     assert apart(result.second.X_WS, drives.X_second) < 0.03
     np.testing.assert_array_equal(result.first.X_WS, drives.X_first)
     assert change(result.first, result.second) == pytest.approx(truth, abs=0.01)
@@ -107,9 +117,9 @@ def test_a_wrong_datum(drives, truth):
 def test_a_small_error_in_a_common_frame(drives, truth):
     recorded = rigid([1.5, -2.0, 0.8], 1.5) @ drives.X_second
     first, second = drives.first(), drives.second(recorded)
-    assert in_one_world(first, second, "auto") is None
-    assert in_one_world(first, second, "never") is None
-    result = in_one_world(first, second, "always")
+    for when in ("auto", "never"):
+        assert in_one_world([first, second], when) == ([first, second], [])
+    result = aligned(first, second, "always")
     assert result.report.guess == "the common frame"
     assert result.report.candidates is None
     assert len(result.second) == len(recorded)
@@ -122,7 +132,7 @@ def test_a_small_error_in_a_common_frame(drives, truth):
 def test_a_common_frame_that_is_none(drives):
     """The poses name one frame but are far off: places must be recognised."""
     recorded = ELSEWHERE @ drives.X_second
-    result = in_one_world(drives.first(), drives.second(recorded), "always")
+    result = aligned(drives.first(), drives.second(recorded), "always")
     assert result.report.guess == "places that look alike"
     assert apart(result.second.X_WS, drives.X_second) < 0.03
 
@@ -132,7 +142,7 @@ def test_a_drive_that_drifts(drives, truth):
     # The trajectory is bent so strongly that no rigid pose fits.
     rigidly = drives.X_second[25] @ poses.inverse(recorded[25]) @ recorded
     assert apart(rigidly, drives.X_second) > 1.5
-    result = in_one_world(
+    result = aligned(
         drives.first(), drives.second(recorded, frame="odom"), "always"
     )
     assert result.report.model == "pose graph"
@@ -149,7 +159,7 @@ def test_the_drive_that_drifts_gives_way(drives):
     scans = make_scans(town, X)
     recorded = ELSEWHERE @ drifted(X, scale=1.01, turn_deg=4.0)
     bad = TownDrive("bad", scans, recorded, frame="odom")
-    result = in_one_world(bad, drives.second(), "always")
+    result = aligned(bad, drives.second(), "always")
     assert (result.report.held, result.report.moved) == ("second", "bad")
     assert result.report.frames == ("map", "odom")
     assert result.report.straightened[0] == 0.0
@@ -159,14 +169,16 @@ def test_the_drive_that_drifts_gives_way(drives):
     good = change(TownDrive("good", scans, X), drives.second())
     assert change(result.first, result.second) == pytest.approx(good, abs=0.01)
     # This does not hold if others are aligned to it already.
-    held = in_one_world(bad, drives.second(), "always", hold_first=True)
-    assert held.report.held == "bad"
-    np.testing.assert_array_equal(held.first.X_WS, recorded)
+    (held, *_), reports = in_one_world(
+        [bad, TownDrive("same", scans, recorded, frame="odom"), drives.second()]
+    )
+    assert [one.held for one in reports] == ["bad"]
+    np.testing.assert_array_equal(held.X_WS, recorded)
 
 
 def test_heights_start_at_the_ground(drives):
     recorded = rigid([0.0, 0.0, 61.3], 0.0) @ drives.X_first
-    result = in_one_world(
+    result = aligned(
         drives.first(recorded, frame="utm"), drives.second(), "always"
     )
     assert result.report.ground == pytest.approx(61.3, abs=0.05)
@@ -181,7 +193,7 @@ def test_another_town(drives):
     X = route()
     other = TownDrive("other", make_scans(make_town(seed=8), X), X, "elsewhere")
     with pytest.raises(InputError, match="other: cannot be aligned to first"):
-        in_one_world(drives.first(), other, "always")
+        aligned(drives.first(), other, "always")
 
 
 @pytest.mark.parametrize("number", [1, 2])
@@ -190,14 +202,14 @@ def test_next_to_nothing(drives, number):
         "few", drives.scans_second[:number], drives.X_second[:number]
     )
     with pytest.raises(InputError, match="few: cannot be aligned to first"):
-        in_one_world(drives.first(), few, "always")
+        aligned(drives.first(), few, "always")
 
 
 def test_scans_that_show_nothing(drives):
     empty = [scan[:0] for scan in drives.scans_second]
     blind = TownDrive("blind", empty, drives.X_second)
     with pytest.raises(InputError, match="blind: cannot be aligned to first"):
-        in_one_world(drives.first(), blind, "always")
+        aligned(drives.first(), blind, "always")
 
 
 def record(folder, scans, X_WS, frame):
@@ -247,9 +259,10 @@ def test_command_tcr(capsys, recordings, truth):
     assert "second (poses in 'odom') aligned to first (in 'map'): " in err
     status, out, err = run(capsys, "tcr", *paths, "--align", "never")
     assert status == 2
-    assert err.count("\n") == 1
-    assert "'odom'" in err
-    assert "'map'" in err
+    fault = err.splitlines()[-1]
+    assert fault.endswith(
+        "second: poses in frame 'odom', those of first in 'map'"
+    )
 
 
 @pytest.mark.night
@@ -266,27 +279,51 @@ def test_command_pr(capsys, recordings):
 
 
 def test_a_control_joins_the_same_world(recordings, drives):
-    maps, reports = maps_in_one_world(list(recordings.values()), "auto")
+    opened, reports = in_one_world(list(map(open_drive, recordings.values())))
     assert [report.moved for report in reports] == ["second", "third"]
-    for one in maps[1:]:
-        np.testing.assert_allclose(
-            one.positions, drives.X_second[:, :3, 3], atol=0.05
-        )
-    np.testing.assert_allclose(
-        maps[0].positions, drives.X_first[:, :3, 3], atol=1e-9
-    )
+    for one in opened[1:]:
+        assert apart(one.X_WS, drives.X_second) < 0.05
+    assert apart(opened[0].X_WS, drives.X_first) < 1e-9
+
+
+def test_recordings_of_a_city_are_aligned_once(recordings, drives):
+    notes = []
+    infos = [
+        RecordingInfo(name, path, "town", name, None, world_frame=name)
+        for name, path in recordings.items()
+    ]
+    (city,) = drives_by_map(infos, notes.append)
+    assert [note.split()[0] for note in notes] == ["first", "second"]
+    X_WS = {one.name: one.source().X_WS for one in city.recordings}
+    X_TW = X_WS["first"][0] @ poses.inverse(drives.X_first[0])
+    for name in ("second", "third"):
+        assert apart(X_WS[name], X_TW @ drives.X_second) < 0.05
+    # The identity of an aligned recording is that of its poses, too.
+    moved = city.stages["first"].source
+    assert moved.identity() != RecordingSource(moved.path).identity()
+    assert moved.identity() == pickle.loads(pickle.dumps(moved)).identity()
 
 
 def test_map_files_are_taken_as_they_are(recordings, drives, tmp_path):
     np.save(tmp_path / "map.npy", make_town())
     paths = [recordings["first"], tmp_path / "map.npy"]
-    maps, reports = maps_in_one_world(paths, "auto")
+    readings = Reading.each(2)
+    opened, reports = open_in_one_world(paths, readings, "auto", print)
     assert reports == []
-    assert maps[1].name == "map.npy"
-    with pytest.raises(InputError, match="--align always: a map file"):
-        maps_in_one_world(paths, "always")
+    assert opened[1] == paths[1]
+    with pytest.raises(InputError, match=r"--align always: .*map\.npy"):
+        open_in_one_world(paths, readings, "always", print)
     with pytest.raises(InputError, match="--lidar roof: a map file has no"):
-        maps_in_one_world(paths[1:] * 2, "auto", "roof")
+        open_in_one_world(
+            paths[1:] * 2, Reading.each(2, lidar="roof"), "auto", print
+        )
+
+
+def test_options_count_for_one_drive_or_for_all():
+    one, two = Reading.each(2, lidar=["a", "b"], columns=5)
+    assert (one.lidar, one.columns, two.lidar, two.columns) == ("a", 5, "b", 5)
+    with pytest.raises(InputError, match=r"--odometry: given 3 times; .* or 2"):
+        Reading.each(2, odometry=["/a", "/b", "/c"])
 
 
 @pytest.mark.night

@@ -18,7 +18,10 @@ def test_two_draws_of_a_city(capsys, tmp_path):
     both = ["pr", tmp_path / "town_01", tmp_path / "town_c1_02"]
     both += ["--method", "solid", "--json"]
     assert_refused(
-        capsys, both, "through town_c1", "through town (--across-maps"
+        capsys,
+        both,
+        "through town_c1",
+        "(cns-eval pr --across-maps",
     )
     with pytest.raises(InputError, match="through town_c1"):
         place_outcome(*map(open_drive, both[1:3]), make_method("solid", {}))

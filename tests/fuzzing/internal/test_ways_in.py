@@ -536,7 +536,6 @@ CLOUDS = (
     "evaluation.clouds.read_blocks",
     "evaluation.clouds.read_cloud",
     "evaluation.change.read_map",
-    "evaluation.change.open_source",
 )
 
 

@@ -117,7 +117,7 @@ def test_drives_that_are_longer_than_the_memory_give_the_same(
     monkeypatch.setattr(parts, "_MOST_HELD", 3)
     monkeypatch.setattr(parts, "_BLOCK", 2)
     monkeypatch.setattr(place_measurements, "MOST_BYTES", 100_000)
-    places, asked = (one[1].read()[1] for one in compared(stored).stored)
+    places, asked = (one[1].read() for one in compared(stored).stored)
     assert places.places.descriptors.is_in_file
     assert asked.queries.descriptors.is_in_file
     found, shown = measured(compared(stored))
