@@ -14,6 +14,7 @@ from dataclasses import is_dataclass
 import inspect
 import itertools
 from pathlib import Path
+import re
 import typing
 from typing import Any
 
@@ -160,6 +161,7 @@ METHODS: Sections = {
 }
 # Where the page of the fields of a drive finds those of a data sheet.
 _OF_LIDARS = "lidars.md"
+_SHEETS = "../../cns_drake/units/sheets"
 # What stands for the default where the model's own does not say it.
 _FILLED_IN = {
     (Scenario, "name"): "the file's name",
@@ -337,12 +339,12 @@ def _lidars_page() -> str:
         LIDAR,
     )
     rows = [
-        (f"`{name}`", *_beams_of(sheet), sheet.source)
+        (f"[`{name}`]({_SHEETS}/{name}.yaml)", *_beams_of(sheet))
         for name, sheet in LIDAR_PRESETS.items()
     ]
     columns = "preset", "rings", "elevations [deg]", "columns", "ranges [m]"
-    presets = _table((*columns, "source"), rows)
-    return f"{fields}\n## Presets\n\n{presets}\n"
+    sources = "The file of each preset names the sources of its numbers:"
+    return f"{fields}\n## Presets\n\n{sources}\n\n{_table(columns, rows)}\n"
 
 
 def _beams_of(sheet: LidarSheet) -> tuple[str, ...]:
@@ -427,7 +429,9 @@ def _values(model: type[BaseModel], name: str) -> str:
     """Returns which values a field takes, after the model's JSON schema."""
     schema = model.model_json_schema()
     alias = model.model_fields[name].alias or name
-    return _kind(schema["properties"][alias], schema.get("$defs", {}))
+    kind = _kind(schema["properties"][alias], schema.get("$defs", {}))
+    # What has limits is a number.
+    return re.sub("^number (?=from|above)", "", kind)
 
 
 def _kind(schema: dict[str, Any], models: dict[str, Any]) -> str:
@@ -563,8 +567,9 @@ def _commands_page() -> str:
             _table(head, own),
         ]
         if others:
-            link = "[options of many commands](#options-of-many-commands)"
-            parts.append(f"And these {link}: {', '.join(others)}.")
+            parts.append(
+                f"[Also](#options-of-many-commands): {', '.join(others)}."
+            )
     parts += ["## Options of many commands", _table(head, shared)]
     return "\n\n".join(parts) + "\n"
 

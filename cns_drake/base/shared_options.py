@@ -17,9 +17,9 @@ Scheduler = Annotated[
     typer.Option(
         metavar="ADDRESS",
         help="Address of a Dask scheduler, such as tcp://10.0.0.1:8786, which "
-        "runs the jobs on several machines. All machines need access to the "
-        "output folder under the same path. By default the value of the "
-        "environment variable DASK_SCHEDULER_ADDRESS, if this variable is set.",
+        "runs the jobs on several machines. All need the output folder under "
+        "the same path. By default the environment variable "
+        "DASK_SCHEDULER_ADDRESS.",
     ),
 ]
 Methods = Annotated[

@@ -172,10 +172,8 @@ class ScatterPlan(_Model):
         clearance: smallest distance of the objects from buildings and streets
             [m].
         ground: kinds of ground on which the objects can stand.
-        kind: first part of the objects' names in the tables. By default `tree`
-            for all trees, `car` for all cars, `truck` for all trucks, `sign`
-            for all traffic signs, and the key in `objects` for all other
-            objects.
+        kind: first part of the names in the tables; by default `tree`, `car`,
+            `truck` or `sign`, or else the name of the object.
     """
 
     objects: Weights = Field(min_length=1)
@@ -195,15 +193,12 @@ class LinePlan(_Model):
         points: points of the line [m]. The objects face to the right of the
             line's direction.
         spacing: smallest and largest distance between two objects [m]. Without
-            `spacing`, one object, such as a fence or a hedge, fills each
-            straight part of the line, or several objects end to end if the part
-            is long or steep.
+            it, one object, such as a fence, fills each straight part of the
+            line, or several end to end if the part is long or steep.
         yaw_deg: angle by which each object is rotated from its usual heading
             along the line [deg].
-        kind: first part of the objects' names in the tables. By default `tree`
-            for all trees, `car` for all cars, `truck` for all trucks, `sign`
-            for all traffic signs, and the key in `objects` for all other
-            objects.
+        kind: first part of the names in the tables; by default `tree`, `car`,
+            `truck` or `sign`, or else the name of the object.
         parameters: settings of the objects, such as `{height: 1.1}` for a
             `garden_wall`.
     """
@@ -223,10 +218,8 @@ class ObjectPlan(_Model):
         object: name of the object to place.
         at: `[x, y]` of the object's position [m].
         yaw_deg: heading of the object [deg].
-        kind: first part of the object's name in the tables. By default `tree`
-            for all trees, `car` for all cars, `truck` for all trucks, `sign`
-            for all traffic signs, and the value of `object` for all other
-            objects.
+        kind: first part of the name in the tables; by default `tree`, `car`,
+            `truck` or `sign`, or else the name of the object.
         parameters: settings of the object, such as `{height: 1.1}` for a
             `garden_wall`.
     """

@@ -46,17 +46,14 @@ class Stage(_Model):
     Attributes:
         story: text that says which changes a visitor would see until the next
             stage.
-        absent: structures that exist in the next stage but not in this stage:
-            lists of names, each list under a heading of your choice. The last
-            stage cannot have this field.
+        absent: structures that the next stage has and this one lacks: lists of
+            names, each under a heading of your choice. Not in the last stage.
         lower: groups of buildings and plants that are lower than in the next
-            stage, each group under a heading of your choice. The last stage
-            cannot have this field.
+            stage, each under a heading of your choice. Not in the last stage.
         sites: groups of buildings that are under construction in this stage
-            only, each group under a heading of your choice. Instead of each
-            building, the stage shows a frame of the given height, together with
-            scaffolds and a crane. The lot of the building must measure at least
-            16 m by 16 m. The last stage cannot have this field.
+            only, each under a heading of your choice: a frame of the given
+            height, with scaffolds and a crane. The lot must measure at least 16
+            m by 16 m. Not in the last stage.
     """
 
     story: str

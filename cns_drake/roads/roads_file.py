@@ -61,9 +61,9 @@ class RoadEntry(RoadStyle):
         end: name of the junction at which the road's centreline ends.
         via: corners of the centreline between the junctions, each as `[x, y,
             radius of the bend]` [m].
-        heights: heights of the road between the junctions, each as `[distance
-            along the centreline, height]` [m]. A monotone cubic curve joins
-            these heights; the curve is level where the road meets a junction.
+        heights: heights between the junctions, each as `[distance along the
+            centreline, height]` [m]. A monotone cubic curve joins them, level
+            at the junctions.
         start_setback: distance from the position of the first junction to the
             start of the road [m]. By default this distance follows from the
             kerb radius.

@@ -279,16 +279,14 @@ class TransientConfig(Section):
             road works: fences, skips or diggers beside the road, and a new kerb
             stone that reaches 0.3 m into the road.
         furniture: share of the poles, lamps and signs that are replaced by new
-            poles, lamps and signs up to 2 m away.
+            ones up to 2 m away.
         roadsides: share of the free places beside kerbs, within 30 m of the
             drive, that get hedges, garden walls, bushes, young trees, garages
-            or parked cars. Each 1 above 1 adds hedges, bushes and trees once
-            more, in the room that is left. Only the cars depend on the seed;
-            all other added objects are the same in every drive.
+            or parked cars; each 1 above 1 adds plants once more. Only the cars
+            depend on the seed.
         height_limit: greatest height of buildings and plants above their lowest
-            point [m]. Buildings that exceed this height by at least 2.5 m (a
-            storey) are cut off at this height, and get a flat roof; plants that
-            exceed this height are scaled down. By default no limit.
+            point [m]. Higher buildings are cut off, with a flat roof; higher
+            plants are scaled down. By default no limit.
     """
 
     seed: int = Field(default=1, ge=0)

@@ -58,8 +58,6 @@ if TYPE_CHECKING:
 class WeatherConfig(Section):
     """The weather. It affects only LiDARs with calibrated returns.
 
-    The notes on calibrated returns list the limits of the model.
-
     Attributes:
         visibility: meteorological visibility in fog [m]; a lower visibility
             means denser fog. By default there is no fog.
@@ -101,10 +99,8 @@ class LidarDescription:
             (from 0 to 1) is lost with the probability `faint_dropout` * (1 -
             I). Only with ideal returns.
         motion_distortion: whether the motion of the LiDAR during a revolution
-            distorts the scan, as in real units. Each column is then measured
-            from the LiDAR's pose at the firing time of this column, `stamp +
-            t`, and expressed in the LiDAR's frame at that time. By default the
-            whole scan is measured from one pose.
+            distorts the scan: each column is then measured from the pose at its
+            firing time, `stamp + t`, and expressed in the frame at that time.
         returns: model of the returns. `ideal` returns are exact, apart from the
             errors that you set; `calibrated` returns have the losses, errors
             and intensities of the unit's data sheet.
@@ -160,9 +156,8 @@ class LidarSection(LidarDescription, Mount):
         resolution: step to which recorded coordinates are rounded [m]; the
             default is 2^-10 m, about 1 mm. 0 records exact values.
         rate: revolutions per second [Hz]. The rate of the fastest LiDAR of the
-            drive must be a multiple of this rate. If the lasers of a unit fire
-            at a fixed frequency, a revolution has more columns at a lower
-            `rate`.
+            drive must be a multiple. A unit that fires steadily has more
+            columns at a lower `rate`.
         layout: LiDAR driver, or other program, whose format the recorded points
             have.
     """

@@ -86,18 +86,15 @@ class BtcConfig(MethodConfig):
             that are merged; [O] 0.1.
         merge_distance_limit: largest distance from the centre of a plane to
             another plane with which it is merged [m]; [O] 0.3.
-        image_axes: axes of the image on a plane, in which keypoints are found.
-            `public` copies the authors' program, in which a wrong term tilts
-            the second axis out of the plane (see
-            `evaluation.methods.btc_keypoints.image_axes`). `orthogonal`
-            corrects this error. [P] public.
+        image_axes: axes of the image on a plane. `public` copies the authors'
+            program, in which a wrong term tilts the second axis out of the
+            plane; `orthogonal` corrects it. [P] public.
         resolution: side of a cell of the image on a plane [m]; [O] 0.5.
         height_range: smallest and largest height of a point that is used,
             measured from the ground [m]; [O] -1, 4.
         height_step: thickness of each layer of the image [m]; [O] 0.1.
-        num_layers: number of layers of the image; [P] 49. The range of heights
-            divided by the step is 50, but a rounding error in the authors'
-            program leaves out one layer. Points in this layer are ignored.
+        num_layers: number of layers of the image; [P] 49, by a rounding error
+            in the authors' program: points in a 50th layer are ignored.
         min_heights: number of occupied layers that a keypoint needs; [O] 10.
         suppression_radius: radius within which only the keypoint with the most
             layers is used [m]; [O] 2.

@@ -379,8 +379,7 @@ class LayeredOverlapConfig(MethodConfig):
             cells.
         min_points: least number of points in an occupied cell.
         poses: number of candidate poses (a place and a heading) that the first
-            search passes to the second. With 24 headings, the default excludes
-            nothing in a database of up to 333 places.
+            search passes to the second.
         refined: number of candidate poses that the second search passes to the
             third.
         candidates: number of places that the third search passes to the last,

@@ -134,11 +134,9 @@ class LearnedConfig(MethodConfig):
     Attributes:
         weights: file with weights from `cns-drake train`. By default the
             shipped weights of the variant.
-        variant: which shipped weights to use. With `radius`, the network was
-            trained on streets of the shipped cities, and every place within 7.5
-            m of a query was a match. With `graded`, the network was trained on
-            other streets, and the places of a query were ranked by their exact
-            overlap.
+        variant: which shipped weights to use: `radius`, trained on streets of
+            the shipped cities, with matches within 7.5 m, or `graded`, on other
+            streets, with exact overlaps.
     """
 
     weights: Path | None = None

@@ -59,12 +59,10 @@ class ScanContextConfig(MethodConfig):
     evaluation program.
 
     Attributes:
-        variant: kind of context (descriptor): polar or Cartesian (cart). The
-            augmented kinds add copies of each place to the database:
-            `augmented-polar` adds two copies, as seen from positions at the
-            distance `lateral_shift` to the left and to the right;
-            `augmented-cart` adds one copy, as seen by a car in the opposite
-            direction. [T] calls the default A-PC.
+        variant: kind of context: polar or Cartesian (cart). The augmented kinds
+            add copies of each place: `augmented-polar` two, as seen from
+            `lateral_shift` to the left and to the right; `augmented-cart` one,
+            as seen in the opposite direction. [T] calls the default A-PC.
         voxel_size: side of the voxels to which each cloud is first downsampled
             [m]; [T] 0.5.
         rings: number of rings of the polar context; [T], [C] 20.

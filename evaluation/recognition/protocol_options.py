@@ -27,10 +27,9 @@ class _Name(str, Enum):
 
 
 _WHAT = (
-    "Protocol, which says how the scans of the query drive become queries. "
-    "random-yaw rotates each scan by a random yaw and tilt, so that no method "
-    "profits from equal headings. paper follows the CNS paper. recorded leaves "
-    "the scans unchanged."
+    "Protocol of the queries. random-yaw rotates each scan by a random yaw and "
+    "tilt, so that no method profits from equal headings; paper follows the "
+    "CNS paper; recorded leaves the scans unchanged."
 )
 _NAMED: _Options = {
     "named_protocol": (
@@ -94,12 +93,9 @@ _FIELDS: _Options = {
             "exclude_recent",
             float | None,
             None,
-            "Measure loop closure: also compare each drive with itself. S is "
-            "the shortest time between a place and a query of the same drive "
-            "[s], such as 30: a query is compared only with places that the "
-            "car passed at least S seconds before the query. With this option, "
-            "every method scores all of these places. Without this option, "
-            "scan-context++ scores only a few candidates.",
+            "Measure loop closure: also compare each drive with itself, a "
+            "query with all places that the car passed at least S seconds "
+            "before, such as 30.",
             "S",
         ),
     )

@@ -99,9 +99,8 @@ def age(
     """Simulate years of change in a city.
 
     Every year, each lot, tree and street object may change, with a given
-    probability: buildings are built, torn down and replaced, trees die, lamps
-    and signs move. Writes pictures, a table of all events, the observed rates,
-    and a map with a stage for today and a stage for each given year.
+    probability. Writes pictures, a table of all events, the observed rates, and
+    a map with a stage for today and for each given year.
 
     Args:
         source: Name of a shipped map, or folder of a map.

@@ -29,16 +29,15 @@ def city(
             writes the stages to this folder, and updates the folder's table of
             drives.
         new: Start from a folder with only roads.yaml: first write the missing
-            files, which are two stages, a drive for each stage, and a city.yaml
-            with a district for each block. Existing files are not changed.
+            files (two stages, a drive for each, and a city.yaml with a district
+            for each block).
         seed: Seed of the random districts and drives that --new writes; by
             default 0.
         check: Write nothing. List the files that would change, and exit with
             status 1 if any would.
-        repair_stages: Update the names of structures in stages.yaml. Use this
-            option after you have added something to city.yaml, because
-            additions renumber the structures. The command recognises structures
-            by their coordinates in the structures.csv of the last run.
+        repair_stages: Update the names of structures in stages.yaml, since
+            additions to city.yaml renumber them. Structures are recognised by
+            their coordinates in the structures.csv of the last run.
 
     Example:
         cns-drake city town --new

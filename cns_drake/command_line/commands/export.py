@@ -64,9 +64,9 @@ def export(
     """Convert recordings for other programs.
 
     The format map-sessions contains two maps without labels, from recordings
-    whose world is unknown, such as real drives. Before cns-eval map-update can
-    use these maps, add ground truth of your own: A/truth.npy and B/truth.npy.
-    All other formats convert one recording.
+    whose world is unknown, such as real drives; for cns-eval map-update, add
+    ground truth of your own: A/truth.npy and B/truth.npy. All other formats
+    convert one recording.
 
     Args:
         drives: Recording to convert; with --format map-sessions, two drives.

@@ -72,24 +72,20 @@ def import_(
             stage (never).
         lod: Level of detail (LoD) at which buildings are read from CityJSON,
             such as 1.2; by default the highest level that each building has.
-        seed: Seed of all random choices: which buildings change between the
-            first stage and today (--grow), and which details are added to
-            buildings and streets. For an OpenDRIVE file, which has no
-            buildings, the whole city depends on the seed.
+        seed: Seed of all random choices: which buildings change (--grow), and
+            which details are added. For an OpenDRIVE file, the whole city
+            depends on it.
         along: CSV file with the path of a drive of your own: columns x and y in
-            the frame of the map [m]. This drive replaces the two drives that
-            the command otherwise makes.
+            the frame of the map [m]. It replaces both drives.
         within: Greatest distance of structures from the drives [m]. Structures
             beyond this distance are left out, to save memory. By default, no
             structure is left out.
         drive_on: Side of the street on which cars drive; by default the side
             that the file names, or right if the file names none.
-        grow: Share of today's buildings, from 0.01 to 0.9, that change between
-            the first stage, which the import adds, and today. By default, 0.3
-            of the buildings, sampled at random, are missing or lower in the
-            first stage. For an OpenDRIVE file, this share of the buildings is
-            missing: the buildings farthest east, by default 0.35 of all
-            buildings. Not with --years or --plain, which add no such stage.
+        grow: Share of today's buildings, from 0.01 to 0.9, that are missing or
+            lower in the first stage, by default 0.3; for an OpenDRIVE file, the
+            share that is missing, farthest east, by default 0.35. Not with
+            --years or --plain.
         plain: Do not add windows, lamps, parked cars and other details that the
             file does not contain. A map from an OpenDRIVE file, which contains
             no buildings, still gets buildings along its roads.

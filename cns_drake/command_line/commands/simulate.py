@@ -38,10 +38,9 @@ def simulate(
     Args:
         scenario: Name of a shipped drive, as cns-drake list shows it, or a
             scenario file of your own.
-        beside: Page that --recording wrote of another drive in the same city,
-            such as an earlier stage. The page of this drive then shows both
-            drives side by side: when you move in one of them, the other goes to
-            the same place.
+        beside: Page that --recording wrote of another drive in the same city.
+            The new page then shows both side by side: when you move in one, the
+            other goes to the same place.
 
     Example:
         cns-drake simulate metropolis_01 --output drives

@@ -48,13 +48,12 @@ def train(
 ) -> None:
     """Train the place-recognition method `learned`.
 
-    The training simulates drives through cities that are generated at random
-    along the streets of Riverside, Suburbia and Downtown. The drives differ in
-    the stage of the city and in the driver, and are not recorded. A third of
-    the drives have one of five presets with 16 to 128 rings, and the others the
-    LiDAR of the map. With --lidar, which may be repeated, each drive has one of
-    these LiDARs at random. On one machine, the same command always gives the
-    same weights. Needs the optional packages of the extra `train` (JAX).
+    The training simulates drives through random cities along the streets of
+    Riverside, Suburbia and Downtown, which differ in stage and driver. A third
+    of the drives have one of five presets with 16 to 128 rings, the others the
+    LiDAR of the map, or all of them those of --lidar, which may be repeated. On
+    one machine, the same command always gives the same weights. Needs the extra
+    `train` (JAX).
 
     Args:
         output: File for the weights. The training curve is written to FILE.png.
@@ -70,18 +69,16 @@ def train(
             --minutes.
         seed: Seed of all random choices. Another seed gives other cities and
             other weights.
-        without: Kind of variation to leave out of the training, in order to
-            measure what this kind contributes. change: the city changes between
-            drives. returns: weather, and the losses and errors of a real LiDAR.
-            driver: the car wanders in its lane and changes lanes. May be
+        without: Kind of variation to leave out, in order to measure what it
+            contributes. change: of the city between drives. returns: weather,
+            losses and errors. driver: wandering and lane changes. May be
             repeated.
         drawn_streets: Generate cities along random streets instead of the
             streets of the shipped maps. The shipped maps can then serve as a
             test, because the training has never seen their streets.
         graded: Train with exact overlaps, so that a place ranks higher if it
-            shows more of the query's scan. Without --graded, all places within
-            7.5 m of a query are equally good matches. With --graded, the
-            training takes about 1.5 times as long as without.
+            shows more of the query's scan; takes about 1.5 times as long.
+            Without it, all places within 7.5 m of a query are equally good.
 
     Example:
         cns-drake train --output mine.npz --minutes 10

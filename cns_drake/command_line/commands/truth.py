@@ -50,10 +50,9 @@ def truth(
     """Write exact ground truth about two drives through one city.
 
     The format maps is the ground truth for change detection: maps of two drives
-    through the same place, with an exact label for each point. The labels of
-    the older map are kept, gone, and unobserved by the newer drive; the labels
-    of the newer map are kept, new, and newly seen. cns-eval map-update compares
-    the labels of your own change detector with this ground truth.
+    with an exact label for each point, which cns-eval map-update compares with
+    those of a change detector. The older map has the labels kept, gone and
+    unobserved, the newer one kept, new and newly seen.
 
     The format overlaps has the exact overlap of each query of drive B with each
     place of drive A, for cns-eval pr --exact-overlaps.

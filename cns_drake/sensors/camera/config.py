@@ -18,7 +18,7 @@ class CameraSection(Section):
         width: width of the image in pixels, at least 2.
         height: height of the image in pixels, at least 2.
         rate: images per second [Hz]. The scan rate of the first LiDAR must be a
-            multiple of this rate, because each image has the stamp of a scan.
+            multiple.
         fov_y_deg: vertical field of view [deg]; by default one radian.
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg]; with zeros the camera

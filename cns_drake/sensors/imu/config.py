@@ -58,11 +58,9 @@ class ImuSection(ImuDescription, Mount):
     Attributes:
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
-        rate: samples per second [Hz], such as 100, 200, 250, 400 or 500. The
-            rate must be at most 1000 and at least the scan rate, and the time
-            between two samples must be a whole number of nanoseconds. By
-            default the rate in the file `kalibr`; without this file, one sample
-            per scan.
+        rate: samples per second [Hz]: at least the scan rate, at most 1000, and
+            a whole number of nanoseconds apart. By default the rate in the file
+            `kalibr`, or one sample per scan.
     """
 
     xyz: Triple = (-1.0, 0.0, 1.6)

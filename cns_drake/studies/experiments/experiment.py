@@ -100,9 +100,8 @@ class MadeMap(Section):
         grow: share of the imported buildings, sampled at random, that change
             between the first stage and today: in the first stage they are
             missing, or lower than today.
-        plain: whether the city has only the windows, roofs and kerbs that the
-            file contains. By default, windows, roofs and kerbs that the file
-            lacks are sampled at random, as in `cns-drake import`.
+        plain: whether windows, roofs and kerbs that the file lacks are left
+            out, as with `cns-drake import --plain`.
         seed: seed of all random numbers.
     """
 
@@ -162,17 +161,15 @@ class Experiment(Section):
         both: scenario fields of both drives. A list of values makes the field a
             factor, which varies.
         database: scenario fields of the drive that makes the database. A list
-            of values makes the field a factor. The field `sessions` is a list
-            of several database drives, each with fields of its own. With
-            `sessions`, the field `keep` limits how many places enter the
-            database, and `maintain` names what updates the maps of these
-            drives.
+            of values makes the field a factor. `sessions` is a list of several
+            such drives, of which `keep` selects places and `maintain` updates
+            the maps.
         query: scenario fields of the drive that makes the queries. A list of
             values makes the field a factor.
-        cases: kinds of change by name. Each case sets fields of one or both
-            drives, or is a list of other cases to combine. A list of values
-            sets the levels of a case, the weakest first. Each case is measured
-            by itself and compared with the case `none`, which changes nothing.
+        cases: kinds of change by name. Each sets fields of one or both drives,
+            or is a list of other cases to combine; a list of values sets its
+            levels, the weakest first. Each is compared with the case `none`,
+            which changes nothing.
         levels: which levels of each case to measure, as numbers from 1; by
             default all. If a number in this list exceeds the number of a case's
             levels, the last level of the case is measured instead.
@@ -189,18 +186,13 @@ class Experiment(Section):
             metrics of each task. `results.csv` contains all metrics.
         seeds: seeds of all random numbers. Each condition is measured with each
             seed.
-        protocol: protocol of place recognition: `random-yaw`, `paper` or
-            `recorded`; a list of these names, to measure by several protocols;
-            or fields of a protocol of your own. The field `base` then names a
-            protocol, which provides the fields that you leave out. Each
-            protocol has a baseline of its own.
-        baseline: values of some factors, such as `{both.stage: last}`. Each
+        protocol: `random-yaw`, `paper` or `recorded`; a list of these names,
+            each with a baseline of its own; or fields of a protocol, of which
+            `base` provides the rest.
+        baseline: values of some factors, such as `{both.stage: last}`: each
             condition is compared with the condition that has these values, and
-            its own values of all other factors. By default all conditions are
-            compared with one: that with the first value of each factor, and
-            without a cause of change. With the design `one-at-a-time`, this
-            condition has the values that you name, and the first values of the
-            other factors.
+            its own values of all other factors. By default, it is the one with
+            the first value of each factor, and without a cause of change.
         frozen: table with a fingerprint of each level's drives. The table
             protects a benchmark from changes: if a drive no longer has its
             fingerprint, the study stops with an error.

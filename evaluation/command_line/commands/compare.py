@@ -30,29 +30,26 @@ def compare(
     command ranks the methods in these tables and in the shipped tables by their
     means over the conditions that all tables share.
 
-    From eight maps on, each mean has a 95 % interval over maps. If each table
-    has a queries.csv next to it, the command also prints the difference in R@1
-    between any two methods, with its interval and p-value, both corrected for
-    the number of differences. With --metric relative_auc_strict, the command
-    prints which methods survive. With --rankings, the command prints Kendall's
-    tau between the rankings of any two tables.
+    From eight maps on, each mean has a 95 % interval over maps. With a
+    queries.csv next to each table, the command also prints the difference in
+    R@1 between any two methods, with its interval and p-value, both corrected
+    for the number of differences; with --metric relative_auc_strict, which
+    methods survive.
 
     Args:
         tables: Tables of results to compare, or folders with a results.csv.
         metric: Metric by which the methods are ranked: auc, r1 or another
             metric in the tables, or a Python file that registers a metric of
             your own. An unknown name makes the command list all metrics.
-        protocol: Protocol of the results to compare; own stands for results
-            that were measured with changed options. By default results of all
-            protocols are used, and each result is compared only with results of
-            the same protocol.
+        protocol: Protocol of the results to compare; own stands for changed
+            options. By default, each result is compared with results of the
+            same protocol.
         verified: Rank the results that were measured with geometric
             verification. By default, the results without geometric verification
             are ranked.
-        rankings: Compare only how the tables rank the methods. The methods of
-            each table are ranked over the conditions of that table, so that you
-            can compare tables with different conditions, such as a table of
-            simulated drives and a table of real drives.
+        rankings: Compare only how the tables rank the methods, each over its
+            own conditions, such as of simulated and of real drives: prints
+            Kendall's tau.
 
     Example:
         cns-eval compare mine/results.csv

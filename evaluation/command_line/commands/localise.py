@@ -41,15 +41,13 @@ def localise(
 ) -> None:
     """Localise scans in a map.
 
-    Each scan of QUERY is aligned to MAP by registration, from an initial guess
-    of the scan's pose: the ground-truth pose, moved by --start in a random
-    direction and rotated by --start-turn about a random axis. With --track, the
-    initial guess is instead the estimated pose of the previous scan, moved by
-    the odometry. The results are pose errors and success rates.
+    Each scan of QUERY is aligned to MAP by registration, from an initial guess:
+    the ground-truth pose, moved by --start in a random direction and rotated by
+    --start-turn about a random axis; with --track, the estimated pose of the
+    previous scan, moved by the odometry.
 
     MAP and QUERY are drives (MCAP, or as a public data set has them) or point
-    clouds (.pcd .ply .npy .bin). If MAP is a drive, its scans are merged at
-    their ground-truth poses. If QUERY is a point cloud, it counts as one scan,
+    clouds (.pcd .ply .npy .bin). A point cloud as QUERY counts as one scan,
     whose ground-truth pose is the origin of the map.
 
     Args:
@@ -65,9 +63,7 @@ def localise(
             moved and rotated.
         query_spacing: Distance that the car drives between two queries [m]; by
             default 10. Not with --track.
-        track: Track the whole drive instead of localising single scans. The
-            initial guess of each scan is the estimated pose of the previous
-            scan, moved by the odometry.
+        track: Track the whole drive instead of localising single scans.
         odometry_drift: Drift of the simulated odometry that --track uses, as a
             share of the distance driven. With 0.01, the default, lengths are
             wrong by about 1 %, and the heading drifts by about 0.01 deg per

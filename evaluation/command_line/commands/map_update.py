@@ -29,13 +29,12 @@ def map_update(
 ) -> None:
     """Score the labels of a change detector on two maps.
 
-    The command compares the labels of a change detector with the ground truth.
-    The labels say what changed between map A and map B. You give the labels
-    (--labels-a and --labels-b), or choose a shipped change detector that
-    computes them (--baseline). DIR is a folder from cns-drake truth, or a
-    folder with the same files for real drives: A/map.ply, A/truth.npy,
-    B/map.ply and B/truth.npy. A shipped change detector also needs the scans
-    and poses in DIR. Points whose ground-truth label is 255 are ignored.
+    The command compares labels of what changed between map A and map B with the
+    ground truth: your own labels (--labels-a and --labels-b), or those of a
+    shipped change detector (--baseline). DIR is a folder from cns-drake truth,
+    or one with A/map.ply, A/truth.npy, B/map.ply and B/truth.npy of real
+    drives, and, for a shipped detector, scans and poses. Points whose
+    ground-truth label is 255 are ignored.
 
     Args:
         folder: Folder with the maps and their ground truth.

@@ -78,10 +78,9 @@ def pr(
             measured, too. May be repeated.
         across_maps: Allow two drives through maps of different names, such as
             two cities generated along the same streets.
-        truth: What makes a place a match of a query. With radius, a match lies
-            within --radius of the query. With overlap:PART, such as
-            overlap:0.5, a match can lie at any distance, and the scan of the
-            match shows at least PART of what the query's scan shows.
+        truth: What makes a place a match. radius: it lies within --radius of
+            the query. overlap:PART, such as overlap:0.5: at any distance, its
+            scan shows at least PART of what the query's scan shows.
         overlaps: CSV file to write: the overlap of each query with each place.
             An existing file is replaced. Needs --truth overlap:PART.
         exact_overlaps: File with exact overlaps, from cns-drake truth --format

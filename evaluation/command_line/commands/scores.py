@@ -27,11 +27,10 @@ def scores(
 ) -> None:
     """Score each pair of scans of two folders.
 
-    DATABASE and QUERY are folders with .bin, .pcd, .npy or .ply files. The
-    scans need no poses, so that the command computes only scores, and no
-    metric. Every query is compared with every place, even if the method usually
-    skips some places to save time. A higher score means more similar; the score
-    of a place that the method rejects is empty.
+    DATABASE and QUERY are folders with .bin, .pcd, .npy or .ply files, without
+    poses: the command computes only scores, of every query with every place.
+    Higher is more similar; the score of a place that the method rejects is
+    empty.
 
     Args:
         database: Folder with the scans of the known places.

@@ -32,20 +32,17 @@ def tcr(
     """Measure how much changed between two drives or maps.
 
     A and B are recorded drives (MCAP, or as a public data set has them) or maps
-    (.pcd .ply .npy .bin). The main result, TCR_sym, is 0 if nothing changed and
-    1 if everything changed. The command also prints two directed ratios: the
-    share of A that is missing in B, and the share of B that is missing in A.
-    Drives in different world frames are aligned first. A yaw or an offset
-    between two frames looks like change, so the command also registers B to A,
-    and prints TCR_sym after this registration.
+    (.pcd .ply .npy .bin). TCR_sym is 0 if nothing changed and 1 if everything
+    changed. Drives in different world frames are aligned first. A yaw or an
+    offset between two frames looks like change, so the command also prints
+    TCR_sym after B is registered to A.
 
     Args:
         source: Drive or map before the change.
         target: Drive or map after the change.
         no_change: Control: a third drive, on A's route in B's stage or on B's
-            route in A's stage. With it, the command also prints TCR_sym between
-            C and the drive in the same stage. These two drives differ only in
-            their routes.
+            route in A's stage. TCR_sym between it and the drive in the same
+            stage comes from the routes alone.
 
     Example:
         cns-eval tcr drives/metropolis_01 drives/metropolis_04
