@@ -101,7 +101,7 @@ class MadeMap(Section):
             between the first stage and today: in the first stage they are
             missing, or lower than today.
         plain: whether windows, roofs and kerbs that the file lacks are left
-            out, as with `cns-drake import --plain`.
+            out, as by the option `--plain` of `cns-drake import`.
         seed: seed of all random numbers.
     """
 
