@@ -1,14 +1,16 @@
 """What the site has besides the pages of this folder.
 
-Pages of the repository's root become pages of the site, and the public names
-of each package a page of the API reference. A drive and a report to look at are
-in the site if they were made before (see CONTRIBUTING.md), as the workflow
-`site.yml` does.
+Pages of the repository's root and notebooks become pages of the site, and the
+public names of each package a page of the API reference. A drive and a report
+to look at are in the site if they were made before (see CONTRIBUTING.md), as
+the workflow `site.yml` does.
 """
 
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterator
+import json
 import os
 from pathlib import Path
 import re
@@ -53,6 +55,11 @@ def on_files(files: Files, config: MkDocsConfig, **_: Any) -> Files:
     for package in PACKAGES:
         for path, text in _reference(package).items():
             files.append(File.generated(config, f"api/{path}", content=text))
+    for notebook in (ROOT / "docs").glob("*/*.ipynb"):
+        src = f"{notebook.parent.name}/{notebook.stem}.md"
+        cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+        text = "\n\n".join(part for cell in cells for part in _parts(cell))
+        files.append(File.generated(config, src, content=text))
     for path in _live_pages():
         made = str(LIVE / path)
         files.append(File.generated(config, f"live/{path}", abs_src_path=made))
@@ -158,6 +165,20 @@ def _set(block: re.Match[str]) -> str:
     return f'{indent}<div class="formula">{formula}</div>'
 
 
+def _parts(cell: dict[str, Any]) -> Iterator[str]:
+    """Yields the Markdown of a notebook's cell, and of its outputs."""
+    source = "".join(cell["source"])
+    is_code = cell["cell_type"] == "code"
+    yield f"```python\n{source}\n```" if is_code else source
+    for output in cell.get("outputs", ()):
+        data = output.get("data", {})
+        if "text" in output:
+            yield f"```text\n{''.join(output['text'])}```"
+        if "image/png" in data:
+            image = "".join(data["image/png"]).replace("\n", "")
+            yield f'<img alt="" src="data:image/png;base64,{image}">'
+
+
 def _in_repository(src: str) -> str:
     """Returns the path in the repository of a page of the site."""
     own = src.removeprefix(f"{_PROJECT}/")
@@ -167,6 +188,8 @@ def _in_repository(src: str) -> str:
 def _in_site(path: str) -> str:
     """Returns the path in the site of a page of the repository."""
     own = path.removeprefix("docs/")
+    if own.endswith(".ipynb"):
+        return own.replace(".ipynb", ".md")
     return own if own != path else f"{_PROJECT}/{path}"
 
 
