@@ -3,12 +3,12 @@
 import itertools
 import json
 
+from helpers.bag_recordings import messages_by_topic
 from helpers.tiny_drive import tiny_scenario
 from mcap.reader import make_reader
 import numpy as np
 from pydantic import ValidationError
 import pytest
-from rosbags.highlevel import AnyReader
 
 from cns_drake.simulation import make_station, simulate
 from docs.examples.gnss import METRES_PER_DEG, GnssScenario, with_gnss
@@ -29,12 +29,7 @@ def recording(scenario, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def messages(recording):
-    found = {}
-    with AnyReader([recording]) as reader:
-        for connection, stamp_ns, data in reader.messages():
-            message = reader.deserialize(data, connection.msgtype)
-            found.setdefault(connection.topic, []).append((stamp_ns, message))
-    return found
+    return messages_by_topic(recording)
 
 
 def test_fixes_are_places_on_the_vehicle_with_noise(scenario, messages):

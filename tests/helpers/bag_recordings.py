@@ -1,6 +1,7 @@
 """Recordings without a simulation: random bytes on the usual topics."""
 
 import numpy as np
+from rosbags.highlevel import AnyReader
 
 from cns_drake.recording import (
     START_NS,
@@ -43,3 +44,13 @@ def write_frame(bag, frame, size=60):
 def contents(folder):
     """Name -> bytes of each file in a folder."""
     return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def messages_by_topic(folder):
+    """Topic -> (stamp_ns, message) of each message of a recording."""
+    found = {}
+    with AnyReader([folder]) as reader:
+        for connection, stamp_ns, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            found.setdefault(connection.topic, []).append((stamp_ns, message))
+    return found

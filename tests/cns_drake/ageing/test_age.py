@@ -4,38 +4,18 @@ import csv
 import os
 import re
 
-from helpers.recorded_traffic import write_rounds
-from helpers.small_city import write_small_city
 import numpy as np
 import pytest
 import shapely
 
 from cns_drake.ageing import DEFAULT_RATES, age_map
 from cns_drake.base import InputError
-from cns_drake.city import generate_city
 from cns_drake.scenarios import load_scenario
 from cns_drake.scene import MapFolder, load_world
 from cns_drake.transient import geometry_by_structure
 
-_DRIVE = """
-map: .
-stage: "02"
-title: Around the north
-route:
-  - {road: north, direction: forward, lane: 1, start: 10.0, end: 120.0}
-speeds: {cruise: 8.0}
-"""
 # A lot happens, so that a few years show all kinds of events.
 _BUSY = {**dict.fromkeys(DEFAULT_RATES, 0.1), "built": 0.3, "moved": 2.0}
-
-
-@pytest.fixture(scope="module")
-def town(tmp_path_factory):
-    folder = write_small_city(tmp_path_factory.mktemp("age") / "town")
-    generate_city(folder)
-    (folder / "sequence_02.yaml").write_text(_DRIVE)
-    write_rounds(folder / "traffic.npz")
-    return folder
 
 
 @pytest.fixture(scope="module")

@@ -1,23 +1,10 @@
 """Road networks: geometry, legality, areas."""
 
-import copy
-
-from helpers.road_crossing import CROSS, load_network
 import numpy as np
 import pytest
 from shapely.geometry import Point
 
 from cns_drake.roads import LaneRef
-
-
-@pytest.fixture
-def cross():
-    return copy.deepcopy(CROSS)
-
-
-@pytest.fixture
-def load(tmp_path):
-    return lambda content: load_network(content, tmp_path)
 
 
 def test_roads_are_cut_back_to_the_kerb_tangents(load, cross):

@@ -1,23 +1,9 @@
 """Impossible road networks: errors name file, field and fault."""
 
-import copy
-
-from helpers.road_crossing import CROSS, load_network
 import pytest
 
 from cns_drake.base import InputError
 from cns_drake.roads import load_road_network
-
-
-@pytest.fixture
-def cross():
-    return copy.deepcopy(CROSS)
-
-
-@pytest.fixture
-def load(tmp_path):
-    return lambda content: load_network(content, tmp_path)
-
 
 FAULTS = {
     "unknown key": (

@@ -8,12 +8,12 @@ import io
 import math
 import re
 
+from helpers.bag_recordings import messages_by_topic
 from helpers.message_digests import message_digests
 from helpers.tiny_drive import tiny_scenario
 import numpy as np
 from PIL import Image
 import pytest
-from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base import InputError
@@ -55,12 +55,7 @@ def recording(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def messages(recording):
-    found = {}
-    with AnyReader([recording]) as reader:
-        for connection, stamp_ns, data in reader.messages():
-            message = reader.deserialize(data, connection.msgtype)
-            found.setdefault(connection.topic, []).append((stamp_ns, message))
-    return found
+    return messages_by_topic(recording)
 
 
 def frames_of(messages):

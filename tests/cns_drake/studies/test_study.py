@@ -4,6 +4,7 @@ from collections import Counter
 import math
 import shutil
 
+from helpers.counting_method import COUNTING
 from helpers.measured_pairs import compare_maps, place_scores
 from helpers.small_map import write_town
 import numpy as np
@@ -398,26 +399,7 @@ def test_costs_follow_the_number_of_places(town, tmp_path, jobs_done):
 
 def test_an_own_method(town, tmp_path, jobs_done, own_methods):
     own = tmp_path / "counting.py"
-    own.write_text(
-        """
-import numpy as np
-from evaluation import Method, MethodConfig, register
-
-@register("counting")
-class Counting(Method):
-    class Config(MethodConfig):
-        unit: float = 1.0
-
-    def describe(self, points):
-        return len(points)
-
-    def build_database(self, places):
-        return np.array(places)
-
-    def score(self, query, database, *, exhaustive=False):
-        return -np.abs(database - query) / 1e6
-"""
-    )
+    own.write_text(COUNTING)
     wanted = experiment(town, methods={str(own): {"unit": [1.0, 2.0]}})
     results = measure(wanted, tmp_path / "out")
     assert {

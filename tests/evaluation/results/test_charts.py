@@ -6,6 +6,7 @@ import math
 import re
 import warnings
 
+from helpers.result_keys import place_key
 import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
@@ -34,19 +35,8 @@ PARTS = {"ring++": 0.9, "solid": 0.5, "mine": 0.7}
 
 
 def row(value, factors, method="mine", metric="auc", town="town", **changes):
-    values = {
-        "experiment": "e",
-        "map": town,
-        "database": f"{town}_01",
-        "query": f"{town}_02",
-        "seed": 1,
-        "factors": factors,
-        "task": "place",
-        "method": method,
-        "verified": False,
-        "protocol": "random-yaw",
-    }
-    return Row(**{**values, **changes}, metric=metric, value=value)
+    key = place_key(town, factors=factors, method=method, **changes)
+    return Row(**key, metric=metric, value=value)
 
 
 def aged():

@@ -4,6 +4,7 @@ import csv
 import math
 from types import SimpleNamespace
 
+from helpers.result_keys import place_key
 import numpy as np
 import pytest
 from scipy.stats import spearmanr
@@ -25,25 +26,10 @@ SNOW = "query.transient.snow"
 BLOCKS = np.repeat(np.arange(10), 2)
 
 
-def key(
-    factors, method="btc", seed=1, task="place", verified=False, town="town"
-):
-    return {
-        "experiment": "e",
-        "map": town,
-        "database": f"{town}_01",
-        "query": f"{town}_02",
-        "seed": seed,
-        "factors": factors,
-        "task": task,
-        "method": method,
-        "verified": verified,
-        "protocol": "random-yaw",
-    }
-
-
 def row(value, factors, metric="auc", **names):
-    return Row(**key(factors, **names), metric=metric, value=value, n=20)
+    return Row(
+        **place_key(factors=factors, **names), metric=metric, value=value, n=20
+    )
 
 
 def answers(right, factors, **names):
@@ -54,7 +40,7 @@ def answers(right, factors, **names):
     right = np.asarray(right, dtype=bool)
     number = len(right)
     return Answers(
-        **key(factors, **names),
+        **place_key(factors=factors, **names),
         columns={
             "query_frame": np.arange(number),
             "block": BLOCKS[:number],
@@ -294,7 +280,7 @@ def test_the_interval_of_a_mean_over_maps(metric):
     means = np.array([0.5, 0.7, 0.8, 0.6, 0.9, 0.7, 0.8, 0.75])
     rows = [
         Row(
-            **key({SNOW: snow}, town=f"town {k}"),
+            **place_key(f"town {k}", factors={SNOW: snow}),
             metric=metric,
             value=value + more,
         )
@@ -316,7 +302,7 @@ def test_the_interval_of_a_mean_over_maps(metric):
 
 
 def test_a_ranking_of_one_condition_has_its_intervals():
-    one = Row(**key({}), metric="auc", value=0.5, low=0.4, high=0.7)
+    one = Row(**place_key(), metric="auc", value=0.5, low=0.4, high=0.7)
     found = rank_methods([one])
     assert found[0].interval == Interval(0.4, 0.7)
     assert rank_methods([one, row(0.1, {SNOW: 1}, method="b")]) == []

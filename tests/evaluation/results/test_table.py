@@ -3,6 +3,7 @@
 import csv
 import math
 
+from helpers.result_keys import place_key
 import numpy as np
 import pytest
 
@@ -44,19 +45,7 @@ def replaced(line, header, column, cell):
 
 
 def key(**changes):
-    values = {
-        "experiment": "e",
-        "map": "town",
-        "database": "town_01",
-        "query": "town_02",
-        "seed": 1,
-        "factors": {FACTOR: 0.2},
-        "task": "place",
-        "method": "btc",
-        "verified": False,
-        "protocol": "random-yaw",
-    }
-    return {**values, **changes}
+    return place_key(**{"factors": {FACTOR: 0.2}, **changes})
 
 
 def test_a_line_becomes_a_row(tmp_path):

@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 
 from helpers.internal.eval_program import assert_refused, run
+from helpers.result_keys import place_key
 import numpy as np
 import pytest
 from scipy.stats import kendalltau
@@ -32,19 +33,8 @@ STAGES = Path("evaluation/results/baselines/stages.csv")
 
 
 def key(method, town="town", **changes):
-    values = {
-        "experiment": "e",
-        "map": town,
-        "database": f"{town}_01",
-        "query": f"{town}_02",
-        "seed": 1,
-        "factors": {},
-        "task": "place",
-        "method": method,
-        "verified": False,
-        **made_by(RANDOM_YAW_PROTOCOL),
-    }
-    return {**values, **changes}
+    made = made_by(RANDOM_YAW_PROTOCOL)
+    return place_key(town, **{"method": method, **made, **changes})
 
 
 def write_table(folder, towns, number=40, *, queries=False, **changes):

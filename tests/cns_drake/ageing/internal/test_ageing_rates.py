@@ -1,6 +1,5 @@
 """A small city that ages: nested, repeatable, sound; and its faults."""
 
-from helpers.small_city import write_small_city
 import numpy as np
 import pytest
 from scipy.stats import poisson
@@ -9,25 +8,7 @@ import shapely
 from cns_drake.ageing import DEFAULT_RATES
 from cns_drake.ageing.aged_map import AgeingCity
 from cns_drake.ageing.old_world import OldWorld
-from cns_drake.city import generate_city
 from cns_drake.scene import MapFolder
-
-_DRIVE = """
-map: .
-stage: "02"
-title: Around the north
-route:
-  - {road: north, direction: forward, lane: 1, start: 10.0, end: 120.0}
-speeds: {cruise: 8.0}
-"""
-
-
-@pytest.fixture(scope="module")
-def town(tmp_path_factory):
-    folder = write_small_city(tmp_path_factory.mktemp("age") / "town")
-    generate_city(folder)
-    (folder / "sequence_02.yaml").write_text(_DRIVE)
-    return folder
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,6 @@
 """`cns-drake reproduce`: one graph of jobs from recordings to pictures."""
 
+from helpers.counting_method import COUNTING
 from helpers.internal import studies
 from helpers.small_map import write_town
 import pytest
@@ -19,25 +20,6 @@ def town(tmp_path_factory):
     """Folder of a map with two drives of a few frames."""
     routes = {"01": "metropolis_01", "04": "metropolis_04"}
     return write_town(tmp_path_factory.mktemp("maps") / "town", routes, 3)
-
-
-COUNTING = """
-import numpy as np
-from evaluation import Method, MethodConfig, register
-
-@register("counting")
-class Counting(Method):
-    Config = MethodConfig
-
-    def describe(self, points):
-        return len(points)
-
-    def build_database(self, places):
-        return np.array(places)
-
-    def score(self, query, database, *, exhaustive=False):
-        return -np.abs(database - query) / 1e6
-"""
 
 
 @pytest.mark.night

@@ -1,5 +1,6 @@
 """The learned descriptor: images, network, scores, files of weights."""
 
+from helpers.learned_weights import weight_values
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -8,16 +9,6 @@ from evaluation.methods import FEATURES, LAYERS, SECTORS, TURNS
 from evaluation.methods.learned import RINGS, _feature_map
 
 RNG = np.random.default_rng(7)
-
-
-def weight_values(**changes):
-    rng = np.random.default_rng(3)
-    values = {"version": np.int64(1), "seen": np.array([0.5, 1.0])}
-    for number, (before, after, _, _) in enumerate(LAYERS):
-        kernel = rng.normal(size=(9 * before, after)) / np.sqrt(9 * before)
-        values[f"kernel_{number}"] = kernel.astype(np.float32)
-        values[f"bias_{number}"] = rng.normal(size=after).astype(np.float32)
-    return values | changes
 
 
 def test_the_network_by_correlations():
