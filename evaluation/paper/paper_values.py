@@ -29,17 +29,20 @@ class Numbers:
 
 @dataclass(frozen=True, eq=False)
 class PaperValues:
-    """The paper's values.
+    """The paper's values, and those of the shipped cities.
 
     Attributes:
         changes: (map, earlier stage, later stage) -> TCR_sym.
         recognitions: (map, database, query, method) -> numbers.
+        simulated_changes, simulated_aucs: the same of the shipped cities.
         modes: method -> which queries the paper counted. The mode is `all`, or
             `filtered` for only the queries with a match.
     """
 
     changes: Mapping[StagePair, float]
     recognitions: Mapping[tuple[str, str, str, str], Numbers]
+    simulated_changes: Mapping[StagePair, float]
+    simulated_aucs: Mapping[tuple[str, str, str, str], float]
     modes: Mapping[str, Mode]
 
     @property
@@ -47,10 +50,16 @@ class PaperValues:
         """Names of the maps with place recognition."""
         return {city for city, *_ in self.recognitions}
 
-    def change(self, map_name: str, stages: Sequence[str]) -> float | None:
-        """Returns TCR_sym of two stages, given in any order."""
+    def change(
+        self, map_name: str, stages: Sequence[str]
+    ) -> tuple[float | None, float | None]:
+        """Returns TCR_sym of two stages, given in any order.
+
+        The first one is the paper's, the second one that of the shipped city.
+        """
         first, second = sorted(stages)
-        return self.changes.get((map_name, first, second))
+        pair = map_name, first, second
+        return self.changes.get(pair), self.simulated_changes.get(pair)
 
 
 @functools.cache
@@ -65,18 +74,28 @@ def paper() -> PaperValues:
     R@1, F1 and AUC in all rows of the method.
     """
     rows = _rows("place_recognition.csv")
+    changes = {
+        (row["map"], row["sequence_a"], row["sequence_b"]): row
+        for row in _rows("tcr.csv")
+    }
     return PaperValues(
-        changes={
-            (row["map"], row["sequence_a"], row["sequence_b"]): float(
-                row["tcr_sym"]
-            )
-            for row in _rows("tcr.csv")
-        },
+        changes={pair: float(row["tcr_sym"]) for pair, row in changes.items()},
         recognitions={
             (row["map"], row["database"], row["query"], row["method"]): Numbers(
                 float(row["auc"]),
                 float(row["recall_at_1"]),
                 float(row["f1_max"]),
+            )
+            for row in rows
+        },
+        simulated_changes={
+            pair: float(row["simulated"])
+            for pair, row in changes.items()
+            if row["simulated"]
+        },
+        simulated_aucs={
+            (row["map"], row["database"], row["query"], row["method"]): float(
+                row["simulated_auc"]
             )
             for row in rows
         },

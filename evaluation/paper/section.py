@@ -37,21 +37,26 @@ def paper_section(
             changes[(city, *sorted(both))] = row.value
     if not any(city in paper().city_names for city, *_ in changes):
         return None
-    of_pair: dict[StagePair, dict[str, tuple[Numbers, Numbers | None]]] = {}
+    of_pair: dict[
+        StagePair, dict[str, tuple[Numbers, Numbers | None, float | None]]
+    ] = {}
     for answers in queries.answers:
         pair = _pair(answers, stages)
         if pair is None or not _is_comparable(answers):
             continue
-        printed = paper().recognitions.get((*pair, answers.label))
-        numbers = _numbers(answers), printed
-        of_pair.setdefault(pair, {})[answers.label] = numbers
+        key = (*pair, answers.label)
+        of_pair.setdefault(pair, {})[answers.label] = (
+            _numbers(answers),
+            paper().recognitions.get(key),
+            paper().simulated_aucs.get(key),
+        )
     return page_section(
         "paper",
         "Paper",
         "results.csv: the rows with the change, of place recognition by the"
         " protocol paper; the tables of the paper",
         changes=[
-            (pair, value, paper().change(pair[0], pair[1:]))
+            (pair, value, *paper().change(pair[0], pair[1:]))
             for pair, value in changes.items()
         ],
         methods=in_table_order(n for found in of_pair.values() for n in found),

@@ -1039,6 +1039,8 @@ NOT_RUN = {
     "and drives through them, for half an hour",
     ".venv/bin/cns-drake study docs/examples/robust": "localises in a shipped "
     "city, for half an hour",
+    ".venv/bin/cns-eval report data/CNS": "needs the authors' drives; "
+    "test_recorded_study has some in their layout",
     ".venv/bin/cns-eval tcr data/MulRan": "needs data sets that cannot be "
     "shipped",
     ".venv/bin/cns-eval pr data/nclt": "needs them, too",

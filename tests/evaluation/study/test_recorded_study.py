@@ -357,7 +357,54 @@ def test_change_beside_the_paper(report):
     assert 0.03 < row.value < 0.5
     assert f"{row.value:.3f}" in section(report, "change")
     paper = section(report, "paper")
-    assert f"<td>{row.value:.4f}<small>0.2920</small>" in paper
+    assert f"<td>{row.value:.4f}<small>0.2920 / 0.070</small>" in paper
+
+
+def test_drives_as_they_were_published_give_the_same_tables(
+    recordings, report, tmp_path
+):
+    """Without a scenario: folders name map and stage."""
+    for stage in ("01", "04"):
+        drive = open_drive(recordings / f"metropolis_{stage}")
+        folder = tmp_path / "CNS" / "Metropolis" / stage
+        X_WB = drive.X_WS.copy()
+        X_WB[:, 2, 3] -= 1.6
+        stamps = drive.stamps_ns.tolist()
+        dataset_folders.write_quaternions(folder / "gt.csv", stamps, X_WB, ",")
+        for frame, stamp in enumerate(stamps):
+            scan = drive.scan(frame)
+            dataset_folders.write_pcd(
+                folder / "pcd" / f"{stamp}.pcd",
+                np.stack([scan[axis] for axis in "xyz"], axis=1),
+            )
+    mount = "translation: [0, 0, 1.6]\nrotation: [0, 0, 0, 1]\n"
+    (tmp_path / "CNS" / "transformation_lidar.yaml").write_text(mount)
+    studies.report(
+        tmp_path / "CNS",
+        tmp_path / "tables",
+        choose_methods(["scan-context++"]),
+        {"paper": PROTOCOLS["paper"]},
+    )
+    for metric, protocol in (("tcr_sym", "random-yaw"), ("auc", "paper")):
+        (before,), (found,) = (
+            [
+                row.value
+                for row in Results.read(folder)
+                .where({"both.stage": "own"}, metric=metric, verified=False)
+                .rows
+                if row.database == "metropolis_01"
+                and row.method in ("", "scan-context++")
+                and row.protocol == name
+            ]
+            for folder, name in (
+                (report, protocol),
+                (tmp_path / "tables", "paper"),
+            )
+        )
+        assert found == pytest.approx(before, abs=1e-6)
+    paper = section(tmp_path / "tables", "paper")
+    assert "<small>0.2920 / 0.070</small>" in paper
+    assert "<small>0.4442 / 0.908</small>" in paper
 
 
 def test_recognition_beside_the_paper(report):
