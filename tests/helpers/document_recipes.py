@@ -1009,7 +1009,6 @@ NOT_RUN = {
     "weights, too",
     ".venv/bin/cns-drake study ladder suburbia --quick --task": "needs "
     "weights, too",
-    "for half in even odd": "needs scans that do not ship",
     "import numpy as np, torch": "needs PyTorch and these weights, too",
     "cns-drake train": "needs an extra, and minutes; test_training trains",
     ".venv/bin/cns-drake train": "needs that extra, too",
