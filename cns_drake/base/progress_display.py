@@ -232,9 +232,9 @@ class _Task:
         return seconds / done * (self.total - self.done)
 
 
-def shown_name(name: str) -> str:
-    """Returns the name of a job without the fingerprint at its end, if any."""
-    return _FINGERPRINT.sub("", name)
+def _in_words(name: str) -> str:
+    """Returns the name of a job, without a fingerprint at its end, in words."""
+    return _FINGERPRINT.sub("", name).replace("_", " ")
 
 
 def shown_times(elapsed: float, left: float | None) -> str:
@@ -407,7 +407,7 @@ class _JobsDisplay(JobsListener):
 
     def start(self, name: str) -> None:
         self._left.start(name, self._now())
-        title = self._titles.get(name) or shown_name(name)
+        title = self._titles.get(name) or _in_words(name)
         self._tasks[name] = _Task(title, "starting")
 
     def doing(

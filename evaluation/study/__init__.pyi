@@ -68,6 +68,7 @@ from .tasks.pair import USUAL_LENGTH as USUAL_LENGTH
 from .tasks.pair import NamedDrive as NamedDrive
 from .tasks.pair import Pair as Pair
 from .tasks.pair import Result as Result
+from .tasks.pair import factors_in_words as factors_in_words
 from .tasks.place import CostTask as CostTask
 from .tasks.place import PlaceTask as PlaceTask
 from .tasks.place import PoseTask as PoseTask

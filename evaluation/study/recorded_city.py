@@ -222,7 +222,8 @@ class _ExtractionJobs(Jobs):
                 cost += self.description_cost(drive, role, protocol)
                 if not self.with_map:
                     cost += self.reading_cost(drive, role, protocol)
-            self.jobs[name] = Job(name, step, drive.needs, cost)
+            title = drive.title or drive.name
+            self.jobs[name] = Job(name, step, drive.needs, cost, title)
         return files
 
     def _chooses_same_scans(self, protocol: RetrievalProtocol) -> bool:

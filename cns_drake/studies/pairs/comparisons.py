@@ -1,6 +1,6 @@
 """Makes the two drives of each condition of an experiment."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 import math
 import re
@@ -44,7 +44,7 @@ from cns_drake.studies.experiments.protocol_fields import protocol_from_fields
 from evaluation.map_update import NOT_MAINTAINED
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
 from evaluation.results import CAUSE, LEVEL, NO_CAUSE, OWN
-from evaluation.study import USUAL_LENGTH
+from evaluation.study import USUAL_LENGTH, factors_in_words
 
 # Greatest length of a value in the name of a drive, which names its folder.
 _LONGEST_LABEL = 48
@@ -72,6 +72,7 @@ class ComparedDrives:
         ages: the years by which the city has aged at the time of each of
             `drives`; empty if the city does not age.
         lengths: approximate length of each of `drives` [m].
+        titles: what each of `drives` is, in words.
     """
 
     database: Scenario
@@ -84,6 +85,7 @@ class ComparedDrives:
     maintain: str = NOT_MAINTAINED
     ages: tuple[int, ...] = ()
     lengths: tuple[float, ...] = ()
+    titles: tuple[str, ...] = ()
 
     @property
     def drives(self) -> tuple[Scenario, ...]:
@@ -244,6 +246,10 @@ class PairMaker:
             maintainer,
             (*(one.years for one in drives), years) if years else (),
             (*(one.length for one in drives), _drive_length(query)),
+            (
+                *(self._names["database"].title(one.drive) for one in drives),
+                self._names["query"].title(query_drive),
+            ),
         )
 
     def _fields(self, condition: Condition) -> dict[str, Any]:
@@ -621,6 +627,13 @@ class _UniqueNames:
         self._with_controls = with_controls
         # Content of a drive -> the drive with its name.
         self._known: dict[str, Scenario] = {}
+        # Name of a drive -> the factors that changed it.
+        self._factors: dict[str, list[tuple[str, Any]]] = {}
+
+    def title(self, drive: Scenario) -> str:
+        """Returns what a drive is, in words."""
+        factors = self._factors.get(drive.name, ())
+        return factors_in_words(self._unchanged.name, factors)
 
     def named(self, drive: Scenario, factors: Changes, seed: int) -> Scenario:
         """Returns a drive with a name that no other drive of this side has.
@@ -632,22 +645,28 @@ class _UniqueNames:
         """
         content = fingerprint(drive.replaced(name="").model_dump(mode="json"))
         if content not in self._known:
+            own = _own_factors(self._side, factors)
             if drive != self._unchanged:
-                drive = self._renamed(drive, factors, seed)
+                drive = self._renamed(drive, own, seed)
             if drive.name in {one.name for one in self._known.values()}:
                 drive = drive.replaced(name=f"{drive.name}_{content[:6]}")
             self._known[content] = drive
+            self._factors[drive.name] = own
         return self._known[content]
 
     def _renamed(
-        self, drive: Scenario, factors: Changes, seed: int
+        self,
+        drive: Scenario,
+        factors: Iterable[tuple[str, Any]],
+        seed: int,
     ) -> Scenario:
         """Returns a drive with a name for its changes."""
         plain = self._unchanged
         if self._with_controls and drive == plain.replaced(stage=drive.stage):
             return control_drive(plain, str(drive.stage))
-        suffix = _name_suffix(self._side, factors, seed)
-        return drive.replaced(name=f"{drive.name}_{suffix}")
+        labels = [f"{name}_{_value_label(v)}" for name, v in factors]
+        name = "_".join([drive.name, *labels, str(seed)])
+        return drive.replaced(name=name)
 
 
 def _value_label(value: object) -> str:
@@ -659,16 +678,17 @@ def _value_label(value: object) -> str:
     return f"{label[:20]}_{fingerprint({'value': value})[:8]}"
 
 
-def _name_suffix(side: str, given: Changes, seed: int) -> str:
+def _own_factors(side: str, given: Changes) -> list[tuple[str, Any]]:
+    """Returns the factors that change a drive of a side, by short names."""
     factors = dict(given)
-    labels = []
+    found = []
     cause, level = factors.pop(CAUSE, NO_CAUSE), factors.pop(LEVEL, 0)
     for path, value in factors.items():
         name = path.rpartition(".")[2]
         is_own = path.partition(".")[0] in (side, "both")
         # The years of a drive age the city of the other side.
         if is_own != (name in ("years", "rates")) or path.startswith("both."):
-            labels.append(f"{name}_{_value_label(value)}")
+            found.append((name, value))
     if cause != NO_CAUSE:
-        labels.append(f"{cause}_{level}")
-    return "_".join([*labels, str(seed)])
+        found.append((cause, level))
+    return found

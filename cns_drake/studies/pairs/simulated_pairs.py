@@ -145,9 +145,9 @@ class SimulatedPairs:
         """Returns a pair of a map as it is measured."""
         compared, query = one.compared, one.query
         *drives, asked = (
-            replace(self.named_drive(drive), length=length)
-            for drive, length in zip(
-                compared.drives, compared.lengths, strict=True
+            replace(self.named_drive(drive), length=length, title=title)
+            for drive, length, title in zip(
+                compared.drives, compared.lengths, compared.titles, strict=True
             )
         )
         database, *beside = self._with_upkept_maps(drives, compared.maintain)

@@ -43,7 +43,7 @@ class DrivenMapTask(MapTask):
         )
         part = jobs.files.part("map", pair.key)
         found = jobs.add(
-            part, measure_maps, arguments, cost=_COST, version=self.version
+            part, measure_maps, arguments, (), _COST, self.version, pair.title
         )
         return (found,)
 

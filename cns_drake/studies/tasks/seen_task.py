@@ -203,12 +203,24 @@ class SeenTask(Task):
             scans = drive.length / arguments[2]
             cost = 2.0 * (OPENING_COST + SCAN_COST * scans)
             found = jobs.add(
-                part, sight_structures, arguments, (), cost, self.version
+                part,
+                sight_structures,
+                arguments,
+                (),
+                cost,
+                self.version,
+                drive.title,
             )
             parts.append(found)
         part = jobs.files.part("changes", pair.key)
         found = jobs.add(
-            part, changes_until, (sources[-1],), (), 1.0, self.version
+            part,
+            changes_until,
+            (sources[-1],),
+            (),
+            1.0,
+            self.version,
+            pair.title,
         )
         parts.append(found)
         return tuple(parts)

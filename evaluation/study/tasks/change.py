@@ -36,7 +36,9 @@ class ChangeTask(Task):
         )
         # The change does not depend on the protocol.
         part = jobs.files.part("change", pair.way.name, pair.query.name)
-        found = jobs.add(part, measure_change, maps, needs, 2.0, self.version)
+        found = jobs.add(
+            part, measure_change, maps, needs, 2.0, self.version, pair.title
+        )
         return (found,)
 
 

@@ -104,7 +104,8 @@ class Jobs:
         job = f"describe {name}"
         cost = self.reading_cost(drive, role, protocol)
         cost += self.description_cost(drive, role, protocol)
-        self.jobs[job] = Job(job, step, drive.needs, cost)
+        title = f"{drive.title or drive.name}, {role}"
+        self.jobs[job] = Job(job, step, drive.needs, cost, title)
         needs.append(job)
         return (
             files.scans,
@@ -149,7 +150,10 @@ class Jobs:
         needs.append(job_name(part))
         cost = _MAP_COST * drive.share if spacing is None else _OTHER_COST
         arguments = (drive.source, spacing)
-        return self.add(part, map_source, arguments, drive.needs, cost)
+        title = f"{drive.title or drive.name}, map"
+        return self.add(
+            part, map_source, arguments, drive.needs, cost, title=title
+        )
 
     def beside(self, pair: Pair, needs: list[str]) -> list[tuple[Part, ...]]:
         """Returns the files of a pair's further drives in the same world.
@@ -207,6 +211,7 @@ class Jobs:
         needs: Iterable[str] = (),
         cost: float = _OTHER_COST,
         version: int = 1,
+        title: str = "",
     ) -> Result:
         """Adds a job that writes a file of results; returns the file.
 
@@ -220,10 +225,11 @@ class Jobs:
             needs: names of jobs that must be finished before.
             cost: approximate cost of the job [s].
             version: see `MakePart`; tasks give their own.
+            title: what the job works on, in words.
         """
         name = job_name(part)
         step = MakePart(part, function, arguments, version)
-        self.jobs[name] = Job(name, step, tuple(needs), cost)
+        self.jobs[name] = Job(name, step, tuple(needs), cost, title)
         return part
 
 

@@ -142,7 +142,13 @@ class LocaliseTask(Task):
         cost += sum(_MAP_COST * one.share for one in drives)
         needs = [need for one in (*drives, pair.query) for need in one.needs]
         found = jobs.add(
-            part, measure_localisation, arguments, needs, cost, self.version
+            part,
+            measure_localisation,
+            arguments,
+            needs,
+            cost,
+            self.version,
+            pair.title,
         )
         return (found,)
 

@@ -1,6 +1,6 @@
 """A pair of drives, as tasks measure it under a condition of an experiment."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 import math
 from typing import Any, Protocol
@@ -24,6 +24,7 @@ class NamedDrive:
         length: about how long the drive is [m], to estimate costs.
         num_scans: number of the drive's scans, if known; at most this number of
             scans is described.
+        title: what drive it is, in words; by default its name.
     """
 
     name: str
@@ -31,6 +32,7 @@ class NamedDrive:
     needs: tuple[str, ...] = ()
     length: float = USUAL_LENGTH
     num_scans: float = math.inf
+    title: str = ""
 
     @property
     def share(self) -> float:
@@ -115,6 +117,12 @@ class Pair:
         return self.methods is None or name in self.methods
 
     @property
+    def title(self) -> str:
+        """Both drives and the condition, in words."""
+        drives = " in ".join(dict.fromkeys(reversed(self.names)))
+        return factors_in_words(drives, self.factors.items())
+
+    @property
     def closes_loops(self) -> bool:
         """Whether a drive is compared with places that it passed before."""
         is_itself = self.database == self.query
@@ -139,3 +147,9 @@ class Pair:
         """Names of the drives of database and query, and the field `keep`."""
         database = [one.name for one in (self.database, *self.beside)]
         return (*database, self.keep, self.query.name)
+
+
+def factors_in_words(name: str, factors: Iterable[tuple[str, Any]]) -> str:
+    """Returns a name and the values of factors in words, to show progress."""
+    values = (f"{key.rpartition('.')[2]} {v}" for key, v in factors)
+    return ", ".join([name.replace("_", " "), *values])

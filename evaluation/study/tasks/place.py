@@ -67,6 +67,7 @@ class PoseTask(Task):
                 needs,
                 cost,
                 PlaceTask.version,
+                pair.title,
             )
             return (found,)
         # Each method has a file, so that another method leaves it as it is.
@@ -89,7 +90,7 @@ class PoseTask(Task):
         ]
         name = f"place {pair.key}"
         whole = Steps(shown.part.path, (shown, *steps))
-        jobs.jobs[name] = Job(name, whole, tuple(needs), cost)
+        jobs.jobs[name] = Job(name, whole, tuple(needs), cost, pair.title)
         return tuple(one.part for one in steps)
 
     def found(self, pair: Pair) -> Outcomes:
@@ -131,7 +132,13 @@ class CostTask(Task):
         part = jobs.files.part("cost", pair.key)
         cost = _search_cost(pair, jobs, NUM_TRIALS)
         found = jobs.add(
-            part, measure_costs, (compared,), needs, cost, self.version
+            part,
+            measure_costs,
+            (compared,),
+            needs,
+            cost,
+            self.version,
+            pair.title,
         )
         return (found,)
 

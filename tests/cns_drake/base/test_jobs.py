@@ -112,6 +112,54 @@ def test_local_jobs_open_no_port(tmp_path):
     assert path.read_text() == "processes 3, ports []"
 
 
+SCRIPT = """
+import asyncio, sys
+from pathlib import Path
+from helpers import job_functions
+from cns_drake.base import Cluster, Job, run_jobs
+
+async def main(folder):
+    jobs = []
+    for name in "abc":
+        done, mark = folder / name, folder / "marks"
+        step = job_functions.Call(
+            job_functions.mark, (done, mark), done, job_functions.is_made
+        )
+        jobs.append(Job(name, step))
+    run_jobs(jobs, Cluster(2))
+
+asyncio.run(main(Path(sys.argv[1])))
+"""
+# As without /dev/shm.
+NO_SEMAPHORES = """
+import _multiprocessing
+del _multiprocessing.SemLock
+"""
+
+
+def test_two_runs_at_once_from_stdin_within_an_event_loop(tmp_path):
+    """Each job is done once, and nothing needs semaphores."""
+    runs = [
+        subprocess.Popen(
+            [sys.executable, "-", tmp_path],
+            stdin=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        )
+        for _ in range(2)
+    ]
+    for run in runs:
+        run.stdin.write(NO_SEMAPHORES + SCRIPT)
+        run.stdin.close()
+    for run in runs:
+        errors = run.stderr.read()
+        assert run.wait() == 0, errors
+        assert "Traceback" not in errors
+    assert sorted((tmp_path / "marks").read_text()) == ["a", "b", "c"]
+    assert {path.name for path in tmp_path.iterdir()} == {*"abc", "marks"}
+
+
 def test_nothing_to_do_starts_nothing():
     run_jobs([], Cluster(scheduler="nowhere"))
 
