@@ -32,7 +32,7 @@ from cns_drake.scene import MapFolder
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
 from cns_drake.studies.experiments.conditions import (
     Condition,
-    baseline_text,
+    baseline_values,
     levels_by_case,
 )
 from cns_drake.studies.experiments.experiment import Experiment
@@ -204,14 +204,18 @@ def plan_study(
     doing("looking at all conditions")
     simulated = SimulatedPairs(run)
     changed = simulated.changed(found)
+    baseline = baseline_values(experiment)
     engine = Engine(
         experiment.name,
         tasks,
         dict(methods),
         run.output,
         run.on_note,
-        baseline_text(experiment),
+        "; ".join(f"{name}={value}" for name, value in baseline.items()),
     )
+    for task in tasks.values():
+        if isinstance(task, PoseTask):
+            task.baselines = _method_baselines(methods, baseline)
     cities: list[ShownCity] = []
     for some, simulations in zip(found, changed, strict=True):
         if some.city is None:
@@ -448,6 +452,24 @@ def _choose_variants(
             for column, one in given.items()
         }
         found[choice.key] = choice, columns
+    return found
+
+
+def _method_baselines(
+    methods: Mapping[str, tuple[MethodChoice, Mapping[str, Any]]],
+    baseline: Mapping[str, Any],
+) -> dict[str, str]:
+    """Returns the key of each method -> that of the method to compare with.
+
+    This is the same method with the settings that the baseline names, and its
+    own values of all other settings.
+    """
+    found = {}
+    for key, (choice, columns) in methods.items():
+        wanted = {name: baseline.get(name, columns[name]) for name in columns}
+        for other, (known, settings) in methods.items():
+            if known.name == choice.name and settings == wanted:
+                found[key] = other
     return found
 
 

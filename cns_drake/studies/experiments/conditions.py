@@ -21,7 +21,13 @@ from cns_drake.studies.experiments.nested_fields import (
     Changes,
     set_field,
 )
-from evaluation.results import CAUSE, FROZEN_REDRAW, LEVEL, NO_CAUSE
+from evaluation.results import (
+    CAUSE,
+    FROZEN_REDRAW,
+    LEVEL,
+    NO_CAUSE,
+    SETTINGS,
+)
 
 if TYPE_CHECKING:
     from cns_drake.studies.experiments.experiment import Experiment
@@ -112,16 +118,15 @@ def conditions(experiment: Experiment) -> list[Condition]:
     return found
 
 
-def baseline_text(experiment: Experiment) -> str:
-    """Returns the values that an experiment names for its baselines, as text.
+def baseline_values(experiment: Experiment) -> dict[str, Any]:
+    """Returns the values that an experiment names for its baselines.
 
-    The text is a column of the tables; "" if the experiment names none.
+    Returns:
+        Name of a factor -> its value in the baseline, as in tables.
     """
-    if not experiment.baseline:
-        return ""
     _, factors = _fields_and_factors(experiment)
     named = _named_values(experiment, factors)
-    return "; ".join(f"{n}={table_value(one)}" for n, one in named.items())
+    return {name: table_value(one) for name, one in named.items()}
 
 
 def _fields_and_factors(
@@ -148,10 +153,17 @@ def _named_values(
         most = max(levels_by_case(experiment).values())
         known = {CAUSE: (NO_CAUSE, *experiment.cases), LEVEL: range(most + 1)}
     known |= factors
+    settings: dict[str, list[Any]] = {}
+    for one in experiment.method_variants:
+        for path, value in one.columns.items():
+            settings.setdefault(path, []).append(value)
+    known |= settings
     named = dict(leaves(experiment.baseline, ()))
     for path, value in named.items():
         if path not in known:
             raise ValueError(f"baseline.{path}: this is no factor")
+        if path in settings:
+            value = named[path] = table_value(value)
         if value not in known[path]:
             raise ValueError(f"baseline.{path}: {value!r} is no value of it")
     return named
@@ -165,7 +177,8 @@ def _compared_values(
     By default these are all factors but those of the protocol: each protocol
     has one baseline. If the field `baseline` names values, these are the
     factors that it names. The centre of one factor at a time is the baseline
-    in any case.
+    in any case. A setting of a method is a factor of the method, not of the
+    condition.
 
     Args:
         experiment: the experiment.
@@ -175,7 +188,7 @@ def _compared_values(
     Returns:
         Name of a factor -> its value in the baseline, as in tables.
     """
-    found = dict(named)
+    found = {n: v for n, v in named.items() if not n.startswith(SETTINGS)}
     if not named or experiment.design != "product":
         of_protocol = {n for n in centre if n.startswith("protocol.")}
         shared = of_protocol - {*named}

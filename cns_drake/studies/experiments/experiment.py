@@ -189,9 +189,9 @@ class Experiment(Section):
         protocol: `random-yaw`, `paper` or `recorded`; a list of these names,
             each with a baseline of its own; or fields of a protocol, of which
             `base` provides the rest.
-        baseline: values of some factors, such as `{both.stage: last}`: each
-            condition is compared with the condition that has these values, and
-            its own values of all other factors. By default, it is the one with
+        baseline: values of some factors, such as `{both.stage: last}`, or of a
+            method's setting: each condition is compared with the one that has
+            these values, and its own values of all other factors. By default, it is the one with
             the first value of each factor, and without a cause of change.
         frozen: table with a fingerprint of each level's drives. The table
             protects a benchmark from changes: if a drive no longer has its

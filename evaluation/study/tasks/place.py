@@ -1,6 +1,6 @@
 """The tasks `place`, `pose` and `cost`, on place recognition."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import compress
 from typing import Any
@@ -39,8 +39,13 @@ class PoseTask(Task):
     """Measures the errors of pose estimates.
 
     A method estimates the pose of each query relative to its top-ranked place.
+
+    Attributes:
+        baselines: key of a method -> key of the method with which it is
+            compared; a method that is missing is compared with itself.
     """
 
+    baselines: Mapping[str, str] = {}
     name = "pose"
     asks = True
 
@@ -106,7 +111,8 @@ class PoseTask(Task):
         self, found: Outcomes, before: Outcomes | None
     ) -> Iterator[Number]:
         for now in found:
-            then = _same_settings_outcome(before, now)
+            method = self.baselines.get(now.method, now.method)
+            then = _outcome_of(before, method, now.is_verified)
             yield from now.numbers(self.name, then)
 
 
@@ -228,11 +234,11 @@ def measure_costs(
     return found
 
 
-def _same_settings_outcome(
-    before: Outcomes | None, now: PlaceOutcome
+def _outcome_of(
+    before: Outcomes | None, method: str, is_verified: bool
 ) -> PlaceOutcome | None:
-    """Returns the baseline's outcome with `now`'s method and verification."""
+    """Returns the outcome of a method, with or without verification."""
     for one in before or ():
-        if (one.method, one.is_verified) == (now.method, now.is_verified):
+        if (one.method, one.is_verified) == (method, is_verified):
             return one
     return None

@@ -293,6 +293,33 @@ def test_each_lidar_is_compared_with_its_own_baseline(
         assert (row.value, math.isnan(row.low)) == (1.0, True)
 
 
+def test_a_setting_is_compared_with_that_of_the_baseline(
+    town, tmp_path, jobs_done
+):
+    setting = "methods.scan-context++.candidates"
+    wanted = experiment(
+        town,
+        methods={"scan-context++": {"candidates": [5, 1]}},
+        query={"transient": {"snow": [0.0, 0.3]}},
+        protocol={"base": "random-yaw", "query_spacing": 5},
+        baseline={setting: 1},
+    )
+    results = measure(wanted, tmp_path)
+    assert {row.baseline for row in results.rows} == {f"{setting}=1"}
+    for snow in (0.0, 0.3):
+        here = results.where({"query.transient.snow": snow}, verified=0)
+        five, one = (
+            {row.metric: row for row in here.where({setting: number}).rows}
+            for number in (5, 1)
+        )
+        assert one["auc"].value > 0.0
+        assert five["relative_auc"].value == pytest.approx(
+            five["auc"].value / one["auc"].value, abs=1e-6
+        )
+        control = one["relative_auc"]
+        assert (control.value, math.isnan(control.low)) == (1.0, True)
+
+
 def test_an_unchanged_city_has_no_change(town, tmp_path, jobs_done):
     wanted = experiment(
         town,
