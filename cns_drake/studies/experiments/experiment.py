@@ -191,8 +191,9 @@ class Experiment(Section):
             `base` provides the rest.
         baseline: values of some factors, such as `{both.stage: last}`, or of a
             method's setting: each condition is compared with the one that has
-            these values, and its own values of all other factors. By default, it is the one with
-            the first value of each factor, and without a cause of change.
+            these values, and its own values of all other factors. By default,
+            it is the one with the first value of each factor, and without a
+            cause of change.
         frozen: table with a fingerprint of each level's drives. The table
             protects a benchmark from changes: if a drive no longer has its
             fingerprint, the study stops with an error.
