@@ -548,14 +548,13 @@ def _commands_page() -> str:
     }
     uses = Counter(row for some in rows.values() for row in some)
     shared = [row for row, number in uses.items() if number > 2]
-    head = ("argument or option", "default", "meaning")
     parts = [
         _heading("Commands"),
         "Commands print results to stdout, and progress and messages to "
         "stderr. The exit status is 0 on success, 2 for bad input (with an "
         "error of one line), and 1 if some of many jobs failed. Add "
         "`--traceback` to any command to see where in the code an error comes "
-        "from.",
+        "from. Brackets have what is required, and defaults.",
     ]
     for name, command in commands.items():
         own = [row for row in rows[name] if row not in shared]
@@ -564,14 +563,22 @@ def _commands_page() -> str:
             f"## {name}",
             _prose(command.help or ""),
             _example(command.epilog),
-            _table(head, own),
+            _options(own),
         ]
         if others:
             parts.append(
                 f"[Also](#options-of-many-commands): {', '.join(others)}."
             )
-    parts += ["## Options of many commands", _table(head, shared)]
+    parts += ["## Options of many commands", _options(shared)]
     return "\n\n".join(parts) + "\n"
+
+
+def _options(rows: list[tuple[str, ...]]) -> str:
+    """Returns a list of options; brackets have the default, if there is one."""
+    return "\n".join(
+        f"- {name}{f' ({default})' * (default not in ('none', 'off'))}: {text}"
+        for name, default, text in rows
+    )
 
 
 def _option(parameter: Any) -> str:
@@ -579,7 +586,7 @@ def _option(parameter: Any) -> str:
     kind = getattr(parameter, "type", None) or parameter.type_descriptor
     choices = map(_plain, getattr(kind, "choices", None) or ())
     metavar = parameter.metavar or "|".join(choices)
-    metavar = metavar or kind_of(parameter).upper()
+    metavar = metavar or kind_of(parameter).removesuffix(" range").upper()
     if parameter.param_type_name == "argument":
         return f"`{metavar}`"
     names = " / ".join([*parameter.opts, *parameter.secondary_opts])

@@ -44,9 +44,8 @@ Vary = Annotated[
     typer.Option(
         metavar="NAME|FILE.yaml",
         help="Shipped experiment, or experiment file, whose drives are added "
-        "to the drives that you name. The command writes the experiment's "
-        "scenario files to <output>/scenarios, and its generated cities to "
-        "<output>/cities.",
+        "to the drives that you name. Its scenario files and generated cities "
+        "are in the folders scenarios and cities of --output.",
     ),
 ]
 Maps = Annotated[
