@@ -1,14 +1,23 @@
-"""Drives recorded as MCAP by cns-drake, or by programs with the same topics."""
+"""Drives in bags of ROS: recordings of cns-drake, and those of robots."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Mapping
 import contextlib
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+import re
+from typing import Any, NamedTuple, NoReturn
+import zlib
 
 import numpy as np
 
-from cns_drake.base import InputError, listed, parse_json, value_errors
+from cns_drake.base import (
+    InputError,
+    listed,
+    parse_json,
+    poses,
+    read_text,
+    value_errors,
+)
 from cns_drake.base import points as point_arrays
 from cns_drake.drives import mcap_messages, ros_types
 from cns_drake.drives.drive import (
@@ -18,86 +27,158 @@ from cns_drake.drives.drive import (
     index_instances,
 )
 from cns_drake.drives.mcap_file import LOCATION, McapFile
-from cns_drake.drives.mcap_messages import StaticTransforms, checked_poses
+from cns_drake.drives.mcap_messages import (
+    StaticTransforms,
+    checked_poses,
+    frame_name,
+)
 from cns_drake.drives.message_rows import (
+    POSE_ROWS,
     MessageRows,
     check_agreement,
     transform_row,
     vehicle_frames,
 )
-from cns_drake.drives.point_cloud2 import has_wrong_rows, to_points, to_records
+from cns_drake.drives.point_cloud2 import (
+    has_wrong_rows,
+    livox_points,
+    to_points,
+    to_records,
+)
 from cns_drake.drives.point_layouts import from_layout
+from cns_drake.drives.rosbag_file import RosbagFile
+from cns_drake.drives.stamped_poses import PosedScans, StampedPoses
 
-_ODOMETRY_TOPIC = "/odometry"
 _IMU_TOPIC = "/imu/data"
 _TF_TOPIC = "/tf"
 _TF_STATIC_TOPIC = "/tf_static"
 _KALIBR = "imu.yaml"
 # By REP 105 of ROS, other frames, such as `odom`, may start anew in each drive.
 _SHARED_FRAME = "map"
-# If log times in a file step back by more than this, the messages are not late:
-# the clock was set back [s].
-_LATEST = 1.0
+_METADATA = "metadata.yaml"
+# rosbag2 compresses each file or message if its metadata say so.
+_PACKED = r"^\s*compression_mode: *[\"']?(file|message)"
+# A function that returns the poses of the LiDAR, given the scans' stamps [ns].
+_Poses = Callable[[np.ndarray], StampedPoses]
 # `image_transport` adds this to the names of topics of depth images.
 _DEPTH = "/compressedDepth"
 
 
-class McapDrive(Drive):
-    """A drive in an MCAP file with /lidar/points, /odometry and /tf_static.
+class _Stream(NamedTuple):
+    """What a drive reads from a topic.
 
-    Without `/lidar/points`, the scans come from the file's only topic of point
-    clouds. If there are several LiDARs, the argument `lidar` chooses one. Two
-    topics are optional: /imu/data, and /<lidar>/labels with `label` and
+    Attributes:
+        title, role: what there are several of, and which is read, in words.
+        usual: usual name of the topic.
+        types: types of its messages; topics of the first of these types that is
+            there are chosen from.
+        option: option that chooses a topic.
+        ending: what follows a name in the name of its topic.
+        advice: what helps if there is none.
+    """
+
+    title: str
+    role: str
+    usual: str
+    types: tuple[tuple[str, ...], ...]
+    option: str
+    ending: str = ""
+    advice: str = ""
+
+
+_LIDAR_TOPIC = "/lidar/points"
+_CLOUDS = _Stream(
+    "point clouds",
+    "LiDAR",
+    _LIDAR_TOPIC,
+    ((ros_types.POINT_CLOUD, ros_types.LIVOX, ros_types.LIVOX_1),),
+    "--lidar TOPIC",
+    "/points",
+)
+_POSES = _Stream(
+    "poses",
+    "odometry",
+    "/odometry",
+    tuple((kind,) for kind in POSE_ROWS),
+    "--odometry TOPIC",
+    advice="; --poses FILE gives poses of the LiDAR",
+)
+
+
+class McapDrive(Drive):
+    """A drive in a bag: a topic of scans, one of poses, and `/tf_static`.
+
+    The bag is an MCAP file, a bag of rosbag2 with SQLite, of several files or
+    compressed, or a bag of ROS 1. The scans are on `/lidar/points`, or on the
+    only topic of point clouds; if there are several LiDARs, the argument
+    `lidar` chooses one. The poses are on `/odometry`, or on the only topic of
+    odometry or, without one, of poses. Topics without a message do not count.
+    Two topics are optional: /imu/data, and /<lidar>/labels with `label` and
     `instance` of each point. Images come from the first topic of compressed
     images.
 
-    Scan i is the i-th point cloud of the LiDAR by log time. The pose of the
-    scan is the pose in the `/odometry` message with exactly the same stamp,
-    composed with the pose of the LiDAR on the vehicle from `/tf_static`. Poses
-    are not interpolated. At the start and end of the recording, scans without a
-    pose or labels are left out, and a note says so. This happens, for example,
-    if the recording was cut off and recovered.
+    Scans are in the order of their stamps, whatever their log times are. The
+    pose of a scan is interpolated at its stamp, see `StampedPoses.at_scans`,
+    and composed with the pose of the LiDAR on the vehicle from `/tf_static`.
+    Without such a transform, the poses are taken as those of the LiDAR. Points
+    in the frame of the world are moved into the frame of the LiDAR. Notes say
+    each of these.
 
     Contradictions raise an error: two poses for one stamp, two mounts of a
     sensor, or a frame that changes during the drive.
 
     Opening a drive reads the file's index; reading a scan reads one chunk. The
-    first use of stamps or poses reads the chunks that hold odometry. If the
-    file does not state that log times equal stamps, the first use of stamps
-    also reads all clouds. Recordings of cns-drake contain this statement, and
-    each chunk in them holds only one topic.
+    first use of stamps or poses reads the chunks that hold poses. If the file
+    does not state that log times equal stamps, the first use of stamps also
+    reads all clouds. Recordings of cns-drake contain this statement, and each
+    chunk in them holds only one topic.
     """
 
-    def __init__(self, path: Path, lidar: str | None = None):
+    placing = (
+        " (recordings share a world if their poses are in one frame; --odometry"
+        " TOPIC and --poses FILE choose others)"
+    )
+
+    def __init__(
+        self,
+        path: Path,
+        lidar: str | None = None,
+        odometry: str | None = None,
+        poses: _Poses | None = None,
+    ):
         """Opens a recording.
 
         Args:
-            path: the .mcap file, or the folder that holds it.
+            path: the bag: a file, or the folder that holds it.
             lidar: name of the LiDAR, whose scans are on the topic
                 /<lidar>/points; or a topic of scans, with any name.
+            odometry: topic of the poses.
+            poses: function that returns poses of the LiDAR, which are used
+                instead of those of a topic.
 
         Raises:
-            InputError: if there is no complete recording at `path`, or no
-                such LiDAR in it.
+            InputError: if there is no complete recording at `path`, or no such
+                topic in it.
         """
-        self._topics = _McapTopics(_mcap_path(Path(path)))
+        self._topics = _Topics(Path(path))
         self._file = self._topics.file
         self._path = self._topics.path
         self.name = _drive_name(Path(path))
-        self._lidar_topic = _choose_lidar_topic(
-            self._file.topics, lidar, self._path
-        )
-        self._topics.require(self._lidar_topic, ros_types.POINT_CLOUD)
-        self._topics.require(_ODOMETRY_TOPIC, ros_types.ODOMETRY)
-        self._topics.require(_TF_STATIC_TOPIC, ros_types.TF)
+        self._lidar_topic = self._topics.choose(_CLOUDS, lidar)
+        self._given = poses
+        self._pose_topic = None
+        if poses is None:
+            self._pose_topic = self._topics.choose(_POSES, odometry)
         labels = self._lidar_topic.removesuffix("points") + "labels"
         self._labels_topic = labels if labels in self._file.topics else None
-        if self._labels_topic is not None:
-            self._topics.require(labels, ros_types.POINT_CLOUD)
-        if _IMU_TOPIC in self._file.topics:
-            self._topics.require(_IMU_TOPIC, ros_types.IMU)
+        for topic, kind in (
+            (labels, ros_types.POINT_CLOUD),
+            (_IMU_TOPIC, ros_types.IMU),
+            (_TF_STATIC_TOPIC, ros_types.TF),
+        ):
+            if topic in self._file.topics:
+                self._topics.require(topic, kind)
         self._has_tf = _TF_TOPIC in self._topics.find(ros_types.TF)
-        self._all_scans = self._file.locate(self._lidar_topic)
         self._images = _McapImages(self._topics)
 
     def __len__(self) -> int:
@@ -105,45 +186,44 @@ class McapDrive(Drive):
 
     @property
     def stamps_ns(self) -> np.ndarray:
-        return self._track[0]
+        return self._all_scans[0][self._kept]
 
-    @property
+    @cached_property
     def X_WS(self) -> np.ndarray:
-        return self._track[1]
+        start = self._kept.start - self._posed.kept.start
+        return self._posed.X_WB[start : start + len(self)] @ self.X_BS
 
     @cached_property
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
-        _, odometry = self._stamps_and_odometry
-        rows = np.concatenate([odometry, self._later_poses()])
-        stamps_ns, kept = np.unique(rows["stamp_ns"], return_index=True)
-        X_WB = checked_poses(
-            rows["position"][kept], rows["quat_xyzw"][kept], str(self._path)
-        )
-        return stamps_ns, X_WB @ self.X_BS
+        found = self._trajectory(self._later_poses())
+        return found.stamps_ns, found.X_WB @ self.X_BS
 
     def _later_poses(self) -> np.ndarray:
         """Returns poses of the vehicle on /tf that are later than the odometry.
 
         They are records of `ODOMETRY_DTYPE` with velocities of zero.
         """
-        if not self._has_tf:
+        topic = self._pose_topic
+        if not self._has_tf or topic is None:
             return np.zeros(0, ODOMETRY_DTYPE)
-        last = self._file.locate(_ODOMETRY_TOPIC)[-1]
-        odometry = self._topics.message(_ODOMETRY_TOPIC, last)
+        last_ns = self.odometry["stamp_ns"][-1]
         places = self._file.locate(_TF_TOPIC)
+        if self._topics.logged_stamps_ns(topic) is not None:
+            places = places[places["log_time_ns"] > last_ns]
+        frames = vehicle_frames(self._topics.first(topic))
         found = [
             transform_row(edge)
-            for place in places[places["log_time_ns"] > last["log_time_ns"]]
+            for place in places
             for edge in self._topics.message(_TF_TOPIC, place).transforms
-            if vehicle_frames(edge) == vehicle_frames(odometry)
+            if vehicle_frames(edge) == frames
         ]
         rows = np.array(found, ODOMETRY_DTYPE)
-        return rows[rows["stamp_ns"] > mcap_messages.stamp_ns(odometry.header)]
+        return rows[rows["stamp_ns"] > last_ns]
 
     @property
     def lidar_names(self) -> tuple[str, ...]:
         """Names of the LiDARs; the first is the one that is read by default."""
-        clouds = _cloud_topics(self._file.topics)
+        clouds = self._topics.of_types(*_CLOUDS.types)
         clouds.sort(key=lambda topic: topic != _LIDAR_TOPIC)
         return tuple(map(_lidar_name, clouds))
 
@@ -160,34 +240,29 @@ class McapDrive(Drive):
 
     @property
     def world_frame(self) -> str:  # type: ignore[override]  # Read late.
-        return self._topics.first(_ODOMETRY_TOPIC).header.frame_id
+        if self._pose_topic is None:
+            return f"poses{Path(str(self._posed_by.source)).resolve()}"
+        return frame_name(self._topics.first(self._pose_topic).header.frame_id)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        notes = []
-        missing = len(self._all_scans) - len(self)
+        notes = [*self._posed.notes, *self._mounted[1]]
+        missing = self._posed.kept.stop - self._kept.stop
         if missing:
             notes.append(
-                f"{self._path}: {_ODOMETRY_TOPIC}: no pose (or no labels) for"
-                f" {missing} of {len(self._all_scans)} scans at the ends of the"
-                " drive; they are left out"
+                f"{self._path}: {self._labels_topic}: no labels for the last"
+                f" {missing} scans; they are left out"
             )
-        if has_wrong_rows(self._topics.first(self._lidar_topic)):
+        first = self._topics.first(self._lidar_topic)
+        if not self._is_livox and has_wrong_rows(first):
             notes.append(
                 f"{self._path}: {self._lidar_topic}: row_step is not width x"
                 " point_step; the points are read one after the other, which"
                 " the length of the data shows"
             )
-        for topic in (self._lidar_topic, _ODOMETRY_TOPIC):
-            back = self._file.step_back_ns(topic) * 1e-9
-            if back > _LATEST:
-                notes.append(
-                    f"{self._path}: {topic}: the clock goes back by {back:.3g}"
-                    " s; messages are read in the order of their log times"
-                )
-        if self.world_frame != _SHARED_FRAME:
+        if self._pose_topic is not None and self.world_frame != _SHARED_FRAME:
             notes.append(
-                f"{self._path}: {_ODOMETRY_TOPIC}: all drives with poses in a"
+                f"{self._path}: {self._pose_topic}: all drives with poses in a"
                 f" frame {self.world_frame!r} count as drives in one world"
                 " (--align always aligns them nevertheless)"
             )
@@ -195,7 +270,8 @@ class McapDrive(Drive):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        return (self._path,)
+        given = () if self._given is None else (self._posed_by.source,)
+        return (*self._file.files, *map(Path, map(str, given)))
 
     @property
     def distortion_note(self) -> str | None:
@@ -249,14 +325,25 @@ class McapDrive(Drive):
         with self._topics.faults(
             f"{self._lidar_topic}: scan {index} at {stamp_ns} ns"
         ):
-            self._check_frame(message.header.frame_id)
-            logged_ns = int(place["log_time_ns"])
-            if self._logged_stamps_ns is not None and stamp_ns != logged_ns:
+            frame = frame_name(message.header.frame_id)
+            if frame != self._lidar_frame:
                 raise ValueError(
-                    f"its log time is {logged_ns} ns, though the file states"
-                    " that log times are stamps"
+                    f"in frame {frame!r}, at first in {self._lidar_frame!r}"
                 )
-            points = to_points(message)
+            if stamp_ns != self.stamps_ns[index]:
+                raise ValueError(
+                    f"its log time is {self.stamps_ns[index]} ns, though the"
+                    " file states that log times are stamps"
+                )
+            points = (
+                livox_points(message) if self._is_livox else to_points(message)
+            )
+            if self._is_in_world:
+                points = points.copy()
+                X_SW = poses.inverse(self.X_WS[index])
+                moved = poses.transform(X_SW, point_arrays.xyz(points))
+                for axis, values in zip("xyz", moved.T, strict=True):
+                    points[axis] = values
             point_arrays.check_range(points, point_arrays.FARTHEST_RETURN)
             return from_layout(
                 points,
@@ -273,7 +360,8 @@ class McapDrive(Drive):
         topic = self._labels_topic
         if topic is None:
             return None
-        message = self._topics.message(topic, self._file.locate(topic)[index])
+        _, places = self._topics.by_stamp(topic)
+        message = self._topics.message(topic, places[self._kept.start + index])
         if message.header.stamp != cloud.header.stamp:
             raise ValueError(
                 f"{topic}: number {index} has another stamp than the scan"
@@ -295,9 +383,11 @@ class McapDrive(Drive):
                 f"{self._path}: attachment {_KALIBR}: no text"
             ) from error
 
-    @property
+    @cached_property
     def odometry(self) -> np.ndarray:
-        return self._stamps_and_odometry[1]
+        if self._pose_topic is None:
+            return np.zeros(0, ODOMETRY_DTYPE)
+        return self._topics.rows(self._pose_topic)
 
     @cached_property
     def imu(self) -> np.ndarray | None:
@@ -317,125 +407,99 @@ class McapDrive(Drive):
     def image(self, index: int) -> bytes:
         return self._images.image(index)
 
-    @cached_property
+    @property
     def _scans(self) -> np.ndarray:
-        """Locations of the scans, except scans at the ends that lack a pose."""
-        scans = self._all_scans
-        odometry = self._file.locate(_ODOMETRY_TOPIC)
-        num_labelled = len(scans)
-        if self._labels_topic is not None:
-            num_labelled = len(self._file.locate(self._labels_topic))
-        if (
-            num_labelled >= len(scans)
-            and self._is_posed(scans[0], odometry)
-            and self._is_posed(scans[-1], odometry[::-1])
-        ):
-            return scans
-        stamps_ns, rows = self._stamps_and_odometry
-        usable = np.isin(stamps_ns, rows["stamp_ns"])
-        usable[num_labelled:] = False
-        kept = np.flatnonzero(usable)
-        # Without any pose, the fault is not at the ends.
-        return scans[kept[0] : kept[-1] + 1] if len(kept) else scans
+        """Locations of the scans that have a pose and labels."""
+        return self._all_scans[1][self._kept]
 
-    def _is_posed(self, scan: np.void, odometry: np.ndarray) -> bool:
-        """Returns whether one of the first messages has a scan's stamp."""
-        wanted, _ = self._read_cloud_header(self._file.read(scan))
-        backward = odometry[0]["log_time_ns"] > odometry[-1]["log_time_ns"]
-        for place in odometry:
-            header = self._topics.message(_ODOMETRY_TOPIC, place).header
-            later = mcap_messages.stamp_ns(header) - wanted
-            if later == 0:
-                return True
-            if (-later if backward else later) > _LATEST * 1e9:
-                return False
-        return False
+    @property
+    def _all_scans(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stamps [ns] and locations of all scans, in the order of stamps."""
+        return self._topics.by_stamp(self._lidar_topic)
 
     @cached_property
-    def _track(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stamps (N,) [ns] and poses (N, 4, 4) of the scans."""
-        stamps_ns, odometry = self._stamps_and_odometry
-        first = np.flatnonzero(self._all_scans == self._scans[0])[0]
-        stamps_ns = stamps_ns[first : first + len(self)]
-        rows = {stamp: i for i, stamp in enumerate(odometry["stamp_ns"])}
-        missing = [
-            index for index, stamp in enumerate(stamps_ns) if stamp not in rows
-        ]
-        if missing:
-            raise InputError(
-                f"{self._path}: {_ODOMETRY_TOPIC}: no pose with the stamp"
-                f" {stamps_ns[missing[0]]} of scan {missing[0]}"
-                f" ({len(missing)} of {len(self)} scans have none)"
-            )
-        matching = odometry[[rows[stamp] for stamp in stamps_ns]]
+    def _kept(self) -> slice:
+        """The scans that have a pose and labels, as a slice of all."""
+        kept = self._posed.kept
+        if self._labels_topic is None:
+            return kept
+        stamps_ns, _ = self._topics.by_stamp(self._labels_topic)
+        return slice(kept.start, min(kept.stop, len(stamps_ns)))
+
+    @cached_property
+    def _posed(self) -> PosedScans:
+        """The poses of the scans."""
+        return self._posed_by.at_scans(self._all_scans[0])
+
+    @cached_property
+    def _posed_by(self) -> StampedPoses:
+        """The poses of the vehicle, or those of the LiDAR from a file."""
+        if self._given is not None:
+            return self._given(self._all_scans[0])
+        return self._trajectory()
+
+    def _trajectory(self, *later: np.ndarray) -> StampedPoses:
+        """Returns the poses of the vehicle in rows of `ODOMETRY_DTYPE`."""
+        rows = np.concatenate([self.odometry, *later])
+        stamps_ns, kept = np.unique(rows["stamp_ns"], return_index=True)
         X_WB = checked_poses(
-            matching["position"], matching["quat_xyzw"], str(self._path)
+            rows["position"][kept], rows["quat_xyzw"][kept], str(self._path)
         )
-        return stamps_ns, X_WB @ self.X_BS
+        source = f"{self._path}: {self._pose_topic}"
+        return StampedPoses(source, stamps_ns, X_WB)
 
-    @cached_property
-    def _stamps_and_odometry(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stamps of all scans, and the odometry, in one pass."""
-        places = self._file.locate(_ODOMETRY_TOPIC)
-        rows = MessageRows(ros_types.ODOMETRY, len(places))
-        logged_ns = self._logged_stamps_ns
-        if logged_ns is None:
-            clouds = self._all_scans
-            stamps_ns = np.zeros(len(clouds), np.int64)
-        else:
-            clouds = self._all_scans[:0]
-            stamps_ns = logged_ns
-        for index, data in self._file.visit(np.concatenate([clouds, places])):
-            if index < len(clouds):
-                stamps_ns[index], frame = self._read_cloud_header(data)
-                with self._topics.faults(
-                    f"{self._lidar_topic}: at {stamps_ns[index]} ns"
-                ):
-                    self._check_frame(frame)
-            else:
-                with self._topics.faults(_ODOMETRY_TOPIC):
-                    rows.add(index - len(clouds), data)
-        odometry = rows.rows()
-        disorder = np.flatnonzero(np.diff(stamps_ns) <= 0)
-        if len(disorder):
-            raise InputError(
-                f"{self._path}: {self._lidar_topic}: the stamp of scan"
-                f" {disorder[0] + 1} is not later than the one before"
-            )
-        with self._topics.faults(_ODOMETRY_TOPIC):
-            check_agreement(odometry)
-        return stamps_ns, odometry
-
-    @cached_property
-    def _logged_stamps_ns(self) -> np.ndarray | None:
-        """Stamps (N,) of all scans, if the file's index has them, or None."""
-        return self._topics.logged_stamps_ns(self._lidar_topic)
-
-    @cached_property
+    @property
     def X_BS(self) -> np.ndarray:
-        """Pose of the LiDAR S on the vehicle B, (4, 4), from /tf_static."""
-        return self._mount(self._lidar_frame)
+        """Pose of the LiDAR S on the vehicle B, (4, 4)."""
+        return self._mounted[0]
 
     @cached_property
     def X_BI(self) -> np.ndarray | None:
         """Pose of the IMU I on the vehicle B, (4, 4); None without an IMU."""
-        if _IMU_TOPIC not in self._topics:
+        if _IMU_TOPIC not in self._topics or self._base is None:
             return None
-        return self._mount(self._topics.first(_IMU_TOPIC).header.frame_id)
+        frame = frame_name(self._topics.first(_IMU_TOPIC).header.frame_id)
+        return self._transforms.pose(self._base, frame)
 
-    def _mount(self, frame: str) -> np.ndarray:
-        """Returns the pose (4, 4) of a sensor's frame on the vehicle."""
-        base = self._topics.first(_ODOMETRY_TOPIC).child_frame_id
-        for topic, name, value in (
-            (_ODOMETRY_TOPIC, "child_frame_id", base),
-            ("the sensor's topic", "frame_id", frame),
-        ):
-            if not value:
-                raise InputError(
-                    f"{self._path}: {topic}: {name} is empty, so no mounting"
-                    f" pose can be found ({self._transforms.listed()})"
-                )
-        return self._transforms.pose(base, frame)
+    @cached_property
+    def _base(self) -> str | None:
+        """Frame of the vehicle B; None if the poses name none."""
+        if self._pose_topic is None:
+            return None
+        first = self._topics.first(self._pose_topic)
+        return frame_name(getattr(first, "child_frame_id", "")) or None
+
+    @property
+    def _is_in_world(self) -> bool:
+        """Whether points are in the frame of the poses, as of FAST-LIO's."""
+        return (
+            self._pose_topic is not None
+            and self._lidar_frame == self.world_frame
+        )
+
+    @cached_property
+    def _mounted(self) -> tuple[np.ndarray, list[str]]:
+        """The pose X_BS (4, 4), and notes on how it was found."""
+        topic, base, frame = self._pose_topic, self._base, self._lidar_frame
+        if topic is None or base == frame:
+            return np.eye(4), []
+        where = f"{self._path}: {self._lidar_topic}"
+        if self._is_in_world:
+            return np.eye(4), [
+                f"{where}: the points are in the frame {frame!r} of the poses;"
+                f" they are moved into the frame {base or 'of the vehicle'!r}"
+            ]
+        if base is not None and frame and _TF_STATIC_TOPIC in self._topics:
+            return self._transforms.pose(base, frame), []
+        why = (
+            f"{topic} names no frame of the vehicle"
+            if base is None
+            else f"no {_TF_STATIC_TOPIC} says where it is in {base!r}"
+        )
+        return np.eye(4), [
+            f"{where}: {why}; the poses on {topic} are taken as those of this"
+            " LiDAR"
+        ]
 
     @cached_property
     def _transforms(self) -> StaticTransforms:
@@ -446,27 +510,16 @@ class McapDrive(Drive):
 
     @cached_property
     def _lidar_frame(self) -> str:
-        return self._topics.first(self._lidar_topic).header.frame_id
+        first = self._topics.first(self._lidar_topic)
+        return frame_name(first.header.frame_id)
 
-    def _check_frame(self, frame: str) -> None:
-        """Refuses a scan whose frame differs from the first scan's frame.
-
-        Raises:
-            ValueError: the frames differ.
-        """
-        if frame != self._lidar_frame:
-            raise ValueError(
-                f"in frame {frame!r}, at first in {self._lidar_frame!r}"
-            )
-
-    def _read_cloud_header(self, data: memoryview) -> tuple[int, str]:
-        """Returns the stamp [ns] and the frame of a scan."""
-        with self._topics.faults(self._lidar_topic):
-            return mcap_messages.read_cloud_header(data)
+    @property
+    def _is_livox(self) -> bool:
+        return self._topics.kind(self._lidar_topic) != ros_types.POINT_CLOUD
 
 
-class _McapTopics:
-    """Reads and decodes messages of an MCAP file; errors name file and topic.
+class _Topics:
+    """Reads and decodes messages of a bag; errors name file and topic.
 
     Attributes:
         file: the file.
@@ -474,42 +527,104 @@ class _McapTopics:
     """
 
     def __init__(self, path: Path):
-        """Opens a file; no topic is read yet.
+        """Opens a bag; no topic is read yet.
 
         Raises:
-            InputError: there is no complete MCAP file.
+            InputError: there is no complete bag.
         """
-        self.file = McapFile(path)
+        self.file = _open_bag(path)
         self.path = self.file.path
         self._types: dict[str, str] = {}
+        self._by_stamp: dict[str, tuple[np.ndarray, np.ndarray]] = {}
 
     def __contains__(self, topic: str) -> bool:
         """Returns whether messages of a topic can be decoded."""
         return topic in self._types
 
-    def require(self, topic: str, message_type: str) -> None:
-        """Checks that a topic has messages, all of one type in CDR.
+    def choose(self, stream: _Stream, wanted: str | None) -> str:
+        """Returns the topic that a drive reads.
+
+        Args:
+            stream: what the topic has.
+            wanted: its name, with or without a slash; None for the usual topic
+                or, without it, the only one.
 
         Raises:
-            InputError: the topic has no message, or messages of other types.
+            InputError: there is no such topic, or there are several.
         """
-        found = self.file.topics.get(topic)
-        if found is None:
-            there = "; ".join(
-                f"{name}: {' and '.join(kinds)}"
-                for name, kinds in sorted(self.file.topics.items())
-            )
+        found = [stream.usual] if stream.usual in self.file.topics else []
+        usual = stream.usual
+        if wanted is not None:
+            named = (wanted, f"/{wanted}{stream.ending}", f"/{wanted}")
+            usual = wanted if wanted.startswith("/") else named[1]
+            for name in named:
+                if name in self.file.empty_topics:
+                    raise InputError(f"{self.path}: {name}: no message")
+            found = [name for name in named if name in self.file.topics]
+        there = [self.of_types(types) for types in stream.types]
+        if wanted is None and not found:
+            found = next(filter(None, there), [])
+        if not found or (wanted is None and len(found) > 1):
+            known = [topic for topics in there for topic in topics]
+            self._refuse(usual, stream, wanted, known)
+        (topic, *_) = found
+        kinds = self.kinds(topic)
+        types = [kind for one in stream.types for kind in one]
+        is_known = len(kinds) == 1 and kinds[0] in types
+        self.require(topic, kinds[0] if is_known else types[0])
+        return topic
+
+    def _refuse(
+        self, usual: str, stream: _Stream, wanted: str | None, there: list[str]
+    ) -> NoReturn:
+        """Raises an error for a topic that is missing or has to be chosen."""
+        if there:
+            advice = "" if wanted else f"; choose one as the {stream.role}"
             raise InputError(
-                f"{self.path}: no topic {topic} of {message_type} (there are:"
-                f" {there or 'no topics'})"
+                f"{self.path}: no topic {usual} ({stream.title}:"
+                f" {' '.join(there)}{advice}, with {stream.option})"
             )
+        found = [
+            f"{name}: {' and '.join(kinds)}"
+            for name, kinds in sorted(self.file.topics.items())
+        ]
+        if empty := self.file.empty_topics:
+            found.append(f"without a message: {' '.join(empty)}")
+        raise InputError(
+            f"{self.path}: no topic {usual} of {stream.types[0][0]} (there are:"
+            f" {'; '.join(found) or 'no topics'}){stream.advice}"
+        )
+
+    def of_types(self, types: tuple[str, ...]) -> list[str]:
+        """Returns the topics with messages of some types, except of labels."""
+        return [
+            topic
+            for topic in self.file.topics
+            if not set(self.kinds(topic)).isdisjoint(types)
+            and not topic.endswith("/labels")
+        ]
+
+    def kinds(self, topic: str) -> list[str]:
+        """Returns the types of a topic's messages."""
+        kinds = self.file.topics.get(topic, [])
+        return [kind.partition(" in ")[0] for kind in kinds]
+
+    def kind(self, topic: str) -> str:
+        """Returns the type of a topic whose messages can be decoded."""
+        return self._types[topic]
+
+    def require(self, topic: str, message_type: str) -> None:
+        """Checks that all messages of a topic are of one type in CDR.
+
+        Raises:
+            InputError: the topic has messages of other types.
+        """
+        found = self.file.topics[topic]
         if found != [f"{message_type} in cdr"]:
             raise InputError(
                 f"{self.path}: {topic}: {' and '.join(found)} instead of"
                 f" {message_type} in cdr"
             )
-        if len(self.file.locate(topic)) == 0:
-            raise InputError(f"{self.path}: {topic}: no message")
         self._types[topic] = message_type
 
     def find(self, message_type: str) -> list[str]:
@@ -544,20 +659,72 @@ class _McapTopics:
         return self.message(topic, self.file.locate(topic)[0])
 
     def rows(self, topic: str) -> np.ndarray:
-        """Returns all messages of a topic of odometry or of an IMU as rows.
+        """Returns all messages of a topic of poses or of an IMU as rows.
+
+        Returns:
+            (N,) rows, by stamp, of `ODOMETRY_DTYPE` or `IMU_DTYPE`.
 
         Raises:
             InputError: a message cannot be read, or two different messages have
                 the same stamp.
         """
+        kind = self._types[topic]
         places = self.file.locate(topic)
-        rows = MessageRows(self._types[topic], len(places))
+        if kind == ros_types.PATH:
+            # Each message has all poses up to then.
+            places = places[-1:]
+        with self.faults(topic):
+            if kind in (ros_types.ODOMETRY, ros_types.IMU):
+                rows = MessageRows(kind, len(places))
+                for index, data in self.file.visit(places):
+                    rows.add(index, data)
+                found = rows.rows()
+            else:
+                made = [
+                    row
+                    for _, data in self.file.visit(places)
+                    for row in POSE_ROWS[kind](mcap_messages.decode(data, kind))
+                ]
+                found = np.array(made, ODOMETRY_DTYPE)
+            check_agreement(found)
+        return found[np.argsort(found["stamp_ns"], kind="stable")]
+
+    def by_stamp(self, topic: str) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the stamps (N,) [ns] and locations (N,) of a topic, sorted.
+
+        A message that is there twice counts once.
+
+        Raises:
+            InputError: a message has no stamp, or two messages with one stamp
+                differ.
+        """
+        if topic not in self._by_stamp:
+            self._by_stamp[topic] = self._sorted(topic)
+        return self._by_stamp[topic]
+
+    def _sorted(self, topic: str) -> tuple[np.ndarray, np.ndarray]:
+        places = self.file.locate(topic)
+        logged_ns = self.logged_stamps_ns(topic)
+        if logged_ns is not None and (np.diff(logged_ns) > 0).all():
+            return logged_ns, places
+        stamps_ns = np.zeros(len(places), np.int64)
+        digests = {}
         with self.faults(topic):
             for index, data in self.file.visit(places):
-                rows.add(index, data)
-            found = rows.rows()
-            check_agreement(found)
-        return found
+                stamps_ns[index] = mcap_messages.read_stamp(data) or 0
+                digests[index] = zlib.crc32(data)
+            if (stamps_ns == 0).any() and len(places) > 1:
+                raise ValueError("a message has no stamp")
+            order = np.argsort(stamps_ns, kind="stable")
+            twice = np.diff(stamps_ns[order], prepend=-1) == 0
+            for k in np.flatnonzero(twice).tolist():
+                if digests[int(order[k])] != digests[int(order[k - 1])]:
+                    raise ValueError(
+                        "two different messages with the stamp"
+                        f" {stamps_ns[order[k]]} ns"
+                    )
+        order = order[~twice]
+        return stamps_ns[order], places[order]
 
     def logged_stamps_ns(self, topic: str) -> np.ndarray | None:
         """Returns the stamps (N,) of a topic's messages [ns] from the index.
@@ -594,7 +761,7 @@ class _McapTopics:
 class _McapImages:
     """The images of the first topic of compressed images, if there is one."""
 
-    def __init__(self, topics: _McapTopics):
+    def __init__(self, topics: _Topics):
         self._topics = topics
         found = topics.find(ros_types.COMPRESSED_IMAGE)
         cameras = [topic for topic in found if not topic.endswith(_DEPTH)]
@@ -616,41 +783,46 @@ class _McapImages:
         place = self._sorted[1][index]
         return self._topics.message(self._topic, place).data.tobytes()
 
-    @cached_property
+    @property
     def _sorted(self) -> tuple[np.ndarray, np.ndarray]:
         """Stamps (M,) [ns] and places of the images, sorted by stamp."""
-        topic = self._topic
-        if topic is None:
+        if self._topic is None:
             return np.zeros(0, np.int64), np.zeros(0, LOCATION)
-        places = self._topics.file.locate(topic)
-        stamps_ns = self._topics.logged_stamps_ns(topic)
-        if stamps_ns is None:
-            stamps_ns = np.zeros(len(places), np.int64)
-            with self._topics.faults(topic):
-                for index, data in self._topics.file.visit(places):
-                    stamps_ns[index] = mcap_messages.read_stamp(data) or 0
-        if (stamps_ns == 0).any():
-            raise InputError(
-                f"{self._topics.path}: {topic}: an image has no stamp"
-            )
-        order = np.argsort(stamps_ns, kind="stable")
-        return stamps_ns[order], places[order]
+        return self._topics.by_stamp(self._topic)
 
 
 def holds_mcap(path: Path) -> bool:
-    """Returns whether `path` is an .mcap file or a folder with one."""
-    if path.is_dir():
-        return bool(listed(path, "*.mcap"))
-    return path.suffix == ".mcap"
-
-
-def _mcap_path(path: Path) -> Path:
+    """Returns whether `path` is a bag of ROS or a folder with one."""
     if not path.is_dir():
-        return path
-    files = listed(path, "*.mcap")
-    if len(files) != 1:
-        raise InputError(f"{path}: {len(files)} .mcap files instead of one")
-    return files[0]
+        return path.suffix in _ENDINGS
+    return (path / _METADATA).is_file() or any(
+        listed(path, f"*{ending}") for ending in _ENDINGS
+    )
+
+
+def _open_bag(path: Path) -> McapFile | RosbagFile:
+    """Opens the bag at a path, or in a folder."""
+    if not path.is_dir():
+        if path.suffix in (".bag", ".db3"):
+            return RosbagFile([path])
+        return McapFile(path)
+    files = {ending: listed(path, f"*{ending}") for ending in _ENDINGS}
+    mcap, sqlite, ros1 = (files[ending] for ending in _ENDINGS)
+    metadata = path / _METADATA
+    told = read_text(metadata) if metadata.is_file() else ""
+    if len(mcap) == 1 and not re.search(_PACKED, told, re.I | re.M):
+        return McapFile(mcap[0])
+    if told:
+        return RosbagFile([path])
+    if len(sqlite) == 1:
+        return RosbagFile(sqlite)
+    if ros1:
+        return RosbagFile(ros1)
+    number, ending = (len(mcap), ".mcap") if mcap else (len(sqlite), ".db3")
+    raise InputError(
+        f"{path}: {number} {ending} files instead of one, and no {_METADATA},"
+        " which says that they are one bag"
+    )
 
 
 def _drive_name(path: Path) -> str:
@@ -659,56 +831,8 @@ def _drive_name(path: Path) -> str:
     return place.name if place.is_dir() else place.stem.removesuffix("_0")
 
 
-_LIDAR_TOPIC = "/lidar/points"
-
-
-def _cloud_topics(topics: Mapping[str, Iterable[str]]) -> list[str]:
-    """Returns the topics with point clouds, except topics of labels.
-
-    Args:
-        topics: topic -> message types, as in `McapFile.topics`.
-    """
-    return [
-        topic
-        for topic, kinds in topics.items()
-        if any(kind.startswith(ros_types.POINT_CLOUD) for kind in kinds)
-        and not topic.endswith("/labels")
-    ]
-
-
-def _choose_lidar_topic(
-    topics: Mapping[str, Iterable[str]], lidar: str | None, source: object
-) -> str:
-    """Returns the topic of the wanted LiDAR.
-
-    If the file has no topic of point clouds, the result need not be in
-    `topics`.
-
-    Args:
-        topics: topic -> message types, as in `McapFile.topics`.
-        lidar: name or topic of the LiDAR. None stands for `/lidar/points` or,
-            if this topic is missing, for the only topic of point clouds.
-        source: the file, with which an error message begins.
-
-    Raises:
-        InputError: the topic does not exist, but other topics of point clouds
-            do; the message names them.
-    """
-    clouds = _cloud_topics(topics)
-    wanted = _LIDAR_TOPIC
-    if lidar is not None:
-        wanted = f"/{lidar}/points"
-        named = (lidar, wanted, f"/{lidar}")
-        wanted = next((topic for topic in named if topic in topics), wanted)
-    elif _LIDAR_TOPIC not in topics and len(clouds) == 1:
-        wanted = clouds[0]
-    if wanted not in topics and clouds:
-        advice = "" if lidar else "; choose one as the LiDAR"
-        raise InputError(
-            f"{source}: no topic {wanted} (point clouds:"
-            f" {' '.join(clouds)}{advice})"
-        )
-    return wanted
+# Endings of bags: of rosbag2, with MCAP or SQLite, and of ROS 1.
+_ENDINGS = (".mcap", ".db3", ".bag")
 
 
 def _lidar_name(topic: str) -> str:

@@ -152,12 +152,36 @@ class McapFile:
     def topics(self) -> dict[str, list[str]]:
         """Maps topics to sorted types of messages, as `<type> in <encoding>`.
 
-        In an intact recording each topic has exactly one such entry.
+        In an intact recording each topic has exactly one such entry. Channels
+        without a message do not count: `ros2 bag record` writes them for all
+        topics that there are.
         """
-        return {
-            topic: sorted({self._kind(channel) for channel in channels})
+        found = {
+            topic: sorted(
+                {self._kind(one) for one in channels if one.id in self._used}
+            )
             for topic, channels in self._channels.items()
         }
+        return {topic: kinds for topic, kinds in found.items() if kinds}
+
+    @property
+    def empty_topics(self) -> list[str]:
+        """Topics without a message."""
+        return [one for one in self._channels if one not in self.topics]
+
+    @property
+    def _used(self) -> set[int]:
+        """The ids of channels with messages."""
+        contents = self._contents
+        if contents.found is not None:
+            return set(contents.found)
+        counts = contents.statistics.channel_message_counts  # type: ignore[union-attr]  # It is whole.
+        return {number for number, count in counts.items() if count}
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file."""
+        return (self.path,)
 
     def locate(self, topic: str) -> np.ndarray:
         """Returns the locations of a topic's messages in the file, by time.
@@ -172,21 +196,6 @@ class McapFile:
         if topic not in self._locations:
             self._locations[topic] = self._read_locations(topic)
         return self._locations[topic]
-
-    def step_back_ns(self, topic: str) -> int:
-        """Returns the largest decrease of log time between two messages [ns].
-
-        The two messages are consecutive messages of one topic, in the order in
-        which they were written. The result is 0 if the log times never
-        decrease.
-
-        Raises:
-            InputError: if the index cannot be read.
-        """
-        places = self.locate(topic)
-        order = np.lexsort((places["offset"], places["chunk"]))
-        times_ns = places["log_time_ns"][order].astype(np.int64)
-        return max(0, -int(np.diff(times_ns).min(initial=0)))
 
     def read(self, location: np.void) -> memoryview:
         """Returns the serialised message at a location.

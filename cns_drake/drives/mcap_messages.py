@@ -100,9 +100,13 @@ def read_cloud_header(data: bytes | memoryview) -> tuple[int, str]:
 def read_stamp(data: bytes | memoryview) -> int | None:
     """Returns the stamp of a message that begins with a header [ns].
 
-    The result is None if the message is too short. For a compressed message, or
-    a message without a header, the result is meaningless.
+    The result is None if the message is too short. For a message without a
+    header, the result is meaningless.
+
+    Raises:
+        ValueError: the message is compressed.
     """
+    _check_uncompressed(data)
     if len(data) < _ENCAPSULATION_BYTES + 8:
         return None
     order = "<" if data[1] & 1 else ">"
@@ -125,6 +129,11 @@ def xyzw(q: Any) -> tuple[float, float, float, float]:
     return q.x, q.y, q.z, q.w
 
 
+def frame_name(name: str) -> str:
+    """Returns the name of a frame; before tf2, names began with a slash."""
+    return name.removeprefix("/")
+
+
 class StaticTransforms:
     """The frames in /tf_static: a tree with each frame's pose in its parent."""
 
@@ -144,12 +153,13 @@ class StaticTransforms:
         for message in messages:
             for edge in message.transforms:
                 new = (
-                    edge.header.frame_id,
+                    frame_name(edge.header.frame_id),
                     xyz(edge.transform.translation),
                     xyzw(edge.transform.rotation),
                 )
                 # Nodes repeat what is fixed.
-                old = self._edges.setdefault(edge.child_frame_id, new)
+                child = frame_name(edge.child_frame_id)
+                old = self._edges.setdefault(child, new)
                 is_same = (
                     old[0] == new[0]
                     and poses.same_numbers(old[1], new[1])
@@ -162,30 +172,39 @@ class StaticTransforms:
                     )
 
     def pose(self, base: str, frame: str) -> np.ndarray:
-        """Returns the pose (4, 4) of a frame in one of its ancestors.
+        """Returns the pose (4, 4) of a frame in another frame of the tree.
 
         Args:
-            base: name of the ancestor.
+            base: name of the other frame.
             frame: name of the frame.
 
         Raises:
-            InputError: no transforms lead from the frame to the ancestor, or
-                one of these transforms is not rigid.
+            InputError: no transforms lead from one frame to the other, or one
+                of these transforms is not rigid.
         """
-        X_CF = np.eye(4)
+        X_AF, X_AB = self._in_ancestors(frame), self._in_ancestors(base)
+        common = next((name for name in X_AF if name in X_AB), None)
+        if common is None:
+            raise InputError(
+                f"{self._where}: no transform from {base} to {frame}"
+                f" ({self.listed()})"
+            )
+        if common == base:
+            return X_AF[base]
+        return poses.inverse(X_AB[common]) @ X_AF[common]
+
+    def _in_ancestors(self, frame: str) -> dict[str, np.ndarray]:
+        """Returns ancestor -> pose (4, 4) of a frame in it, itself first."""
+        found = {frame: np.eye(4)}
         child = frame
-        for _ in range(len(self._edges) + 1):
-            if child == base:
-                return X_CF
-            if child not in self._edges:
-                break
+        while child in self._edges:
+            X_CF = found[child]
             child, p_PC, quat_PC = self._edges[child]
+            if child in found:
+                break
             X_PC = checked_poses(np.array(p_PC), np.array(quat_PC), self._where)
-            X_CF = X_PC @ X_CF
-        raise InputError(
-            f"{self._where}: no transform from {base} to {frame}"
-            f" ({self.listed()})"
-        )
+            found[child] = X_PC @ X_CF
+        return found
 
     def listed(self) -> str:
         """Returns what transforms there are, for error messages."""

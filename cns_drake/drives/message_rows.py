@@ -42,6 +42,27 @@ def transform_row(message: Any) -> tuple:
     return stamp_ns(message.header), *place, 0.0, 0.0
 
 
+def pose_row(message: Any) -> tuple:
+    """Returns a message of a pose with a header as `odometry_row` does.
+
+    The velocities are zero.
+    """
+    pose = getattr(message.pose, "pose", message.pose)
+    place = xyz(pose.position), xyzw(pose.orientation)
+    return stamp_ns(message.header), *place, 0.0, 0.0
+
+
+# Type of messages with poses -> function that returns a message's rows, in the
+# order in which topics are chosen.
+POSE_ROWS: dict[str, Callable[[Any], list[tuple]]] = {
+    ros_types.ODOMETRY: lambda message: [odometry_row(message)],
+    ros_types.TRANSFORM: lambda message: [transform_row(message)],
+    ros_types.POSE_COVARIANCE: lambda message: [pose_row(message)],
+    ros_types.POSE: lambda message: [pose_row(message)],
+    ros_types.PATH: lambda message: list(map(pose_row, message.poses)),
+}
+
+
 def imu_row(message: Any) -> tuple:
     """Returns a message sensor_msgs/msg/Imu as a record of `IMU_DTYPE`.
 

@@ -10,6 +10,16 @@ import numpy as np
 _DATATYPES = dict(
     enumerate(["i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"], start=1)
 )
+_LIVOX = np.dtype(
+    [
+        ("x", "<f4"),
+        ("y", "<f4"),
+        ("z", "<f4"),
+        ("intensity", "<f4"),
+        ("ring", "<u2"),
+        ("t", "<u4"),
+    ]
+)
 
 
 def point_field_datatype(dtype: np.dtype) -> int:
@@ -46,6 +56,21 @@ def to_points(message: Any) -> np.ndarray:
             raise ValueError(f"the point cloud has no field {name} of floats")
     _check_separate(dtype)
     return _records(message, dtype)
+
+
+def livox_points(message: Any) -> np.ndarray:
+    """Returns the points of a message of Livox's drivers, (N,).
+
+    Lines are rings, and reflectivities are intensities. `t` is the time since
+    the message's stamp [ns].
+    """
+    return np.array(
+        [
+            (p.x, p.y, p.z, p.reflectivity, p.line, p.offset_time)
+            for p in message.points
+        ],
+        _LIVOX,
+    )
 
 
 def is_dense(message: Any) -> bool:

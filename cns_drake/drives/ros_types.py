@@ -14,11 +14,19 @@ from typing import Any
 import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
 IMU = "sensor_msgs/msg/Imu"
 ODOMETRY = "nav_msgs/msg/Odometry"
 TF = "tf2_msgs/msg/TFMessage"
+PATH = "nav_msgs/msg/Path"
+POSE = "geometry_msgs/msg/PoseStamped"
+POSE_COVARIANCE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+TRANSFORM = "geometry_msgs/msg/TransformStamped"
+# Points of Livox's driver for ROS 2, and of the one for ROS 1, which are alike.
+LIVOX = "livox_ros_driver2/msg/CustomMsg"
+LIVOX_1 = "livox_ros_driver/msg/CustomMsg"
 COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
 DETECTIONS_3D = "vision_msgs/msg/Detection3DArray"
 SCENE_UPDATE = "foxglove_msgs/msg/SceneUpdate"
@@ -30,6 +38,11 @@ for _path in sorted(_FOLDER.glob("*/msg/*.msg")):
     _TYPESTORE.register(
         get_types_from_msg(_path.read_text(encoding="utf-8"), _name)
     )
+
+
+def known_types() -> Typestore:
+    """Returns the table of message types."""
+    return _TYPESTORE
 
 
 def message_class(message_type: str) -> type:
@@ -87,8 +100,8 @@ def message_hash(message_type: str) -> str:
 
 
 def serialize(message: Any) -> bytes:
-    """Returns a message serialised as CDR."""
-    return bytes(_TYPESTORE.serialize_cdr(message, message.__msgtype__))
+    """Returns a message, also one of ROS 1, serialised as CDR."""
+    return bytes(_TYPESTORE.serialize_cdr(message, _known(message.__msgtype__)))
 
 
 def deserialize(data: bytes | memoryview, message_type: str) -> Any:
@@ -97,4 +110,8 @@ def deserialize(data: bytes | memoryview, message_type: str) -> Any:
     Raises:
         Exception: of any class, if the data are not a message of this type.
     """
-    return _TYPESTORE.deserialize_cdr(data, message_type)
+    return _TYPESTORE.deserialize_cdr(data, _known(message_type))
+
+
+def _known(message_type: str) -> str:
+    return LIVOX if message_type == LIVOX_1 else message_type

@@ -232,15 +232,6 @@ def _another_type(messages: list[RecordedMessage], rng) -> None:
     )
 
 
-def _drop_pose(messages: list[RecordedMessage], rng) -> None:
-    del messages[_some(messages, _ODOMETRY, rng)]
-
-
-def _scan_again(messages: list[RecordedMessage], rng) -> None:
-    place = _some(messages, _LIDAR, rng)
-    messages.insert(place, messages[place].copy(channel=int(rng.integers(2))))
-
-
 # Name -> edit, and a text of the error.
 CONTRADICTIONS: dict[
     str, tuple[Callable[[list[RecordedMessage], Any], None], str]
@@ -261,8 +252,6 @@ CONTRADICTIONS: dict[
     "another height": (_changed(_more_rows, _LIDAR), "bytes instead of"),
     "another encoding": (_add_channel(encoding="json"), "in cdr and .* json"),
     "another type": (_another_type, "and .* instead of"),
-    "no pose": (_drop_pose, "no pose with the stamp|no topic|no message"),
-    "a scan again": (_scan_again, "not later"),
 }
 
 

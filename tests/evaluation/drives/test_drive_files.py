@@ -3,6 +3,7 @@
 import hashlib
 import os
 from pathlib import Path
+import pickle
 import shutil
 import struct
 import sys
@@ -21,7 +22,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError, file_digests
-from evaluation.drives import open_drive
+from evaluation.drives import MovedDrive, open_drive
 from evaluation.study import RecordingSource
 
 MATRIX = "matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1.6, 0, 0, 0, 1]\n"
@@ -109,6 +110,17 @@ def cns(root):
 
 
 EVERY = (mcap, mulran, helipr, nclt, boreas, kitti, cns)
+
+
+@pytest.mark.parametrize("write", EVERY, ids=lambda write: write.__name__)
+def test_a_drive_goes_to_other_processes(tmp_path, write):
+    drive = open_drive(write(tmp_path))
+    moved = MovedDrive(drive, drive.X_WS + 1.0, "other", None)
+    for one in (drive, moved):
+        again = pickle.loads(pickle.dumps(one))
+        np.testing.assert_array_equal(again.X_WS, one.X_WS)
+        assert again.world_frame == one.world_frame
+        assert [s.tobytes() for s in again] == [s.tobytes() for s in one]
 
 
 def opened_by(action):

@@ -160,9 +160,3 @@ def test_scans_without_a_pose_at_the_ends(tmp_path, shifted, kept):
     for k, frame in enumerate(kept):
         np.testing.assert_array_equal(drive.scan(k), whole.scan(frame))
     assert f"for {len(shifted)} of 6 scans" in drive.notes[0]
-
-
-def test_scans_without_a_pose_between_others(tmp_path):
-    path = record(tmp_path, without_pose=[2, 5])
-    with pytest.raises(InputError, match=r"scan 2 \(1 of 5 scans have none\)"):
-        _ = open_drive(path).X_WS

@@ -1096,7 +1096,11 @@ def drive(folder):
     return read_map(folder / "drive")
 
 
-DRIVES = ("evaluation.drives.open_drive", "evaluation.study.find_recordings")
+DRIVES = (
+    "evaluation.alignment.open_in_one_world",
+    "evaluation.drives.open_drive",
+    "evaluation.study.find_recordings",
+)
 
 
 def chunk(size, level=19):

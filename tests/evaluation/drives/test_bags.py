@@ -1,0 +1,288 @@
+"""Bags by the conventions of public programs are read as they are."""
+
+import pickle
+
+from helpers.bags import (
+    LIVOX,
+    cloud,
+    header,
+    join_bags,
+    pose,
+    transform,
+    write_bag,
+)
+from helpers.drive_files import T0_NS, yaw_pose
+import numpy as np
+import pytest
+
+from cns_drake.base import InputError, poses, xyz
+from evaluation.drives import open_drive
+
+POINTS = "sensor_msgs/msg/PointCloud2"
+ODOMETRY = "nav_msgs/msg/Odometry"
+STATIC = "tf2_msgs/msg/TFMessage"
+NUM_SCANS = 12
+ID = np.eye(4)
+X_BS = yaw_pose(0.4, -0.1, 1.7, 0.3)
+p_WP = np.random.default_rng(4).uniform(-30.0, 30.0, (60, 3))
+
+
+def X_WB(stamp_ns):
+    """Returns where the robot is; it turns and drives evenly."""
+    t = (stamp_ns - T0_NS) * 1e-9
+    return yaw_pose(3.0 * t, 1.0 - t, 0.2 * t, 0.4 * t - 0.2)
+
+
+STAMPS = [T0_NS + 100_000_000 * k for k in range(NUM_SCANS)]
+# Poses come when they come, from before the first scan to behind the last.
+POSE_STAMPS = [T0_NS - 17_000_000 + 33_000_000 * k for k in range(38)]
+
+
+def points_of(X_WS, names="x y z intensity"):
+    """Returns the points in a LiDAR's frame, with further fields."""
+    kinds = {"ring": "<u2", "t": "<u4", "time_stamp": "<u4", "channel": "<u2"}
+    kinds |= {"timestamp": "<f8", "tag": "u1"}
+    dtype = [(name, kinds.get(name, "<f4")) for name in names.split()]
+    found = np.zeros(len(p_WP), dtype)
+    for axis, values in zip(
+        "xyz", poses.transform(poses.inverse(X_WS), p_WP).T, strict=True
+    ):
+        found[axis] = values
+    return found
+
+
+def clouds(topic, frame, names="x y z intensity", X_BS=X_BS, in_world=False):
+    for stamp in STAMPS:
+        X_WS = ID if in_world else X_WB(stamp) @ X_BS
+        points = points_of(X_WS, names)
+        yield topic, POINTS, stamp, cloud(points, frame, stamp)
+
+
+def livox(topic, frame, X_BS=X_BS):
+    for stamp in STAMPS:
+        points = [
+            {"x": x, "y": y, "z": z, "offset_time": k, "line": k % 4}
+            for k, (x, y, z) in enumerate(xyz(points_of(X_WB(stamp) @ X_BS)))
+        ]
+        fields = {"header": header(stamp, frame), "points": points}
+        yield topic, LIVOX, stamp, fields
+
+
+def odometry(topic, frame, child, X_BC=ID, away=0.0):
+    for stamp in POSE_STAMPS:
+        X = X_WB(stamp) @ X_BC
+        X[0, 3] += away
+        fields = {
+            "header": header(stamp, frame),
+            "child_frame_id": child,
+            "pose": {"pose": pose(X)},
+        }
+        yield topic, ODOMETRY, stamp, fields
+
+
+def stamped(topic, frame, kind="PoseStamped", X_BC=ID):
+    for stamp in POSE_STAMPS:
+        X = pose(X_WB(stamp) @ X_BC)
+        fields = {"header": header(stamp, frame)}
+        fields["pose"] = {"pose": X} if "Covariance" in kind else X
+        yield topic, f"geometry_msgs/msg/{kind}", stamp, fields
+
+
+def paths(topic, frame, X_BC):
+    for n in (20, len(POSE_STAMPS)):
+        rows = list(stamped(topic, frame, X_BC=X_BC))[:n]
+        fields = {"header": header(T0_NS, frame)}
+        fields["poses"] = [of_pose for *_, of_pose in rows]
+        yield topic, "nav_msgs/msg/Path", T0_NS + n, fields
+
+
+def static(*edges):
+    rows = [transform(*edge, T0_NS) for edge in edges]
+    return [("/tf_static", STATIC, T0_NS, {"transforms": rows})]
+
+
+def vicon(topic, frame, child):
+    for stamp in POSE_STAMPS:
+        fields = transform(frame, child, X_WB(stamp), stamp)
+        yield topic, "geometry_msgs/msg/TransformStamped", stamp, fields
+
+
+BASE = ("base_link", "velodyne", X_BS)
+TAKEN = "are taken as those of this LiDAR"
+BAGS = {
+    "FAST-LIO, Livox, ROS 1": (
+        [*livox("/livox/lidar", "livox_frame", ID),
+         *odometry("/Odometry", "camera_init", "body"),
+         *paths("/path", "camera_init", ID)],
+        {"storage": "lz4", "ending": ".bag"}, {}, TAKEN,
+    ),
+    "FAST-LIO, registered": (
+        [*clouds("/cloud_registered", "camera_init", in_world=True),
+         *clouds("/cloud_registered_body", "body", X_BS=ID),
+         *odometry("/Odometry", "camera_init", "body")],
+        {"storage": "sqlite3"}, {"lidar": "/cloud_registered"},
+        "are moved into the frame 'body'",
+    ),
+    "FAST-LIO, in the body": (
+        [*clouds("/cloud_registered", "camera_init", in_world=True),
+         *clouds("/cloud_registered_body", "body", X_BS=ID),
+         *odometry("/Odometry", "camera_init", "body")],
+        {}, {"lidar": "cloud_registered_body"}, "interpolated",
+    ),
+    "KISS-ICP": (
+        [*clouds("/velodyne_points", "velodyne", "x y z intensity ring time"),
+         *clouds("/kiss/local_map", "odom_lidar", in_world=True),
+         *odometry("/kiss/odometry", "odom_lidar", "velodyne", X_BS)],
+        {}, {"lidar": "/velodyne_points"}, "'odom_lidar' count as drives",
+    ),
+    "robot_localization": (
+        [*static(BASE), *clouds("/velodyne_points", "velodyne"),
+         *odometry("/odometry/filtered", "odom", "base_link", away=50.0),
+         *odometry("/odometry/filtered_map", "map", "base_link")],
+        {"storage": "sqlite3"}, {"odometry": "/odometry/filtered_map"}, "inter",
+    ),
+    "Autoware, split": (
+        [*static(("base_link", "sensor_kit_base_link", X_BS),
+                 ("sensor_kit_base_link", "velodyne_top", ID)),
+         *clouds("/sensing/lidar/top/pointcloud_raw_ex", "velodyne_top",
+                 "x y z intensity time_stamp channel"),
+         *stamped("/localization/pose_estimator/pose", "map"),
+         *odometry("/localization/kinematic_state", "map", "base_link")],
+        {"split": True}, {}, "interpolated at 1",
+    ),
+    "ouster-ros": (
+        [*static(("os_sensor", "os_lidar", X_BS),
+                 ("os_sensor", "os_imu", X_BS)),
+         *clouds("/ouster/points", "os_lidar", "x y z intensity t ring"),
+         *odometry("/odom", "map", "os_imu", X_BS)],
+        {"storage": "mcap-message"}, {}, "interpolated",
+    ),
+    "velodyne, ROS 1 with tf": (
+        [*static(("/base_link", "/velodyne", X_BS)),
+         *clouds("/velodyne_points", "/velodyne", "x y z intensity ring time"),
+         *odometry("/odom", "/map", "/base_link")],
+        {"ending": ".bag"}, {}, "interpolated",
+    ),
+    "LIO-SAM": (
+        [*clouds("/points_raw", "base_link", X_BS=ID),
+         *odometry("/lio_sam/mapping/odometry", "odom", "odom_mapping", away=9),
+         *paths("/lio_sam/mapping/path", "odom", ID)],
+        {"ending": ".bag", "storage": "bz2"},
+        {"odometry": "lio_sam/mapping/path"}, TAKEN,
+    ),
+    "Vicon": (
+        [*static(("robot", "velodyne", X_BS)),
+         *clouds("/velodyne_points", "velodyne"),
+         *vicon("/vicon/robot/robot", "world", "robot")],
+        {"storage": "sqlite3-file"}, {}, "interpolated",
+    ),
+    "NDT": (
+        [*clouds("/lexus3/os_center/points", "base_link"),
+         *stamped("/ndt_pose", "map", "PoseWithCovarianceStamped", X_BS)],
+        {"storage": "sqlite3-message"}, {}, "names no frame of the vehicle",
+    ),
+    "Hesai, ros2 bag record -a": (
+        [*static(("base_link", "hesai_lidar", X_BS)),
+         *clouds("/lidar_points", "hesai_lidar", "x y z ring timestamp"),
+         *odometry("/odometry", "map", "base_link")],
+        {"empty": [("/imu/data", "sensor_msgs/msg/Imu"), ("/tf", STATIC),
+                   ("/rear/points", POINTS), ("/odom", ODOMETRY)]},
+        {}, "interpolated",
+    ),
+    "Livox, ROS 2, shuffled log times": (
+        [*static(("base_link", "livox_frame", X_BS)),
+         *livox("/livox/lidar", "livox_frame"),
+         *odometry("/odom", "map", "base_link")],
+        {"shuffled": True}, {}, "interpolated",
+    ),
+}  # fmt: skip
+
+
+def write(folder, entries, split=False, shuffled=False, ending="", **options):
+    rng = np.random.default_rng(2)
+    if shuffled:
+        times = [stamp for _, _, stamp, _ in entries]
+        options["log_times"] = rng.permutation(times)
+    if not split:
+        path = write_bag(folder / f"ride_0{ending}", entries, **options)
+    else:
+        write_bag(folder / "other", entries[1::2], **options)
+        path = write_bag(folder / "first", entries[::2], **options)
+        join_bags(path, folder / "other")
+    return path
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_a_bag_is_read_as_it_is(tmp_path, name):
+    entries, options, reading, note = BAGS[name]
+    drive = open_drive(write(tmp_path, entries, **options), **reading)
+    assert drive.stamps_ns.tolist() == STAMPS
+    for k, scan in enumerate(pickle.loads(pickle.dumps(drive))):
+        seen = poses.transform(drive.X_WS[k], xyz(scan))
+        np.testing.assert_allclose(seen, p_WP, atol=1e-4)
+    assert note in "; ".join(drive.notes)
+
+
+def test_poses_from_a_file(tmp_path):
+    """KISS-ICP writes a trajectory of the LiDAR, as TUM or as KITTI."""
+    path = write(tmp_path, [*clouds("/points", "os_lidar")])
+    with pytest.raises(InputError, match=r"msg/Odometry .*--poses FILE"):
+        open_drive(path)
+    rows = []
+    for stamp in POSE_STAMPS:
+        found = pose(X_WB(stamp) @ X_BS)
+        place = [*found["position"], *found["orientation"]]
+        rows.append(f"{stamp / 1e9:.9f} {' '.join(map(str, place))}\n")
+    tum = tmp_path / "poses.tum"
+    tum.write_text("# timestamp x y z qx qy qz qw\n" + "".join(rows[1:-4]))
+    kitti = tmp_path / "poses.txt"
+    X_WS = np.array([X_WB(stamp) @ X_BS for stamp in STAMPS])
+    np.savetxt(kitti, X_WS[:, :3].reshape(-1, 12))
+    for file, kept in ((tum, slice(1, -1)), (kitti, slice(0, 12))):
+        drive = pickle.loads(pickle.dumps(open_drive(path, poses=file)))
+        assert drive.stamps_ns.tolist() == STAMPS[kept]
+        np.testing.assert_allclose(drive.X_WS, X_WS[kept], atol=1e-5)
+        assert file in drive.files
+        seen = poses.transform(drive.X_WS[3], xyz(drive.scan(3)))
+        np.testing.assert_allclose(seen, p_WP, atol=1e-4)
+    kitti.write_text("1 2 3\n")
+    with pytest.raises(InputError, match="rows of 3 numbers; TUM has 8"):
+        _ = open_drive(path, poses=kitti).X_WS
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_log_times_change_nothing(tmp_path, seed):
+    entries = [
+        *static(BASE),
+        *clouds("/lidar/points", "velodyne"),
+        *odometry("/odometry", "map", "base_link"),
+    ]
+    rng = np.random.default_rng(seed)
+    rng.shuffle(entries)
+    times = T0_NS + rng.integers(-(10**10), 10**10, len(entries))
+    path = write_bag(tmp_path / "a", entries, log_times=times)
+    drive = open_drive(path)
+    assert drive.stamps_ns.tolist() == STAMPS
+    seen = [
+        poses.transform(X, xyz(scan))
+        for X, scan in zip(drive.X_WS, drive, strict=True)
+    ]
+    np.testing.assert_allclose(seen, [p_WP] * NUM_SCANS, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("options", "fault"),
+    [
+        ({"lidar": "rear"}, r"no topic /rear/points \(point clouds: /points"),
+        ({"odometry": "/p"}, r"no topic /p \(poses: /odometry, with --odom"),
+        ({"odometry": "/points"}, "/points: .*instead of nav_msgs/msg/Odom"),
+        ({"lidar": "/late"}, "/late: no message"),
+        ({}, r"/odometry: no pose for .* are 1\.\d+ s apart, more than 1 s"),
+    ],
+)
+def test_what_is_missing_is_named(tmp_path, options, fault):
+    poses_there = [*odometry("/odometry", "map", "os", X_BS)]
+    rows = [*clouds("/points", "os"), *poses_there[:2], *poses_there[-3:]]
+    path = write_bag(tmp_path / "a", rows, empty=[("/late", POINTS)])
+    with pytest.raises(InputError, match=fault):
+        _ = open_drive(path, **options).X_WS
