@@ -4,6 +4,7 @@ Nothing here imports the project, so that a change of its insides changes none
 of these files.
 """
 
+import os
 import sys
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
@@ -81,13 +82,23 @@ def write_traps(folder):
     for name in _MODULES:
         (folder / f"{name}.py").write_text(_TRAP)
     (folder / ".numba_config.yaml").write_text("{{{")
-    (folder / "matplotlibrc").write_bytes(b"\xff")
+    if not (folder / "matplotlibrc").exists():
+        os.mkfifo(folder / "matplotlibrc")
 
 
 def write_city(folder):
     """Writes the small city with a drive, as `town`."""
     world = write_small_city(folder / "town")
     (world / "sequence_02.yaml").write_text(yaml.safe_dump(_DRIVE))
+
+
+def write_sequences(folder):
+    """Writes a short drive through each stage of the small city."""
+    for stage in ("01", "02"):
+        values = _DRIVE | {"stage": stage, "lidars": {"lidar": _LIDAR}}
+        values["route"] = [_NORTH | {"start": 10.0, "end": 60.0}]
+        path = folder / "town" / f"sequence_{stage}.yaml"
+        path.write_text(yaml.safe_dump(values))
 
 
 # Archetypes, with width, depth and height [m].

@@ -96,7 +96,7 @@ def helps(program: str, name: str) -> Callable[[Path], dict[str, str]]:
     """Returns the edge of all help texts of a program."""
 
     def edge(folder: Path) -> dict[str, str]:
-        verbs = _verbs(run(folder, program, "--help"))
+        verbs = verbs_in(run(folder, program, "--help"))
         lines = [f"{name} --help", *(f"{name} {verb} --help" for verb in verbs)]
         text = _python(folder, "-I", "-c", _FORKS, program, *lines)
         # Since 0.28, Typer ends an argument that may be repeated with dots.
@@ -106,7 +106,7 @@ def helps(program: str, name: str) -> Callable[[Path], dict[str, str]]:
     return edge
 
 
-def _verbs(text: str) -> Iterator[str]:
+def verbs_in(text: str) -> Iterator[str]:
     """Yields what stands first in the rows of sections of commands."""
     for part in text.partition("--help")[2].split("\n\n"):
         title, *rows = part.strip("\n").splitlines() or [""]
