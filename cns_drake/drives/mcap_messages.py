@@ -9,16 +9,10 @@ import numpy as np
 from cns_drake.base import InputError, poses, value_errors
 from cns_drake.drives import ros_types
 
-# More bytes than a message of each type can need [bytes]. A few compressed
-# kilobytes can hold gigabytes of padding. A cloud fills a chunk at most.
-_LONGEST = {
-    ros_types.ODOMETRY: 1 << 12,
-    ros_types.IMU: 1 << 12,
-    ros_types.TF: 1 << 20,
-}
-# Limits of a point cloud: number of fields, and length of a name [bytes].
+# A few compressed kilobytes can hold a million transforms or fields: greatest
+# length of a message of transforms [bytes], and number of fields of a cloud.
+_LONGEST_TF = 1 << 20
 _MOST_FIELDS = 256
-_LONGEST_NAME = 1 << 10
 # The header of CDR that gives the order of bytes.
 _ENCAPSULATION_BYTES = 4
 # What compressed data begin with -> the name of the compression. No message in
@@ -42,7 +36,7 @@ def decode(data: bytes | memoryview, message_type: str) -> Any:
             any plausible message of this type.
     """
     _check_uncompressed(data)
-    if len(data) > _LONGEST.get(message_type, len(data)):
+    if message_type == ros_types.TF and len(data) > _LONGEST_TF:
         raise ValueError(
             f"a message of {len(data)} bytes, more than one of its type holds"
         )
@@ -75,16 +69,14 @@ def read_cloud_header(data: bytes | memoryview) -> tuple[int, str]:
     """Returns the stamp [ns] and frame of a PointCloud2, and nothing else.
 
     Raises:
-        ValueError: if the message is cut off or compressed, or has an
-            implausibly long frame name or too many fields.
+        ValueError: the message is cut off or compressed, or has too many
+            fields.
     """
     _check_uncompressed(data)
     try:
         order = "<" if data[1] & 1 else ">"
         body = data[_ENCAPSULATION_BYTES:]
         sec, nanosec, length = struct.unpack_from(f"{order}iII", body)
-        if length > _LONGEST_NAME:
-            raise ValueError(f"a name of a frame of {length} bytes")
         # Strings end with a zero; numbers begin at multiples of four.
         (text,) = struct.unpack_from(f"{length}s", body, 12)
         behind = 12 + -(-length // 4) * 4

@@ -21,8 +21,8 @@ from cns_drake.base import (
 )
 
 _NS_PER_US = 1000
-# Largest table [bytes]: enough for hours of an IMU.
-_TABLE_LIMIT_BYTES = 1 << 26
+# Largest table [bytes]: NCLT has some of 80 MB.
+_TABLE_LIMIT_BYTES = 1 << 29
 
 
 def read_stamped_rows(

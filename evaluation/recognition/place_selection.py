@@ -10,26 +10,23 @@ from cns_drake.base import InputError
 KEEP_ALL = "all"
 # In each cell, the places of the latest drive through it are kept.
 KEEP_LATEST = "latest"
-# Greatest number of places that are kept in a cell.
-_MOST = 1_000_000
 
 
 def checked_keep(value: Any, where: str) -> str | int:
     """Returns a value of the field `keep` of an experiment.
 
     Args:
-        value: `all`, `latest`, or a number of places per cell, at most
-            1 000 000.
+        value: `all`, `latest`, or a number of places per cell.
         where: file and field, for errors.
 
     Raises:
         InputError: the value is anything else.
     """
-    is_number = type(value) is int and 1 <= value <= _MOST
+    is_number = type(value) is int and value >= 1
     if not (is_number or value in (KEEP_ALL, KEEP_LATEST)):
         raise InputError(
             f"{where}: {value!r} is neither {KEEP_ALL}, {KEEP_LATEST} nor a"
-            f" whole number from 1 to {_MOST}"
+            " positive whole number"
         )
     return value
 

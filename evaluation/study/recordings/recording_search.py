@@ -20,8 +20,6 @@ _NAME_FORMS = (
     re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)"),
     re.compile(r"(?P<map>.*\D)(?P<stage>\d+)"),
 )
-# A whole disk has more folders, and takes minutes to search.
-_MOST_FOLDERS = 10_000
 _UNKNOWN_STAGE = (
     "map and stage are unknown: no scenario, and no name <map>_<stage>"
 )
@@ -85,19 +83,14 @@ def _find_drives(folder: Path, on_note: Callable[[str], None]) -> list[Path]:
         on_note: is called with each note.
 
     Raises:
-        InputError: no drive is left, or there are too many folders.
+        InputError: no drive is left.
     """
     children = listed(folder)
     drives = [path for path in children if _holds_drive(path)]
     nested = [path for path in children if path.is_dir() and path not in drives]
     deeper: list[Path] = []
     below = (path for child in nested for path in _folders_in(child, 2))
-    for number, path in enumerate(below):
-        if number == _MOST_FOLDERS:
-            raise InputError(
-                f"{folder}: more than {_MOST_FOLDERS} folders in it; give the"
-                " folder of the recordings"
-            )
+    for path in below:
         if _holds_drive(path):
             if any(one.is_nested for one in find_data_sets(path)):
                 drives.append(path)

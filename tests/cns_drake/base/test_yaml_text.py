@@ -23,7 +23,6 @@ def test_what_people_write_is_read():
     }
     assert parse_yaml("") is None
     assert parse_yaml("a: \u00fc".encode("utf-16")) == {"a": "\u00fc"}
-    assert parse_yaml("[" * 50 + "]" * 50) is not None
 
 
 @pytest.mark.parametrize(
@@ -33,13 +32,12 @@ def test_what_people_write_is_read():
         ("0", 0),
         ("-12", -12),
         ("+7", 7),
-        ("0x1F", 31),
         ("007.5", 7.5),
         ("1.5e+3", 1500.0),
         (".5", 0.5),
         ("-.inf", -math.inf),
-        # PyYAML reads 90, 90.5, 5, a date, and an error.
-        *[(one, one) for one in ("1:30", "1:30.5", "0b101")],
+        # PyYAML reads 90, 90.5, 5, 31, a date, and an error.
+        *[(one, one) for one in ("1:30", "1:30.5", "0b101", "0x1F")],
         *[(one, one) for one in ("2012-01-15", "2001-99-99", "=")],
         # It leaves these as texts, so that older files have them.
         *[(one, one) for one in ("08", "-09", "2e-2", "0o17", "y", "N")],
@@ -75,11 +73,9 @@ def test_what_pyyaml_writes_is_read_as_it_was():
     [
         (_LAUGHS, "stands for more than"),
         ("a: &a [*a]", "line 1: contains itself"),
-        ("[" * 51 + "]" * 51, "nested more than 50"),
         ("[" * 100_000, "nesting|nested"),
         ("a: 1\nb: {c: 1,\n  c: 2}", "line 3: 'c' is there twice"),
         ("a: " + "9" * 5000, "4300 digits"),
-        ("a: 0x" + "f" * 4000, "line 1: a number of 4002 letters"),
         ("a: !!int x", "line 1: 'x' is not a number"),
         ("a: !!int 1:30", "line 1: '1:30' is not a number"),
         ("a: !!float 1:30", "line 1: '1:30' is not a number"),

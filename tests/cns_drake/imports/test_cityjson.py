@@ -230,7 +230,7 @@ def set_in(*keys):
     ("text", "fault"),
     [
         ("{", "no JSON"),
-        ("[" * 200_000, "nested more than 50 deep"),
+        ("[" * 200_000, "nested too deep"),
         ("[1]", "no JSON object"),
         ('{"type": "Feature"}', "type 'Feature' is not CityJSON"),
         (broken(set_in("version", "3.0")), "version '3.0'"),
