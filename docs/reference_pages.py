@@ -309,24 +309,26 @@ def _fields_page(title: str, introduction: str, sections: Sections) -> str:
     links = {model: heading for heading, model in sections.items()}
     if sections is not LIDAR:
         links |= {LidarSheet: _OF_LIDARS}
-    parts = [_heading(title), introduction]
+    brackets = "Brackets have the values of a field, and its default, if any."
+    parts = [_heading(title), f"{introduction}\n\n{brackets}"]
     for heading, model in sections.items():
         description, meanings = explain_fields(model)
-        rows = [
-            (
-                f"`{field.alias or name}`",
-                describe_default(model, name),
-                _values(model, name),
+        lines = [
+            _field(
+                field.alias or name,
+                [_values(model, name), describe_default(model, name)],
                 meanings[name] + _links(field.annotation, links),
             )
             for name, field in own_fields(model).items()
         ]
-        parts += [
-            f"## {heading}",
-            description,
-            _table(("field", "default", "values", "meaning"), rows),
-        ]
+        parts += [f"## {heading}", description, "\n".join(lines)]
     return "\n\n".join(parts) + "\n"
+
+
+def _field(name: str, words: list[str], meaning: str) -> str:
+    """Returns a field with its values and default in brackets."""
+    said = "; ".join(word for word in words if word not in ("", "none"))
+    return f"- `{name}`{f' ({said})' * bool(said)}: {meaning}"
 
 
 def _lidars_page() -> str:

@@ -1,5 +1,7 @@
 """The reference pages explain every field and option, as the code has it."""
 
+import re
+
 from helpers import documents
 import pytest
 
@@ -58,14 +60,17 @@ def test_every_model_has_a_table():
 
 
 def test_a_row_has_default_and_limits():
-    page = documents.read("docs/reference/scenario.md")
-    rows = {row[0]: row[1:3] for row in documents.table(page, "## LiDARs")}
-    assert rows["`xyz`"] == ["`[0, 0, 1.6]`", "3 numbers from -1000 to 1000"]
-    assert rows["`columns`"] == ["none", "integer from 4 to 8192"]
-    assert rows["`returns`"] == ["`ideal`", "`ideal`, `calibrated`"]
-    drive = documents.table(page, "## Scenario")
-    assert [row[0].strip("`") for row in drive] == list(Scenario.model_fields)
-    assert drive[0][1] == "the file's name"
+    page = documents.read("docs/reference/scenario.md").text
+    for line in (
+        "- `xyz` (3 numbers from -1000 to 1000; `[0, 0, 1.6]`): position",
+        "- `columns` (integer from 4 to 8192): number",
+        "- `returns` (`ideal`, `calibrated`; `ideal`): ",
+        "- `name` (text; the file's name): name",
+    ):
+        assert f"\n{line}" in page
+    _, _, drive = page.partition("\n## Scenario\n")
+    fields = re.findall(r"(?m)^- `(\w+)`", drive.partition("\n## ")[0])
+    assert fields == list(Scenario.model_fields)
 
 
 @pytest.mark.parametrize(

@@ -43,10 +43,12 @@ def rows():
     for section in re.split(r"^## ", text, flags=re.MULTILINE)[1:]:
         heading = section.partition("\n")[0]
         place = PLACES.get(heading, f"{heading.lower()}.")
-        for line in re.findall(r"^\| `.*", section, re.MULTILINE):
-            name, _, values, _ = re.split(r" (?<!\\)\| ", line[2:], maxsplit=3)
-            field = place + name.strip("`")
-            yield field, value_of(values.strip())
+        for name, said in re.findall(
+            r"(?m)^- `(.*?)`(?: \((.*?)\))?: ", section
+        ):
+            values, _, default = said.partition("; ")
+            is_section = not default and values == "required"
+            yield place + name, value_of("" if is_section else values)
 
 
 def value_of(values):
