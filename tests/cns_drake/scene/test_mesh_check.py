@@ -1,10 +1,12 @@
 """Meshes whose shapes would be misread, and what is not read of others."""
 
+import base64
 import json
 import struct
 
 from helpers.mesh_texts import L_TRIANGLES, gltf_text
 from helpers.mesh_worlds import notes_of, read_mesh, world_of
+import numpy as np
 import pytest
 
 from cns_drake.base import InputError
@@ -400,6 +402,35 @@ def test_triangles_that_are_not_read_are_missed(tmp_path):
     )
     with pytest.raises(InputError, match="only 5 of 8 triangles"):
         read_mesh(path)
+
+
+@pytest.mark.slow
+def test_faces_of_gltf_have_their_vertices(tmp_path):
+    """Open3D leaves out a face without its vertices, wherever it is shown."""
+
+    def change(top):
+        indices = np.array([0, 1, 2, 3, 4, 900], "<u2").tobytes()
+        data = base64.b64encode(indices).decode()
+        top["buffers"].append(
+            {
+                "byteLength": len(indices),
+                "uri": f"data:application/octet-stream;base64,{data}",
+            }
+        )
+        top["bufferViews"].append({"buffer": 1, "byteLength": len(indices)})
+        top["accessors"].append(
+            {
+                "bufferView": 2,
+                "componentType": 5123,
+                "count": 6,
+                "type": "SCALAR",
+            }
+        )
+        top["meshes"][0]["primitives"][0]["indices"] = 2
+        top["nodes"] = [{"children": [1]}, {"mesh": 0}]
+
+    with pytest.raises(InputError, match="of 2 triangles can be read"):
+        read_mesh(write(tmp_path, change))
 
 
 @pytest.mark.parametrize(
