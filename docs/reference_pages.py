@@ -506,17 +506,17 @@ def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
 def _metrics_page() -> str:
     arrows = {"more": " ↑", "less": " ↓"}
 
-    def explained(metric: Metric) -> tuple[str, ...]:
+    def explained(metric: Metric) -> str:
         values = metric.range_text.removeprefix("a number ")
-        better = arrows.get(metric.better, "")
-        return metric.over_queries, f"{values}{better}", metric.undefined
+        text = f"{metric.over_queries}; {values}{arrows.get(metric.better, '')}"
+        without = f", undefined if {metric.undefined}"
+        return text + without * bool(metric.undefined)
 
     # Metrics of which the same is said stand together.
-    rows = [
-        (", ".join(f"`{one.name}` ({one.label})" for one in alike), *words)
-        for words, alike in itertools.groupby(METRICS.values(), explained)
+    lines = [
+        f"- {', '.join(f'`{one.name}` ({one.label})' for one in alike)}: {text}"
+        for text, alike in itertools.groupby(METRICS.values(), explained)
     ]
-    head = ("metrics (titles)", "what", "values", "undefined if")
     parts = (
         _heading("Metrics"),
         "The values of the column `metric` in [results.csv]"
@@ -525,8 +525,8 @@ def _metrics_page() -> str:
         " defined values; an undefined value is an empty cell, and is left out"
         " with a note. [A metric of your own]"
         "(../how-to/own_method.md#a-metric-of-your-own) is a function in a"
-        " file.",
-        _table(head, rows),
+        " file. Brackets have the titles of metrics.",
+        "\n".join(lines),
     )
     return "\n\n".join(parts) + "\n"
 

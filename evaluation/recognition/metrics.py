@@ -474,7 +474,7 @@ def _of_answers() -> Iterator[Metric]:
     for rank in (5, 10, 25):
         yield _share(
             f"r{rank}", f"R@{rank}",
-            f"share of the queries with a match among the best {rank} places",
+            "share of the queries with a match among the best N places",
             _NO_MATCH, methodcaller("recall_at", rank), **_RESAMPLED)
     yield _share(
         "r1_percent", "R@1%", "share of the queries with a match among the best"
@@ -498,7 +498,7 @@ def _of_answers() -> Iterator[Metric]:
     for radius in (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0):
         yield _share(
             f"auc_{radius:g}m", f"AUC within {radius:g} m",
-            f"AUC if a place is a match within {radius:g} m", _NO_MATCH,
+            "AUC with this radius of a match", _NO_MATCH,
             methodcaller("auc_within", radius))
     yield _retained("relative_auc", "auc", "relative AUC",
                     **_PLACE, **_RESAMPLED)
