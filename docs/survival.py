@@ -3,8 +3,10 @@
     python docs/survival.py
 
 The losses are those of the shipped tables (source `tables`: a query every 10 m,
-one draw of the random yaw), and of `notes/yaw_draws.csv` (source `draws`: a
-query every 30 m, each draw and the mean of all, at four radii of a match).
+one draw of the random yaw; `figure-1`: the same without fresh Metropolis, which
+has the stages of Metropolis cleared), and of `notes/yaw_draws.csv` (source
+`draws`: a query every 30 m, each draw and the mean of all, at four radii of a
+match).
 """
 
 from __future__ import annotations
@@ -60,8 +62,12 @@ def retained_in_cities(verified: bool) -> list[Row]:
 def lines() -> Iterator[tuple[object, ...]]:
     """Yields the lines of the file."""
     for verified in (False, True):
-        for one in judge_survival(retained_in_cities(verified)):
+        rows = retained_in_cities(verified)
+        for one in judge_survival(rows):
             yield "tables", "7.5", "0", *_cells(verified, one)
+        others = [row for row in rows if "metropolis, fresh" not in row.map]
+        for one in judge_survival(others):
+            yield "figure-1", "7.5", "0", *_cells(verified, one)
     # The lost shares of the pairs of each city.
     losses: dict[tuple[str, ...], dict[str, dict[str, list[float]]]] = {}
     for row in csv_rows("yaw_draws.csv"):

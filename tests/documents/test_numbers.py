@@ -3,9 +3,10 @@
 import csv
 
 from helpers import documents
+import numpy as np
 import pytest
 
-from docs import fill_numbers, survival
+from docs import declared, fill_numbers, survival
 
 FILLED = [
     page
@@ -114,10 +115,32 @@ cells: {{AUC: '{{auc:.2f}}', kind: '{{note}}'}}
     )
 
 
-def test_survival_is_what_its_program_writes(tmp_path):
-    survival.main(tmp_path / "survival.csv")
-    written = documents.ROOT / "docs/notes/survival.csv"
-    assert (tmp_path / "survival.csv").read_bytes() == written.read_bytes()
+@pytest.mark.parametrize("program", [survival, declared])
+def test_tables_are_what_their_programs_write(tmp_path, program):
+    name = f"{program.__name__.rpartition('.')[2]}.csv"
+    program.main(tmp_path / name)
+    written = documents.ROOT / "docs/notes" / name
+    assert (tmp_path / name).read_bytes() == written.read_bytes()
+
+
+def test_a_declared_interval_by_hand():
+    """RING++ without fronts: 3.182 standard errors of four cities."""
+    rows = fill_numbers.csv_rows("what_changes.csv")
+    kept = [
+        float(row["value"])
+        for row in rows
+        if (row["cause"], row["metric"], row["method"], row["verified"])
+        == ("missing", "relative_auc_strict", "ring++", "0")
+    ]
+    (found,) = (
+        row
+        for row in fill_numbers.csv_rows("declared.csv")
+        if (row["condition"], row["method"], row["verified"])
+        == ("missing", "ring++", "0")
+    )
+    half = 3.1824 * np.std(kept, ddof=1) / 2.0
+    assert float(found["high"]) == pytest.approx(np.mean(kept) + half, abs=1e-4)
+    assert float(found["low"]) == pytest.approx(np.mean(kept) - half, abs=1e-4)
 
 
 def test_survival_is_judged_by_the_cities_means():
