@@ -40,25 +40,20 @@ RUNS = {
         "ms a frame",
     ),
     "start.py": (("{drive}", "--runs", 2), "simulate "),
-    "tcr_of_large_maps.py": (("--points", 5000), "TCR_sym"),
 }
 # They take minutes or a recording, need packages of the extra `benchmark`, or
 # files that cannot be shipped; what they share with others is run above.
 BY_HAND = {
     "any_diagram.py",
-    "evaluation_of_recordings.py",
     "first_hour.py",
-    "growth.py",
     "interruptions.py",
     "interval_coverage.py",
-    "kills.py",
     "lidar_odometry.py",
     "memory.py",
     "peers.py",
     "predicts_failure.py",
     "real_or_simulated.py",
     "repeats.py",
-    "silences.py",
     "source_rays.py",
     "street_blocks.py",
     "table1_sources.py",
