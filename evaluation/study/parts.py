@@ -492,21 +492,21 @@ class MakePart(Step):
     def is_done(self) -> bool:
         return (
             self.part.path.is_file()
-            and self.part.is_current(self._inputs())
+            and self.part.is_current(self.inputs())
             and all(file.is_file() for file in self.figures)
         )
 
     def run(self, reporter: Reporter) -> None:
         # Inputs are read first, so that a file that changes during the work
         # counts as changed.
-        inputs = self._inputs()
+        inputs = self.inputs()
         self.part.write(inputs, self.function(reporter, *self.arguments))
 
     def parts(self) -> Iterator[Part]:
         """Yields the parts among the arguments of the function."""
         return _parts_in(self.arguments)
 
-    def _inputs(self) -> dict[str, object]:
+    def inputs(self) -> dict[str, object]:
         """Returns all inputs of the result, ready for JSON.
 
         Raises:

@@ -1,6 +1,6 @@
 """Measures place recognition between two drives."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 import itertools
@@ -184,18 +184,25 @@ class PlaceComparison(NamedTuple):
     overlaps: Part | None = None
     leaves_out_slow: bool = True
 
-    def by_method(self, number: int) -> "PlaceComparison":
-        """Returns the comparison by one method, given its number.
+    def by_methods(self, numbers: Collection[int]) -> "PlaceComparison":
+        """Returns the comparison by some methods, given their numbers."""
 
-        Both drives must be in files.
-        """
-        (scans, *described), (asked, *descriptors) = self.stored
+        def of(drive: tuple[Part, ...]) -> tuple[Part, ...]:
+            scans, *described = drive
+            return scans, *(described[k] for k in numbers)
+
+        database, query = (
+            of(one) if isinstance(one, tuple) else one
+            for one in (self.database, self.query)
+        )
         return self._replace(
-            database=(scans, described[number]),
-            query=(asked, descriptors[number]),
-            methods=(self.methods[number],),
-            distractors=tuple((parts[number],) for parts in self.distractors),
-            beside=tuple((one, parts[number]) for one, *parts in self.beside),
+            database=database,
+            query=query,
+            methods=tuple(self.methods[k] for k in numbers),
+            distractors=tuple(
+                tuple(parts[k] for k in numbers) for parts in self.distractors
+            ),
+            beside=tuple(map(of, self.beside)),
         )
 
     @property

@@ -50,6 +50,22 @@ from evaluation.study import USUAL_LENGTH, factors_in_words
 _LONGEST_LABEL = 48
 
 
+class DatedDrive(NamedTuple):
+    """A drive that is compared.
+
+    Attributes:
+        years: the years by which its city has aged.
+        length: its approximate length in full [m].
+        drive: the drive.
+        title: what drive it is, in words.
+    """
+
+    years: int
+    length: float
+    drive: Scenario
+    title: str
+
+
 @dataclass(frozen=True)
 class ComparedDrives:
     """The drives of the database and the query drive of one condition.
@@ -69,10 +85,7 @@ class ComparedDrives:
             `evaluation.recognition.place_selection.kept_places`.
         maintain: what updates the maps of older drives by newer drives, see
             `evaluation.map_update.upkeep`.
-        ages: the years by which the city has aged at the time of each of
-            `drives`; empty if the city does not age.
-        lengths: approximate length of each of `drives` [m].
-        titles: what each of `drives` is, in words.
+        dated: what else is known of each of `drives`.
     """
 
     database: Scenario
@@ -83,9 +96,7 @@ class ComparedDrives:
     beside: tuple[Scenario, ...] = ()
     keep: str | int = KEEP_ALL
     maintain: str = NOT_MAINTAINED
-    ages: tuple[int, ...] = ()
-    lengths: tuple[float, ...] = ()
-    titles: tuple[str, ...] = ()
+    dated: tuple[DatedDrive, ...] = ()
 
     @property
     def drives(self) -> tuple[Scenario, ...]:
@@ -112,20 +123,6 @@ class ComparedDrives:
                 **self.asked,
             }
         )
-
-
-class _DatedDrive(NamedTuple):
-    """A drive of a database.
-
-    Attributes:
-        years: the years by which its city has aged.
-        length: its approximate length [m].
-        drive: the drive.
-    """
-
-    years: int
-    length: float
-    drive: Scenario
 
 
 @dataclass
@@ -244,11 +241,14 @@ class PairMaker:
             tuple(one.drive for one in beside),
             keep,
             maintainer,
-            (*(one.years for one in drives), years) if years else (),
-            (*(one.length for one in drives), _drive_length(query)),
             (
-                *(self._names["database"].title(one.drive) for one in drives),
-                self._names["query"].title(query_drive),
+                *drives,
+                DatedDrive(
+                    years,
+                    _drive_length(query),
+                    query_drive,
+                    self._names["query"].title(query_drive),
+                ),
             ),
         )
 
@@ -363,7 +363,7 @@ class PairMaker:
         query: Changes,
         condition: Condition,
         seed: int,
-    ) -> list[_DatedDrive]:
+    ) -> list[DatedDrive]:
         """Returns the drives of a database, from older to newer.
 
         The field `years` of a drive says how many years before the other side
@@ -424,7 +424,12 @@ class PairMaker:
                 )
         found.sort(key=lambda one: one[0])
         return [
-            _DatedDrive(time[0], _drive_length(sessions[place]), drive)
+            DatedDrive(
+                time[0],
+                _drive_length(sessions[place]),
+                drive,
+                self._names["database"].title(drive),
+            )
             for time, place, drive in found
         ]
 

@@ -32,6 +32,8 @@ from evaluation.study import (
     job_name,
 )
 
+# Mean speed of the shipped drives [m/s].
+_USUAL_SPEED = 10.0
 # Expected time to update a map by a usual drive, once it is open [s].
 _UPKEEP_COST = 60.0
 
@@ -145,13 +147,17 @@ class SimulatedPairs:
         """Returns a pair of a map as it is measured."""
         compared, query = one.compared, one.query
         *drives, asked = (
-            replace(self.named_drive(drive), length=length, title=title)
-            for drive, length, title in zip(
-                compared.drives, compared.lengths, compared.titles, strict=True
+            replace(
+                self.named_drive(one.drive),
+                length=_driven_length(one.drive, one.length),
+                title=one.title,
+                # Without a later year, the city of the query has not aged.
+                years=one.years if compared.dated[-1].years else None,
             )
+            for one in compared.dated
         )
         database, *beside = self._with_upkept_maps(drives, compared.maintain)
-        way = database
+        way = None
         if self.run.experiment.drives == "same-route":
             city = {
                 name: getattr(compared.database, name)
@@ -180,13 +186,12 @@ class SimulatedPairs:
             key=f"{database.name} {asked.name} {digest}",
             database=database,
             query=asked,
-            way=way,
             protocol=compared.protocol,
             distractors=compared.distractors,
             beside=tuple(beside),
             keep=compared.keep,
-            ages=compared.ages,
             may_repeat=bool(compared.asked or compared.distractors),
+            way=way,
         )
 
     def _with_upkept_maps(
@@ -224,6 +229,13 @@ class SimulatedPairs:
                 drive.name, RecordingSource(self.run.output / drive.name)
             )
         return NamedDrive(drive.name, SimulationSource(drive))
+
+
+def _driven_length(drive: Scenario, length: float) -> float:
+    """Returns about how long a drive is [m], given its length in full [m]."""
+    if drive.frames is None:
+        return length
+    return min(length, _USUAL_SPEED * drive.frames * drive.frame_period)
 
 
 def _base_name(database: Scenario) -> str:

@@ -183,7 +183,7 @@ class SeenTask(Task):
         check_positive(value, where)
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
-        if not pair.ages:
+        if pair.query.years is None:
             return ()
         drives = (pair.database, *pair.beside, pair.query)
         sources = [plain_source(one.source) for one in drives]
@@ -227,10 +227,15 @@ class SeenTask(Task):
 
     def found(self, pair: Pair) -> Any:
         *sightings, years = [part.read() for part in pair.parts[self.name]]
-        *drives, query = zip(pair.ages, sightings, strict=True)
+        drives = pair.database, *pair.beside
+        dated = [
+            (one.years or 0, sighting)
+            for one, sighting in zip(drives, sightings[:-1], strict=True)
+        ]
+        query = sightings[-1]
         every, by_query = (
-            noticed_changes(some, query[1], *years)
-            for some in (drives, [drives[0], query])
+            noticed_changes(some, query, *years)
+            for some in (dated, [dated[0], (pair.query.years or 0, query)])
         )
         return Sightings(every, every.chosen(by_query.is_noticed))
 

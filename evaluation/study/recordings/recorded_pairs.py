@@ -104,7 +104,6 @@ def recorded_pairs(
                 key=f"{database.name} {query.name} {fingerprint(asked)[:8]}",
                 database=database,
                 query=query,
-                way=database,
                 protocol=condition.protocol,
                 methods=condition.methods,
             )
@@ -179,7 +178,6 @@ def _composed_pairs(
             key=f"{named[0].name} {query.name} {digest}",
             database=named[0],
             query=query.named,
-            way=named[0],
             protocol=one.protocol,
             beside=tuple(named[1:]),
             keep=one.keep,

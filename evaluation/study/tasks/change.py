@@ -29,13 +29,14 @@ class ChangeTask(Task):
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         if pair.closes_loops or pair.is_composed:
             return ()
+        way = pair.way or pair.database
         needs: list[str] = []
         maps = tuple(
             jobs.mapped(drive, self.settings["spacing"], needs)
-            for drive in (pair.way, pair.query)
+            for drive in (way, pair.query)
         )
         # The change does not depend on the protocol.
-        part = jobs.files.part("change", pair.way.name, pair.query.name)
+        part = jobs.files.part("change", way.name, pair.query.name)
         found = jobs.add(
             part, measure_change, maps, needs, 2.0, self.version, pair.title
         )

@@ -25,6 +25,8 @@ class NamedDrive:
         num_scans: number of the drive's scans, if known; at most this number of
             scans is described.
         title: what drive it is, in words; by default its name.
+        years: number of years by which its city has aged; None if it does not
+            age.
     """
 
     name: str
@@ -33,6 +35,7 @@ class NamedDrive:
     length: float = USUAL_LENGTH
     num_scans: float = math.inf
     title: str = ""
+    years: int | None = None
 
     @property
     def share(self) -> float:
@@ -71,9 +74,6 @@ class Pair:
         key: name of the results. Two pairs have the same key only if they
             measure the same thing; only the radius of a match can differ.
         database, query: the drives.
-        way: drive along the query's route through the database's city, if there
-            is one; otherwise the database drive. The change of the city
-            (TCR_sym) is measured between this drive and the query drive.
         protocol: protocol of place recognition.
         distractors: number of places of other cities that are added to the
             database.
@@ -81,14 +81,15 @@ class Pair:
             database, from older to newer.
         keep: which places of these drives and of the database drive are kept,
             see `evaluation.recognition.place_selection.kept_places`.
-        ages: number of years by which the city has aged at each drive of the
-            database, and at the query drive; empty if the city does not age.
         may_repeat: whether the pair can repeat drives of another pair, because
             its condition changes the queries (random yaw, tilt or occluded
             sector) or adds distractors. A task whose results depend only on the
             drives then skips the pair if it has measured these drives before.
         methods: names of the methods that are measured; None for all methods
             of the study.
+        way: drive along the query's route through the database's city, with
+            which the task `change` compares the query drive; None for the
+            database drive.
         parts: task -> its results, as files or in memory, for the tasks that
             measure the pair.
     """
@@ -102,14 +103,13 @@ class Pair:
     key: str
     database: NamedDrive
     query: NamedDrive
-    way: NamedDrive
     protocol: RetrievalProtocol
     distractors: int = 0
     beside: tuple[NamedDrive, ...] = ()
     keep: str | int = KEEP_ALL
-    ages: tuple[int, ...] = ()
     may_repeat: bool = False
     methods: Collection[str] | None = None
+    way: NamedDrive | None = None
     parts: dict[str, tuple[Result, ...]] = field(default_factory=dict)
 
     def has_method(self, name: str) -> bool:

@@ -1,7 +1,7 @@
 """The tasks `place`, `pose` and `cost`, on place recognition."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import compress
 from typing import Any
 
@@ -14,7 +14,7 @@ from evaluation.recognition import (
     measure_search,
     numbers_of,
 )
-from evaluation.study.parts import MakePart
+from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import (
     DescribedSource,
     PlaceComparison,
@@ -57,46 +57,32 @@ class PoseTask(Task):
         num_queries = num_described(pair.query, "queries", pair.protocol)
         cost = _search_cost(pair, jobs, num_queries)
         cost += _OVERLAP_COST * num_queries
+        # The task `place` reads the same files. Each method has a file, so that
+        # another method leaves it as it is.
+        parts = tuple(
+            jobs.files.part("place", pair.key, one.key)
+            for one in compared.methods
+        )
         sides = compared.database, compared.query
-        # The task `place` reads the same files.
-        if not all(isinstance(one, tuple) for one in sides):
+        if all(isinstance(one, tuple) for one in sides):
+            overlaps = jobs.files.part("overlaps", pair.key)
+            shown = MakePart(
+                overlaps,
+                shown_overlaps,
+                (compared.by_methods([0]),),
+                PlaceTask.version,
+            )
+            compared = compared._replace(overlaps=overlaps)
+            step = Steps(overlaps.path, (shown, *_by_method(parts, compared)))
+        else:
             for (drive, role), side in zip(pair.roles, sides, strict=True):
                 if not isinstance(side, tuple):
                     cost += jobs.reading_cost(drive, role, pair.protocol)
                     cost += jobs.description_cost(drive, role, pair.protocol)
-            part = jobs.files.part("place", pair.key)
-            found = jobs.add(
-                part,
-                measure_places,
-                (compared,),
-                needs,
-                cost,
-                PlaceTask.version,
-                pair.title,
-            )
-            return (found,)
-        # Each method has a file, so that another method leaves it as it is.
-        part = jobs.files.part("overlaps", pair.key)
-        shown = MakePart(
-            part,
-            shown_overlaps,
-            (compared.by_method(0),),
-            PlaceTask.version,
-        )
-        compared = compared._replace(overlaps=part)
-        steps = [
-            MakePart(
-                jobs.files.part("place", pair.key, choice.key),
-                measure_places,
-                (compared.by_method(k),),
-                PlaceTask.version,
-            )
-            for k, choice in enumerate(compared.methods)
-        ]
+            step = _AtOnce(parts[0].path, _by_method(parts, compared), compared)
         name = f"place {pair.key}"
-        whole = Steps(shown.part.path, (shown, *steps))
-        jobs.jobs[name] = Job(name, whole, tuple(needs), cost, pair.title)
-        return tuple(one.part for one in steps)
+        jobs.jobs[name] = Job(name, step, tuple(needs), cost, pair.title)
+        return parts
 
     def found(self, pair: Pair) -> Outcomes:
         radius = pair.protocol.radius
@@ -114,6 +100,42 @@ class PoseTask(Task):
             method = self.baselines.get(now.method, now.method)
             then = _outcome_of(before, method, now.is_verified)
             yield from now.numbers(self.name, then)
+
+
+def _by_method(
+    parts: Sequence[Part], compared: PlaceComparison
+) -> tuple[MakePart, ...]:
+    """Returns a step for each method, which writes its outcomes to a file."""
+    return tuple(
+        MakePart(
+            part,
+            measure_places,
+            (compared.by_methods([k]),),
+            PlaceTask.version,
+        )
+        for k, part in enumerate(parts)
+    )
+
+
+@dataclass(frozen=True)
+class _AtOnce(Steps):
+    """The steps of `_by_method`, for which a drive is read once.
+
+    Attributes:
+        compared: the comparison by all methods.
+    """
+
+    steps: tuple[MakePart, ...]
+    compared: PlaceComparison
+
+    def run(self, reporter: Reporter) -> None:
+        left = [k for k, one in enumerate(self.steps) if not one.is_done()]
+        inputs = [self.steps[k].inputs() for k in left]
+        found = measure_places(reporter, self.compared.by_methods(left))
+        for k, made_of in zip(left, inputs, strict=True):
+            method = self.compared.methods[k].key
+            of_method = [one for one in found if one.method == method]
+            self.steps[k].part.write(made_of, of_method)
 
 
 class PlaceTask(PoseTask):

@@ -109,7 +109,7 @@ def test_drives_that_are_longer_than_the_memory_give_the_same(
         return pair(root, tmp_path / "pair.data", query=query).arguments[0]
 
     def measured(compared):
-        shown = shown_overlaps(Reporter(), compared.by_method(0))
+        shown = shown_overlaps(Reporter(), compared.by_methods([0]))
         return measure_places(Reporter(), compared), shown
 
     expected, expected_shown = measured(compared(folder))
