@@ -45,10 +45,8 @@ from evaluation.study import (
 _PAGE_BYTES = 18e6
 # Mean size of a frame in a recording.
 _RECORDED_BYTES = 170e3
-# Mean size of a frame in the study's folder, in the end.
-_KEPT_BYTES = 18e3
-# Mean size of a frame in the study's folder while it runs.
-_SPENT_BYTES = 50e3
+# Mean size of a frame in the study's folder.
+_STUDY_BYTES = 68e3
 
 
 def reproduce_maps(
@@ -149,10 +147,9 @@ def _recordings(
 def _expected_space(
     num_frames: int, num_pages: int, output: Path, *, with_recordings: bool
 ) -> Space:
-    """Returns how much space all files need, during the jobs and afterwards."""
-    of_frame = _KEPT_BYTES + (_RECORDED_BYTES if with_recordings else 0.0)
-    kept = num_pages * _PAGE_BYTES + num_frames * of_frame
-    return Space(output, kept + num_frames * _SPENT_BYTES, kept)
+    """Returns how much space all files need."""
+    of_frame = _STUDY_BYTES + (_RECORDED_BYTES if with_recordings else 0.0)
+    return Space(output, num_pages * _PAGE_BYTES + num_frames * of_frame)
 
 
 def _recordable_drives(folder: Path) -> list[Scenario]:

@@ -3,7 +3,6 @@
 from collections.abc import (
     Callable,
     Collection,
-    Iterable,
     Mapping,
     MutableMapping,
     Sequence,
@@ -17,11 +16,9 @@ from cns_drake.base import (
     InputError,
     Job,
     Space,
-    Steps,
     did_you_mean,
     doing,
     forecast,
-    nothing_left,
     run_jobs,
 )
 from evaluation.results import (
@@ -35,8 +32,6 @@ from evaluation.results import (
     write_tables,
 )
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.feature_extraction import FeatureExtraction
-from evaluation.study.parts import MakePart, Part
 from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import NamedDrive, Pair
@@ -139,7 +134,6 @@ class Engine:
             self.on_note(text)
         make_output(self.output, ["page"])
         jobs = list(self.jobs.values())
-        _renew_removed_descriptors(jobs)
         pictures = list(self.pictures.values())
         told = forecast([*jobs, *pictures], cluster, space, least=_LONG)
         if told is not None:
@@ -155,7 +149,6 @@ class Engine:
                 " why"
             )
         write_tables(self.output, *tables)
-        _remove_descriptors(jobs)
         if pictures:
             run_jobs(pictures, cluster)
         doing("writing the page")
@@ -277,62 +270,3 @@ def made_tasks(
             )
         tasks[name] = known[name](settings, source)
     return tasks
-
-
-def _remove_descriptors(jobs: Iterable[Job]) -> None:
-    """Removes the descriptors that jobs keep only until the study is done.
-
-    The steps of these jobs have `FeatureExtraction.removes_descriptors`. All
-    jobs must be done.
-
-    Raises:
-        InputError: a file cannot be written.
-    """
-    for job in jobs:
-        if (
-            isinstance(job.step, FeatureExtraction)
-            and job.step.removes_descriptors
-        ):
-            job.step.files.remove_descriptors()
-
-
-def _renew_removed_descriptors(jobs: Collection[Job]) -> None:
-    """Lets jobs compute removed descriptors again if new results need them.
-
-    Args:
-        jobs: all jobs of a study, each after the jobs that it needs.
-    """
-    if not any(
-        isinstance(one.step, FeatureExtraction) and one.step.removes_descriptors
-        for one in jobs
-    ):
-        return
-    # A drive that is recorded anew can have other scans.
-    recorded = {need for one in jobs for need in one.needs}
-    changed = {
-        one.name
-        for one in jobs
-        if one.name in recorded
-        and not isinstance(one.step, FeatureExtraction | MakePart | Steps)
-        and not nothing_left(one.step)
-    }
-    # Files that will be written, and folders of features of new recordings.
-    stale: set[Path] = set()
-    needed: list[Part] = []
-    for job in jobs:
-        if isinstance(job.step, FeatureExtraction):
-            stale.update(part.path for part in job.step.missing())
-            if not changed.isdisjoint(job.needs):
-                stale.add(job.step.files.folder)
-            continue
-        steps = job.step.steps if isinstance(job.step, Steps) else [job.step]
-        for step in steps:
-            if isinstance(step, MakePart):
-                inputs = list(step.parts())
-                read = {one.path for one in inputs}
-                read |= {one.path.parent for one in inputs}
-                if not stale.isdisjoint(read) or not nothing_left(step):
-                    stale.add(step.part.path)
-                    needed += inputs
-    for part in needed:
-        part.discard_if_value_removed()

@@ -1,7 +1,6 @@
 """Feature extraction: reads a drive once, for its map and descriptors."""
 
 from collections.abc import Callable, Mapping, Set
-import contextlib
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -196,9 +195,6 @@ class FeatureExtraction(Step):
         with_map: whether to make a map; otherwise only the scans of places and
             queries are read.
         further: methods with descriptors by a second protocol, if any.
-        removes_descriptors: whether descriptors are removed when results have
-            been made from them. Descriptors that new results need are computed
-            again.
     """
 
     source: DriveSource
@@ -209,7 +205,6 @@ class FeatureExtraction(Step):
     with_scans: bool = False
     with_map: bool = True
     further: tuple[Further, ...] = ()
-    removes_descriptors: bool = False
 
     @property
     def output(self) -> Path:
@@ -219,16 +214,6 @@ class FeatureExtraction(Step):
         # A drive that is new is not read for this.
         asked = map(self.files.described, self._asked)
         return all(one.path.is_file() for one in asked) and not self._missing()
-
-    def missing(self) -> list[Part]:
-        """Returns the files of an earlier run that are missing or stale.
-
-        The result is empty if there is no recording yet, or no earlier run.
-        """
-        with contextlib.suppress(InputError):
-            if self.files.folder.is_dir():
-                return list(self._missing())
-        return []
 
     def run(self, reporter: Reporter) -> None:
         missing = self._missing()

@@ -47,8 +47,6 @@ from cns_drake.base import (
 
 _MAGIC = b"cns-eval part 2\n"
 _LEVEL = 1
-# Field of the header of a part whose value was removed.
-_REMOVED = "spent"
 # Greatest size of a line of inputs [bytes].
 _MOST_INPUTS = 1 << 24
 # Limit of the uncompressed size, as a multiple of the compressed bytes.
@@ -337,39 +335,6 @@ class Part:
             **({"lists": stored} if stored else {}),
         }
         make_folder(self.path.parent)
-        self._write(header, data, lists)
-
-    def remove_value(self) -> None:
-        """Removes the value, and keeps the record of its inputs.
-
-        Results that were made from the value stay valid. Call
-        `discard_if_value_removed` if the value must be computed again.
-
-        Raises:
-            InputError: if there is no such file, or it is damaged.
-        """
-        with self._opened() as (header, _):
-            if _REMOVED in header:
-                return
-        header.pop("lists", None)
-        self._write({**header, "bytes": 0, _REMOVED: True}, b"")
-
-    def discard_if_value_removed(self) -> None:
-        """Deletes the file if its value was removed; a job then makes it anew.
-
-        Raises:
-            InputError: if the file cannot be deleted.
-        """
-        is_removed = False
-        with contextlib.suppress(InputError), self._opened() as (header, _):
-            is_removed = _REMOVED in header
-        if is_removed:
-            with user_errors(self.path):
-                self.path.unlink()
-
-    def _write(
-        self, header: Mapping, data: bytes, lists: Sequence[LongList] = ()
-    ) -> None:
         with (
             completing(self.path) as unfinished,
             open(unfinished, "wb") as stream,
@@ -403,8 +368,6 @@ class Part:
             InputError: if there is no such file, or it is damaged.
         """
         with self._opened() as (header, stream):
-            if _REMOVED in header:
-                raise InputError(f"{self.path}: its value was removed")
             data = stream.read(header["bytes"])
             if "stored" not in header:
                 data = zstandard.ZstdDecompressor().decompress(data)
@@ -425,7 +388,7 @@ class Part:
         """
         with self._opened() as (header, stream):
             in_lists = sum(one["plain"] for one in header.get("lists", []))
-            if {"stored", _REMOVED} & header.keys():
+            if "stored" in header:
                 return header["bytes"] + in_lists
             return zstandard.frame_content_size(stream.read(18)) + in_lists
 
@@ -445,7 +408,7 @@ class Part:
             if stream.seek(0, 2) - start != size + in_lists:
                 raise ValueError("cut off")
             stream.seek(start)
-            if not {"stored", _REMOVED} & header.keys():
+            if "stored" not in header:
                 _check_size(stream.read(18), size)
                 stream.seek(start)
             yield header, stream
@@ -502,10 +465,6 @@ class MakePart(Step):
         inputs = self.inputs()
         self.part.write(inputs, self.function(reporter, *self.arguments))
 
-    def parts(self) -> Iterator[Part]:
-        """Yields the parts among the arguments of the function."""
-        return _parts_in(self.arguments)
-
     def inputs(self) -> dict[str, object]:
         """Returns all inputs of the result, ready for JSON.
 
@@ -518,14 +477,6 @@ class MakePart(Step):
                 "arguments": _identity(self.arguments),
             }
         )
-
-
-def _parts_in(argument: object) -> Iterator[Part]:
-    if isinstance(argument, Part):
-        yield argument
-    elif isinstance(argument, tuple):
-        for one in argument:
-            yield from _parts_in(one)
 
 
 def _identity(argument: Any) -> object:

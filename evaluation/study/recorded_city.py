@@ -214,7 +214,6 @@ class _ExtractionJobs(Jobs):
                 with_scans=bool(roles),
                 with_map=self.with_map,
                 further=tuple(self._further[drive.name].values()),
-                removes_descriptors=True,
             )
             # All scans are read for the map.
             cost = STARTING_COST + self.with_map * _MAP_COST * drive.share

@@ -54,17 +54,6 @@ class FeatureFiles:
         """
         return Part(self.folder / f"described_{file_name(key)}.data")
 
-    def remove_descriptors(self) -> None:
-        """Removes all descriptors; call it when the results exist.
-
-        Descriptors take three quarters of the space; see `Part.remove_value`.
-
-        Raises:
-            InputError: a file cannot be written.
-        """
-        for path in sorted(self.folder.glob("described_*.data")):
-            Part(path).remove_value()
-
 
 @dataclass(frozen=True)
 class StudyFiles:

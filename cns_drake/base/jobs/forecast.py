@@ -18,18 +18,14 @@ class Space:
 
     Attributes:
         folder: folder of the results, which exists.
-        most: space that the jobs need while they run [bytes].
-        rest: space that the jobs' results need in the end [bytes].
+        most: space that the jobs need [bytes].
     """
 
     folder: Path
     most: float
-    rest: float
 
     def __str__(self) -> str:
         text = f"{_gigabytes_text(self.most)} on the disk"
-        if self.rest < 0.95 * self.most:
-            text += f" ({_gigabytes_text(self.rest)} in the end)"
         free = shutil.disk_usage(self.folder).free
         if free < self.most:
             text += f", which has {_gigabytes_text(free)}"

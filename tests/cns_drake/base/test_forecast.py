@@ -18,14 +18,13 @@ def test_what_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "disk_usage", lambda path: usage(9e9, 0, 5e9))
     done = job("done", is_done=True)
     jobs = [done, *(job(f"single {k}") for k in range(6))]
-    space = Space(tmp_path, 4e9, 3e9)
+    space = Space(tmp_path, 4e9)
     assert forecast([done], Cluster(2), space) is None
     assert forecast(jobs, Cluster(2), space, least=60.1) is None
     assert forecast(jobs, Cluster(2), space, least=60.0) == (
-        "6 jobs: 2.4 GB of memory with 2 at a time;"
-        " 4.0 GB on the disk (3.0 GB in the end)"
+        "6 jobs: 2.4 GB of memory with 2 at a time; 4.0 GB on the disk"
     )
-    text = forecast(jobs, Cluster(64), Space(tmp_path, 6e9, 6e9))
+    text = forecast(jobs, Cluster(64), Space(tmp_path, 6e9))
     assert text.startswith("6 jobs: 7.2 GB of memory with 6 at a time")
     assert text.endswith("; 6.0 GB on the disk, which has 5.0 GB")
     assert forecast(jobs, Cluster(scheduler="tcp://a:1")) is None

@@ -81,7 +81,6 @@ def test_a_part_that_is_replaced_while_it_is_read(tmp_path):
     part.write({}, LongList.of([7] * 700))
     assert len(found) == 600
     assert_equal(found[0], item(0))
-    part.remove_value()
     assert_equal(found[599], item(599))
 
 
@@ -142,18 +141,6 @@ def test_a_damaged_list_is_named(tmp_path):
     part.path.write_bytes(whole[:-40] + bytes(40))
     with pytest.raises(InputError, match=r"list\.data: damaged"):
         part.read()[599]
-
-
-def test_a_removed_value_takes_no_room(tmp_path):
-    part = Part(tmp_path / "list.data")
-    part.write({"a": 1}, some(600))
-    part.remove_value()
-    assert part.path.stat().st_size < 500
-    assert part.is_current({"a": 1})
-    header = json.loads(part.path.read_bytes().splitlines()[1])
-    assert "lists" not in header
-    with pytest.raises(InputError, match="its value was removed"):
-        part.read()
 
 
 def test_nothing_is_left_of_a_temporary_file(tmp_path):

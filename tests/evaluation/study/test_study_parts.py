@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import zstandard
 
-from cns_drake.base import InputError, Reporter, fingerprint, nothing_left
-from evaluation.study import MakePart, Part
+from cns_drake.base import InputError, fingerprint
+from evaluation.study import Part
 
 INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
 
@@ -244,43 +244,3 @@ def test_a_part_of_zeros_is_read_however_small_it_could_be(tmp_path):
     part = Part(tmp_path / "zeros.data")
     part.write(INPUTS, np.zeros(1 << 28, np.uint8))
     assert not part.read().any()
-
-
-def test_a_value_that_is_removed_keeps_its_results(tmp_path):
-    part = Part(tmp_path / "one.data")
-    part.discard_if_value_removed()
-    part.write(INPUTS, np.arange(10_000.0))
-    result = MakePart(Part(tmp_path / "result.data"), summed, (("a", part),))
-    result.run(Reporter())
-    before = part.identity()
-    for _ in range(2):
-        part.remove_value()
-        assert part.path.stat().st_size < 1000
-        assert part.is_current(INPUTS)
-        assert part.identity() == before
-        assert nothing_left(result)
-        with pytest.raises(InputError, match="its value was removed"):
-            part.read()
-    (read,) = result.parts()
-    read.discard_if_value_removed()
-    assert not part.path.exists()
-    assert not nothing_left(result)
-    with pytest.raises(InputError, match=r"one\.data"):
-        part.remove_value()
-    part.write(INPUTS, np.arange(10_000.0))
-    part.discard_if_value_removed()  # Nothing to discard.
-    assert len(part.read()) == 10_000
-    assert nothing_left(result)
-
-
-def test_a_damaged_part_is_not_discarded(tmp_path):
-    part = Part(tmp_path / "one.data")
-    part.write(INPUTS, [1])
-    content = part.path.read_bytes()[:-1]
-    part.path.write_bytes(content)
-    part.discard_if_value_removed()
-    assert part.path.read_bytes() == content
-
-
-def summed(reporter: Reporter, named: tuple[str, Part]) -> float:
-    return float(named[1].read().sum())
