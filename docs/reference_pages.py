@@ -549,7 +549,11 @@ def _commands_page() -> str:
         for name, command in commands.items()
     }
     uses = Counter(row for some in rows.values() for row in some)
-    shared = [row for row, number in uses.items() if number > 2]
+    shared = [
+        row
+        for row, number in uses.items()
+        if number > 1 and row[1] != "required"
+    ]
     parts = [
         _heading("Commands"),
         "Commands print results to stdout, and progress and messages to "

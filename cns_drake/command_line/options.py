@@ -7,13 +7,11 @@ import typer
 
 Output = Annotated[
     Path,
-    typer.Option(
-        help="Folder for the recordings; created if it does not exist."
-    ),
+    typer.Option(help="Folder for the recordings."),
 ]
 Results = Annotated[
     Path,
-    typer.Option(help="Folder for the results; created if it does not exist."),
+    typer.Option(help="Folder for the results."),
 ]
 Recording = Annotated[
     Path | None,

@@ -75,7 +75,7 @@ Tables = Annotated[
     typer.Option(
         metavar="DIR",
         help="Folder for the tables results.csv and queries.csv, which have "
-        "the columns of a study's tables; created if it does not exist.",
+        "the columns of a study's tables.",
     ),
 ]
 SensorHeight = Annotated[

@@ -72,9 +72,8 @@ def export(
         drives: Recording to convert; with --format map-sessions, two drives.
         layout: Format to write: one of CONVERTED (tum has only the trajectory)
             or map-sessions.
-        output: Folder to write; created if it does not exist. The folder must
-            be new or empty, or contain earlier exports of the same format,
-            except with map-sessions, which needs a new or empty folder.
+        output: Folder to write: new, empty, or, except with map-sessions, with
+            earlier exports of the same format.
         absent_in: Another stage of the map, such as 01. Points on structures
             that do not exist in that stage get SemanticKITTI's labels of moving
             objects (252 to 259). Only with a format that has labels, such as

@@ -77,9 +77,8 @@ def import_(
             depends on it.
         along: CSV file with the path of a drive of your own: columns x and y in
             the frame of the map [m]. It replaces both drives.
-        within: Greatest distance of structures from the drives [m]. Structures
-            beyond this distance are left out, to save memory. By default, no
-            structure is left out.
+        within: Greatest distance of structures from the drives [m]; what lies
+            beyond is left out, to save memory.
         drive_on: Side of the street on which cars drive; by default the side
             that the file names, or right if the file names none.
         grow: Share of today's buildings, from 0.01 to 0.9, that are missing or
@@ -87,8 +86,7 @@ def import_(
             share that is missing, farthest east, by default 0.35. Not with
             --years or --plain.
         plain: Do not add windows, lamps, parked cars and other details that the
-            file does not contain. A map from an OpenDRIVE file, which contains
-            no buildings, still gets buildings along its roads.
+            file does not contain.
 
     Example:
         cns-drake import delft.city.jsonl \\

@@ -48,8 +48,8 @@ def pairs(
         drives: Shipped drives, or scenario files. If you name none, the drives
             of the experiment that --vary names are used, or all shipped drives
             if --vary is not given.
-        output: Folder to write; created if it does not exist. The folder must
-            be new or empty, or contain earlier data of this command.
+        output: Folder to write: new, empty, or with earlier data of this
+            command.
         spacing: Distance that the car drives between two clouds [m].
         held_out: Drive that is used for evaluation only, and never for
             training, even if DRIVE or --vary names it. May be repeated.

@@ -51,7 +51,7 @@ def study(
             file of your own.
         maps: Maps to use instead of the experiment's maps: names of shipped
             maps, or folders of your own maps.
-        output: Folder for the results; created if it does not exist.
+        output: Folder for the results.
         quick: Measure less than the whole experiment, in order to finish
             sooner. The section `quick` of the experiment says what is measured
             then.
@@ -66,9 +66,8 @@ def study(
             dot, such as database.years=[0,5]. A list in brackets makes a
             setting a factor, which varies. If a setting has several numbers,
             separate them by commas without brackets. May be repeated.
-        allow_code: Allow the experiment to run the Python files that it names.
-            Python files that you name yourself, with --method or --set, run
-            even without --allow-code.
+        allow_code: Allow the experiment to run the Python files that it names;
+            those of --method or --set run anyway.
         list_all: List the shipped experiments, and do nothing else.
         show: Print the experiment file, as a start for your own experiment, and
             do nothing else.

@@ -56,13 +56,12 @@ def train(
     `train` (JAX).
 
     Args:
-        output: File for the weights. The training curve is written to FILE.png.
-            Existing files are replaced. The state of the training is written to
-            FILE.npz.training; after an interruption, the same command resumes
-            from this file.
-        minutes: Approximate computing time on one core in minutes. The numbers
-            of cities and of training steps follow from this time. The training
-            ends after these steps, however long they take.
+        output: File for the weights. The training curve is written to FILE.png,
+            and the state of the training, from which the same command resumes,
+            to FILE.npz.training.
+        minutes: Approximate computing time on one core in minutes, from which
+            the numbers of cities and steps follow. The training ends after
+            these steps, however long they take.
         cities: Number of cities to train on; by default the number follows from
             --minutes.
         steps: Number of training steps; by default the number follows from
@@ -73,9 +72,8 @@ def train(
             contributes. change: of the city between drives. returns: weather,
             losses and errors. driver: wandering and lane changes. May be
             repeated.
-        drawn_streets: Generate cities along random streets instead of the
-            streets of the shipped maps. The shipped maps can then serve as a
-            test, because the training has never seen their streets.
+        drawn_streets: Generate cities along random streets, so that the shipped
+            maps can serve as a test.
         graded: Train with exact overlaps, so that a place ranks higher if it
             shows more of the query's scan; takes about 1.5 times as long.
             Without it, all places within 7.5 m of a query are equally good.

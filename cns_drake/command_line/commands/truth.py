@@ -61,8 +61,8 @@ def truth(
         first: Older drive, or database drive: a shipped drive or a scenario
             file or, with maps, a recording of cns-drake.
         second: Newer drive, or query drive, in the same way.
-        output: Folder to write; created if it does not exist. It must be new or
-            empty or, with overlaps, contain earlier overlaps.
+        output: Folder to write: new, empty, or, with overlaps, with earlier
+            overlaps.
         layout: What to write.
         spacing: Distance that the car drives between two scans of a map (by
             default 1), or between two places (by default 10) [m].

@@ -68,10 +68,9 @@ def localise(
             share of the distance driven. With 0.01, the default, lengths are
             wrong by about 1 %, and the heading drifts by about 0.01 deg per
             metre.
-        output: Folder for the results; created if it does not exist. The tables
-            results.csv and queries.csv have the columns of a study's tables;
-            localisation.csv contains all values of each query. With --track,
-            the folder also contains a picture.
+        output: Folder for the results: the tables results.csv and queries.csv,
+            localisation.csv with all values of each query, and, with --track, a
+            picture.
 
     Example:
         cns-eval localise drives/metropolis_01 \\

@@ -47,8 +47,7 @@ def map_update(
             The file is a .npy file, or a .ply file with a property
             `prediction`. Needs --labels-a.
         output: Folder for the tables results.csv and queries.csv, and for the
-            labels that were scored, A.npy and B.npy; created if it does not
-            exist.
+            labels that were scored, A.npy and B.npy.
 
     Example:
         cns-eval map-update maps --baseline distance

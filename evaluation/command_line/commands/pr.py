@@ -96,7 +96,7 @@ def pr(
         seed: Seed of the random yaws, tilts and occluded sectors of the
             queries.
         output: Folder for the tables results.csv and queries.csv, which have
-            the columns of a study's tables; created if it does not exist.
+            the columns of a study's tables.
 
     Example:
         cns-eval pr drives/metropolis_01 drives/metropolis_04 \\

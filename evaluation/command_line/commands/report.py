@@ -36,7 +36,7 @@ def report(
 
     Args:
         recordings: Folder that contains the recordings.
-        output: Folder for the results; created if it does not exist.
+        output: Folder for the results.
 
     Example:
         cns-eval report drives --output report
