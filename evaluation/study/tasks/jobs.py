@@ -13,7 +13,7 @@ from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 
 # Expected time to start a job [s].
-STARTING_COST = 2.0
+STARTING_COST = 0.2
 # Expected time to start a job and to open a drive [s].
 OPENING_COST = 8.0
 # Expected time to read a scan [s].
