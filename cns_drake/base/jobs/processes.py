@@ -344,7 +344,10 @@ def _preload_modules(modules: Iterable[str]) -> None:
     ignore_local_settings()
     collect_garbage_seldom()
     os.setsid()
+    parent = os.getppid()
     for name in modules:
+        if os.getppid() != parent:  # Nobody waits for these imports any more.
+            os._exit(0)
         # The process of a job reports what fails.
         with contextlib.suppress(Exception):
             importlib.import_module(name)
