@@ -180,7 +180,11 @@ def _tau_interval(
         for k, (i, j) in enumerate(pairs):
             sums = np.bincount(of_map, values[i] - values[j])
             weights = np.bincount(of_map).astype(float)
-            _, p_value = sign_flip_test(sums, weights, 2 * len(pairs))
+            # Random patterns of signs must not depend on names.
+            order = np.lexsort((sums, weights))
+            _, p_value = sign_flip_test(
+                sums[order], weights[order], 2 * len(pairs)
+            )
             is_known = p_value < SIGNIFICANT and not np.isnan(sums).any()
             known[k] *= np.sign(sums.sum()) if is_known else 0.0
     unknown = np.count_nonzero(known == 0.0)
