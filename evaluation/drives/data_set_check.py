@@ -1,13 +1,15 @@
 """Public checks of data sets, as scikit-learn has for estimators."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 import functools
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
+import small_gicp
 
-from cns_drake.base import InputError, errors_at, poses
+from cns_drake.base import InputError, errors_at, note, poses
 from cns_drake.drives import Drive
 from cns_drake.units import check_preset
 from evaluation.drives.opening import open_drive
@@ -18,6 +20,12 @@ _NUM_SCANS = 8
 _LONGEST_STEP = 60.0
 # Least time [s].
 _SHORTEST_STEP = 1e-3
+# What is wrong with a drive if nothing is.
+_AS_GIVEN = "nothing is wrong"
+# Scans are this far from each other at most [m].
+_FARTHEST_MOVE = 25.0
+# Number of points that are compared at most.
+_COMPARED = 3000
 # Greatest plausible speed of a vehicle [m/s].
 _FASTEST = 100.0
 # Plausible range of the median point [m].
@@ -28,22 +36,52 @@ _GROUND = (3.0, 30.0)
 _LAYER = 0.25
 # The ground lies at most this far above a LiDAR [m].
 _HIGHEST_GROUND = 1.0
-# Two scans are compared if the LiDAR moved or turned by this much [m], [rad]:
-# near scans have most points in common, far ones show a fault more clearly.
-_LEAST_MOVES = ((1.0, np.radians(5.0)), (10.0, np.radians(30.0)))
-# Scans that are farther apart have too few points in common [m].
-_FARTHEST_MOVE = 25.0
-# Number of points that are compared, at most and at least.
-_COMPARED = 1500
+# Motion is measured from scan to scan until it is this long [m], in this many
+# steps. After a small step [m], the next one has twice as many scans.
+_MEASURED = 3.0
+_MOST_STEPS = 6
+_SMALL_STEP = 0.5
+# Least number of points of a scan that is registered.
 _FEWEST = 100
+# Voxels of the points that are registered [m], and the greatest distances of
+# pairs, one stage after the other [m].
+_VOXEL = 0.3
+_STAGES = (4.0, 1.5, 0.6)
+# Points fit if their counterparts are this near [m], and scans if this share of
+# their points fits.
+_FITTING = 0.3
+_FITTING_SHARE = 0.5
+# A motion says something from this length on [m].
+_LEAST_MOTION = 1.0
 # Points that are so much higher than the ground's layer are not the ground's
 # [m].
 _GROUND_MARGIN = 0.5
 _METRES_PER_FOOT = 0.3048
-# Other poses are right if points then lie nearer by this factor.
-_NEARER = 0.5
-_AS_GIVEN = "nothing is wrong"
+# Poses claim the measured motion if they differ by at most this share of it, or
+# other poses do not fit better by this factor.
+_CLOSE = 0.15
+_BETTER = 0.5
+# Ratio of the length that scans measure to the length that poses claim -> what
+# is wrong.
+_RATIOS = {
+    1000.0: "the poses are in kilometres",
+    1e-2: "the poses are in centimetres",
+    1e-3: "the poses are in millimetres",
+    1.0 / _METRES_PER_FOOT: "the points are in feet, and the poses in metres",
+    _METRES_PER_FOOT: "the poses are in feet",
+}
+# Poses that claim a smaller share of the motion stand still.
+_STILL = 1e-5
+# Least turn of the poses against the points that is named [rad].
+_TURNED = np.radians(5.0)
 _MIRROR_Y = np.diag([1.0, -1.0, 1.0, 1.0])
+# Where the points' x, y and z axes point, seen from the poses' frame -> X_PS.
+_AXES = {
+    "the points' x axis points to the left": ("y", "-x", "z"),
+    "the points' x axis points to the right": ("-y", "x", "z"),
+    "the points' x axis points to the back": ("-x", "-y", "z"),
+    "the poses have the axes of a camera": ("z", "-x", "-y"),
+}
 
 
 def check_data_set(path: Path | str) -> None:
@@ -255,23 +293,74 @@ def _above_ground(points: np.ndarray) -> np.ndarray:
     return points[points[:, 2] > height + _LAYER + _GROUND_MARGIN]
 
 
-@_check(check_scans, check_poses)
+@_check(check_scans, check_points, check_poses)
 def check_frames(drive: Drive) -> Iterator[str]:
-    """Scans fit later ones as the poses place them, and in no other way."""
-    trees = {
-        frame: KDTree(above)
-        for frame, cloud in _clouds(drive).items()
-        if len(above := _above_ground(cloud)) >= _FEWEST
+    """The motion that the poses claim is the one that the scans measure."""
+    found = [_motion(drive, frame) for frame in _some_frames(drive)[:-1]]
+    motions = [one for one in found if one is not None]
+    if not motions:
+        note(
+            f"{drive.name}: frames: not checked: no two neighbouring scans can"
+            " be registered to each other"
+        )
+        return
+    lengths = [
+        np.linalg.norm([X[:3, 3] for X in of], axis=1).max()
+        for of in (
+            [one.X_AB for one in motions],
+            [_claimed(drive, one) for one in motions],
+        )
+    ]
+    measured, claimed = lengths
+    if max(lengths) < _LEAST_MOTION:
+        note(
+            f"{drive.name}: frames: not checked: neither the poses nor the"
+            f" scans move by {_LEAST_MOTION:g} m"
+        )
+        return
+    if claimed < _STILL * measured:
+        yield f"poses: all alike, but the scans move by {measured:.2f} m"
+        return
+    if measured < _CLOSE * min(claimed, _LEAST_MOTION):
+        yield (
+            f"poses: the LiDAR moves by {claimed:.2f} m between scans that"
+            f" measure {measured:.2f} m; the points of all scans are in one"
+            " frame already"
+        )
+        return
+    fits = {
+        name: _fit(motions, made) for name, made in _placements(drive).items()
     }
-    for least_move in _LEAST_MOVES:
-        gaps = _gaps(drive, trees, *least_move)
-        given = gaps.pop(_AS_GIVEN, 0.0)
-        best = min(gaps, key=lambda name: gaps[name], default=_AS_GIVEN)
-        if best in gaps and gaps[best] < _NEARER * given:
-            yield (
-                "poses: neighbouring scans fit better"
-                f" ({gaps[best]:.2f} m instead of {given:.2f} m) if {best}"
-            )
+    given = fits.pop(_AS_GIVEN)
+    name, best = min(fits.items(), key=lambda item: item[1].error)
+    if given.error < max(_CLOSE, best.error / _BETTER):
+        name, best = _AS_GIVEN, given
+    if best.error > 2.0 * _CLOSE:
+        if abs(given.turn) > _TURNED and given.turned_error < 2.0 * _CLOSE:
+            deg = np.degrees(given.turn)
+            line = _tr_line(poses.yaw_pose(given.turn))
+            yield (f"poses: turned by {deg:.0f} deg against the points{line}")
+            return
+        note(
+            f"{drive.name}: frames: not checked: what the scans measure differs"
+            f" by {best.error:.0%} from what the poses claim, in no known way"
+        )
+        return
+    if name != _AS_GIVEN:
+        line = _tr_line(_X_PS(_AXES[name])) if name in _AXES else ""
+        yield (
+            f"poses: neighbouring scans fit better (off by {best.error:.0%} of"
+            f" the motion instead of {given.error:.0%}) if {name}{line}"
+        )
+    if not 1.0 - _CLOSE < best.ratio < 1.0 + _CLOSE:
+        near = min(_RATIOS, key=lambda one: abs(np.log(best.ratio / one)))
+        is_near = abs(np.log(best.ratio / near)) < _CLOSE
+        ratio = f"{float(f'{best.ratio:.3g}'):g}"
+        what = _RATIOS[near] if is_near else "the poses have no scale"
+        yield (
+            f"poses: scans move {ratio} times as far as the poses claim:"
+            f" {what}? Multiply the poses' positions by {ratio}"
+        )
 
 
 # What `check_data_set` checks, for `pytest.mark.parametrize`: functions of a
@@ -287,89 +376,168 @@ data_set_checks: list[_Check] = [
 ]
 
 
-def _gaps(
-    drive: Drive,
-    trees: Mapping[int, KDTree],
-    least_move: float,
-    least_turn: float,
-) -> dict[str, float]:
-    """Returns how far scans lie from later ones, by what may be wrong [m].
+class _Motion(NamedTuple):
+    """A motion that scans measure.
+
+    Attributes:
+        first, last: numbers of the two scans A and B.
+        X_AB: (4, 4) pose of B in A, by registration.
+    """
+
+    first: int
+    last: int
+    X_AB: np.ndarray
+
+
+class _Fit(NamedTuple):
+    """How well poses claim the measured motions.
+
+    Attributes:
+        error: root mean square of the differences, as a share of the motion.
+        ratio: measured length by claimed length.
+        turn: yaw of the claimed motions against the measured ones [rad].
+        turned_error: the error without this yaw.
+    """
+
+    error: float
+    ratio: float
+    turn: float
+    turned_error: float
+
+
+def _motion(drive: Drive, frame: int) -> _Motion | None:
+    """Measures the motion from a scan on; None if scans do not fit."""
+    X_AB, last, stride = np.eye(4), frame, 1
+    cloud = _above_ground(_returns(drive.scan(frame)))
+    placed = _placements(drive).values()
+    for _ in range(_MOST_STEPS):
+        other = last + stride
+        if other >= len(drive):
+            break
+        beside = _above_ground(_returns(drive.scan(other)))
+        guesses = [np.eye(4), *(claim(last, other) for claim in placed)]
+        X_step = _registered(cloud, beside, guesses)
+        if X_step is None:
+            break
+        X_AB, last, cloud = X_AB @ X_step, other, beside
+        if np.linalg.norm(X_step[:3, 3]) < _SMALL_STEP:
+            stride *= 2
+        if np.linalg.norm(X_AB[:3, 3]) > _MEASURED:
+            break
+    return None if last == frame else _Motion(frame, last, X_AB)
+
+
+def _registered(
+    target: np.ndarray, source: np.ndarray, guesses: Sequence[np.ndarray]
+) -> np.ndarray | None:
+    """Returns the pose (4, 4) of one scan in the other; None without a fit.
 
     Args:
-        drive: the drive.
-        trees: frame -> the points of its scan above the ground.
-        least_move, least_turn: see `_moved_frame`.
+        target, source: (N, 3) points.
+        guesses: poses (4, 4) from which registrations begin.
     """
-    found: dict[str, list[float]] = {}
-    rng = np.random.default_rng(0)
-    for frame, tree in trees.items():
-        other = _moved_frame(drive.X_WS, frame, least_move, least_turn)
-        if other is None:
+    if min(len(target), len(source)) < _FEWEST:
+        return None
+    tree = KDTree(target)
+    some = source[np.random.default_rng(0).permutation(len(source))[:_COMPARED]]
+    aim, aim_tree = small_gicp.preprocess_points(target, _VOXEL)
+    moved, _ = small_gicp.preprocess_points(some, _VOXEL)
+    best, share = None, _FITTING_SHARE
+    for guess in guesses:
+        if np.linalg.norm(guess[:3, 3]) > _FARTHEST_MOVE:
             continue
-        beside = _above_ground(_returns(drive.scan(other)))
-        if len(beside) < _FEWEST:
-            continue
-        some = beside[rng.permutation(len(beside))[:_COMPARED]]
-        placed = _placements(drive.X_WS[frame], drive.X_WS[other])
-        for name, X_there in placed.items():
-            moved = some @ X_there[:3, :3].T + X_there[:3, 3]
-            distance, _ = tree.query(moved)
-            found.setdefault(name, []).append(float(np.median(distance)))
-    return {name: float(np.mean(some)) for name, some in found.items()}
+        X = guess
+        for distance in _STAGES:
+            X = small_gicp.align(
+                aim,
+                moved,
+                aim_tree,
+                init_T_target_source=X,
+                max_correspondence_distance=distance,
+            ).T_target_source
+        away, _ = tree.query(poses.transform(X, some))
+        fitting = float((away < _FITTING).mean())
+        if fitting > share:
+            best, share = X, fitting
+            if share > 0.9:
+                break
+    return best
 
 
-def _placements(X_WA: np.ndarray, X_WB: np.ndarray) -> dict[str, np.ndarray]:
+def _placements(
+    drive: Drive,
+) -> dict[str, Callable[[int, int], np.ndarray]]:
     """Returns where a scan B lies beside a scan A, by what may be wrong.
 
-    Args:
-        X_WA, X_WB: (4, 4) poses of the LiDAR, as given.
-
     Returns:
-        What is wrong -> the map (4, 4) from points of B to points of A.
+        What is wrong -> the pose (4, 4) of B in A, given their numbers.
     """
-    X_AB = poses.inverse(X_WA) @ X_WB
-    in_feet = X_AB.copy()
-    in_feet[:3, 3] /= _METRES_PER_FOOT
-    transposed = [X_WA.copy(), X_WB.copy()]
-    for X in transposed:
-        X[:3, :3] = X[:3, :3].T
-    found = {
-        _AS_GIVEN: X_AB,
+    X_WS = drive.X_WS
+
+    def claimed(a: int, b: int) -> np.ndarray:
+        return poses.inverse(X_WS[a]) @ X_WS[b]
+
+    def transposed(a: int, b: int) -> np.ndarray:
+        X = X_WS[[a, b]].copy()
+        X[:, :3, :3] = np.swapaxes(X[:, :3, :3], 1, 2)
+        return poses.inverse(X[0]) @ X[1]
+
+    def turned(X_PS: np.ndarray) -> Callable[[int, int], np.ndarray]:
+        return lambda a, b: np.linalg.inv(X_PS) @ claimed(a, b) @ X_PS
+
+    return {
+        _AS_GIVEN: claimed,
         "the poses are inverted: X_SW instead of X_WS?": (
-            X_WA @ poses.inverse(X_WB)
+            lambda a, b: X_WS[a] @ poses.inverse(X_WS[b])
         ),
-        "their rotations are transposed": (
-            poses.inverse(transposed[0]) @ transposed[1]
-        ),
-        "the points of all scans are in one frame already": np.eye(4),
-        "the points are in feet, and the poses in metres": in_feet,
-        "y is mirrored: a left-handed frame?": _MIRROR_Y @ X_AB @ _MIRROR_Y,
+        "their rotations are transposed": transposed,
+        "y is mirrored: a left-handed frame?": turned(_MIRROR_Y),
+        **{name: turned(_X_PS(axes)) for name, axes in _AXES.items()},
     }
-    for axis, yaw_deg in (("left", 90), ("right", -90), ("back", 180)):
-        # X_SC, where C is the frame of the points.
-        X_SC = poses.yaw_pose(np.radians(yaw_deg), 0.0, 0.0)
-        found[f"the points' x axis points to the {axis}"] = (
-            poses.inverse(X_SC) @ X_AB @ X_SC
-        )
-    return found
 
 
-def _moved_frame(
-    X_WS: np.ndarray, frame: int, least_move: float, least_turn: float
-) -> int | None:
-    """Returns the next scan from a pose that differs enough, or None.
+def _X_PS(axes: Sequence[str]) -> np.ndarray:
+    """Returns the pose (4, 4) of the points' frame, by where its axes point."""
+    X = np.eye(4)
+    X[:3, :3] = 0.0
+    for column, axis in enumerate(axes):
+        X["xyz".index(axis[-1]), column] = -1.0 if axis[0] == "-" else 1.0
+    return X
 
-    Args:
-        X_WS: (N, 4, 4) poses of the LiDAR.
-        frame: number of a scan.
-        least_move, least_turn: one of both is enough [m], [rad].
-    """
-    X = poses.inverse(X_WS[frame]) @ X_WS[frame + 1 :]
-    moves = np.linalg.norm(X[:, :3, 3], axis=1)
-    turns = np.arccos(
-        np.clip((np.trace(X[:, :3, :3], axis1=1, axis2=2) - 1) / 2, -1.0, 1.0)
+
+def _tr_line(X_PS: np.ndarray) -> str:
+    """Returns the line that corrects the axes, for the end of a message."""
+    numbers = " ".join(f"{value + 0.0:.6g}" for value in X_PS[:3].ravel())
+    return f" (in the layout of KITTI, write Tr: {numbers} into calib.txt)"
+
+
+def _fit(
+    motions: Sequence[_Motion], made: Callable[[int, int], np.ndarray]
+) -> _Fit:
+    """Returns how well poses claim motions, whatever their scale is."""
+    X_AB = np.array([one.X_AB for one in motions])
+    claimed = np.array([made(one.first, one.last) for one in motions])
+    p, q = claimed[:, :3, 3], X_AB[:, :3, 3]
+    # Rotations count by how far they move a point at a motion's length.
+    length = np.linalg.norm(q, axis=1)
+    R = np.swapaxes(claimed[:, :3, :3], 1, 2) @ X_AB[:, :3, :3]
+    cosine = (np.trace(R, axis1=1, axis2=2) - 1.0) / 2.0
+    angles = np.arccos(np.clip(cosine, -1.0, 1.0))
+    turn = float(
+        np.angle(np.sum((p[:, 0] + 1j * p[:, 1]) * (q[:, 0] - 1j * q[:, 1])))
     )
-    far = np.flatnonzero((moves >= least_move) | (turns >= least_turn))
-    if not len(far) or moves[far[0]] > _FARTHEST_MOVE:
-        return None
-    return frame + 1 + int(far[0])
+
+    def error(p: np.ndarray) -> tuple[float, float]:
+        ratio = max(float((p * q).sum() / max((p * p).sum(), 1e-30)), 1e-9)
+        off = np.linalg.norm(ratio * p - q, axis=1)
+        total = np.hypot(off, angles * length)
+        return float(np.sqrt((total**2).sum() / (length**2).sum())), ratio
+
+    found, ratio = error(p)
+    turned, _ = error(p @ poses.yaw_pose(turn)[:3, :3])
+    return _Fit(found, ratio, turn, turned)
+
+
+def _claimed(drive: Drive, motion: _Motion) -> np.ndarray:
+    """Returns the motion (4, 4) that the poses claim."""
+    return _placements(drive)[_AS_GIVEN](motion.first, motion.last)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from cns_drake.base import (
     InputError,
@@ -182,7 +183,7 @@ def recognise(
         one for one in outcomes if one.is_verified == protocol.verified
     )
     check_has_match(outcome)
-    for text in _notes(made, drives):
+    for text in (*_notes(made, drives), *_easy(outcome, drives, protocol)):
         on_note(text)
     if protocol.exclude_recent is None and _is_itself(database, query):
         on_note(
@@ -302,6 +303,22 @@ def _overlaps(
     if protocol.overlap is not None:
         return overlap_matrix(places, queries, protocol)
     return None
+
+
+def _easy(
+    outcome: PlaceOutcome,
+    drives: Sequence[Drive],
+    protocol: RetrievalProtocol,
+) -> list[str]:
+    """Returns a note if every answer is right."""
+    frames = outcome.place_frames, outcome.columns["query_frame"]
+    p, q = (one.X_WS[of, :3, 3] for one, of in zip(drives, frames, strict=True))
+    if protocol.overlap is not None or cdist(p, q).max() > protocol.radius:
+        return []
+    return [
+        f"{outcome.database}: every place lies within {protocol.radius:g} m of"
+        " every query, so every answer is right (are the poses in metres?)"
+    ]
 
 
 def _notes(method: Method, drives: Iterable[CountedDrive]) -> list[str]:

@@ -1,5 +1,6 @@
 """The public check of data sets, on every layout and on what goes wrong."""
 
+import re
 import shutil
 
 from helpers import helipr_drive
@@ -176,6 +177,59 @@ def test_a_wrong_drive_is_refused_in_one_line(tmp_path, fault, scans, more):
     with pytest.raises(InputError, match=fault) as raised:
         check_data_set(folder)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("fault", "change"),
+    [
+        ("in kilometres", 1e-3),
+        ("in feet", 1 / 0.3048),
+        ("have no scale", 1 / 150),
+        ("axes of a camera", [[0, -1, 0], [0, 0, -1], [1, 0, 0]]),
+        ("x axis points to the left", [[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+        ("turned by 20 deg", yaw_pose(0, 0, 0, np.radians(20))[:3, :3]),
+    ],
+)
+def test_the_cure_that_a_fault_names_helps(tmp_path, fault, change):
+    X_PS = np.eye(4)
+    X_WP = X_WB.copy()
+    if np.ndim(change):
+        X_PS[:3, :3] = change
+        X_WP = X_PS @ X_WB @ poses.inverse(X_PS)
+    else:
+        X_WP[:, :3, 3] *= change
+    kitti(tmp_path / "00", SCANS, X_WP)
+    with pytest.raises(InputError, match=fault) as raised:
+        check_data_set(tmp_path / "00")
+    message = str(raised.value)
+    if np.ndim(change):
+        (line,) = re.findall(r"Tr: [-.0-9e ]+", message)
+        (tmp_path / "00/calib.txt").write_text(f"{line.strip()}\n")
+    else:
+        X_WP[:, :3, 3] *= float(message.rpartition(" by ")[2])
+        kitti(tmp_path / "00", SCANS, X_WP)
+    check_data_set(tmp_path / "00")
+
+
+@pytest.mark.parametrize(
+    ("scans", "X_WS", "said"),
+    [
+        ([SCANS[0]] * NUM_SCANS, X_WB[:1].repeat(NUM_SCANS, 0), "by 1 m"),
+        ([one[::50] for one in SCANS], X_WB, "can be registered"),
+    ],
+)
+def test_what_cannot_be_checked_is_said(tmp_path, capsys, scans, X_WS, said):
+    kitti(tmp_path / "00", scans, X_WS)
+    check_data_set(tmp_path / "00")
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("00: frames: not checked: ")
+    assert said in line
+
+
+def test_poses_that_stand_still_while_scans_move(tmp_path):
+    kitti(tmp_path / "00", SCANS, X_WB[:1].repeat(NUM_SCANS, 0))
+    with pytest.raises(InputError, match="all alike, but the scans move by"):
+        check_data_set(tmp_path / "00")
 
 
 def test_beams_without_a_return_are_left_out(tmp_path):
