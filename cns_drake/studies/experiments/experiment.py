@@ -152,12 +152,10 @@ class Experiment(Section):
         maps: maps to use: names of shipped maps, folders of maps, folders of
             recordings, or maps to make. By default the shipped cities.
         files: folder with the files that the field `import` of a map names.
-        drives: which drives of a map are compared. `same-route`: the last drive
-            is the query, and the database is recorded along the same route.
-            `stages`: the last drive is the query for each earlier drive.
-            `both-ways`: as `stages`, but if a map has two drives, each is also
-            the query for the other. `first-and-last`: the last drive, through
-            the last stage, is the query for the first drive.
+        drives: which drives of a map are compared: the last drive with one
+            along the same route (`same-route`, the default), with each earlier
+            drive (`stages`), in both directions if there are two (`both-ways`),
+            or with the first (`first-and-last`).
         both: scenario fields of both drives. A list of values makes the field a
             factor, which varies.
         database: scenario fields of the drive that makes the database. A list
