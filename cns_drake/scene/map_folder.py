@@ -118,12 +118,14 @@ class MapFolder:
 def drive_name(path: Path) -> str:
     """Returns the name of the drive that a scenario file describes.
 
-    The name of `<map>/sequence_04.yaml` is `<map>_04`. The name of any other
-    file is the file's name without the suffix.
+    The name of `<map>/sequence_04.yaml` is `<map>_04`, and that of
+    `<map>/other_04.yaml` is `<map>_other_04`. The name of any other file is the
+    file's name without the suffix.
     """
-    if path.stem.startswith("sequence_"):
-        number = path.stem.removeprefix("sequence_")
-        return f"{path.resolve().parent.name}_{number}"
+    for prefix in ("sequence_", "other_"):
+        if path.stem.startswith(prefix):
+            number = path.stem.removeprefix("sequence_")
+            return f"{path.resolve().parent.name}_{number}"
     return path.stem
 
 

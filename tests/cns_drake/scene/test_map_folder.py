@@ -45,4 +45,5 @@ def test_what_editors_leave_is_no_file_of_a_map(tmp_path):
 def test_names_of_drives(tmp_path):
     folder = MapFolder(tmp_path / "town")
     assert drive_name(folder.drive("04")) == "town_04"
+    assert drive_name(folder.other_drive("04")) == "town_other_04"
     assert drive_name(folder.path / "my_drive.yaml") == "my_drive"
