@@ -311,11 +311,11 @@ class Display(Listener):
 
     def line(self) -> str:
         """Returns all that is done as one line, for a log."""
-        (whole, _), *jobs = self._rows()
-        named = [text for text, _ in jobs[:_MOST_NAMED]]
-        if len(jobs) > _MOST_NAMED:
-            named.append(f"and {len(jobs) - _MOST_NAMED} more")
-        return printable("; ".join([whole, *named]))
+        rows = [text for text, _ in self._rows()]
+        more = len(rows) - 1 - _MOST_NAMED
+        if more > 0:
+            rows[-more:] = [f"and {more} more"]
+        return printable("; ".join(rows))
 
     def _keep_telling(self) -> None:
         """Shows progress until the display ends."""
@@ -341,6 +341,8 @@ class Display(Listener):
         if self._jobs is not None:
             return self._jobs.rows(now)
         own = self._own
+        if not own.activity:
+            return []
         times = shown_times(now - self._start, own.left(now))
         return [(", ".join(filter(None, (own.text(), times))), own.share())]
 
