@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 import contextlib
+import functools
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+import warnings
 
 from cns_drake.base.complete_files import completing
+from cns_drake.base.terminal import note
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,6 +20,21 @@ _DATES = {"pdf": "CreationDate", "svg": "Date"}
 # TrueType fonts stay text in PDF; ids of SVG follow the salt.
 _FILES = {"pdf.fonttype": 42, "svg.hashsalt": "cns", "svg.fonttype": "path"}
 
+
+# Fonts with the letters of many scripts, which are used where DejaVu Sans lacks
+# a letter, if they are installed.
+_FURTHER_FONTS = (
+    "Noto Sans CJK JP",
+    "Noto Sans CJK SC",
+    "Source Han Sans",
+    "WenQuanYi Micro Hei",
+    "IPAexGothic",
+    "Noto Sans Devanagari",
+    "Noto Sans Thai",
+    "Arial Unicode MS",
+)
+# Part of Matplotlib's warning about a letter that no font has.
+_MISSING = "missing from font"
 
 Rgb = tuple[int, int, int]
 
@@ -39,11 +57,35 @@ def figure_style(changes: Mapping[str, Any] | None = None) -> Iterator[None]:
         changes: name -> value of the parameters that differ from Matplotlib's
             defaults.
     """
-    # Imported here: it is slow to load.
-    from matplotlib import style
+    # Imported here: they are slow to load.
+    from matplotlib import font_manager, style
 
-    with style.context(["default", dict(changes or {})]):
+    there = {one.name for one in font_manager.fontManager.ttflist}
+    fonts = ["DejaVu Sans", *(one for one in _FURTHER_FONTS if one in there)]
+    settings = {"font.sans-serif": fonts, **(changes or {})}
+    with (
+        style.context(["default", settings]),
+        warnings.catch_warnings(record=True) as caught,
+    ):
+        warnings.filterwarnings("always", f".*{_MISSING}")
         yield
+    boxes = [one for one in caught if _MISSING in str(one.message)]
+    for one in caught:
+        if one not in boxes:
+            warnings.warn_explicit(
+                one.message, one.category, one.filename, one.lineno
+            )
+    if boxes:
+        _note_boxes()
+
+
+@functools.cache
+def _note_boxes() -> None:
+    """Notes, once in a process, that letters are missing."""
+    note(
+        "figures: no installed font has some letters of the names, and boxes"
+        f" stand for them; install {_FURTHER_FONTS[0]}, for example"
+    )
 
 
 def save_figure(figure: Figure, path: Path, dpi: float, **options: Any) -> None:

@@ -78,6 +78,11 @@ class Road:
         self._curve = curve
         self.first_station = setbacks[0]
         self.last_station = curve.length - setbacks[1]
+        if np.isinf(setbacks).any():
+            raise ValueError(
+                "it leaves a junction in the direction of another road; lead"
+                " it elsewhere with via"
+            )
         if self.length < 1.0:
             raise ValueError(
                 f"its junctions need {sum(setbacks):.1f} m of its "

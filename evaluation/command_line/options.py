@@ -103,8 +103,9 @@ def write_tables(found: Measured, output: Path) -> None:
     """Writes both tables of what was measured, and shows a note on them."""
     from evaluation import results
 
+    done = "replaced" if (output / results.RESULTS).exists() else "wrote"
     results.write_tables(output, found.results, found.queries)
-    terminal.note(f"wrote {output / results.RESULTS} and {results.QUERIES}")
+    terminal.note(f"{done} {output / results.RESULTS} and {results.QUERIES}")
 
 
 def overlap_of(truth: str) -> float | None:

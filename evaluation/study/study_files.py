@@ -9,6 +9,9 @@ from cns_drake.base import InputError, file_name, user_errors
 from evaluation.results import check_output
 from evaluation.study.parts import Part
 
+# Longest name of a file without its ending; file systems allow 255 [bytes].
+_LONGEST_BYTES = 200
+
 
 @dataclass(frozen=True)
 class FeatureFiles:
@@ -117,4 +120,7 @@ class StudyFiles:
             names: names of the drives to which the result belongs.
         """
         name = ",".join(map(file_name, names))
+        # Two long names together are too long for a file.
+        if len(name.encode()) > _LONGEST_BYTES:
+            name = file_name(name)
         return Part(self._parts / kind / f"{name}.data")

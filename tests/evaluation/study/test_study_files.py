@@ -40,3 +40,14 @@ def test_pictures_of_drives_that_are_gone_go(tmp_path):
         files.change(drawn).write({}, [])
     files.remove_other_changes([files.figures / stay[0]])
     assert {one.name for one in files.figures.iterdir()} == {*stay}
+
+
+def test_two_long_names_make_one_short_name(tmp_path):
+    long, other = "x" * 120, "x" * 119 + "y"
+    parts = [
+        StudyFiles(tmp_path).part("place", *names)
+        for names in ((long, long), (long, other), (other, long))
+    ]
+    for one in parts:
+        one.write({}, 1)
+    assert len({one.path for one in parts}) == 3
