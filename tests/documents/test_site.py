@@ -10,6 +10,7 @@ import sys
 from urllib.parse import unquote, urlparse
 
 from helpers import documents
+from helpers.browser import chromium, has_chromium
 import pytest
 
 import cns_drake
@@ -116,3 +117,21 @@ def test_search_finds_methods_and_names(site):
     index = json.loads((site / "search/search_index.json").read_text())
     titles = {entry["title"] for entry in index["docs"]}
     assert {"add_lidar", "Layered overlap", "Tutorial"} <= titles
+
+
+@pytest.mark.skipif(not has_chromium(), reason="no Chromium")
+def test_search_works_from_a_folder(site, tmp_path):
+    with chromium(tmp_path) as browser:
+        browser.open((site / "tutorial.html").as_uri(), 1300, 900)
+        browser.evaluate(
+            "document.querySelector('#__search').click();"
+            "const field = document.querySelector('input[name=query]');"
+            "field.value = 'add_lidar';"
+            "field.dispatchEvent(new Event('input', {bubbles: true}));"
+            "field.dispatchEvent(new KeyboardEvent('keyup', {bubbles: true}))"
+        )
+        links = "[...document.querySelectorAll('.md-search-result__link')]"
+        browser.wait_for(f"{links}.length > 0")
+        found = browser.evaluate(f"{links}.map((link) => link.href)")
+        assert any(one.endswith("sensors.add_lidar") for one in found)
+        assert browser.complaints == []

@@ -944,7 +944,6 @@ NOT_RUN = {
     "compares the pictures with their data",
     "name: my-sessions": "needs recordings of a user; test_recorded_studies "
     "has some",
-    "mkdocs serve": "a server, which does not end; test_site builds the site",
     "python3 -m venv .venv\n": "installs from the network; test_wheel installs "
     "the same",
     "python3 -m venv .venv && .venv/bin/pip install -e": "installs from the "
