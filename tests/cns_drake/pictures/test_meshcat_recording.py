@@ -1,4 +1,4 @@
-from types import SimpleNamespace
+from functools import partial
 import zlib
 
 from helpers.meshcat_pages import (
@@ -9,17 +9,13 @@ from helpers.meshcat_pages import (
     tracks,
     vertices,
 )
+from helpers.scripted_car import film
 import numpy as np
-from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.multibody.math import SpatialVelocity
-from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder, LeafSystem
-from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.pictures import MeshcatRecorder, ShownStages, height_rgb
+from cns_drake.pictures import ShownStages, height_rgb
 from cns_drake.scene import CLASS_RGB, load_world
 from cns_drake.sensors import POINT_DTYPE
 
@@ -101,53 +97,8 @@ def scan_at(time, name):
     return scan
 
 
-class _Car(LeafSystem):
-    def __init__(self, plant):
-        super().__init__()
-        self._plant = plant
-        self._scratch = plant.CreateDefaultContext()
-        # One object is reused for all times, as a careless system may do.
-        self._X_WB = RigidTransform()
-        time = {self.time_ticket()}
-        self.DeclareVectorOutputPort(
-            "position", plant.num_positions(), self._position, time
-        )
-        self.DeclareAbstractOutputPort(
-            "odometry", lambda: Value(object()), self._odometry, time
-        )
-        for name, factor in (("specific_force", 1), ("angular_velocity", 2)):
-            self.DeclareVectorOutputPort(
-                name,
-                3,
-                lambda context, out, factor=factor: out.SetFromVector(
-                    factor * np.array([1.0, 2.0, 3.0]) * context.get_time()
-                ),
-                time,
-            )
-        for name in X_BSs:
-            self.DeclareAbstractOutputPort(
-                f"{name}_scan",
-                lambda: Value(object()),
-                lambda context, out, name=name: out.set_value(
-                    scan_at(context.get_time(), name)
-                ),
-                time,
-            )
-
-    def _position(self, context, out):
-        base = self._plant.GetBodyByName("base_link")
-        X_WB = X_WB_at(context.get_time())
-        self._plant.SetFreeBodyPose(self._scratch, base, X_WB)
-        axle = self._plant.GetJointByName("axle")
-        axle.set_angle(self._scratch, context.get_time())
-        out.SetFromVector(self._plant.GetPositions(self._scratch))
-
-    def _odometry(self, context, out):
-        X_WB = X_WB_at(context.get_time())
-        self._X_WB.set_translation(X_WB.translation())
-        self._X_WB.set_rotation(X_WB.rotation())
-        V_WB_B = SpatialVelocity([0.0, 0.0, 0.1], [SPEED, 0.0, 0.0])
-        out.set_value(SimpleNamespace(X_WB=self._X_WB, V_WB_B=V_WB_B))
+def imu_at(time):
+    return (1.0 * time, 2.0 * time, 3.0 * time), (2 * time, 4 * time, 6 * time)
 
 
 def drive(
@@ -161,39 +112,19 @@ def drive(
     """Returns a recorder that has seen a drive of 0.5 m a frame."""
     world = load_world(folder / f"{stage}.sdf", vehicle=folder / "vehicle.sdf")
     other = other_stage and load_world(folder / f"{other_stage}.sdf")
-    builder = DiagramBuilder()
-    scene_graph = builder.AddSystem(world.scene_graph)
-    car = builder.AddSystem(_Car(world.plant))
-    to_pose = builder.AddSystem(MultibodyPositionToGeometryPose(world.plant))
-    recorder = builder.AddSystem(
-        MeshcatRecorder(
-            world,
-            X_BSs=X_BSs,
-            period=PERIOD,
-            shown=ShownStages(other, is_earlier=is_earlier),
-            **kwargs,
-        )
+    return film(
+        world,
+        X_WB_at,
+        lambda time: (0.0, 0.0, 0.1, SPEED, 0.0, 0.0),
+        imu_at,
+        {name: partial(scan_at, name=name) for name in X_BSs},
+        num_frames,
+        period=PERIOD,
+        angles_at={"axle": lambda time: time},
+        X_BSs=X_BSs,
+        shown=ShownStages(other, is_earlier=is_earlier),
+        **kwargs,
     )
-    builder.Connect(car.GetOutputPort("position"), to_pose.get_input_port())
-    builder.Connect(
-        to_pose.get_output_port(),
-        scene_graph.get_source_pose_port(world.plant.get_source_id()),
-    )
-    builder.Connect(
-        scene_graph.get_query_output_port(),
-        recorder.GetInputPort("geometry_query"),
-    )
-    for name in (
-        "odometry",
-        "specific_force",
-        "angular_velocity",
-        "lidar_scan",
-        "rear_scan",
-    ):
-        builder.Connect(car.GetOutputPort(name), recorder.GetInputPort(name))
-    simulator = Simulator(builder.Build())
-    simulator.AdvanceTo((num_frames - 1) * PERIOD)
-    return recorder
 
 
 def page_commands(recorder, path):

@@ -1,13 +1,13 @@
+from functools import partial
 from types import SimpleNamespace
 
+from helpers.scripted_car import ScriptedCar
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 import numpy as np
-from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from pydrake.systems.framework import DiagramBuilder
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
@@ -48,57 +48,23 @@ def scan_at(time, lidar):
     return points
 
 
-class _Car(LeafSystem):
-    """Outputs that are functions of time, as of a prescribed motion."""
-
-    def __init__(self, fail_at=np.inf):
-        super().__init__()
-        self._fail_at = fail_at
-        time = {self.time_ticket()}
-        self.DeclareAbstractOutputPort(
-            "odometry", lambda: Value(object()), self._odometry, time
-        )
-        self.DeclareVectorOutputPort(
-            "specific_force",
-            3,
-            lambda context, out: out.SetFromVector(
-                [context.get_time(), 2.0, 9.81]
-            ),
-            time,
-        )
-        self.DeclareVectorOutputPort(
-            "angular_velocity",
-            3,
-            lambda context, out: out.SetFromVector(
-                [0.1, context.get_time(), 0.3]
-            ),
-            time,
-        )
-        for name in X_BSs:
-            self.DeclareAbstractOutputPort(
-                f"{name}_scan",
-                lambda: Value(object()),
-                lambda context, out, name=name: out.set_value(
-                    scan_at(context.get_time(), name)
-                ),
-                time,
-            )
-
-    def _odometry(self, context, out):
-        time = context.get_time()
-        if time >= self._fail_at:
+def make_car(fail_at=np.inf):
+    def V_WB_B_at(time):
+        if time >= fail_at:
             raise InputError("car: it broke down")
-        out.set_value(
-            SimpleNamespace(
-                X_WB=X_WB_at(time),
-                V_WB_B=SpatialVelocity(w=[0, 0, time], v=[10.0, time, 0]),
-            )
-        )
+        return 0, 0, time, 10.0, time, 0
+
+    return ScriptedCar(
+        X_WB_at,
+        V_WB_B_at,
+        lambda time: ((time, 2.0, 9.81), (0.1, time, 0.3)),
+        {name: partial(scan_at, lidar=name) for name in X_BSs},
+    )
 
 
 def make_diagram(bag, **kwargs):
     builder = DiagramBuilder()
-    car = builder.AddNamedSystem("car", _Car(**kwargs))
+    car = builder.AddNamedSystem("car", make_car(**kwargs))
     given = {name: RigidTransform(X) for name, X in X_BSs.items()}
     X_BI_given = RigidTransform(X_BI)
     recorder = builder.AddNamedSystem(

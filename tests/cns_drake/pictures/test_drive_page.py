@@ -4,6 +4,7 @@ import json
 import re
 
 from helpers.browser import chromium, has_chromium
+from helpers.scripted_car import film, scan_of
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
@@ -11,16 +12,6 @@ import pytest
 from cns_drake import load_scenario
 from cns_drake.base import InputError
 from cns_drake.pictures import ShownStages, read_drive_page
-from cns_drake.pictures.drive_page import (
-    make_drive_page,
-    make_pair_page,
-    moving_frames,
-)
-from cns_drake.pictures.drive_record import (
-    DriveRecord,
-    ScanRecord,
-    pack_scan,
-)
 from cns_drake.recording import FRAME_PERIOD
 from cns_drake.scenarios import DrivePlan
 from cns_drake.scene import load_world
@@ -72,46 +63,41 @@ def points_of(frame):
     return X_WB_at(frame).translation() + rng.normal(scale=90.0, size=(500, 3))
 
 
-def packed(frame):
-    p_WRset, p_WB = points_of(frame), X_WB_at(frame).translation()
-    return pack_scan(frame, p_WRset, np.zeros(len(p_WRset), int), p_WB)
+def scan_at(time):
+    frame = round(time / PERIOD)
+    return scan_of((X_WB_at(frame).inverse() @ points_of(frame).T).T)
 
 
-def make_page(folder, other_stage=None, title="a < b"):
+def film_town(folder, other_stage=None):
+    """A drive through a town, filmed; the LiDAR is at the vehicle's origin."""
     vehicle = folder / "vehicle.sdf"
     vehicle.write_text(VEHICLE)
-    world = stage(folder, "here", GROUND, HALL, KIOSK, vehicle=vehicle)
-    X_WBs = [X_WB_at(frame) for frame in range(NUM_FRAMES)]
-    scans = ScanRecord()
-    for frame in (0, 10, 20):
-        scans.add(packed(frame))
-    drive = DriveRecord(
-        PERIOD,
-        X_WBs,
-        dict.fromkeys(moving_frames(world), X_WBs),
-        scans,
-        ("lidar: cns, 32 rings",),
-        speeds=[0.5 * frame for frame in range(NUM_FRAMES)],
-        specific_forces_I=[np.array([0.1, 0.2, 9.81])] * NUM_FRAMES,
-        angular_velocities_I=[np.array([0.0, 0.0, 0.1])] * NUM_FRAMES,
-    )
-    return make_drive_page(
-        drive,
-        world,
-        ShownStages(
+    return film(
+        stage(folder, "here", GROUND, HALL, KIOSK, vehicle=vehicle),
+        lambda time: X_WB_at(time / PERIOD),
+        lambda time: (0.0, 0.0, 0.1, 0.5 * time / PERIOD, 0.0, 0.0),
+        lambda time: ((0.1, 0.2, 9.81), (0.0, 0.0, 0.1)),
+        {"lidar": scan_at},
+        NUM_FRAMES,
+        period=PERIOD,
+        X_BSs={"lidar": RigidTransform()},
+        shown=ShownStages(
             other_stage, "stage <02>", False, "01", ("01", "02"), "a & b"
         ),
-        title=title,
+        sensors=("lidar: cns, 32 rings",),
     )
+
+
+def write_page(path, other_stage=None, title="a < b", **options):
+    film_town(path.parent, other_stage).save(path, title=title, **options)
+    return path
 
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
     other = stage(folder, "there", GROUND, HIGHER_HALL, TOWER)
-    path = folder / "page.html"
-    path.write_text(make_page(folder, other))
-    return path
+    return write_page(folder / "page.html", other)
 
 
 def test_page_has_title_length_and_legend(page):
@@ -148,7 +134,7 @@ def test_page_of_another_city_is_refused(page, tmp_path):
 
 
 def test_without_another_stage_nothing_is_said_of_change(tmp_path):
-    text = make_page(tmp_path)
+    text = write_page(tmp_path / "page.html").read_text()
     assert 'id="change"' not in text
     assert 'class="change"' not in text
     assert 'id="divider"' not in text
@@ -156,38 +142,34 @@ def test_without_another_stage_nothing_is_said_of_change(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.night
-def test_page_of_a_shipped_drive_is_small():
+def test_page_of_a_shipped_drive_is_small(tmp_path):
     """With scans that are hard to compress."""
     scenario = load_scenario("downtown_01")  # It has the largest page.
     loaded = load_drive(DrivePlan(scenario))
-    world, trajectory = loaded.world, loaded.trajectory
-    X_WBs = [
-        trajectory.pose(frame * FRAME_PERIOD)
-        for frame in range(loaded.num_frames)
-    ]
     rng = np.random.default_rng(0)
-    scans = ScanRecord(len(X_WBs))
-    for frame, X_WB in enumerate(X_WBs):
-        if scans.wants(frame):
-            p_WB = X_WB.translation()
-            p_WRset = p_WB + rng.normal(scale=30.0, size=(25_000, 3))
-            rings = np.repeat(np.arange(25), 1000)
-            scans.add(pack_scan(frame, p_WRset, rings, p_WB))
-    motion = rng.normal(size=(len(X_WBs), 7))
-    drive = DriveRecord(
-        FRAME_PERIOD,
-        X_WBs,
-        dict.fromkeys(moving_frames(world), X_WBs),
-        scans,
-        speeds=motion[:, 0].tolist(),
-        specific_forces_I=list(motion[:, 1:4]),
-        angular_velocities_I=list(motion[:, 4:]),
+
+    def noisy_scan(time):
+        scan = scan_of(rng.normal(scale=30.0, size=(25_000, 3)))
+        scan["ring"] = np.repeat(np.arange(25), 1000)
+        return scan
+
+    recorder = film(
+        loaded.world,
+        loaded.trajectory.pose,
+        lambda time: rng.normal(size=6),
+        lambda time: rng.normal(size=(2, 3)),
+        {"lidar": noisy_scan},
+        loaded.num_frames,
+        period=FRAME_PERIOD,
+        X_BSs={"lidar": RigidTransform()},
+        shown=ShownStages(load_world(scenario.folder.stage("04"))),
     )
-    page = make_drive_page(
-        drive, world, ShownStages(load_world(scenario.folder.stage("04")))
+    path = tmp_path / "page.html"
+    recorder.save(path)
+    assert 19e6 < path.stat().st_size <= 20e6
+    assert re.search(
+        r">One scan in \d+, every point: up to 25,000 a ", path.read_text()
     )
-    assert 19e6 < len(page.encode()) <= 20e6
-    assert re.search(r">One scan in \d+, every point: up to 25,000 a ", page)
 
 
 @pytest.fixture(scope="module")
@@ -229,15 +211,14 @@ def opened(browser, page, request):
 @pytest.fixture
 def pair(browser, tmp_path):
     """A page of two drives, both standing still."""
-    for name in ("first", "second"):
-        (tmp_path / f"{name}.html").write_text(make_page(tmp_path, title=name))
-    pages = [
-        read_drive_page(tmp_path / f"{name}.html", "a & b")
-        for name in ("first", "second")
-    ]
-    path = tmp_path / "pair.html"
+    first = write_page(tmp_path / "first.html", title="first")
+    path = write_page(
+        tmp_path / "pair.html",
+        title="second",
+        beside=read_drive_page(first, "a & b"),
+    )
     # Tests look into the frames, which have an origin of their own.
-    text = make_pair_page(*pages)
+    text = path.read_text()
     assert text.count(SANDBOX) == 2
     path.write_text(text.replace(SANDBOX, ""))
     browser.open(path.as_uri(), 1440, 900)
@@ -258,10 +239,11 @@ TAKE = "<script>parent.document.title = 'taken'</script><h1>"
 @pytest.mark.slow
 @pytest.mark.skipif(not has_chromium(), reason="no chromium")
 def test_a_page_of_others_runs_in_a_frame_of_its_own(browser, tmp_path):
-    path = tmp_path / "page.html"
-    path.write_text(make_page(tmp_path).replace("<h1>", TAKE, 1))
-    page = read_drive_page(path, "a & b")
-    path.write_text(make_pair_page(page, page))
+    path = write_page(tmp_path / "page.html")
+    path.write_text(path.read_text().replace("<h1>", TAKE, 1))
+    path = write_page(
+        tmp_path / "pair.html", beside=read_drive_page(path, "a & b")
+    )
     browser.open(path.as_uri(), 1440, 900)
     # The first drive, whose script has run by then, still leads the second.
     browser.evaluate("new Promise((heard) => { onmessage = heard; })")
@@ -336,11 +318,18 @@ def test_camera_rises_over_a_wall_that_hides_the_car(browser, tmp_path, height):
     wall = visual("house/wall", place, size, "0.7 0.7 0.7")
     world = stage(tmp_path, "here", GROUND, wall, vehicle=vehicle)
     X_WBs = [RigidTransform([3.0 * k, 0.0, 0.5]) for k in range(NUM_FRAMES)]
-    drive = DriveRecord(
-        PERIOD, X_WBs, dict.fromkeys(moving_frames(world), X_WBs)
+    recorder = film(
+        world,
+        lambda time: X_WBs[round(time / PERIOD)],
+        lambda time: np.zeros(6),
+        lambda time: np.zeros((2, 3)),
+        {},
+        NUM_FRAMES,
+        period=PERIOD,
+        X_BSs={},
     )
     path = tmp_path / "page.html"
-    path.write_text(make_drive_page(drive, world))
+    recorder.save(path)
     browser.open(path.as_uri(), *SCREENS["desktop"])
     browser.evaluate("viewer.renderer.setPixelRatio(0.1)")
     browser.wait_for('!document.getElementById("loading")')
@@ -469,19 +458,18 @@ class TestInChromium:
     @pytest.mark.parametrize("frame", [0, 9, 10, 20])
     def test_latest_scan_is_shown_with_every_point(self, reader, frame):
         go_to(reader, frame * PERIOD)
-        shown = frame - frame % 10
         points = (
             'viewer.scene_tree.find(["scans"]).object.children[0]'
             ".geometry.attributes.position"
         )
-        first = points_of(shown)[0]
+        first = points_of(frame)[0]
         reader.wait_for(
             f"(viewer.render(), Math.abs({points}?.array[0] - ({first[0]})) <"
             " 0.02)"
         )
         array = reader.evaluate(f"[...{points}.array]")
         np.testing.assert_allclose(
-            np.reshape(array, (-1, 3)), points_of(shown), atol=0.0101
+            np.reshape(array, (-1, 3)), points_of(frame), atol=0.0101
         )
 
     def test_camera_follows_the_car(self, reader):
