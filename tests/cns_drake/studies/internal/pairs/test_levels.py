@@ -91,6 +91,7 @@ def test_a_rebuilt_city_is_not_the_frozen_one(tmp_path):
     # Neither does the city of another session hide behind the first one's.
     former = drive.replaced(stage="01" if drive.stage != "01" else "04")
     several = ComparedDrives(drive, drive, RECORDED_PROTOCOL, beside=(former,))
+    assert several.fingerprint() != known
     before = drives_fingerprint(several, {})
     world = former.world_file
     assert world != drive.world_file
