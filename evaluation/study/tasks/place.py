@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import compress
 from typing import Any
 
 from cns_drake.base import Job, Reporter, Steps, track
@@ -16,7 +15,6 @@ from evaluation.recognition import (
 )
 from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import (
-    DescribedSource,
     PlaceComparison,
     measure_places,
     shown_overlaps,
@@ -186,35 +184,24 @@ def _comparison(
         needs: list to which the names of the added jobs are appended.
         kept: whether both drives must be in files.
     """
-    is_chosen = [pair.has_method(one.name) for one in jobs.methods]
-
-    def of_chosen(described: DescribedSource) -> DescribedSource:
-        if not isinstance(described, tuple):
-            return described
-        scans, *of_methods = described
-        return scans, *compress(of_methods, is_chosen)
-
     database, query = (
-        of_chosen(jobs.described(drive, role, pair.protocol, needs, kept=kept))
+        jobs.described(drive, role, pair.protocol, needs, kept=kept)
         for drive, role in pair.roles
     )
     radii = tuple(sorted(jobs.radii[pair.key]))
-    return PlaceComparison(
+    by_all = PlaceComparison(
         database,
         query,
-        tuple(compress(jobs.methods, is_chosen)),
+        jobs.methods,
         replace(pair.protocol, radius=radii[0]),
         radii,
-        tuple(
-            tuple(compress(one, is_chosen))
-            for one in jobs.distractor_places(pair, needs)
-        ),
+        jobs.distractor_places(pair, needs),
         pair.distractors,
-        tuple(
-            (scans, *compress(of_methods, is_chosen))
-            for scans, *of_methods in jobs.beside(pair, needs)
-        ),
+        tuple(jobs.beside(pair, needs)),
         pair.keep,
+    )
+    return by_all.by_methods(
+        [k for k, one in enumerate(jobs.methods) if pair.has_method(one.name)]
     )
 
 
