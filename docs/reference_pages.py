@@ -192,7 +192,8 @@ def pages() -> dict[str, str]:
         "city.md": _fields_page(
             "Fields of a city",
             "[Files of a city](../city.md#the-files) says what each file is "
-            "for, and lists the archetypes of buildings and the objects.",
+            "for, what weights and ranges are, and lists the archetypes of "
+            "buildings and the objects.",
             CITY,
         ),
         "experiment.md": _fields_page(

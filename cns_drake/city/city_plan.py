@@ -93,14 +93,11 @@ class RowPlan(_Model):
     Attributes:
         setback: distance from the inner edge of the sidewalk to the building
             fronts [m].
-        archetypes: names of archetypes, each with its weight in the random
-            choice, such as `{house: 3, office: 1}`.
-        width: smallest and largest width of a lot [m]. The width of each lot is
-            sampled between these limits.
-        depth: smallest and largest depth of a lot [m].
-        height: smallest and largest height of a building's parapet, ridge or
-            spire [m].
-        gap: smallest and largest gap between neighbouring buildings [m].
+        archetypes: weights of archetypes, such as `{house: 3, office: 1}`.
+        width: range of the widths of lots [m].
+        depth: range of the depths of lots [m].
+        height: range of the heights of parapets, ridges or spires [m].
+        gap: range of the gaps between neighbouring buildings [m].
         fill: share of the lots that have a building.
         kind: first part of the buildings' names in the tables; by default the
             archetype.
@@ -165,7 +162,7 @@ class ScatterPlan(_Model):
     """Plants or other objects at random places on a district's open ground.
 
     Attributes:
-        objects: names of objects, each with its weight in the random choice.
+        objects: weights of objects.
         spacing: smallest distance between two objects [m].
         fill: share of the possible places at which an object stands.
         within: corners of an area [m]. The objects stand only in this area.
@@ -189,7 +186,7 @@ class LinePlan(_Model):
     """Objects along a line, such as an avenue of trees, a fence or benches.
 
     Attributes:
-        objects: names of objects, each with its weight in the random choice.
+        objects: weights of objects.
         points: points of the line [m]. The objects face to the right of the
             line's direction.
         spacing: smallest and largest distance between two objects [m]. Without
@@ -235,17 +232,15 @@ class StreetPlan(_Model):
     """The objects on the sidewalks in front of a district.
 
     Attributes:
-        trees: names of tree species, each with its weight in the random choice.
-            By default there are no trees.
-        tree_spacing: smallest and largest distance between neighbouring trees
-            [m].
+        trees: weights of tree species; by default there are no trees.
+        tree_spacing: range of the distances between neighbouring trees [m].
         tree_gaps: share of the trees that are left out at random.
         lamp: name of the object to use as street lamp.
         lamp_spacing: distance between neighbouring lamps [m].
-        furniture: names of objects other than trees and lamps, such as benches,
-            each with its weight in the random choice.
-        furniture_spacing: smallest and largest distance between neighbouring
-            pieces of furniture [m].
+        furniture: weights of objects other than trees and lamps, such as
+            benches.
+        furniture_spacing: range of the distances between neighbouring pieces of
+            furniture [m].
     """
 
     trees: Weights = Field(default_factory=dict)
@@ -314,8 +309,7 @@ class CityPlan(_Model):
         bounds: `[x0, y0, x1, y1]`, the smallest and largest x and y of the
             world [m].
         water_level: height of the water's surface [m].
-        cars: names of car models, each with its weight in the random choice of
-            parked cars.
+        cars: weights of car models, for parked cars.
         street: objects on sidewalks, in front of districts without a `street`
             of their own.
         medians: objects on the medians of roads; only the fields `trees` and
