@@ -72,10 +72,10 @@ def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
     """
     check_regular(path)
     with user_errors(path), open(path, "rb") as stream:
-        content = stream.read(limit + 1)
-    if len(content) > limit:
-        raise InputError(f"{path}: larger than {limit} bytes")
-    return content
+        size = os.fstat(stream.fileno()).st_size
+        if size > limit:
+            raise InputError(f"{path}: larger than {limit} bytes")
+        return stream.read(size)
 
 
 def read_text(path: Path, limit: int = _WRITTEN_BYTES) -> str:

@@ -49,8 +49,6 @@ from cns_drake.base.terminal import note, resumable
 _ADDRESS_VARIABLE = "DASK_SCHEDULER_ADDRESS"
 # How long a scheduler may take to answer [s].
 _ANSWER_TIMEOUT = 10.0
-# Greatest number of jobs side by side; each is a process.
-_MOST_JOBS = 1024
 # How often a job is started again after its process has died.
 _RETRIES = 2
 
@@ -132,8 +130,7 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
             machine, one for each core.
 
     Raises:
-        InputError: if both options are given, or the number is not from 1 to
-            1024.
+        InputError: both options are given, or the number is not positive.
     """
     if num_jobs is not None:
         if scheduler is not None:
@@ -142,8 +139,6 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
             )
         if num_jobs < 1:
             raise InputError(f"--jobs: {num_jobs} is not a positive number")
-        if num_jobs > _MOST_JOBS:
-            raise InputError(f"--jobs: {num_jobs} is more than {_MOST_JOBS}")
         return Cluster(num_workers=num_jobs)
     return Cluster(
         num_workers=num_cores(),

@@ -1237,29 +1237,6 @@ def _(folder):
     path.write_text("".join(rows))
 
 
-# --- Options
-
-
-def jobs(folder):
-    from cns_drake.base import InputError, program
-    from cns_drake.command_line import app
-
-    words = ["generate", "--output", "x", "--jobs"]
-    number = (folder / "x.txt").read_text()
-    try:
-        app([*words, number], prog_name="cns-drake", standalone_mode=False)
-    except Exception as error:
-        text, _ = program._failure_of(error)
-        raise InputError(text) from error
-
-
-for _number in ("0", "-1", "1025", "1" + "0" * 4000, "9" * 6000, "1e9", "inf"):
-
-    @way(f"--jobs {_number[:9]}", "--jobs", "--jobs", use=jobs)
-    def _(folder, number=_number):
-        (folder / "x.txt").write_text(number)
-
-
 # --- The tests
 
 # Public names that look like readers, and read no file of a user by themselves.
@@ -1351,7 +1328,6 @@ def test_every_reader_has_a_way():
     claimed = {name for one in WAYS.values() for name in one.readers}
     assert offered - claimed - NO_FILES.keys() == set()
     assert (NO_FILES.keys() | claimed) - offered == {
-        "--jobs",
         "evaluation.methods.make_method",
         "evaluation.results.Results",
     }
