@@ -7,6 +7,9 @@ import shapely
 from shapely.geometry import LinearRing, Polygon
 
 _MM_PER_M = 1000.0
+# Of a polygon with more corners, GEOS makes the triangles: the time for those
+# below, of which cities consist, grows by the square of the corners.
+_MANY_CORNERS = 1500
 # A corner or point in whole millimetres.
 _Point = tuple[int, int]
 
@@ -24,6 +27,8 @@ def triangulate(polygon: Polygon) -> np.ndarray:
     Raises:
         ValueError: the polygon turns out not to be valid.
     """
+    if shapely.get_num_coordinates(polygon) > _MANY_CORNERS:
+        return _triangles_of_geos(polygon)
     polygon = shapely.orient_polygons(shapely.normalize(polygon))
     rings = [_corners(ring) for ring in (polygon.exterior, *polygon.interiors)]
     if len(rings[0]) < 3:
@@ -39,6 +44,19 @@ def triangulate(polygon: Polygon) -> np.ndarray:
     ears = ([ring[k] for k in ear] for ear in cut_ears(ring))
     triangles = _delaunay(ears, fixed)
     return np.array(triangles, dtype=float).reshape(-1, 3, 2) / _MM_PER_M
+
+
+def _triangles_of_geos(polygon: Polygon) -> np.ndarray:
+    rounded = shapely.transform(
+        polygon, lambda xy: np.rint(xy * _MM_PER_M) / _MM_PER_M
+    )
+    rounded = shapely.remove_repeated_points(rounded)
+    try:
+        parts = shapely.constrained_delaunay_triangles(rounded)
+    except shapely.errors.GEOSException as error:
+        raise ValueError("the polygon is not valid") from error
+    parts = shapely.orient_polygons(shapely.get_parts(parts))
+    return shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3]
 
 
 def _corners(ring: LinearRing) -> list[_Point]:
