@@ -99,8 +99,8 @@ def kept_points(scan: np.ndarray, half_extent: float) -> np.ndarray:
     half_extent *= math.sqrt(3.0)
     names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
     kept = within_cube(xyz(scan), half_extent)
-    # A view would hold all fields.
-    return repack_fields(scan[names][kept])
+    # A view would hold all fields, and a subclass could not be stored.
+    return repack_fields(np.asarray(scan)[names][kept])
 
 
 @dataclass(frozen=True)
