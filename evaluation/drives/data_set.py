@@ -4,6 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from cns_drake.base import InputError
 from cns_drake.drives import Drive
 
 
@@ -48,3 +51,39 @@ class DataSet:
     has_lidars: bool = False
     is_nested: bool = False
     needs_scenario: bool = False
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it is a module of this package."""
+        return self.holds.__module__.startswith(f"{__package__}.")
+
+
+def check_interface(drive: Drive) -> None:
+    """Checks that a drive has values of the types and shapes of `Drive`.
+
+    Raises:
+        InputError: a value is missing, or is of another type or shape.
+    """
+    if not isinstance(drive, Drive):
+        raise InputError(f"{drive!r} is no Drive")
+    for name in ("name", "world_frame"):
+        if not isinstance(getattr(drive, name, None), str):
+            raise InputError(f"{name}: no text")
+    number = len(drive)
+    for name, shape, kinds in (
+        ("stamps_ns", (number,), "iu"),
+        ("X_WS", (number, 4, 4), "f"),
+    ):
+        value = getattr(drive, name)
+        if not (
+            isinstance(value, np.ndarray)
+            and value.shape == shape
+            and value.dtype.kind in kinds
+        ):
+            kind = "integers" if kinds == "iu" else "floating-point numbers"
+            raise InputError(f"{name}: no array of {kind} of shape {shape}")
+    if number:
+        scan = drive.scan(0)
+        names = getattr(getattr(scan, "dtype", None), "names", None) or ()
+        if np.ndim(scan) != 1 or not {"x", "y", "z"} <= set(names):
+            raise InputError("scan 0: no array of points with x, y and z")

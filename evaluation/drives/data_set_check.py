@@ -12,6 +12,7 @@ import small_gicp
 from cns_drake.base import InputError, errors_at, note, poses
 from cns_drake.drives import Drive
 from cns_drake.units import check_preset
+from evaluation.drives.data_set import check_interface
 from evaluation.drives.opening import open_drive
 
 # How many scans are read, spread over the drive.
@@ -138,6 +139,15 @@ def _check(*first: _Check) -> Callable[[_Faults], _Check]:
 
 
 @_check()
+def check_types(drive: Drive) -> Iterator[str]:
+    """The values have the types and shapes of the interface `Drive`."""
+    try:
+        check_interface(drive)
+    except InputError as error:
+        yield str(error)
+
+
+@_check(check_types)
 def check_names(drive: Drive) -> Iterator[str]:
     """The drive has a name, and its LiDAR is known if it has one."""
     if not (drive.name.strip() and drive.name.isprintable()):
@@ -156,18 +166,15 @@ def check_names(drive: Drive) -> Iterator[str]:
             yield f"lidars: preset: {error}"
 
 
-@_check()
+@_check(check_types)
 def check_times(drive: Drive) -> Iterator[str]:
     """Two scans at least, in increasing times in nanoseconds."""
     number, stamps_ns = len(drive), drive.stamps_ns
     if number < 2:
         yield f"scans: {number} instead of two at least"
         return
-    if stamps_ns.shape != (number,) or stamps_ns.dtype != np.int64:
-        yield (
-            f"times: {stamps_ns.dtype} of shape {stamps_ns.shape} instead of"
-            f" int64 ({number},)"
-        )
+    if stamps_ns.dtype != np.int64:
+        yield f"times: {stamps_ns.dtype} instead of int64"
         return
     steps = np.diff(stamps_ns)
     if (steps <= 0).any():
@@ -181,13 +188,10 @@ def check_times(drive: Drive) -> Iterator[str]:
         )
 
 
-@_check()
+@_check(check_types)
 def check_poses(drive: Drive) -> Iterator[str]:
     """Each scan has a finite rigid pose."""
-    number, X_WS = len(drive), drive.X_WS
-    if X_WS.shape != (number, 4, 4):
-        yield f"poses: of shape {X_WS.shape}, not ({number}, 4, 4)"
-        return
+    X_WS = drive.X_WS
     for frame, X in enumerate(X_WS):
         if not poses.is_pose(X):
             yield f"poses: that of scan {frame} is no finite rigid pose"
@@ -366,6 +370,7 @@ def check_frames(drive: Drive) -> Iterator[str]:
 # What `check_data_set` checks, for `pytest.mark.parametrize`: functions of a
 # drive, or of its path, each of which raises an InputError.
 data_set_checks: list[_Check] = [
+    check_types,
     check_names,
     check_times,
     check_poses,

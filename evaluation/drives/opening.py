@@ -8,11 +8,11 @@ import inspect
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Family, doing, import_modules, listed
+from cns_drake.base import Family, doing, errors_at, import_modules, listed
 from cns_drake.base import InputError as InputError
 from cns_drake.drives import Drive as Drive
 from evaluation.clouds import is_cloud
-from evaluation.drives.data_set import DataSet
+from evaluation.drives.data_set import DataSet, check_interface
 from evaluation.drives.posed_drive import PosedDrive
 
 
@@ -123,15 +123,12 @@ def open_drive(
                 " names one"
             )
         named: dict[str, Any] = {"odometry": odometry, "poses": poses}
-        drive = found.open(
-            path,
-            lidar if found.has_lidars else columns,
-            **{
-                name: value
-                for name, value in named.items()
-                if name in arguments
-            },
-        )
+        given = lidar if found.has_lidars else columns
+        asked = {name: one for name, one in named.items() if name in arguments}
+        if found.is_own:
+            drive = found.open(path, given, **asked)
+        else:
+            drive = _open_others(found, path, given, **asked)
         if poses is not None and "poses" not in arguments:
             drive = PosedDrive(drive, poses)
         return drive
@@ -152,6 +149,19 @@ def open_drive(
     )
 
 
+def _open_others(
+    data_set: DataSet, path: Path, *words: Any, **named: Any
+) -> Drive:
+    """Opens a drive of a plug-in's data set, whose interface is checked."""
+    with errors_at(f"{path}: data set {data_set.title}"):
+        try:
+            drive = data_set.open(path, *words, **named)
+        except TypeError as error:  # Such as an incomplete class.
+            raise InputError(error) from error
+        check_interface(drive)
+    return drive
+
+
 def register_data_set(data_set: DataSet) -> DataSet:
     """Registers a data set of your own, whose drives `open_drive` then opens.
 
@@ -159,6 +169,7 @@ def register_data_set(data_set: DataSet) -> DataSet:
         data_set: the data set; all commands take its drives.
 
     Raises:
+        InputError: it is no data set.
         ValueError: there is another data set with this title.
 
     Example:
@@ -168,6 +179,8 @@ def register_data_set(data_set: DataSet) -> DataSet:
             DataSet("Mine", is_mine, open_mine, "the folder with `mine.txt`")
         )
     """
+    if not isinstance(data_set, DataSet):
+        raise InputError(f"{data_set!r} is no DataSet")
     _DATA_SETS.load_own()
     _add(data_set)
     return data_set

@@ -3,6 +3,7 @@
 import abc
 from collections.abc import Sequence
 import contextlib
+import inspect
 from pathlib import Path
 import re
 from typing import ClassVar, Generic, Literal, TypeVar
@@ -317,11 +318,20 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
 
 def check_class(method: type[Method]) -> None:
-    """Checks the attributes of a method's class, see `Method`.
+    """Checks a method's class and its attributes, see `Method`.
 
     Raises:
-        InputError: an attribute is impossible. The error begins with its name.
+        InputError: it is no complete subclass of Method, or an attribute is
+            impossible. The error begins with the name of the attribute.
     """
+    if not (isinstance(method, type) and issubclass(method, Method)):
+        raise InputError("no subclass of Method")
+    if inspect.isabstract(method):
+        missing = ", ".join(sorted(method.__abstractmethods__))
+        raise InputError(f"lacks {missing}")
+    kind = method.Config
+    if not (isinstance(kind, type) and issubclass(kind, MethodConfig)):
+        raise InputError(f"Config: {kind!r} is no MethodConfig")
     for name, least in (
         ("scans_per_place", 1),
         ("batch_size", 1),

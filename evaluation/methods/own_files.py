@@ -25,7 +25,7 @@ from types import ModuleType
 from typing import Any
 
 from cns_drake.base import InputError, errors_at
-from evaluation.methods.method import Method, MethodConfig, check_class
+from evaluation.methods.method import Method
 
 # Functions of the interface that a method's author may have written.
 _WRITTEN_BY_USERS = (
@@ -80,7 +80,7 @@ def _registered_method(module: ModuleType, path: Path) -> type[Method]:
     """Returns the one method that a module registers.
 
     Raises:
-        InputError: the module does not register exactly one complete method.
+        InputError: the module does not register exactly one method.
     """
     found = [
         value
@@ -94,18 +94,7 @@ def _registered_method(module: ModuleType, path: Path) -> type[Method]:
         raise InputError(
             f"{path}: registers {len(found)} methods instead of one"
         )
-    method = found[0]
-    if inspect.isabstract(method):
-        missing = ", ".join(sorted(method.__abstractmethods__))
-        raise InputError(f"{path}: {method.__name__}: lacks {missing}")
-    kind = method.Config
-    if not (isinstance(kind, type) and issubclass(kind, MethodConfig)):
-        raise InputError(
-            f"{path}: {method.__name__}: Config: {kind!r} is no MethodConfig"
-        )
-    with errors_at(f"{path}: {method.__name__}"):
-        check_class(method)
-    return method
+    return found[0]
 
 
 def _own_getter(found: property, path: Path) -> Callable:
@@ -156,7 +145,7 @@ def run_module(path: Path) -> ModuleType:
     # Dataclasses look up their module there.
     sys.modules[name] = module
     _shares[place] = _Share()
-    with users_code(path):
+    with users_code(path), errors_at(path, f"{place}: "):
         spec.loader.exec_module(module)
     return module
 

@@ -11,8 +11,14 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from cns_drake.base import Family, InputError, did_you_mean, import_modules
-from evaluation.methods.method import Method
+from cns_drake.base import (
+    Family,
+    InputError,
+    did_you_mean,
+    errors_at,
+    import_modules,
+)
+from evaluation.methods.method import Method, check_class
 from evaluation.methods.own_files import users_code
 
 METHODS: Family[type[Method]] = Family(
@@ -27,6 +33,7 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
     Raises:
         ValueError: if another method has that name, or the name is empty, has
             unprintable characters, or begins or ends with a space.
+        InputError: if the class is no complete method.
 
     Example:
         from evaluation import Method, register
@@ -41,6 +48,8 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
         raise ValueError(f"{name!r} is no name of a method")
 
     def enter(method: _MethodClass) -> _MethodClass:
+        with errors_at(getattr(method, "__name__", repr(method))):
+            check_class(method)
         module = method.__module__
         method.name = name
         method.title = method.title or name

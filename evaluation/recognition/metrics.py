@@ -805,6 +805,7 @@ def register_metric(
     Raises:
         ValueError: another metric has this name, the name is empty or has
             unprintable characters, or `fields` has something else.
+        InputError: the function fails for made-up outcomes, or is random.
 
     Example:
         import numpy as np
@@ -825,12 +826,13 @@ def register_metric(
         raise ValueError(f"{name}: better: {better!r} is no direction")
 
     def enter(compute: Callable[[QueryOutcomes], float]) -> Metric:
+        file = Path(inspect.getfile(compute))
         metric = _metric(
             name,
             title or name.replace("_", " "),
             unit,
-            compute=compute,
-            file=Path(inspect.getfile(compute)),
+            compute=as_users_code(compute, file),
+            file=file,
             **fields,
         )
         if metric.least >= metric.greatest:
@@ -838,14 +840,11 @@ def register_metric(
                 f"{name}: least: {metric.least:g} is not below greatest,"
                 f" {metric.greatest:g}"
             )
-        METRICS.add(name, metric, _source(compute))
+        _try(metric)
+        METRICS.add(name, metric, (compute.__module__, compute.__qualname__))
         return metric
 
     return enter
-
-
-def _source(compute: Callable) -> tuple[str, str]:
-    return compute.__module__, compute.__qualname__
 
 
 def load_metrics(path: Path) -> list[Metric]:
@@ -868,17 +867,7 @@ def load_metrics(path: Path) -> list[Metric]:
         raise InputError(
             f"{path}: registers no metric; see evaluation.register_metric"
         )
-    return [_checked_here(metric, path) for metric in found]
-
-
-def _checked_here(metric: Metric, path: Path) -> Metric:
-    """Returns a metric whose faults name its file."""
-    assert metric.compute is not None
-    naming = as_users_code(metric.compute, path)
-    named = replace(metric, compute=naming, file=path)
-    _try(named)
-    METRICS.add(metric.name, named, _source(metric.compute))
-    return named
+    return found
 
 
 def _try(metric: Metric) -> None:

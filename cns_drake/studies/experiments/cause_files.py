@@ -23,6 +23,7 @@ from cns_drake.base import (
     merged,
     read_yaml,
     validated,
+    value_errors,
 )
 from cns_drake.sensors import Section
 from cns_drake.studies.experiments.nested_fields import SIDES, Case
@@ -100,27 +101,37 @@ def register_cause(cause: Path | str | Mapping[str, Any]) -> Cause:
             }
         )
     """
+    # It needs more modules than most commands.
+    from cns_drake.studies.experiments.experiment import Experiment
+
     _CAUSES.load_own()
-    return _add(cause)
+    found = _read(cause)
+    for name, case in found.strengths.items():
+        where = f"cause {found.name!r}: strengths.{name}"
+        cases = {found.name: case, ALL: [found.name]}
+        values = {"name": "check", "about": "", "cases": cases}
+        with value_errors(where):
+            # Nobody else's experiments are to fail.
+            _ = validated(Experiment, values, where).conditions
+    _CAUSES.add(found.name, found, found)
+    return found
 
 
 def _load_own() -> None:
     for path in sorted(_FOLDER.glob("*.yaml")):
-        _add(path)
+        cause = _read(path)
+        _CAUSES.add(cause.name, cause, cause)
 
 
 _CAUSES: Family[Cause] = Family("cause", _load_own)
 
 
-def _add(cause: Path | str | Mapping[str, Any]) -> Cause:
+def _read(cause: Path | str | Mapping[str, Any]) -> Cause:
     if isinstance(cause, Mapping):
         name = cause.get("name")
-        found = validated(Cause, cause, f"cause {name!r}" if name else "cause")
-    else:
-        path = Path(cause)
-        found = validated(Cause, {"name": path.stem, **read_yaml(path)}, path)
-    _CAUSES.add(found.name, found, found)
-    return found
+        return validated(Cause, cause, f"cause {name!r}" if name else "cause")
+    path = Path(cause)
+    return validated(Cause, {"name": path.stem, **read_yaml(path)}, path)
 
 
 def with_cases(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
