@@ -15,6 +15,7 @@ class DaskProcesses:
 
     Attributes:
         address: of the scheduler.
+        scheduler: its process.
         workers: the processes, one thread each, which are not restarted.
     """
 
@@ -26,7 +27,7 @@ class DaskProcesses:
         self.workers = []
 
     def __enter__(self):
-        self._scheduler = self._start(
+        self.scheduler = self._start(
             "dask_scheduler",
             "--port",
             "0",
@@ -35,18 +36,16 @@ class DaskProcesses:
             "--host",
             "tls://127.0.0.1" if self._options else "127.0.0.1",
         )
-        for line in self._scheduler.stderr:
+        for line in self.scheduler.stderr:
             if "Scheduler at:" in line:
                 self.address = line.split()[-1]
                 break
         # Output that is not read would stop the writing process.
-        threading.Thread(
-            target=self._scheduler.stderr.read, daemon=True
-        ).start()
+        threading.Thread(target=self.scheduler.stderr.read, daemon=True).start()
         return self
 
     def __exit__(self, *error):
-        for process in (*self.workers, self._scheduler):
+        for process in (*self.workers, self.scheduler):
             process.kill()
             process.wait()
 

@@ -80,13 +80,10 @@ def test_a_job_that_cannot_be_done_and_the_address_in_the_environment(
     assert (output / "short" / "metadata.yaml").is_file()
 
 
-@pytest.mark.parametrize(
-    "number",
-    [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.night)],
-)
-def test_jobs_end_with_the_client_that_wanted_them(dask, tmp_path, number):
+def start_to_hold(dask, folder):
+    """Starts a client whose job never ends; returns the two processes."""
     dask.add_workers(1)
-    pipe = tmp_path / "pipe"
+    pipe = folder / "pipe"
     os.mkfifo(pipe)
     script = (
         "import sys\n"
@@ -100,11 +97,31 @@ def test_jobs_end_with_the_client_that_wanted_them(dask, tmp_path, number):
     client = subprocess.Popen(
         [sys.executable, "-c", script, dask.address, pipe],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        stderr=subprocess.PIPE,
+        text=True,
     )
-    job = psutil.Process(job_functions.read_holder(pipe))
+    return client, psutil.Process(job_functions.read_holder(pipe))
+
+
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.night)],
+)
+def test_jobs_end_with_the_client_that_wanted_them(dask, tmp_path, number):
+    client, job = start_to_hold(dask, tmp_path)
     client.send_signal(number)
-    client.wait()
+    client.communicate()
     assert psutil.wait_procs([job], timeout=600)[1] == []
+
+
+@pytest.mark.night
+def test_jobs_end_with_their_scheduler(tmp_path):
+    with DaskProcesses(tmp_path) as dask:
+        client, job = start_to_hold(dask, tmp_path)
+        dask.scheduler.kill()
+        _, errors = client.communicate()
+        assert "InputError: the connection to the scheduler was lost" in errors
+        assert psutil.wait_procs([job], timeout=600)[1] == []
 
 
 @pytest.mark.night
