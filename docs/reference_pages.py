@@ -264,40 +264,29 @@ def _table_of_methods() -> str:
 
 
 def _causes() -> str:
-    rows = [
-        (
-            f"`{cause.name}`",
-            cause.title,
-            "query scans" if cause.scans_only else " and ".join(cause.sides),
-            " ".join(cause.about.split())
-            + ("" if cause.combined else " (not part of `all`)"),
-            _values_of_levels(cause.strengths.get("levels")),
-        )
-        for cause in causes().values()
-    ]
+    lines = []
+    for cause in causes().values():
+        side = "scans" if cause.scans_only else " and ".join(cause.sides)
+        alone = "" if cause.combined else ", not part of `all`"
+        line = f"- `{cause.name}` ({cause.title}; {side}{alone}): "
+        line += " ".join(cause.about.split())
+        if levels := cause.strengths.get("levels"):
+            line += f". In the levels: {_values_of_levels(levels)}"
+        lines.append(line)
     parts = [
         "## Causes of change",
         "The experiment [`ladder`](../ladder.md) measures each cause by itself,"
         " at up to four levels, and all of them together. The"
-        " [levels](../ladder.md#levels) combine weaker causes.",
-        _table(
-            (
-                "cause",
-                "in words",
-                "changes",
-                "levels 1 to 4 of the ladder",
-                "in the levels",
-            ),
-            rows,
-        ),
+        " [levels](../ladder.md#levels) combine weaker causes. Brackets have"
+        " the title of a cause, and what it changes: the drive of the database"
+        " or of the query, or the query's scans.",
+        "\n".join(lines),
     ]
     return "\n\n".join(parts) + "\n"
 
 
 def _values_of_levels(fields: Any, path: str = "") -> str:
     """Returns the values at each level of the fields of drives."""
-    if fields is None:
-        return "-"
     if not isinstance(fields, dict):
         return f"`{path}` {_plain(fields)}"
     return "; ".join(
