@@ -112,7 +112,7 @@ def film(
     )
     to_pose = builder.AddSystem(MultibodyPositionToGeometryPose(plant))
     recorder = builder.AddSystem(
-        MeshcatRecorder(world, period=period, **options)
+        MeshcatRecorder(world, period=period, num_frames=num_frames, **options)
     )
     builder.Connect(car.GetOutputPort("position"), to_pose.get_input_port())
     builder.Connect(

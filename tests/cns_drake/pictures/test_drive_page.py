@@ -166,7 +166,8 @@ def test_page_of_a_shipped_drive_is_small(tmp_path):
     )
     path = tmp_path / "page.html"
     recorder.save(path)
-    assert 19e6 < path.stat().st_size <= 20e6
+    # Scans are left out evenly, so some room is left.
+    assert 15e6 < path.stat().st_size <= 20e6
     assert re.search(
         r">One scan in \d+, every point: up to 25,000 a ", path.read_text()
     )

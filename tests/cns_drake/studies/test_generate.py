@@ -105,16 +105,20 @@ def test_a_world_or_a_route_that_has_changed(tmp_path, name):
     assert not is_recorded(scenario, tmp_path / "output")
 
 
-@pytest.mark.parametrize("damage", ["", "{", "a: 1", "- 1"])
-@pytest.mark.parametrize("name", ["metadata.yaml", "scenario.yaml"])
-def test_damaged_files_are_no_recording(tmp_path, name, damage):
+def test_damaged_files_are_no_recording(tmp_path):
     scenario = tiny_scenario(tmp_path, frames=3)
-    folder = tmp_path / "output" / "tiny_01"
-    folder.mkdir(parents=True)
-    (folder / "tiny_01_0.mcap").touch()
-    (folder / "metadata.yaml").touch()
-    (folder / name).write_text(damage)
-    assert not is_recorded(scenario, tmp_path / "output")
+    folder = simulate(scenario, tmp_path / "output").folder
+    for name, damages in (
+        ("metadata.yaml", ("", "{", "a: 1", "- 1")),
+        ("scenario.yaml", ("{", "a: b: c")),
+        ("fingerprint.txt", ("", "other")),
+    ):
+        whole = (folder / name).read_text()
+        for damage in damages:
+            (folder / name).write_text(damage)
+            assert not is_recorded(scenario, tmp_path / "output"), name
+        (folder / name).write_text(whole)
+    assert is_recorded(scenario, tmp_path / "output")
 
 
 def test_two_drives_of_one_name(scenarios, tmp_path):
