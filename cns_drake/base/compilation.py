@@ -60,11 +60,11 @@ def compiled(function: _Function) -> _Function:
 def compiled_callback(function: Callable) -> int:
     """Compiles a function that C code calls; returns its address.
 
-    The function takes one pointer, to integers of 8 bytes, and returns nothing.
+    The function takes one address and returns nothing.
     It may call compiled functions. Its machine code is kept as that of
     `compiled`.
     """
-    signature = numba.void(numba.types.CPointer(numba.int64))
+    signature = numba.void(numba.intp)
     options = {"nopython": True}
     with (
         interlude(f"compiling {function.__name__}"),

@@ -1,10 +1,5 @@
 from .embree import load as load
-from .embree_hierarchy import (
-    EmbreeHierarchy as EmbreeHierarchy,
-)
-from .embree_primitives import SOLID as SOLID
-from .embree_primitives import merge_first as merge_first
-from .embree_primitives import merge_second as merge_second
+from .embree_scene import EmbreeScene as EmbreeScene
 from .known_poses import NOTHING_KNOWN as NOTHING_KNOWN
 from .known_poses import KnownPoses as KnownPoses
 from .moving_groups import EVERYWHERE as EVERYWHERE

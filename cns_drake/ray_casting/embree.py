@@ -6,45 +6,37 @@ Formats and values of the C interface: Embree 4 manual,
 https://github.com/RenderKit/embree, headers `rtcore_*.h`.
 """
 
+from collections.abc import Callable
 import ctypes
 from functools import lru_cache
 import importlib
 import importlib.util
 from pathlib import Path
 
-import numba
+from llvmlite import ir
 from numba import types
 
 # With this import, numba accepts functions as arguments of compiled functions.
-from numba.extending import intrinsic, register_jitable, typeof_impl
+from numba.extending import intrinsic
 
 # Types of geometries (`RTC_GEOMETRY_TYPE_...`).
 TRIANGLE = 0
-CONE = 15
-ROUND_SEGMENT = 16
-SPHERE = 50
-DISC = 52
-USER = 120
 INSTANCE = 121
 # Types of buffers (`RTC_BUFFER_TYPE_...`).
 INDEX_BUFFER = 0
 VERTEX_BUFFER = 1
-NORMAL_BUFFER = 3
 # Formats of buffers (`RTC_FORMAT_...`).
-UINT = 0x5001
 UINT3 = 0x5003
 FLOAT3 = 0x9003
-FLOAT4 = 0x9004
 FLOAT3X4_ROW_MAJOR = 0x9134
 # Flag of a scene (`RTC_SCENE_FLAG_ROBUST`).
 ROBUST_SCENE = 1 << 2
-# Quality of a scene's hierarchy (`RTC_BUILD_QUALITY_LOW`): quick to build, slow
-# to traverse.
-LOW_QUALITY = 0
 # Error of a device (`RTC_ERROR_OUT_OF_MEMORY`).
 OUT_OF_MEMORY = 4
-# Flag of a query (`RTC_RAY_QUERY_FLAG_COHERENT`).
+# Flags of a query (`RTC_RAY_QUERY_FLAG_...`): coherent rays, and the filter in
+# the arguments for all geometries.
 COHERENT_RAYS = 1 << 16
+FILTERED_RAYS = 1 << 1
 # Id of a geometry or instance if there is no hit (`RTC_INVALID_GEOMETRY_ID`).
 INVALID_ID = 0xFFFFFFFF
 # Setting of a device: room for more user threads than a machine has.
@@ -55,24 +47,6 @@ INVALID_ID = 0xFFFFFFFF
 ALONE = b"user_threads=65536"
 # Rays in a packet, and RTC_DEVICE_PROPERTY_NATIVE_RAY<rays>_SUPPORTED.
 _NATIVE_PACKETS = ((8, 33), (16, 34))
-
-
-# Numba's own addresses are unsigned numbers.
-_PACKET_TYPE = types.FunctionType(
-    types.void(types.uintp, types.intp, types.uintp, types.intp)
-)
-
-
-class IntersectArguments(ctypes.Structure):
-    """Embree's C struct RTCIntersectArguments."""
-
-    _fields_ = (
-        ("flags", ctypes.c_uint),
-        ("feature_mask", ctypes.c_uint),
-        ("context", ctypes.c_void_p),
-        ("filter", ctypes.c_void_p),
-        ("intersect", ctypes.c_void_p),
-    )
 
 
 @lru_cache(maxsize=1)
@@ -98,7 +72,6 @@ def load() -> ctypes.CDLL:
         ("rtcGetDeviceProperty", ctypes.c_ssize_t, [pointer, integer]),
         ("rtcNewScene", pointer, [pointer]),
         ("rtcSetSceneFlags", None, [pointer, integer]),
-        ("rtcSetSceneBuildQuality", None, [pointer, integer]),
         ("rtcJoinCommitScene", None, [pointer]),
         ("rtcRetainScene", None, [pointer]),
         ("rtcReleaseScene", None, [pointer]),
@@ -108,11 +81,6 @@ def load() -> ctypes.CDLL:
         ("rtcDisableGeometry", None, [pointer]),
         ("rtcReleaseGeometry", None, [pointer]),
         ("rtcAttachGeometry", uint, [pointer, pointer]),
-        ("rtcSetGeometryMask", None, [pointer, uint]),
-        ("rtcSetGeometryUserPrimitiveCount", None, [pointer, uint]),
-        ("rtcSetGeometryUserData", None, [pointer, pointer]),
-        ("rtcSetGeometryBoundsFunction", None, [pointer, pointer, pointer]),
-        ("rtcSetGeometryIntersectFunction", None, [pointer, pointer]),
         ("rtcSetGeometryInstancedScene", None, [pointer, pointer]),
         ("rtcSetGeometryTransform", None, [pointer, uint, integer, pointer]),
         ("rtcSetGeometryTransformQuaternion", None, [pointer, uint, pointer]),
@@ -128,35 +96,10 @@ def load() -> ctypes.CDLL:
     return embree
 
 
-class PacketFunction(types.WrapperAddressProtocol):
-    """A C function that casts a packet of rays, for compiled code.
+def native_packet(embree: ctypes.CDLL, device: int) -> tuple[int, int]:
+    """Returns the number of rays in a packet, and what casts it.
 
-    The function takes the addresses of four things: the mask of active rays,
-    the scene, the packet and the arguments. Unlike a ctypes function, it can be
-    an argument of a compiled function whose machine code numba keeps on disk.
-    """
-
-    def __init__(self, function: object):
-        """Takes rtcIntersect4, rtcIntersect8 or rtcIntersect16."""
-        self._address = ctypes.cast(function, ctypes.c_void_p).value  # type: ignore[arg-type]  # A function is a pointer.
-
-    def __wrapper_address__(self) -> int | None:
-        return self._address
-
-    def signature(self) -> object:
-        return _PACKET_TYPE.signature
-
-
-@typeof_impl.register(PacketFunction)  # type: ignore[untyped-decorator]  # numba has no hints.
-def _typeof_packet_function(*_: object) -> types.Type:
-    """Returns numba's type; without this, numba makes one for each call."""
-    return _PACKET_TYPE
-
-
-def native_packet(
-    embree: ctypes.CDLL, device: int
-) -> tuple[int, PacketFunction]:
-    """Returns the number of rays in a packet, and the function that casts it.
+    That is the address of rtcIntersect4, rtcIntersect8 or rtcIntersect16.
 
     The number is the width of the processor's vector units, such as 16 with
     AVX-512 and 8 with AVX2. In a larger packet, Embree would cast the rays one
@@ -170,21 +113,95 @@ def native_packet(
     for more, supported in _NATIVE_PACKETS:
         if embree.rtcGetDeviceProperty(device, supported):
             lanes = more
-    return lanes, PacketFunction(getattr(embree, f"rtcIntersect{lanes}"))
+    function = getattr(embree, f"rtcIntersect{lanes}")
+    address = ctypes.cast(function, ctypes.c_void_p).value
+    assert address is not None
+    return lanes, address
 
 
 @intrinsic  # type: ignore[untyped-decorator]  # numba has no hints.
-def _pointer(context: object, address: object) -> tuple:
-    """In compiled code, the pointer that an integer stands for."""
+def cast_packet(
+    context: object,
+    function: object,
+    valid: object,
+    scene: object,
+    packet: object,
+    arguments: object,
+) -> tuple:
+    """In compiled code, calls rtcIntersect4, rtcIntersect8 or rtcIntersect16.
 
-    def cast(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        kind = context.get_value_type(signature.return_type)
-        return builder.inttoptr(arguments[0], kind)
+    All arguments are addresses.
+    """
+    address = types.intp
 
-    return numba.types.voidptr(address), cast
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        number = context.get_data_type(address)
+        kind = ir.FunctionType(ir.VoidType(), [number] * 4)
+        place = builder.inttoptr(arguments[0], kind.as_pointer())
+        builder.call(place, arguments[1:])
+        return context.get_dummy_value()
+
+    return types.void(*[address] * 5), generate
 
 
-@register_jitable  # type: ignore[untyped-decorator]  # numba has no hints.
-def array_at(address: int, shape: object, dtype: object) -> object:
-    """In compiled code, the array at an address."""
-    return numba.carray(_pointer(address), shape, dtype)
+def _reader(stored: types.Type, taken: types.Type) -> Callable:
+    """Returns a function of compiled code that reads a number at an address."""
+
+    @intrinsic  # type: ignore[untyped-decorator]  # numba has no hints.
+    def read(context: object, address: object) -> tuple:
+        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            kind = context.get_data_type(stored).as_pointer()
+            place = builder.inttoptr(arguments[0], kind)
+            return context.cast(builder, builder.load(place), stored, taken)
+
+        return taken(types.intp), generate
+
+    return read  # type: ignore[no-any-return]
+
+
+def _writer(stored: types.Type, taken: types.Type) -> Callable:
+    """Returns a function of compiled code that writes a number."""
+
+    @intrinsic  # type: ignore[untyped-decorator]  # numba has no hints.
+    def write(context: object, address: object, value: object) -> tuple:
+        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            kind = context.get_data_type(stored).as_pointer()
+            place = builder.inttoptr(arguments[0], kind)
+            number = context.cast(builder, arguments[1], taken, stored)
+            builder.store(number, place)
+            return context.get_dummy_value()
+
+        return types.void(types.intp, taken), generate
+
+    return write  # type: ignore[no-any-return]
+
+
+# What compiled code reads and writes at addresses. Numbers are of 8 bytes once
+# they are read: few types of numbers are quick to compile.
+read_int32 = _reader(types.int32, types.int64)
+read_uint32 = _reader(types.uint32, types.int64)
+read_int64 = _reader(types.int64, types.int64)
+read_single = _reader(types.float32, types.float64)
+read_double = _reader(types.float64, types.float64)
+write_int32 = _writer(types.int32, types.int64)
+write_int64 = _writer(types.int64, types.int64)
+write_single = _writer(types.float32, types.float64)
+write_double = _writer(types.float64, types.float64)
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # numba has no hints.
+def prefetch(context: object, address: object) -> tuple:
+    """In compiled code, makes the processor load a line of its cache."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        byte, flag = ir.IntType(8).as_pointer(), ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [byte, flag, flag, flag])
+        function = builder.module.declare_intrinsic(
+            "llvm.prefetch", [byte], kind
+        )
+        place = builder.inttoptr(arguments[0], byte)
+        # To read, as near as possible, data.
+        builder.call(function, [place, flag(0), flag(3), flag(1)])
+        return context.get_dummy_value()
+
+    return types.void(types.intp), generate

@@ -1,48 +1,55 @@
-"""Groups of geometry as two Embree hierarchies.
+"""Groups of geometry in Embree's hierarchy, and rays that are cast on it.
 
-Curved shapes are not tessellated: Embree intersects spheres, cones, discs and
-rounded segments exactly (in float32), and an ellipsoid is an instance of the
-unit sphere. A curved shape in a scene slows down all rays of the scene by a
-third (measured), even rays that hit only triangles. Curved shapes that never
-move are therefore in a second hierarchy. The first hierarchy contains polyhedra
-around these shapes; only the few rays that hit a polyhedron are cast on the
-second hierarchy. Curved shapes that move are in the first hierarchy themselves,
-as instances, which few rays enter. Embree loses rays along the axis of a
-rounded segment; such rays are therefore cast in closed form (`_CapsuleAxes`).
+Embree gets triangles that contain a margin around each shape (see `proxies`),
+and what a ray meets follows in double precision (see `packets`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+import ctypes
+from typing import NamedTuple
+import weakref
 
 import numpy as np
+from pydrake.math import RotationMatrix
 
 from cns_drake.base import product, rotated
-from cns_drake.ray_casting.curved_proxies import NearCurvedShapes
-from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
-from cns_drake.ray_casting.embree_primitives import (
-    PROXY_OWNER,
-    SOLID,
-    merge_first,
-    merge_second,
-)
+from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.moving_groups import Placed
-from cns_drake.ray_casting.ray_groups import Motion, RayGroup
+from cns_drake.ray_casting.near_shapes import CurvedShapes, NearShapes
+from cns_drake.ray_casting.packets import PLACE_NUMBERS, Targets, cast_on
+from cns_drake.ray_casting.proxies import SHAPE_NUMBERS, Proxies, make_proxies
+from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
-from cns_drake.scene import CapsuleSurface
 
-# Rays are cast in closed form if the sine of their angle to a capsule's axis is
-# below this.
-_LARGEST_SINE = 5e-3
-# Hits whose ranges differ by less than this are the same [m].
-_RANGE_TOLERANCE = 1e-4
+# Least number of rays that a thread takes at once: a multiple of every packet
+# size, and large enough that the call costs little.
+_BLOCK = 1024
+_NO_SHAPES = np.zeros((0, SHAPE_NUMBERS))
+
+
+class _Built(NamedTuple):
+    """What rays meet in a group.
+
+    Attributes:
+        scene: address of its RTCScene, 0 if it is empty.
+        records, shapes: see `Proxies`.
+    """
+
+    scene: int
+    records: np.ndarray
+    shapes: np.ndarray
 
 
 class EmbreeScene:
     """Casts rays on groups of geometry with Embree.
 
     It is a part of `cns_drake.ray_casting.ray_casting_scene.RayCastingScene`.
+    Rays are cast in packets that are marked as coherent. Such packets are fast
+    for neighbouring beams of a LiDAR. Embree's robust mode is on, so that no
+    ray passes through an edge that two triangles share.
     """
 
     def __init__(
@@ -63,186 +70,280 @@ class EmbreeScene:
             MemoryError: Embree has no memory for the scene.
             RuntimeError: Embree cannot build the scene for another reason.
         """
-        first, second = None, None
-        if previous is not None:
-            first, second = previous._first, previous._second
-        self._first: EmbreeHierarchy = EmbreeHierarchy(
-            groups, merge_first, num_threads, first
+        self._groups = groups
+        self._num_threads = num_threads
+        # Threads start at their first use.
+        self._helpers = ThreadPoolExecutor(max(1, num_threads - 1))
+        self._lib = embree.load()
+        if previous is None:
+            self._device = self._lib.rtcNewDevice(embree.ALONE)
+        else:
+            self._device = previous._device
+            self._lib.rtcRetainDevice(self._device)
+        self._scenes: list[int] = []
+        weakref.finalize(
+            self, _release_scenes, self._lib, self._device, self._scenes
         )
-        self._second: EmbreeHierarchy = EmbreeHierarchy(
-            groups, merge_second, 1, second
+        before = {} if previous is None else previous._by_content
+        self._by_content: dict[tuple, _Built] = {}
+        built = [self._scene_of_group(group, before) for group in groups]
+        fixed = [k for k, group in enumerate(groups) if group.is_merged_world]
+        fixed = [k for k in fixed if built[k].scene]
+        moving = [
+            k for k, one in enumerate(built) if one.scene and k not in fixed
+        ]
+        self._top = self._new_scene() if moving else 0
+        # Row of a group -> handle of its instance.
+        self._instances = {
+            k: self._new_instance(built[k].scene) for k in moving
+        }
+        # Rows of groups that rays cannot meet.
+        self._disabled: set[int] = set()
+        # Without static geometry, row 0 belongs to no group, and no ray meets
+        # it.
+        rows = [*(fixed or [-1]), *moving]
+        self._row_of = {group: row for row, group in enumerate(rows)}
+        self._targets = self._make_targets(built, rows)
+        shapes = [built[row].shapes if row >= 0 else _NO_SHAPES for row in rows]
+        self._near = NearShapes(
+            CurvedShapes.of(
+                np.concatenate(shapes),
+                np.repeat(np.arange(len(rows)), [len(one) for one in shapes]),
+            )
         )
-        self._proxies = NearCurvedShapes(
-            [groups[row] for row in self._second.rows]
-        )
-        self._axes = _CapsuleAxes(groups)
+        self.place(Placed.of(groups, moving))
+        self._check_device()
 
     def place(self, placed: Placed) -> None:
-        """Moves all groups to their current poses."""
-        self._first.place(placed)
+        """Moves the groups in sight to their poses, and disables all others.
 
-    def cast_rays(
-        self, rays: Rays, with_normals: bool, doubt_all: bool
-    ) -> Hits:
+        The fewer groups are enabled, the faster the hierarchy is rebuilt, and
+        the faster rays are cast on it.
+        """
+        lib = self._lib
+        matrices = np.ascontiguousarray(placed.X_OLs, np.float32)
+        # Lists and one address: NumPy takes long for single values.
+        address, size = matrices.ctypes.data, matrices.strides[0]
+        in_sight, moves = placed.in_sight.tolist(), placed.moves.tolist()
+        has_changed = False
+        for k, row in enumerate(placed.rows.tolist()):
+            handle = self._instances.get(row)
+            if handle is None:
+                continue
+            if not in_sight[k]:
+                if row not in self._disabled:
+                    lib.rtcDisableGeometry(handle)
+                    self._disabled.add(row)
+                    has_changed = True
+                continue
+            has_changed = True
+            if row in self._disabled:
+                lib.rtcEnableGeometry(handle)
+                self._disabled.remove(row)
+            place = self._targets.places[self._row_of[row]]
+            place[:12] = placed.X_OLs[k].ravel()
+            was_moving = place[-1] != 0.0
+            place[-1] = moves[k]
+            if moves[k]:
+                _place_motion(self._groups[row], place)
+                steps = _decompose_motion(self._groups[row])
+                lib.rtcSetGeometryTimeStepCount(handle, len(steps))
+                for step in range(len(steps)):
+                    lib.rtcSetGeometryTransformQuaternion(
+                        handle, step, steps[step].ctypes.data
+                    )
+            else:
+                if was_moving:
+                    lib.rtcSetGeometryTimeStepCount(handle, 1)
+                lib.rtcSetGeometryTransform(
+                    handle, 0, embree.FLOAT3X4_ROW_MAJOR, address + k * size
+                )
+            lib.rtcCommitGeometry(handle)
+        if has_changed:
+            lib.rtcJoinCommitScene(self._top)
+
+    def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
         """Casts rays on the scene; returns the hits.
 
         Args:
             rays: the rays.
             with_normals: whether to find normals as well.
-            doubt_all: whether to meet all triangles in double precision.
         """
-        hits = self._first.cast(
-            rays, with_normals=with_normals, doubt_all=doubt_all
-        )
-        if self._second.rows:
-            self._cast_on_curved_shapes(rays, hits, with_normals, doubt_all)
-        self._axes.cast(rays, hits)
+        num_rays = len(rays.d_Sset)
+        hits = Hits.misses(num_rays, with_normals)
+        starts_near = self._near.contain(rays, self._targets.places)
+        # All threads take parts from one iterator, which yields each part once.
+        parts = iter(_ray_ranges(num_rays, self._num_threads))
+
+        def cast() -> None:
+            for first, last in parts:
+                cast_on(self._targets, rays, starts_near, hits, first, last)
+
+        num_helpers = min(self._num_threads, -(-num_rays // _BLOCK)) - 1
+        helpers = [self._helpers.submit(cast) for _ in range(num_helpers)]
+        cast()
+        for helper in helpers:
+            helper.result()
         return hits
 
-    def _cast_on_curved_shapes(
-        self, rays: Rays, hits: Hits, with_normals: bool, doubt_all: bool
-    ) -> None:
-        """Updates hits of rays that may meet curved shapes that never move."""
-        is_near = self._proxies.contain(rays.p_OSset)
-        is_unsure = hits.owner == PROXY_OWNER
-        if is_near.any():  # Origins are taken in turn.
-            is_unsure |= is_near[np.arange(len(is_unsure)) % len(is_near)]
-        again = np.flatnonzero(is_unsure)
-        if len(again):
-            rest = rays.select(again, rays.max_ranges_of(again))
-            in_second = self._second.cast(rest, with_normals=with_normals)
-            # Nearer hits can only be in the other hierarchy.
-            reach = np.minimum(in_second.ranges, rest.max_ranges)
-            in_first = self._first.cast(
-                rest._replace(max_ranges=reach),
-                mask=SOLID,
-                with_normals=with_normals,
-                doubt_all=doubt_all,
-            )
-            is_first = in_first.owner >= 0
-            for result, first, second in zip(
-                hits, in_first, in_second, strict=True
-            ):
-                second[is_first] = first[is_first]
-                result[again] = second
+    def _check_device(self) -> None:
+        """Raises an error if a call of Embree has failed."""
+        error = self._lib.rtcGetDeviceError(self._device)
+        if error:
+            fault = f"Embree cannot build the scene: error {error}"
+            if error == embree.OUT_OF_MEMORY:
+                raise MemoryError(fault)
+            raise RuntimeError(fault)
 
-
-class _CapsuleAxes:
-    """Casts rays along the axes of capsules, in closed form.
-
-    Embree's rounded segments lose most rays within 1e-3 rad of their axis. Only
-    rays that start in line with a capsule can run along its axis.
-    """
-
-    def __init__(self, groups: Sequence[RayGroup]):
-        """Collects the capsules C of groups.
+    def _make_targets(
+        self, built: Sequence[_Built], rows: Sequence[int]
+    ) -> Targets:
+        """Returns what packets are cast on.
 
         Args:
-            groups: the groups, already placed (see `RayGroup.place`). Each cast
-                takes their current poses and motions.
+            built: the scene of each group; kept as long as this object.
+            rows: the group of each row, -1 for none.
         """
-        self._found = [
-            (row, group, index, X_LC.GetAsMatrix4(), (c.length / 2, c.radius))
-            for row, group in enumerate(groups)
-            for index, X_LC, c in group.members
-            if isinstance(c, CapsuleSurface)
-        ]
-
-    def cast(self, rays: Rays, hits: Hits) -> None:
-        """Corrects the hits of rays that run along the axis of a capsule.
-
-        Args:
-            rays: N rays.
-            hits: hits of the N rays as Embree found them, changed in place.
-        """
-        seen = [entry for entry in self._found if entry[1].in_sight]
-        if not (seen and len(rays.d_Sset)):
-            return
-        _, groups, _, matrices, sizes = zip(*seen, strict=True)
-        X_LCs = np.array(matrices)
-        half, radius = np.transpose(sizes)
-        X_OCs = product(np.array([group.X_OL for group in groups]), X_LCs)
-        angle, way = np.transpose(
-            [_greatest_motion(group.motion) for group in groups]
+        lanes, intersect = embree.native_packet(self._lib, self._device)
+        counts = [len(group.members) for group in self._groups]
+        indices = [index for g in self._groups for index, *_ in g.members]
+        tables = np.zeros((len(rows), 2), np.int64)
+        for table, row in zip(tables, rows, strict=True):
+            if row >= 0:
+                arrays = built[row].records, built[row].shapes
+                table[:] = [array.ctypes.data for array in arrays]
+        return Targets(
+            lanes,
+            intersect,
+            built[rows[0]].scene if rows[0] >= 0 else 0,
+            self._top,
+            tables,
+            np.zeros((len(rows), PLACE_NUMBERS)),
+            np.array(rows, np.int32),
+            np.cumsum([0, *counts])[rows],
+            np.array(indices, np.int32),
         )
-        # Rays along an axis start in a cone about it, which is wider if the
-        # capsule moves.
-        columns = np.ascontiguousarray(rays.p_OSset.T)
-        low, high = columns.min(axis=1), columns.max(axis=1)
-        way += np.linalg.norm((high - low) / 2.0)
-        way += angle * np.linalg.norm(X_LCs[:, :3, 3], axis=1)
-        away = (low + high) / 2.0 - X_OCs[:, :, 3]
-        distance = np.linalg.norm(away, axis=1)
-        along = (away * X_OCs[:, :, 2]).sum(axis=1)
-        reach = (2.0 * _LARGEST_SINE + angle) * (distance + way + half)
-        reach += radius + way
-        R_SOset = rays.R_OSset.swapaxes(1, 2)
-        for k in np.flatnonzero(distance**2 - along**2 <= reach**2):
-            row, group, index, X_LC, size = seen[k]
-            times = rays.times if group.motion else rays.times[:1]
-            axes = product(group.X_OL_at(times), X_LC)[:, :, 2]
-            cycle = np.arange(np.lcm(len(axes), len(R_SOset)))
-            axes_S = rotated(
-                R_SOset[cycle % len(R_SOset)], axes[cycle % len(axes)]
+
+    def _scene_of_group(
+        self, group: RayGroup, before: Mapping[tuple, _Built]
+    ) -> _Built:
+        """Returns the scene of a group; groups of the same shapes share it.
+
+        Args:
+            group: the group.
+            before: content of a group -> its scene in an earlier hierarchy,
+                which is reused.
+        """
+        content = group.content()
+        if content not in self._by_content:
+            built = before.get(content)
+            if built is None:
+                proxies = make_proxies(group.members)
+                built = _Built(
+                    self._build_scene(proxies), proxies.records, proxies.shapes
+                )
+            elif built.scene:
+                self._lib.rtcRetainScene(built.scene)
+                self._scenes.append(built.scene)
+            self._by_content[content] = built
+        return self._by_content[content]
+
+    def _new_scene(self) -> int:
+        scene = self._lib.rtcNewScene(self._device)
+        self._lib.rtcSetSceneFlags(scene, embree.ROBUST_SCENE)
+        self._scenes.append(scene)
+        return scene
+
+    def _build_scene(self, proxies: Proxies) -> int:
+        """Returns the address of a scene of proxies, 0 if there are none."""
+        if not len(proxies.indices):
+            return 0
+        scene = self._new_scene()
+        handle = self._lib.rtcNewGeometry(self._device, embree.TRIANGLE)
+        for slot, form, array in (
+            (embree.VERTEX_BUFFER, embree.FLOAT3, proxies.corners),
+            (embree.INDEX_BUFFER, embree.UINT3, proxies.indices),
+        ):
+            address = self._lib.rtcSetNewGeometryBuffer(
+                handle, slot, 0, form, array.strides[0], len(array)
             )
-            d_Sset = rays.d_Sset.reshape(-1, len(cycle), 3)
-            # A sum over the last axis takes twenty times as long.
-            d_along = sum(d_Sset[:, :, n] * axes_S[:, n] for n in range(3))
-            ray = np.flatnonzero(d_along**2 >= 1.0 - _LARGEST_SINE**2)
-            near = rays.select(ray, rays.max_ranges_of(ray))
-            X_OC = product(group.X_OL_at(near.times), X_LC)
-            R_CO = X_OC[:, :, :3].swapaxes(1, 2)
-            ranges, normals_C = _meet_capsule(
-                rotated(R_CO, near.p_OSset - X_OC[:, :, 3]),
-                rotated(R_CO, near.d_Oset()),
-                *size,
-            )
-            is_nearer = ranges <= near.max_ranges
-            is_nearer &= ranges < hits.ranges[ray] - _RANGE_TOLERANCE
-            ray = ray[is_nearer]
-            hits.ranges[ray] = ranges[is_nearer]
-            hits.owner[ray], hits.group[ray] = index, row
-            if hits.normals.shape[1]:
-                normals_L = rotated(X_LC[:3, :3], normals_C[is_nearer])
-                hits.normals[ray] = normals_L
+            if address is None:
+                raise MemoryError("Embree has no room for the scene")
+            ctypes.memmove(address, array.ctypes.data, array.nbytes)
+        self._lib.rtcCommitGeometry(handle)
+        self._lib.rtcAttachGeometry(scene, handle)
+        self._lib.rtcReleaseGeometry(handle)
+        self._lib.rtcJoinCommitScene(scene)
+        return scene
+
+    def _new_instance(self, scene: int) -> int:
+        handle = self._lib.rtcNewGeometry(self._device, embree.INSTANCE)
+        self._lib.rtcSetGeometryInstancedScene(handle, scene)
+        self._lib.rtcAttachGeometry(self._top, handle)
+        self._lib.rtcReleaseGeometry(handle)  # The scene owns it.
+        return handle
 
 
-def _greatest_motion(motion: Motion | None) -> tuple[float, float]:
-    """Returns the greatest rotation [rad] and displacement [m] of a frame."""
-    if motion is None:
-        return 0.0, 0.0
-    time = motion.duration + abs(motion.start)
-    return math.hypot(*motion.w) * time, math.hypot(*motion.v) * time
+def _ray_ranges(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
+    """Returns ranges of ray indices for threads to take, the longest first.
+
+    Some directions meet more geometry than others, so a thread that finishes
+    early takes another range. Later ranges are shorter, so that all threads
+    finish at about the same time.
+    """
+    parts = []
+    first = 0
+    while first < num_rays:
+        share = (num_rays - first) // (2 * num_threads)
+        size = max(share // _BLOCK, 1) * _BLOCK if num_threads > 1 else num_rays
+        parts.append((first, min(first + size, num_rays)))
+        first += size
+    return parts
 
 
-def _meet_capsule(
-    p: np.ndarray, d: np.ndarray, half: float, radius: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the hits of N rays on a capsule along z, in closed form.
+def _release_scenes(
+    lib: ctypes.CDLL, device: int, scenes: Sequence[int]
+) -> None:
+    for scene in reversed(scenes):
+        lib.rtcReleaseScene(scene)
+    lib.rtcReleaseDevice(device)
 
-    Args:
-        p: (N, 3) origins, relative to the capsule's middle [m].
-        d: (N, 3) unit directions.
-        half: half the length of the capsule's straight part [m].
-        radius: radius of the capsule [m].
+
+def _place_motion(group: RayGroup, place: np.ndarray) -> None:
+    """Sets the motion in the numbers of a group's place."""
+    assert group.motion is not None
+    motion = group.motion
+    p_FL_L = rotated(group.X_FL[:3, :3].T, group.X_FL[:3, 3])
+    place[12:15] = rotated(group.X_OL[:, :3], p_FL_L)
+    spans = np.array([[motion.start], [motion.duration]])
+    place[15:21] = (spans * motion.w).ravel()
+    place[21:27] = (spans * motion.v).ravel()
+
+
+def _decompose_motion(group: RayGroup) -> np.ndarray:
+    """Returns the poses of a moving group at evenly spaced times.
+
+    Embree rotates F from one orientation to the next at a constant rate about
+    F's origin, which moves in a straight line. That is the motion of a frame
+    with constant velocities.
 
     Returns:
-        (N,) ranges, inf for a miss [m]; and (N, 3) normals of any length.
+        (T, 16) float32, an RTCQuaternionDecomposition each: 3 scales, 3
+        skews, shift, quaternion (real part first), translation. A point is
+        scaled, shifted, turned, and translated.
     """
-    nearest = np.full(len(d), np.inf)
-    # NaN, which stands for no root, fails every comparison.
-    with np.errstate(invalid="ignore", divide="ignore"):
-        # The straight part, where z counts for nothing, and the half spheres.
-        for end in (0.0, -1.0, 1.0):
-            shown = (1.0, 1.0, abs(end))
-            q, e = (p - (0.0, 0.0, end * half)) * shown, d * shown
-            a, b = (e * e).sum(axis=1), (q * e).sum(axis=1)
-            root = np.sqrt(b * b - a * ((q * q).sum(axis=1) - radius**2))
-            for distance in ((-b - root) / a, (-b + root) / a):
-                z = p[:, 2] + distance * d[:, 2]
-                fits = np.where(np.abs(z) < half, 0.0, np.sign(z)) == end
-                fits &= (distance >= 0.0) & (distance < nearest)
-                nearest[fits] = distance[fits]
-        normals = p + nearest[:, None] * d
-    normals[:, 2] -= np.clip(normals[:, 2], -half, half)
-    return nearest, normals
+    assert group.motion is not None
+    num_steps = group.motion.num_steps
+    R_OO, way_F = group.motion.at(np.linspace(0.0, 1.0, num_steps))
+    R_OL = group.X_OL[:, :3]
+    p_FL_L = rotated(group.X_FL[:3, :3].T, group.X_FL[:3, 3])
+    quaternions = [
+        RotationMatrix.ProjectToRotationMatrix(R).ToQuaternion().wxyz()
+        for R in product(R_OO, R_OL)
+    ]
+    steps = np.zeros((num_steps, 16))
+    steps[:, 0:3] = 1.0
+    steps[:, 6:9] = p_FL_L
+    steps[:, 9:13] = quaternions
+    steps[:, 13:16] = group.X_OL[:, 3] - rotated(R_OL, p_FL_L) + way_F
+    return np.ascontiguousarray(steps, np.float32)

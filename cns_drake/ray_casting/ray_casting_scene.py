@@ -168,7 +168,6 @@ class RayCastingScene:
         R_WSset: np.ndarray = _IDENTITY,
         times: np.ndarray = _AT_ONCE,
         with_normals: bool = False,
-        doubt_all: bool = False,
     ) -> SceneHits:
         """Returns the first hits of N rays from one or several poses of S.
 
@@ -185,8 +184,6 @@ class RayCastingScene:
                 revolution to 1 at its end; by default 0.
             with_normals: whether to also return the normals of the surfaces, as
                 they are at the start of the revolution.
-            doubt_all: whether to meet all triangles in double precision, not
-                only where single precision is doubtful for rays of a scan.
 
         Raises:
             ValueError: N is not a multiple of K, L, M or T.
@@ -212,18 +209,16 @@ class RayCastingScene:
             np.ascontiguousarray(times, dtype=np.float32),
         )
         if self._planes:
-            hits = self._cast_on_planes(rays, with_normals, doubt_all)
+            hits = self._cast_on_planes(rays, with_normals)
         else:
-            hits = self._scene.cast_rays(rays, with_normals, doubt_all)
+            hits = self._scene.cast_rays(rays, with_normals)
         is_outside = np.zeros(0, bool)
         if with_normals:
             matrices = self._calc_normal_matrices()
             is_outside = _face_origins(hits, matrices, rays.d_Oset())
         return SceneHits(hits.ranges, hits.owner, hits.normals, is_outside)
 
-    def _cast_on_planes(
-        self, rays: Rays, with_normals: bool, doubt_all: bool
-    ) -> Hits:
+    def _cast_on_planes(self, rays: Rays, with_normals: bool) -> Hits:
         """Casts rays on half spaces first, and then on all other geometry.
 
         A ray that hits a plane is followed no farther than that. Rays hit a
@@ -236,7 +231,7 @@ class RayCastingScene:
             times = _AT_ONCE if group.motion is None else rays.times
             _cast_on_plane(group.X_OL_at(times).copy(), rays, row, limits, met)
         hits = self._scene.cast_rays(
-            rays._replace(max_ranges=limits), with_normals, doubt_all
+            rays._replace(max_ranges=limits), with_normals
         )
         _take_plane_hits(met, limits, self._owners, hits)
         return hits

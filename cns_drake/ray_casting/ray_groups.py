@@ -8,11 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 from pydrake.geometry import FrameId
-from pydrake.math import RigidTransform, inv
+from pydrake.math import RigidTransform
 
 from cns_drake.base import product, rotated, turns
 from cns_drake.scene import (
-    EllipsoidSurface,
     HalfSpaceSurface,
     PerceptionGeometry,
     Surface,
@@ -90,13 +89,12 @@ class RayGroup:
 
     Attributes:
         frame_id: the frame F to which the group is fixed; None for the world.
-        X_FL: (4, 4) affine map from L to F. The map is not rigid for an
-            ellipsoid, because an ellipsoid is the unit sphere in L.
+        X_FL: (4, 4) pose of L in F.
         members: the geometry of the group, expressed in L. A half space has a
             group of its own; its surface is z = 0 in L.
         is_merged_world: whether the group is the merged geometry that never
             moves; L then has the axes of the world and the origin of O.
-        X_OL: (3, 4) affine map from L to the scene's frame O, at the start of a
+        X_OL: (3, 4) pose of L in the scene's frame O, at the start of a
             revolution; missing until `place` is called.
         motion: motion of F during the revolution; None if F does not move.
         in_sight: whether rays can meet the group. If rays cannot meet the
@@ -141,8 +139,8 @@ class RayGroup:
         R_OL0, way_F = self.motion.at(times)
         # L in axes of O, relative to F's origin, which moves in a straight
         # line.
-        p_LF = rotated(inv(self.X_FL[:3, :3]), self.X_FL[:3, 3])
-        p_FL = rotated(self.X_OL[:, :3], p_LF)
+        p_FL_L = rotated(self.X_FL[:3, :3].T, self.X_FL[:3, 3])
+        p_FL = rotated(self.X_OL[:, :3], p_FL_L)
         X_OL = product(R_OL0, self.X_OL)
         X_OL[:, :, 3] = self.X_OL[:, 3] - p_FL + way_F + rotated(R_OL0, p_FL)
         return X_OL
@@ -153,7 +151,7 @@ class RayGroup:
         Groups with equal keys can share one Embree scene. A key is valid as
         long as the surfaces of the group exist in memory.
         """
-        shapes = tuple(
+        return tuple(
             (
                 # Comparing all triangles would take too long.
                 id(surface)
@@ -163,9 +161,6 @@ class RayGroup:
             )
             for _, X_LG, surface in self.members
         )
-        # Curved shapes that never move are built in another way.
-        is_flat = all(isinstance(shape, int) for shape, _ in shapes)
-        return is_flat or self.frame_id is None, shapes
 
 
 def group_geometries(
@@ -209,11 +204,11 @@ def group_geometries(
         X_FL, X_LF = RigidTransform(shift), RigidTransform(-shift)
         merged: list[Member] = []
         for index, X_FG, surface in members:
-            own = _group_of_one(frame_id, (index, X_FG, surface), shared)
-            if own is None:
-                merged.append((index, X_LF @ X_FG, surface))
+            if id(surface) in shared:
+                one: Member = (index, RigidTransform(), surface)
+                alone.append(RayGroup(frame_id, X_FG.GetAsMatrix4(), [one]))
             else:
-                alone.append(own)
+                merged.append((index, X_LF @ X_FG, surface))
         if merged:
             groups.append(
                 RayGroup(
@@ -267,35 +262,6 @@ def _choose_origin(
         cube = _MERGED_CUBE if world else _MOVING_CUBE
         p_WO += cube * np.round((p_WS - p_WO) / cube)
     return p_WO
-
-
-def _group_of_one(
-    frame_id: FrameId | None, member: Member, shared: Collection[int]
-) -> RayGroup | None:
-    """Returns the group of a geometry that is merged with no other geometry.
-
-    Such a geometry is a copy of a shared surface, or an ellipsoid. The result
-    is None for all other geometry.
-
-    Args:
-        frame_id: the frame F of the geometry; None for the world.
-        member: the geometry, expressed in F.
-        shared: the `id` of each surface that is stored once for all copies.
-    """
-    index, X_FG, surface = member
-    if id(surface) in shared:
-        return RayGroup(
-            frame_id, X_FG.GetAsMatrix4(), [(index, RigidTransform(), surface)]
-        )
-    if isinstance(surface, EllipsoidSurface) and not surface.is_sphere:
-        stretch = np.diag([*surface.semi_axes, 1.0])
-        unit_sphere = EllipsoidSurface((1.0, 1.0, 1.0))
-        return RayGroup(
-            frame_id,
-            X_FG.GetAsMatrix4() @ stretch,
-            [(index, RigidTransform(), unit_sphere)],
-        )
-    return None
 
 
 def serves(

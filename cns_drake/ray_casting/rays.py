@@ -11,10 +11,6 @@ import numpy as np
 
 from cns_drake.base import compiled
 
-# Values of `Hits.doubt` for certain hits and misses, and for doubtful misses.
-CERTAIN = -1
-MISSED = -2
-
 
 class Rays(NamedTuple):
     """N rays, cast from one or several poses of a sensor S.
@@ -38,20 +34,6 @@ class Rays(NamedTuple):
     max_ranges: np.ndarray
     d_Sset: np.ndarray
     times: np.ndarray
-
-    def select(self, rows: np.ndarray, max_ranges: np.ndarray) -> Rays:
-        """Returns some of the rays, given by index, with new maximum ranges."""
-        return Rays(
-            self.p_OSset[rows % len(self.p_OSset)],
-            self.R_OSset[rows % len(self.R_OSset)],
-            max_ranges,
-            self.d_Sset[rows],
-            self.times[rows % len(self.times)],
-        )
-
-    def max_ranges_of(self, rows: np.ndarray) -> np.ndarray:
-        """Returns the maximum ranges of the rays in the given rows."""
-        return self.max_ranges[rows % len(self.max_ranges)]
 
     def d_Oset(self) -> np.ndarray:
         """Returns the (N, 3) float64 direction of each ray in O."""
@@ -89,15 +71,12 @@ class Hits(NamedTuple):
             geometries of a group are fixed to the same frame L.
         normals: (N, 3) float32 normal of the surface, expressed in L, of any
             length; zero for a miss. (N, 0) unless normals were requested.
-        doubt: (N,) int32 number of the triangle that was hit, in its hierarchy,
-            if single precision may be wrong; otherwise `CERTAIN` or `MISSED`.
     """
 
     ranges: np.ndarray
     owner: np.ndarray
     group: np.ndarray
     normals: np.ndarray
-    doubt: np.ndarray
 
     @classmethod
     def misses(cls, num_rays: int, with_normals: bool) -> Hits:
@@ -112,5 +91,4 @@ class Hits(NamedTuple):
             np.full(num_rays, -1, np.int32),
             np.full(num_rays, -1, np.int32),
             np.zeros((num_rays, 3 if with_normals else 0), np.float32),
-            np.full(num_rays, CERTAIN, np.int32),
         )

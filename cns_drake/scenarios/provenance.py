@@ -27,7 +27,7 @@ _PACKAGES = (
 _BLOCK_BYTES = 1 << 20
 # Counts the changes of what is simulated or recorded of the same scenario and
 # files. Raise it with each such change.
-SIMULATION_VERSION = 1
+SIMULATION_VERSION = 2
 # The key of the inputs' combined digest in a recording's metadata.
 INPUTS_KEY = "inputs_sha256"
 

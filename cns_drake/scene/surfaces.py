@@ -109,8 +109,14 @@ def merge_triangles(
     owners = [np.zeros(0, np.int32)]
     num_vertices = 0
     for index, X_TG, surface in members:
+        R_TG, p = X_TG.rotation().matrix(), surface.p_GVset
+        # In a fixed order: the result of a matrix library depends on the
+        # processor.
         vertices.append(
-            surface.p_GVset @ X_TG.rotation().matrix().T + X_TG.translation()
+            p[:, :1] * R_TG[:, 0]
+            + p[:, 1:2] * R_TG[:, 1]
+            + p[:, 2:] * R_TG[:, 2]
+            + X_TG.translation()
         )
         triangles.append(surface.triangles + np.int32(num_vertices))
         owners.append(np.full(len(surface.triangles), index, np.int32))

@@ -66,7 +66,6 @@ def cast_free_rays(
         ranges,
         times=np.array([time]),
         with_normals=True,
-        doubt_all=True,
     )
     return RayHits(
         hits.ranges, geometry_ids(seen.built, hits.geometry), hits.normals_W

@@ -22,7 +22,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.ray_casting import EmbreeHierarchy
+from cns_drake.ray_casting import EmbreeScene
 from cns_drake.scene import geometry_port
 from cns_drake.sensors import Lidar, make_beam_pattern
 
@@ -371,16 +371,15 @@ def test_what_did_not_change_is_not_built_anew(monkeypatch):
     stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
     stage.eval()
     built = []
-    build = EmbreeHierarchy._build_scene
+    build = EmbreeScene._build_scene
     monkeypatch.setattr(
-        EmbreeHierarchy,
+        EmbreeScene,
         "_build_scene",
-        lambda self, parts: built.append(parts) or build(self, parts),
+        lambda self, proxies: built.append(proxies) or build(self, proxies),
     )
     context = stage.scene_graph.GetMyMutableContextFromRoot(stage.context)
     stage.scene_graph.ChangeShape(
         context, stage.source, crates[0], Box(4, 2, 2)
     )
     assert ahead(stage.eval()) == pytest.approx(8.0, abs=1e-5)
-    # Flat ones, and no curved ones.
-    assert [len(parts) for parts in built] == [1, 0]
+    assert [len(proxies.records) for proxies in built] == [12]

@@ -1,4 +1,4 @@
-"""Hits of scans, and of single rays, where single precision is not right.
+"""Hits of scans, and of single rays, where single precision is not enough.
 
 Oracles: triangles in double precision, one by one, and closed meshes, which no
 ray leaves.
@@ -32,8 +32,6 @@ ERROR = 2e-3
 GAP = 1e-3
 # Distance from an edge at which a beam may pass on either side [m].
 BESIDE = 1e-4
-# The same for a ray of `CastRays` [m].
-BESIDE_SINGLE = 1e-9
 
 
 class Scene:
@@ -152,7 +150,7 @@ def distance_from(points, corners):
 def test_slender_triangles_seen_along_their_plane(tmp_path, is_moving):
     """In single precision, hundreds of beams end up to 9 m beside."""
     rng = np.random.default_rng(7 + is_moving)
-    sure = grazing = thin = 0
+    sure = grazing = 0
     for trial in range(12):
         start = rng.uniform(-50.0, 50.0, 3)
         u, v = rng.normal(size=(2, 3))
@@ -176,17 +174,6 @@ def test_slender_triangles_seen_along_their_plane(tmp_path, is_moving):
         scene = Scene([(mesh, RigidTransform())], X, X_WF @ p, d_W)
         ranges = scene.scan()
         expected, beside, is_inside = meet_triangle(p, d, corners)
-        # Single rays are all cast in double precision.
-        single = scene.cast(X_WF @ p, d_W).ranges
-        is_sure = beside > BESIDE_SINGLE
-        np.testing.assert_array_equal(
-            np.isfinite(single[is_sure]), is_inside[is_sure]
-        )
-        is_sure &= is_inside
-        np.testing.assert_allclose(
-            single[is_sure], expected[is_sure], rtol=0.0, atol=1e-4
-        )
-        thin += (is_sure & np.isinf(ranges)).sum()
         met = np.isfinite(ranges)
         points = p + ranges[met, None] * d[met]
         assert distance_from(points, corners).max(initial=0.0) < GAP
@@ -200,7 +187,6 @@ def test_slender_triangles_seen_along_their_plane(tmp_path, is_moving):
         grazing += met.sum()
     assert sure > 700
     assert grazing > 3000
-    assert thin > 0
 
 
 def closed_meshes():

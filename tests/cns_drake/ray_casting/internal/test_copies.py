@@ -68,10 +68,10 @@ def make_scene(shapes, most, monkeypatch, **arguments):
 
 def scenes_of_copies(scene):
     """The Embree scene of each copy."""
-    hierarchy = scene._scene._first
+    hierarchy = scene._scene
     return [
-        hierarchy._built[row].scene
-        for row, group in enumerate(hierarchy._groups)
+        hierarchy._by_content[group.content()].scene
+        for group in hierarchy._groups
         for _, X_LG, surface in group.members
         if isinstance(surface, TriangleSurface) and X_LG.IsExactlyIdentity()
     ]
