@@ -660,12 +660,8 @@ class Lidar(LeafSystem):
     ) -> RayHits:
         """Casts N rays on the geometry that the LiDAR sees in a Context.
 
-        The rays do not depend on the LiDAR's pattern or noise. They meet all
-        triangles in double precision, beams only where single precision is
-        doubtful. For rays that start within 1 km of the LiDAR, ranges are exact
-        to 1e-4 m, and a ray that passes an edge of a triangle within 1e-9 m,
-        measured across the ray, can end on either side of it. Hits on half
-        spaces and curved shapes are computed in single precision.
+        The rays do not depend on the LiDAR's pattern or noise. For rays that
+        start within 1 km of the LiDAR, ranges are exact to 1e-4 m.
 
         Args:
             context: context of the LiDAR.
