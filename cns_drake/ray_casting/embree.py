@@ -156,7 +156,7 @@ def _reader(stored: types.Type, taken: types.Type) -> Callable:
 
         return taken(types.intp), generate
 
-    return read  # type: ignore[no-any-return]
+    return read
 
 
 def _writer(stored: types.Type, taken: types.Type) -> Callable:
@@ -173,7 +173,7 @@ def _writer(stored: types.Type, taken: types.Type) -> Callable:
 
         return types.void(types.intp, taken), generate
 
-    return write  # type: ignore[no-any-return]
+    return write
 
 
 # What compiled code reads and writes at addresses. Numbers are of 8 bytes once

@@ -20,6 +20,7 @@ from cns_drake.scene import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
+    HalfSpaceSurface,
     TriangleSurface,
     merge_triangles,
     tessellate,
@@ -86,9 +87,13 @@ class Proxies(NamedTuple):
 def make_proxies(members: Sequence[Member]) -> Proxies:
     """Returns the proxies of a group's members, none of them half spaces."""
     # Numbered within the group: groups of the same shapes can share them.
-    numbered = [(k, X, surface) for k, (_, X, surface) in enumerate(members)]
-    flat = [m for m in numbered if isinstance(m[2], TriangleSurface)]
-    curved = [m for m in numbered if not isinstance(m[2], TriangleSurface)]
+    flat: list[tuple[int, RigidTransform, TriangleSurface]] = []
+    curved: list[tuple[int, RigidTransform, CurvedSurface]] = []
+    for k, (_, X_LG, surface) in enumerate(members):
+        if isinstance(surface, TriangleSurface):
+            flat.append((k, X_LG, surface))
+        elif not isinstance(surface, HalfSpaceSurface):
+            curved.append((k, X_LG, surface))
     merged, owners = merge_triangles(flat)
     corners, rows = _widen(merged)
     sides = _SIDES if len(curved) <= _MANY_SHAPES else _FEW_SIDES
@@ -112,10 +117,9 @@ def make_proxies(members: Sequence[Member]) -> Proxies:
             ]
         ),
         records,
-        np.reshape(
-            [_shape_numbers(X, surface, sides) for _, X, surface in curved],
-            (-1, SHAPE_NUMBERS),
-        ),
+        np.array(
+            [_shape_numbers(X, surface, sides) for _, X, surface in curved]
+        ).reshape(-1, SHAPE_NUMBERS),
     )
 
 

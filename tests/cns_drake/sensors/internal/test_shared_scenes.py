@@ -10,11 +10,9 @@ from cns_drake.sensors import add_lidar
 
 
 def stills(lidar, root):
-    """Addresses of what Embree has of the geometry that never moves."""
+    """The address of what Embree has of the geometry that never moves."""
     scene = lidar.EvalScene(lidar.GetMyContextFromRoot(root))._scene
-    return {
-        hierarchy._built[0].scene for hierarchy in (scene._first, scene._second)
-    }
+    return scene._targets.fixed
 
 
 def test_lidars_and_contexts_share_what_stands_still():
