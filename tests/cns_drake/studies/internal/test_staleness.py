@@ -88,7 +88,7 @@ def test_a_quick_study(reproduce, monkeypatch, tmp_path):
     assert reproduce(with_recordings=False) == of_change
     monkeypatch.setattr(PlaceTask, "version", 2)
     assert reproduce(with_recordings=False) == COMPARED | CONTROL
-    monkeypatch.setattr(simulated_drive, "SIMULATION_VERSION", 2)
+    monkeypatch.setattr(simulated_drive, "SIMULATION_VERSION", 0)
     assert reproduce(with_recordings=False) == STUDY
     monkeypatch.setattr(step, "__version__", "another")
     assert reproduce(with_recordings=False) == STUDY
@@ -118,7 +118,7 @@ def test_recordings_pages_and_pictures(reproduce, monkeypatch, tmp_path):
     monkeypatch.setattr(Record, "version", 2)
     assert reproduce() == PAGES
     assert not list((tmp_path / "out").glob("*.part"))
-    monkeypatch.setattr(provenance, "SIMULATION_VERSION", 2)
+    monkeypatch.setattr(provenance, "SIMULATION_VERSION", 0)
     # The new recordings hold the same, and so what was measured on them stays.
     assert reproduce(with_pages=False) == DRIVES
     assert reproduce() == PAGES
