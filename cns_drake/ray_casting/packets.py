@@ -42,10 +42,10 @@ _TINY = 1e-18
 # nearest hit [m]: more than the errors of single precision.
 _BEHIND = 2.0**-8
 _BEYOND = 2.0**-5
+# The same as a share of the range.
+_ROUNDING = 2.0**-18
 # A hit this far beyond the nearest proxy is not the nearest for sure [m].
 _AHEAD = _BEYOND / 2.0 - _BEHIND
-# Share of a range by which single precision may round it.
-_ROUNDING = 2.0**-22
 # Tolerance of a hit beside an edge, as a share of the triangle's size. With it,
 # no ray passes between two triangles that share an edge.
 _EDGE_TOLERANCE = 1e-9
@@ -213,7 +213,7 @@ def _cast_packets(
             write_single(at + 7 * row, time)
             if starts_near[origin]:
                 limit = math.inf
-            write_single(at + 8 * row, _beyond(limit))
+            write_single(at + 8 * row, _beyond(limit + _BEHIND))
             write_int32(at + 9 * row, -1)
             write_int32(at + 10 * row, lane)
             write_int32(at + 11 * row, 0)
@@ -262,7 +262,7 @@ def _cast_packets(
                 limit = read_double(state + _RANGE)
                 if read_int64(state + _STARTS_NEAR) != 0:
                     limit = math.inf
-                write_single(at + 8 * row, _beyond(limit))
+                write_single(at + 8 * row, _beyond(limit + _BEHIND))
         for lane in range(count):
             state = states + _STATE * lane
             record = read_int64(state + _RECORD)
@@ -283,8 +283,8 @@ def _cast_packets(
 
 @compiled
 def _beyond(distance: float) -> float:
-    """Returns how far Embree looks if a hit is so far away [m]."""
-    return distance + distance * _ROUNDING + (_BEHIND + _BEYOND)
+    """Returns how far Embree looks if something is so far away [m]."""
+    return distance + distance * _ROUNDING + _BEYOND
 
 
 def _collect(arguments: int) -> None:
@@ -316,7 +316,7 @@ def _collect(arguments: int) -> None:
         distance = read_single(packet + 8 * row + at)
         if distance < read_double(state + _NEAREST):
             write_double(state + _NEAREST, distance)
-            write_single(packet + 8 * row + at, distance + _BEYOND)
+            write_single(packet + 8 * row + at, _beyond(distance))
         else:
             write_int32(valid + at, 0)
 
