@@ -5,9 +5,13 @@ import sys
 
 from cns_drake.base import leave_out_folder
 
-leave_out_folder(sys.path)  # Before anything else is imported.
+try:
+    leave_out_folder(sys.path)  # Before anything else is imported.
+except FileNotFoundError:
+    print("error: the working folder is not there any more", file=sys.stderr)
+    sys.exit(2)
 
-from cns_drake.base import start  # noqa: E402
+from cns_drake.base import start
 
 
 def main() -> None:

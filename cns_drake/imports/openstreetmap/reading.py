@@ -35,8 +35,8 @@ _WITHOUT_AREA = "without area"
 _NOT_CLOSED = "whose outline does not close"
 # Ways of fewer nodes cost little, however often they cross themselves.
 _MANY_NODES = 64
-# Distance of pieces of a way that lie in each other, about 0.3 m [deg].
-_NEAR = 3e-6
+# Distance of pieces of a way that lie in each other, 0.3 to 0.6 m [deg].
+_NEAR = 5e-6
 _LETTERS = {"Node": "n", "Way": "w", "Relation": "r"}
 # A negative id of a file becomes this number minus the id.
 _FIRST_NEW = 10**12

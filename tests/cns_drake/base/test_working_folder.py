@@ -1,6 +1,9 @@
 """Neither code nor settings of the working folder count."""
 
 import json
+import os
+import subprocess
+import sys
 
 import pytest
 
@@ -31,3 +34,17 @@ def test_a_python_of_its_own_is_not_in_the_working_folder(
     assert found["here"] == "/"
     assert str(modules) in found["path"]
     assert not {"", str(here)} & {*found["path"]}
+
+
+@pytest.mark.slow
+def test_a_working_folder_that_is_gone_is_named(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "cns_drake", "list"],
+        cwd=tmp_path,
+        preexec_fn=lambda: os.rmdir(tmp_path),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr == "error: the working folder is not there any more\n"

@@ -938,7 +938,7 @@ OSM = {
     "lanes": ([(0, 30), (9, 30)], {"highway": "primary", "lanes": "99999999"}),
     "laps": (SQUARE[:4] * 1500, {"highway": "residential"}),
     "zigzag": (
-        [(0.02 * k, 30 + 0.3 * (k % 2)) for k in range(6000)],
+        [(0.05 * k, 30 + 0.3 * (k % 2)) for k in range(10_000)],
         {"barrier": "wall"},
     ),
     "wood": (SQUARE, {"natural": "wood"}),
