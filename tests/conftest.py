@@ -13,11 +13,11 @@ from types import ModuleType
 
 import pytest
 
-from cns_drake.base import collect_garbage_seldom, num_cores
+from cns_drake.base import num_cores
 
 # What is imported is there to stay: nobody looks for garbage in it.
 gc.disable()
-collect_garbage_seldom()
+gc.set_threshold(50_000)
 
 # Where Open3D is an oracle, nobody needs its machine learning, which takes
 # longer to import than all the rest of it.

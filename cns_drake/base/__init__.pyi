@@ -119,9 +119,6 @@ from .points import xyz as xyz
 from .polylines import distances_along as distances_along
 from .polylines import length_of as length_of
 from .polylines import step_lengths as step_lengths
-from .process import (
-    collect_garbage_seldom as collect_garbage_seldom,
-)
 from .process import num_cores as num_cores
 from .progress import doing as doing
 from .progress import track as track

@@ -21,9 +21,7 @@ from .point_cloud2 import (
     point_field_datatype as point_field_datatype,
 )
 from .point_cloud2 import to_points as to_points
-from .point_cloud2 import to_records as to_records
 from .point_layouts import LayoutName as LayoutName
-from .point_layouts import from_layout as from_layout
 from .point_layouts import to_labels as to_labels
 from .point_layouts import to_layout as to_layout
 from .ros_types import COMPRESSED_IMAGE as COMPRESSED_IMAGE

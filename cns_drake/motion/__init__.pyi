@@ -1,7 +1,6 @@
 from .path_geometry import SmoothPath as SmoothPath
 from .road_profile import RoadProfile as RoadProfile
 from .road_profile import RoughnessClass as RoughnessClass
-from .splines import REACH as REACH
 from .suspension import Suspension as Suspension
 from .suspension import load_car_masses as load_car_masses
 from .suspension import (

@@ -10,7 +10,6 @@ from .localisation_map import (
 from .localisation_map import make_map as make_map
 from .localisation_map import map_frames as map_frames
 from .localisation_map import map_of as map_of
-from .localiser import NEAR as NEAR
 from .localiser import Localiser as Localiser
 from .localiser import Query as Query
 from .localiser import localise as localise
@@ -37,6 +36,5 @@ from .settings import (
     default_settings as default_settings,
 )
 from .tracking import LOST as LOST
-from .tracking import Tracked as Tracked
 from .tracking import localised as localised
 from .tracking import track_drive as track_drive

@@ -13,9 +13,6 @@ from .parts import LongList as LongList
 from .parts import MakePart as MakePart
 from .parts import Part as Part
 from .place_measurements import (
-    DescribedSource as DescribedSource,
-)
-from .place_measurements import (
     PlaceComparison as PlaceComparison,
 )
 from .place_measurements import measure_places as measure_places
@@ -54,7 +51,6 @@ from .tasks.jobs import SCAN_COST as SCAN_COST
 from .tasks.jobs import Jobs as Jobs
 from .tasks.jobs import job_name as job_name
 from .tasks.localise import NOT_LOCALISED as NOT_LOCALISED
-from .tasks.localise import SHIPPED as SHIPPED
 from .tasks.localise import LocaliseTask as LocaliseTask
 from .tasks.localise import (
     measure_localisation as measure_localisation,

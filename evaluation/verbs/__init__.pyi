@@ -1,8 +1,6 @@
-from .change import Change as Change
 from .change import change_between as change_between
 from .localisation import Localisation as Localisation
 from .localisation import localise as localise
-from .map_update import MapUpdate as MapUpdate
 from .map_update import update_map as update_map
 from .measured import Measured as Measured
 from .recognition import Recognition as Recognition

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+import gc
 import multiprocessing as mp
 from multiprocessing.connection import Connection
 import os
@@ -30,7 +31,7 @@ import time
 import numpy as np
 from processes import in_process
 
-from cns_drake.base import ALLOCATION, collect_garbage_seldom
+from cns_drake.base import ALLOCATION
 from cns_drake.scenarios import (
     DrivePlan,
     Scenario,
@@ -130,7 +131,7 @@ def record(
     # Ends of turns, each reported once.
     ends = iter(range(step, frames + 1, step))
     end = next(ends)
-    collect_garbage_seldom()  # As jobs do.
+    gc.set_threshold(50_000)  # As jobs do.
     turns.recv()
 
     def on_frame(done: int, total: int) -> None:

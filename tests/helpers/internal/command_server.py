@@ -30,7 +30,7 @@ import tempfile
 from _pytest.monkeypatch import MonkeyPatch
 
 import cns_drake
-from cns_drake.base import ALLOCATION, collect_garbage_seldom
+from cns_drake.base import ALLOCATION
 from cns_drake.base.compilation import start_compiler
 from cns_drake.base.jobs import processes
 from cns_drake.simulation import simulate
@@ -129,7 +129,7 @@ def _serve(listener: socket.socket) -> None:
     """Forks for each client until stdin ends, without waiting for the forks."""
     if INSTALLED_VARIABLE in os.environ:
         assert _TESTS.parent not in Path(cns_drake.__file__).parents
-    collect_garbage_seldom()
+    gc.set_threshold(50_000)
     os.fsync = os.fstat  # As in the process of the tests.
     for package in map(importlib.import_module, ("cns_drake", "evaluation")):
         prefix = f"{package.__name__}."

@@ -8,12 +8,12 @@ from cns_drake.drives import (
     POINT_CLOUD,
     McapDrive,
     deserialize,
-    from_layout,
     to_labels,
     to_layout,
     to_points,
-    to_records,
 )
+from cns_drake.drives.point_cloud2 import to_records
+from cns_drake.drives.point_layouts import from_layout
 from cns_drake.recording import encode_point_cloud
 from cns_drake.sensors import POINT_DTYPE
 
