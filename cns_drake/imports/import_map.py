@@ -42,6 +42,13 @@ from cns_drake.roads import (
 )
 from cns_drake.scene import MESH_FOLDER, check_new_map
 
+# Plausible heights of the median building of a city, and a usual one [m].
+_PLAUSIBLE_HEIGHTS = (1.2, 200.0)
+_USUAL_HEIGHT = 8.0
+# Factors between units that are confused: kilometres, metres, feet, inches,
+# centimetres and millimetres.
+_FACTORS = (1e6, 1000.0, 100.0, 3.28084, 0.3048, 0.0254, 0.01, 0.001)
+
 # Share of the buildings that usually change between an added first stage and
 # today.
 _CHANGED_SHARE = 0.3
@@ -85,6 +92,7 @@ def import_city(
         return _import_roads(kind, source, output, options, own, finish)
     city = kind.read(source, options)
     staged = stage_city(source, city, options)
+    _note_implausible_sizes(staged.kept, city.faults)
     changes = None
     if options.grow is not None:
         staged, changes = grow(staged, options.grow, options.seed)
@@ -128,6 +136,37 @@ def import_city(
         )
         finish(draft, sizes)
     return report
+
+
+def _note_implausible_sizes(
+    objects: Sequence[ImportedObject], faults: ImportFaults
+) -> None:
+    """Counts the buildings as a fault if they are too small or too large.
+
+    Each value of a file in another unit is plausible, but the city is not.
+    """
+    buildings = [
+        one for one in objects if "building" in one.object_type.lower()
+    ]
+    if not buildings:
+        return
+    height = float(
+        np.median([np.ptp(one.triangles[:, :, 2]) for one in buildings])
+    )
+    low, high = _PLAUSIBLE_HEIGHTS
+    if low <= height <= high:
+        return
+    away = {
+        factor: abs(math.log(max(height, 1e-9) * factor / _USUAL_HEIGHT))
+        for factor in _FACTORS
+    }
+    side = "too small" if height < low else "too large"
+    faults.add(
+        f"{side}: the median building is {height:.3g} m high; multiply"
+        f" coordinates by {min(away, key=lambda one: away[one]):g}?",
+        buildings[0].structure.name,
+        len(buildings),
+    )
 
 
 def with_usual_growth(source: Path, options: ImportOptions) -> ImportOptions:

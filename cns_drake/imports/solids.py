@@ -25,6 +25,7 @@ def extruded(
     faults: ImportFaults,
     roof: str = "flat",
     roof_height: float = 0.0,
+    ground: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the walls and the roof of a solid, as triangles (M, 3, 3) [m].
 
@@ -33,8 +34,8 @@ def extruded(
 
     Args:
         polygon: the footprint.
-        low: height of the lowest point [m]; above 0, the walls include an
-            underside.
+        low: height of the lowest point [m]; above the ground, the walls
+            include an underside.
         high: height of the highest point [m].
         name: name of the object, as an example in `faults`.
         faults: counts roofs and areas that were replaced or left out.
@@ -42,12 +43,13 @@ def extruded(
             sees all of its walls; `gabled` or `hipped`, on a footprint with
             four corners.
         roof_height: height of the roof above the eaves [m].
+        ground: height of the ground [m].
     """
     polygon = orient(polygon)
     eaves = high - roof_height
     # A solid that begins above the ground can be seen from below.
     floor = np.zeros((0, 3, 3))
-    if low > 0.0:
+    if low > ground:
         floor = flat_surface(polygon, low, name, faults)[:, ::-1]
     corners = level_rings(polygon, eaves)[0]
     pitched = None

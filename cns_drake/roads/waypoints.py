@@ -48,9 +48,9 @@ def load_waypoint_path(
 
     Each line of the CSV file contains one waypoint: x, y and, if given, z of
     the vehicle frame in W [m]. The origin of this frame is on the ground.
-    Without the third number, `ground` gives z. If the first line contains the
-    names of the columns, the columns can be in another order, and there can be
-    further columns.
+    Without the third number, `ground` gives z along the path. If the first line
+    contains the names of the columns, the columns can be in another order, and
+    there can be further columns.
 
     The path is the line from waypoint to waypoint, with corners rounded by arcs
     of 8 m radius. Where the waypoints are too close together, the radius is
@@ -65,7 +65,8 @@ def load_waypoint_path(
             turns by more than 150 degrees at a waypoint. The far end of the
             loop is at the waypoint. Without `u_turns`, such a turn is an error.
         ground: function that returns the heights (N,) of the ground at places
-            (N, 2) in W [m]; by default, a file without z is an error.
+            (N, 2) in W, which are 2 m apart along the path [m]; by default, a
+            file without z is an error.
 
     Raises:
         InputError: a line of the file is not usable, or the path turns too
@@ -74,12 +75,14 @@ def load_waypoint_path(
     """
     path = Path(path)
     points, lines = read_waypoints(path)
-    if np.isnan(points).any():
-        if ground is None:
-            raise InputError(f"{path}: has no column z")
-        points[:, 2] = ground(points[:, :2])
+    if not np.isnan(points).any():
+        ground = None
+    elif ground is None:
+        raise InputError(f"{path}: has no column z")
     names = [f"{path}: line {line}" for line in lines]
-    return make_waypoint_path(points, spacing, names, path, u_turns=u_turns)
+    return make_waypoint_path(
+        points, spacing, names, path, u_turns=u_turns, ground=ground
+    )
 
 
 def make_waypoint_path(
@@ -89,6 +92,7 @@ def make_waypoint_path(
     source: object = "waypoints",
     *,
     u_turns: bool = False,
+    ground: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> LanePath:
     """Returns the path along waypoints, without speed limits.
 
@@ -98,6 +102,8 @@ def make_waypoint_path(
         names: N names of the waypoints, for error messages.
         source: name of the list of waypoints, for error messages.
         u_turns: whether turns by more than 150 degrees are driven as loops.
+        ground: gives the heights of the path instead of the waypoints, see
+            `load_waypoint_path`.
 
     Raises:
         InputError: fewer than two different waypoints, a turn by more than 150
@@ -140,6 +146,7 @@ def make_waypoint_path(
         np.array(corner_radii),
         spacing,
         source,
+        ground,
     )
 
 
@@ -189,7 +196,11 @@ def _free_lengths(
 
 
 def _rounded_path(
-    corners: np.ndarray, radii: np.ndarray, spacing: float, source: object
+    corners: np.ndarray,
+    radii: np.ndarray,
+    spacing: float,
+    source: object,
+    ground: Callable[[np.ndarray], np.ndarray] | None,
 ) -> LanePath:
     """Returns the path along corners (N, 3), rounded with N - 2 radii [m]."""
     curve = Centreline(corners[:, :2], radii)
@@ -197,8 +208,9 @@ def _rounded_path(
     edges = np.diff(corners[:, :2], axis=0)
     headings = arctan2(edges[:, 1], edges[:, 0])
     turns = np.abs(wrapped(np.diff(headings)))
-    count = int(np.ceil(curve.length / DENSE_SPACING)) + 1
-    along = np.linspace(0.0, curve.length, count)
+    along = np.linspace(
+        0.0, curve.length, int(np.ceil(curve.length / DENSE_SPACING)) + 1
+    )
     from scipy.interpolate import PchipInterpolator
 
     # The curve passes each corner in the middle of its arc.
@@ -208,9 +220,16 @@ def _rounded_path(
     at_corners = np.concatenate([[0.0], np.cumsum(lengths)])
     at_corners[1:-1] -= (shortened[:-1] + shortened[1:]) / 2
     at_corners[-1] -= shortened[-1]
-    z = PchipInterpolator(at_corners, corners[:, 2])(along)
+    stations, heights = at_corners, corners[:, 2]
+    if ground is not None:
+        count = int(np.ceil(curve.length / _GROUND_SPACING)) + 1
+        stations = np.linspace(0.0, curve.length, count)
+        heights = ground(curve.evaluate(stations)[:, :2])
+    z = PchipInterpolator(stations, heights)(along)
     points = np.column_stack([curve.evaluate(along)[:, :2], z])
-    return sample_lane_path(points, np.full(count, np.inf), spacing, source)
+    return sample_lane_path(
+        points, np.full(len(along), np.inf), spacing, source
+    )
 
 
 def _loop_approach(turns: np.ndarray) -> np.ndarray:
@@ -246,6 +265,8 @@ def _loop_corners_at(
     )
 
 
+# Distance along the path between places at which the ground is asked [m].
+_GROUND_SPACING = 2.0
 # A greater coordinate is a mistake, not a place [m].
 _FARTHEST = 1_000_000.0
 

@@ -64,6 +64,9 @@ _MOST_SURFACES = 64
 _CLEARANCE = 2.0
 # A car is off the ground at a greater height above or below it [m].
 _OFF_GROUND = 0.5
+# The ground rises and falls by less between two places of a path, which are 2 m
+# apart [m].
+_STEEPEST = 1.0
 # Greatest z component of the normal of an obstacle.
 _STEEP = 0.7
 
@@ -282,16 +285,55 @@ def ground_notes(scenario: Scenario, trajectory: Trajectory) -> tuple[str, ...]:
 
 
 def _ground_heights(scenario: Scenario, xy: np.ndarray) -> np.ndarray:
-    """Returns the heights (N,) of the ground at places (N, 2) of a world [m].
+    """Returns the heights (N,) of the ground along a path in a world [m].
 
     The ground is the surface on which a car has room. If there are several, it
-    is the one at z = 0; without any surface, the height is 0.
+    is the one that continues the ground before or behind. If there are several
+    along the whole path, it begins at z = 0. Where there is no surface, the
+    heights beside are interpolated; without any, they are 0.
+
+    Args:
+        scenario: the scenario.
+        xy: (N, 2) places along the path, 2 m apart.
 
     Raises:
-        InputError: the world cannot be loaded, or there are several surfaces
-            and none is at z = 0.
+        InputError: the world cannot be loaded, or it is open which of several
+            surfaces is the ground.
     """
-    scene = _scene_of(scenario)
+    levels = _usable_levels(_scene_of(scenario), xy)
+    heights = np.full(len(xy), np.nan)
+    for number, found in enumerate(levels):
+        if len(found) == 1:
+            heights[number] = found[0]
+    if np.isnan(heights).all():
+        for number, found in enumerate(levels):
+            level = [z for z in found if abs(z) < _OFF_GROUND]
+            if len(level) == 1:
+                heights[number] = level[0]
+    for order in (range(1, len(xy)), range(len(xy) - 2, -1, -1)):
+        step = order.step
+        for number in order:
+            before = heights[number - step]
+            near = [z for z in levels[number] if abs(z - before) < _STEEPEST]
+            if np.isnan(heights[number]) and near:
+                heights[number] = min(near, key=lambda z: abs(z - before))
+    open_ = np.isnan(heights)
+    for number in np.flatnonzero(open_).tolist():
+        if levels[number]:
+            x, y = xy[number]
+            some = " and ".join(f"{z:.2f}" for z in levels[number][:3])
+            raise InputError(
+                f"{scenario.waypoints}: has no column z, and at {x:.1f},"
+                f" {y:.1f} the ground can be at {some} m; add the column z"
+            )
+    if open_.all():
+        return np.zeros(len(xy))
+    stations = np.arange(len(xy))
+    return np.interp(stations, stations[~open_], heights[~open_])
+
+
+def _usable_levels(scene: RayCastingScene, xy: np.ndarray) -> list[list[float]]:
+    """Returns for each place the heights on which a car has room [m]."""
     down = np.tile([0.0, 0.0, -1.0], (len(xy), 1))
     start = np.column_stack([xy, np.full(len(xy), _SKY)])
     levels: list[list[float]] = [[] for _ in xy]
@@ -303,22 +345,18 @@ def _ground_heights(scenario: Scenario, xy: np.ndarray) -> np.ndarray:
             start[number, 2] -= ranges[number]
             levels[number].append(float(start[number, 2]))
         start[:, 2] -= _STEP_BELOW
-    heights = np.zeros(len(xy))
-    for number, found in enumerate(levels):
+    usable = []
+    for found in levels:
         room = np.diff([_SKY, *found]) < -_CLEARANCE
-        usable = [z for z, free in zip(found, room, strict=True) if free]
-        level = [z for z in usable if abs(z) < _OFF_GROUND]
-        chosen = usable if len(usable) < 2 else level
-        if usable and len(chosen) != 1:
-            x, y = xy[number]
-            some = " and ".join(f"{z:.2f}" for z in usable[:3])
-            raise InputError(
-                f"{scenario.waypoints}: has no column z, and at {x:.1f},"
-                f" {y:.1f} the ground can be at {some} m; add the column z"
-            )
         # Rays are exact to a tenth of a millimetre here.
-        heights[number] = round(chosen[0], 3) + 0.0 if chosen else 0.0
-    return heights
+        usable.append(
+            [
+                round(z, 3) + 0.0
+                for z, free in zip(found, room, strict=True)
+                if free
+            ]
+        )
+    return usable
 
 
 def _scene_of(scenario: Scenario) -> RayCastingScene:

@@ -12,7 +12,7 @@ from pydrake.geometry import (
     ReadObjToTriangleSurfaceMesh,
 )
 
-from cns_drake.base import InputError, read_bytes
+from cns_drake.base import InputError, note, read_bytes
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.file_watch import once_a_file
 from cns_drake.scene.foreign_meshes import ForeignMeshes
@@ -23,6 +23,10 @@ from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 
 # Formats whose y axis points up. Drake rotates them so that z does.
 _Y_UP = (*GLTF, ".dae")
+# Formats whose coordinates are read in double precision.
+_DOUBLE = (".obj", ".ply")
+# Greatest step of coordinates that no note mentions [m].
+_COARSE = 0.005
 # Greatest number of triangles in all copies of meshes at further scales, of
 # which a small world can declare any number.
 _MOST_COPIED = 1 << 25
@@ -111,6 +115,14 @@ class MeshFiles:
         # Drake only warns; a ray caster would read outside its memory.
         if not 0 <= triangles.min() <= triangles.max() < len(p_GVset):
             raise ValueError("a face has a vertex that is not there")
+        if ending not in _DOUBLE:
+            step = float(np.spacing(np.abs(p_GVset).max().astype(np.float32)))
+            if step > _COARSE:
+                note(
+                    f"{path}: coordinates of single precision are coarse here:"
+                    f" steps of {step:.2g} m; move the vertices to the origin,"
+                    " or convert the file to OBJ or PLY"
+                )
         if ending in _Y_UP:
             x, y, z = p_GVset.T
             p_GVset = np.stack([x, -z, y], axis=1)

@@ -58,11 +58,13 @@ class _PlacedOutline(NamedTuple):
     Attributes:
         line: the outline in W [m].
         low: (N,) z of the foot below each corner in W [m].
+        rise: (N,) how far this foot is above the road [m].
         heights: (N,) heights of the corners above this foot [m].
     """
 
     line: LineString
     low: np.ndarray
+    rise: np.ndarray
     heights: np.ndarray
 
 
@@ -201,13 +203,15 @@ def _extruded_object(
         faults.add("object without an area, left out", name)
         return None
     low = outline.low
-    foot = float(low.min())
+    foot, rise = float(low.min()), float(outline.rise.min())
     # Any height will do, because each vertex gets that of the nearest corner.
     triangles = np.concatenate(
         [
             part
             for piece in pieces
-            for part in extruded(piece, foot, foot + 1.0, name, faults)
+            for part in extruded(
+                piece, foot, foot + 1.0, name, faults, ground=foot - rise
+            )
         ]
     )
     corners = shapely.get_coordinates(outline.line)
@@ -241,7 +245,7 @@ def _placed_outline(road: ImportedRoad, thing: Thing) -> _PlacedOutline | None:
         inside = np.clip(s, _INSIDE, road.length - _INSIDE)
         corners = road.points(s, inside, t)
         line = LineString(corners[:, :2])
-        return _PlacedOutline(line, corners[:, 2] + rise, heights)
+        return _PlacedOutline(line, corners[:, 2] + rise, rise, heights)
     length, width, _ = thing.size
     if thing.outline is not None:
         footprint = LineString(thing.outline[:, :2])
@@ -254,7 +258,7 @@ def _placed_outline(road: ImportedRoad, thing: Thing) -> _PlacedOutline | None:
         heights = rise = np.zeros(len(footprint.coords))
     foot = _foot_of(road, thing)
     line = placed(footprint, (foot.x, foot.y), foot.heading + thing.heading)
-    return _PlacedOutline(line, foot.z + rise, heights)
+    return _PlacedOutline(line, foot.z + rise, rise, heights)
 
 
 def _swept_object(

@@ -50,12 +50,37 @@ def test_level_ground_is_at_zero_below_a_deck(scenario):
     np.testing.assert_array_equal(heights(drive), 0.0)
 
 
-def test_two_surfaces_of_which_none_is_at_zero_need_z(scenario):
-    drive = scenario(YARD + DECK, "x,y\n0,0\n30,0\n60,0\n")
+def test_two_surfaces_along_the_whole_path_need_z(scenario):
+    deck = BOX.format("deck", "30 0 8.5", "90 20 1")
+    drive = scenario(YARD + deck, "x,y\n0,0\n30,0\n60,0\n")
     with pytest.raises(InputError, match=r"no column z.*9\.00 and 5\.00 m"):
         plan_drive(drive)
-    drive = scenario(YARD + DECK, "x,y,z\n0,0,5\n30,0,5\n60,0,5\n")
+    drive = scenario(YARD + deck, "x,y,z\n0,0,5\n30,0,5\n60,0,5\n")
     np.testing.assert_array_equal(heights(drive), 5.0)
+
+
+@pytest.mark.parametrize("up", [-300, -20, 0, 500])
+def test_a_world_that_is_moved_is_the_same(scenario, up):
+    """The street dips and rises, also below a deck and beside a hole."""
+    parts = [
+        BOX.format(f"s{k}", f"{8 * k} 0 {up - 0.5 + 0.2 * (k % 3)}", "8 9 1")
+        for k in range(9)
+        if k != 6
+    ]
+    parts.append(BOX.format("deck", f"28 0 {up + 8.5}", "20 20 1"))
+    world = "".join(parts)
+    drive = scenario(world, "x,y\n0,0\n60,0\n")
+    times = np.linspace(0.0, plan_drive(drive).duration, 60)
+    path = plan_drive(drive).poses(times)[1]
+    x, z = path[:, 0], path[:, 2] - up
+    inside = np.abs((x + 4) % 8 - 4) < 1.9
+    inside &= (x < 42) | (x > 54)
+    level = 0.2 * (np.rint(x / 8) % 3)
+    np.testing.assert_allclose(z[inside], level[inside], atol=0.05)
+    # Waypoints may be dense or not.
+    dense = "".join(f"{x},0\n" for x in range(0, 61, 5))
+    other = plan_drive(scenario(world, f"x,y\n{dense}")).poses(times)[1]
+    np.testing.assert_allclose(other, path, atol=1e-6)
 
 
 @pytest.mark.parametrize(
