@@ -267,7 +267,7 @@ def drive_along(path: Path) -> WaypointRoute:
     Raises:
         InputError: if the file cannot be used, or a bend is too tight.
     """
-    points, _ = read_waypoints(path)
+    points = read_waypoints(path).points
     control = load_waypoint_path(
         path, POINT_SPACING, ground=lambda xy: np.zeros(len(xy))
     ).points[:, :2]

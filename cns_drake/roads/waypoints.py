@@ -1,8 +1,10 @@
 """Paths along waypoints, for worlds without a road network."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 import math
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -50,7 +52,7 @@ def load_waypoint_path(
     the vehicle frame in W [m]. The origin of this frame is on the ground.
     Without the third number, `ground` gives z along the path. If the first line
     contains the names of the columns, the columns can be in another order, and
-    there can be further columns.
+    there can be further columns, of which `velocity` limits the speed [m/s].
 
     The path is the line from waypoint to waypoint, with corners rounded by arcs
     of 8 m radius. Where the waypoints are too close together, the radius is
@@ -74,15 +76,38 @@ def load_waypoint_path(
             the file and, if the fault is in a single line, the line.
     """
     path = Path(path)
-    points, lines = read_waypoints(path)
+    points, limits, lines, _ = read_waypoints(path)
     if not np.isnan(points).any():
         ground = None
     elif ground is None:
         raise InputError(f"{path}: has no column z")
     names = [f"{path}: line {line}" for line in lines]
-    return make_waypoint_path(
+    made = make_waypoint_path(
         points, spacing, names, path, u_turns=u_turns, ground=ground
     )
+    if np.isinf(limits).all():
+        return made
+    return replace(made, speed_limits=_limits_along(made, points, limits))
+
+
+def _limits_along(
+    path: LanePath, points: np.ndarray, limits: np.ndarray
+) -> np.ndarray:
+    """Returns the speed limits (N,) at the points of a path [m/s].
+
+    Between two waypoints, the limit changes evenly. It is at least 0.5 m/s:
+    files end with a velocity of 0, at which a car would never arrive.
+
+    Args:
+        path: the path along the waypoints.
+        points, limits: the waypoints, see `Waypoints`.
+    """
+    steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    # Rounded corners are a little shorter.
+    share = np.linspace(0.0, 1.0, len(path.points))
+    found = np.interp(share * along[-1], along, limits)
+    return np.maximum(found, _SLOWEST)
 
 
 def make_waypoint_path(
@@ -267,66 +292,92 @@ def _loop_corners_at(
 
 # Distance along the path between places at which the ground is asked [m].
 _GROUND_SPACING = 2.0
+# Least limit of speed [m/s].
+_SLOWEST = 0.5
 # A greater coordinate is a mistake, not a place [m].
 _FARTHEST = 1_000_000.0
 
 
-def read_waypoints(path: Path) -> tuple[np.ndarray, list[int]]:
-    """Reads waypoints from a file.
+class Waypoints(NamedTuple):
+    """The waypoints in a file.
 
-    Returns:
-        (N, 3) positions of the waypoints [m], z is NaN in a file without z; the
-        line number of each waypoint.
+    Attributes:
+        points: (N, 3) positions [m]; z is NaN in a file without z.
+        limits: (N,) speed limits, the column `velocity` [m/s]; infinite without
+            it.
+        lines: line number of each waypoint.
+        unused: names of columns that are not used.
+    """
+
+    points: np.ndarray
+    limits: np.ndarray
+    lines: list[int]
+    unused: list[str]
+
+
+def read_waypoints(path: Path | str) -> Waypoints:
+    """Reads waypoints from a file.
 
     Raises:
         InputError: the file cannot be read, or a line is not usable. The
             message names file, line and fault.
     """
-    points, lines = [], []
-    columns = None
+    path = Path(path)
+    rows, lines = [], []
+    columns: dict[str, int] = {}
+    unused: list[str] = []
     for line, cells in read_rows(path):
         where = f"{path}: line {line}"
-        if columns is None:
+        if not columns:
             columns = _columns(cells, where)
-            if not _is_number(cells[columns[0]]):
+            if not _is_number(cells[columns["x"]]):
+                unused = [
+                    cell
+                    for k, cell in enumerate(cells)
+                    if k not in columns.values()
+                ]
                 continue
-        if max(columns) >= len(cells):
+        if max(columns.values()) >= len(cells):
             raise InputError(
                 f"{where}: {len(cells)} column(s) are too few; give x and y, "
                 "or x, y and z"
             )
-        values = [cells[column] for column in columns]
-        for value in values:
+        row = dict.fromkeys(("x", "y", "z"), math.nan) | {"velocity": math.inf}
+        for name, column in columns.items():
+            value = cells[column]
             if not _is_number(value):
                 raise InputError(f"{where}: {value!r} is not a finite number")
+            if name == "velocity" and float(value) < 0.0:
+                raise InputError(f"{where}: velocity: {value} m/s is below 0")
             if abs(float(value)) > _FARTHEST:
                 raise InputError(
                     f"{where}: {value} m are more than {_FARTHEST:.0f} m"
                 )
-        x, y, *z = map(float, values)
-        points.append((x, y, z[0] if z else math.nan))
+            row[name] = float(value)
+        rows.append([*row.values()])
         lines.append(line)
-    if not points:
+    if not rows:
         raise InputError(f"{path}: the file has no waypoints")
-    return np.array(points), lines
+    table = np.array(rows)
+    return Waypoints(table[:, :3], table[:, 3], lines, unused)
 
 
-def _columns(cells: list[str], where: str) -> list[int]:
-    """Returns the indices of the columns x, y and, if present, z.
+def _columns(cells: list[str], where: str) -> dict[str, int]:
+    """Returns the indices of the columns x, y and, if present, z and velocity.
 
     `cells` is the first line of the file. If the line has no names, the columns
-    are in this order. `where` begins the error messages.
+    are x, y and z. `where` begins the error messages.
 
     Raises:
         InputError: the first line has neither such names nor such numbers.
     """
     names = [cell.lower() for cell in cells]
     if {"x", "y"} <= set(names):
-        wanted = ["x", "y", "z"] if "z" in names else ["x", "y"]
+        wanted = [one for one in ("x", "y", "z", "velocity") if one in names]
         for name in repeated(names):
             if name in wanted:
                 raise InputError(f"{where}: column '{name}' is there twice")
-        return [names.index(name) for name in wanted]
+        return {name: names.index(name) for name in wanted}
     if not all(_is_number(cell) for cell in cells):
         raise InputError(
             f"{where}: neither numbers nor the names of columns x, y and z"
@@ -335,7 +386,7 @@ def _columns(cells: list[str], where: str) -> list[int]:
         raise InputError(
             f"{where}: {len(cells)} column(s); it must be x, y or x, y, z"
         )
-    return list(range(len(cells)))
+    return {name: k for k, name in enumerate("xyz"[: len(cells)])}
 
 
 def _is_number(text: str) -> bool:

@@ -31,6 +31,7 @@ from cns_drake.roads import (
     load_road_network,
     load_waypoint_path,
     make_lane_path,
+    read_waypoints,
 )
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files
@@ -258,8 +259,9 @@ def ground_notes(scenario: Scenario, trajectory: Trajectory) -> tuple[str, ...]:
     Raises:
         InputError: the world cannot be loaded.
     """
+    named = _unused_columns(scenario)
     if scenario.world is None:
-        return ()
+        return named
     times = np.linspace(0.0, trajectory.duration, _CHECKED)
     path = trajectory.poses(times)[1]
     start = path + np.array([0.0, 0.0, _ABOVE_PATH])
@@ -267,7 +269,7 @@ def ground_notes(scenario: Scenario, trajectory: Trajectory) -> tuple[str, ...]:
     ranges = _scene_of(scenario).cast_rays(start, down, _DEEPEST).ranges
     above = ranges - _ABOVE_PATH
     is_there = np.isfinite(above)
-    notes = []
+    notes = [*named]
     if not is_there.all():
         notes.append(
             f"{scenario.waypoints}: no ground is below"
@@ -282,6 +284,16 @@ def ground_notes(scenario: Scenario, trajectory: Trajectory) -> tuple[str, ...]:
             f" {abs(above[worst]):.2f} m {side} the ground, at z = {z:.2f} m"
         )
     return tuple(notes)
+
+
+def _unused_columns(scenario: Scenario) -> tuple[str, ...]:
+    """Returns a note on columns of the waypoints that are not used."""
+    if scenario.waypoints is None:
+        return ()
+    unused = read_waypoints(scenario.waypoints).unused
+    if not unused:
+        return ()
+    return (f"{scenario.waypoints}: not used: the columns {', '.join(unused)}",)
 
 
 def _ground_heights(scenario: Scenario, xy: np.ndarray) -> np.ndarray:

@@ -122,3 +122,27 @@ def test_model_paths_must_exist_and_need_a_world(scenario, tmp_path):
     (tmp_path / "e.yaml").write_text("base: downtown_01\nmodel_paths: [.]\n")
     with pytest.raises(InputError, match=r"model_paths.*for a world only"):
         load_scenario(tmp_path / "e.yaml")
+
+
+def test_the_velocity_of_waypoints_limits_the_speed(scenario):
+    rows = "x,y,velocity,lane\n0,0,4,a\n100,0,4,a\n150,0,12,a\n300,0,0,a\n"
+    drive = scenario(BOX.format("s", "150 0 -0.5", "400 20 1"), rows)
+    trajectory = plan_drive(drive)
+    times = np.linspace(0.0, trajectory.duration, 4000)
+    x = trajectory.poses(times)[1][:, 0]
+    speed = np.gradient(x, times)
+    slow = (x > 20.0) & (x < 95.0)
+    assert speed[slow].max() < 4.05
+    assert speed[slow].min() > 3.9
+    # The scenario's own limit is 8 m/s.
+    assert 7.5 < speed.max() < 8.05
+    limit = np.interp(x, [0, 100, 150, 300], [4, 4, 12, 0])
+    assert (speed < np.maximum(limit, 0.5) + 0.1).all()
+    (note,) = ground_notes(drive, trajectory)
+    assert note.endswith("p.csv: not used: the columns lane")
+
+
+def test_a_velocity_below_zero_is_refused(scenario):
+    drive = scenario(STREET, "x,y,velocity\n0,0,4\n60,0,-1\n")
+    with pytest.raises(InputError, match=r"line 3: velocity: -1 m/s is below"):
+        plan_drive(drive)
