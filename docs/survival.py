@@ -4,9 +4,10 @@
 
 The losses are those of the shipped tables (source `tables`: a query every 10 m,
 one draw of the random yaw; `figure-1`: the same without fresh Metropolis, which
-has the stages of Metropolis cleared), and of `notes/yaw_draws.csv` (source
-`draws`: a query every 30 m, each draw and the mean of all, at four radii of a
-match).
+has the stages of Metropolis cleared), of `notes/yaw_draws.csv` (source `draws`:
+a query every 30 m, each draw and the mean of all, at four radii of a match),
+and of `notes/new_plans.csv` (source `networks`, `extracts` of OpenStreetMap,
+and `towns` of CARLA's; a method counts where its control finds anything).
 """
 
 from __future__ import annotations
@@ -68,6 +69,7 @@ def lines() -> Iterator[tuple[object, ...]]:
         others = [row for row in rows if "metropolis, fresh" not in row.map]
         for one in judge_survival(others):
             yield "figure-1", "7.5", "0", *_cells(verified, one)
+        yield from _on_networks(verified)
     # The lost shares of the pairs of each city.
     losses: dict[tuple[str, ...], dict[str, dict[str, list[float]]]] = {}
     for row in csv_rows("yaw_draws.csv"):
@@ -90,8 +92,28 @@ def lines() -> Iterator[tuple[object, ...]]:
             yield "draws", radius, draw, *_cells(verified == "1", one)
 
 
+def _on_networks(verified: bool) -> Iterator[tuple[object, ...]]:
+    rows = (
+        Results.read(ROOT / "docs/notes/new_plans.csv")
+        .where({STAGE: OWN}, metric="relative_auc_strict", verified=verified)
+        .rows
+    )
+    for method in sorted({row.method for row in rows}):
+        of_method = [row for row in rows if row.method == method]
+        towns = [row for row in of_method if row.map.startswith("town")]
+        extracts = [row for row in of_method if row not in towns]
+        for source, some in (
+            ("networks", of_method), ("extracts", extracts), ("towns", towns),
+        ):  # fmt: skip
+            for one in judge_survival(some):
+                yield source, "7.5", "0", *_cells(verified, one)
+
+
 def _cells(verified: bool, one: Survival) -> tuple[object, ...]:
-    limits = (f"{limit:.6f}" for limit in (one.interval.low, one.interval.high))
+    limits = (
+        "" if np.isnan(limit) else f"{limit:.6f}"
+        for limit in (one.interval.low, one.interval.high)
+    )  # fmt: skip
     return (
         int(verified), one.method, f"{one.loss:.6f}", *limits, one.cities,
         one.verdict,
