@@ -334,6 +334,8 @@ def _cloud(method: Method, seed: int, number: int | None = None) -> np.ndarray:
     )
     for axis, values in zip("xyz", points.T, strict=True):
         cloud[axis] = values
+    for name in names:  # Small whole numbers are a ring and a class, too.
+        cloud[name] = rng.integers(0, 8, len(points))
     return cloud
 
 

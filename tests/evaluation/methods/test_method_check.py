@@ -42,6 +42,16 @@ def test_a_correct_method_passes_each_check(check):
     assert ". " not in check.__doc__
 
 
+def test_a_method_of_another_field_alone_passes():
+    """Made-up points have values there that differ, as those of a radar."""
+
+    def describe(self, points):
+        ranges = np.hypot(points["x"], points["y"])
+        return np.histogram(ranges, 20, (0.0, 80.0), weights=points["power"])[0]
+
+    check_method(replaced(describe=describe, point_fields=("power",)))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*shipped_methods(), "probe"])
 def test_shipped_methods_pass(name):

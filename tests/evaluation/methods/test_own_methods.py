@@ -83,13 +83,13 @@ def test_the_shown_method_finds_turned_places(tmp_path):
         ("1 / 0", "ZeroDivisionError: division by zero"),
         ("x = 1", "registers 0 methods"),
         (
-            "from evaluation.methods import Method, register\n"
-            "register('btc')(type('A', (Method,), {}))",
+            "from evaluation.methods import METHODS, register\n"
+            "register('btc')(type('A', (METHODS['solid'],), {}))",
             "there is another method 'btc'",
         ),
         (
-            "from evaluation.methods import Method, register\n"
-            "register('bevplace')(type('A', (Method,), {}))",
+            "from evaluation.methods import METHODS, register\n"
+            "register('bevplace')(type('A', (METHODS['solid'],), {}))",
             "there is another method 'bevplace'",
         ),
         (
