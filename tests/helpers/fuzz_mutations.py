@@ -153,7 +153,7 @@ def _mutate_tree(tree, rng):
             return _pick(rng, _VALUES)
         holder, key = places[int(rng.integers(len(places)))]
         value = holder[key]
-        kind = rng.integers(6)
+        kind = rng.integers(7)
         if kind == 0:
             del holder[key]
         elif kind == 1 and isinstance(value, int | float):
@@ -168,9 +168,19 @@ def _mutate_tree(tree, rng):
             holder[key] = json.loads(json.dumps(other[place], default=repr))
         elif kind == 4:
             holder[key] = _pick(rng, ([value], {"a": value}, str(value)))
+        elif kind == 5 and isinstance(value, list):
+            holder[key] = _tangled(value, rng)
         else:
             holder[key] = _pick(rng, _VALUES)
     return tree
+
+
+def _tangled(corners, rng):
+    """Returns corners of many laps, one after the other or to and fro."""
+    laps = (corners * int(_pick(rng, (2, 50, 2000))))[:20_000]
+    if rng.random() < 0.5:
+        laps = [laps[k] for k in rng.permutation(len(laps))]
+    return laps
 
 
 def _places(tree):
@@ -231,8 +241,8 @@ def _mutate_tokens(data: bytes, rng, first: int = 4000) -> bytes:
 
 
 def mutate_osm(path: Path, data: bytes, rng: np.random.Generator) -> bytes:
-    """Mutates OpenStreetMap's XML: words, bytes, or references."""
-    kind = rng.integers(6)
+    """Mutates OpenStreetMap's XML: words, bytes, ways, or references."""
+    kind = rng.integers(7)
     if kind < 2:
         return _mutate_tokens(data, rng, first=1 << 20)
     if kind == 2:
@@ -240,6 +250,11 @@ def mutate_osm(path: Path, data: bytes, rng: np.random.Generator) -> bytes:
     text = data.decode()
     if kind == 3:
         return _pick(rng, _OSM_DOCUMENTS).encode()
+    if kind == 4:
+        nodes = "<nd [^>]*>"
+        way = _pick(rng, list(re.finditer(rf"(?:{nodes}\s*)+", text)))
+        laps = "".join(_tangled(re.findall(nodes, way[0]), rng))
+        return (text[: way.start()] + laps + text[way.end() :]).encode()
     name, words = _pick(
         rng,
         (
