@@ -52,10 +52,10 @@ def _triangles_of_geos(polygon: Polygon) -> np.ndarray:
     )
     rounded = shapely.remove_repeated_points(rounded)
     try:
-        parts = shapely.constrained_delaunay_triangles(rounded)
+        triangles = shapely.constrained_delaunay_triangles(rounded)
     except shapely.errors.GEOSException as error:
         raise ValueError("the polygon is not valid") from error
-    parts = shapely.orient_polygons(shapely.get_parts(parts))
+    parts = shapely.orient_polygons(shapely.get_parts(triangles))
     return shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3]
 
 
