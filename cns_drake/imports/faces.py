@@ -175,24 +175,24 @@ def valid_area(polygon: Polygon) -> BaseGeometry:
     if polygon.is_valid:
         return polygon
     rings = (polygon.exterior, *polygon.interiors)
-    if any(is_tangled(np.array(ring.coords)) for ring in rings):
+    if is_tangled(*(np.array(ring.coords) for ring in rings)):
         return Polygon()
     return make_valid(polygon)
 
 
-def is_tangled(line: np.ndarray, reach: float = 0.0) -> bool:
-    """Returns whether pieces of a line (N, 2) meet too many others.
+def is_tangled(*lines: np.ndarray, reach: float = 0.0) -> bool:
+    """Returns whether pieces of lines (N, 2) meet too many others.
 
     Shapely takes minutes and gigabytes for a line that crosses or covers itself
     very often, which no map needs and a small file can contain. The pieces of
     long lines are sampled.
 
     Args:
-        line: the corners of the line.
+        lines: the corners of each line.
         reach: distance at which pieces meet; by default they cross.
     """
-    ends = np.stack([line[:-1], line[1:]], axis=1)
-    pieces = np.asarray(shapely.linestrings(ends))
+    ends = [np.stack([line[:-1], line[1:]], axis=1) for line in lines]
+    pieces = np.asarray(shapely.linestrings(np.concatenate(ends)))
     some = pieces[:: max(1, len(pieces) // _SAMPLED)]
     tree = shapely.STRtree(pieces)
     _, met = tree.query(some, predicate="dwithin", distance=reach)

@@ -212,7 +212,7 @@ def _way_of(
         return None
     line = np.array([(node.lon, node.lat) for node in nodes])
     if len(line) > _MANY_NODES and (
-        is_tangled(line) or is_tangled(line, _NEAR)
+        is_tangled(line) or is_tangled(line, reach=_NEAR)
     ):
         faults.add("way with a tangle of nodes, left out", name)
         return None

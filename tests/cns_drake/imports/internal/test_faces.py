@@ -67,3 +67,10 @@ def test_faults_are_repaired_or_left_out_and_noted(xy, kind, area):
         kind in told and example == "the one"
         for told, _, example in faults.rows()
     )
+
+
+def test_holes_that_lie_in_each_other_are_a_tangle():
+    faults = ImportFaults()
+    found = face_triangles([ring(OUTER), *[ring(HOLE)] * 1500], "a", faults)
+    assert len(found) == 0
+    assert "very often, left out" in faults.rows()[0][0]
