@@ -1,5 +1,7 @@
 """Solids on footprints, with the roof shapes that OpenStreetMap describes."""
 
+import itertools
+
 import numpy as np
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
@@ -13,6 +15,24 @@ from cns_drake.imports.faults import ImportFaults
 _MOST_INSET_SHARE = 0.45
 # Shorter ridges count as this long [m].
 _SHORTEST_RIDGE = 1e-6
+# Shape of a roof -> its outline as shares of the footprint's size, and heights
+# as shares of the roof's height, from the eaves to the top.
+_ARC = np.linspace(0.0, 0.5 * np.pi, 7)
+_PROFILES: dict[str, list[tuple[float, float]]] = {
+    "pyramidal": [(1.0, 0.0), (0.0, 1.0)],
+    "dome": [*zip(np.cos(_ARC).tolist(), np.sin(_ARC).tolist(), strict=True)],
+    "onion": [
+        (1.0, 0.0),
+        (0.96, 0.2),
+        (0.8, 0.4),
+        (0.45, 0.6),
+        (0.15, 0.75),
+        (0.06, 0.9),
+        (0.0, 1.0),
+    ],
+}
+# Inset of a mansard roof's flat top, as a share of the roof's height.
+_MANSARD_INSET = 0.5
 # Triangles (M, 3, 3) of a pitched roof [m]: its slopes, and its gables.
 _Roof = tuple[list[np.ndarray], list[np.ndarray]]
 
@@ -39,9 +59,10 @@ def extruded(
         high: height of the highest point [m].
         name: name of the object, as an example in `faults`.
         faults: counts roofs and areas that were replaced or left out.
-        roof: `flat`; `pyramidal`, on a footprint without holes whose centroid
-            sees all of its walls; `gabled` or `hipped`, on a footprint with
-            four corners.
+        roof: `flat`; `skillion`; `pyramidal`, `dome` or `onion`, on a
+            footprint without holes whose centroid sees all of its walls;
+            `mansard`, on a footprint without holes; `gabled` or `hipped`, on a
+            footprint with four corners.
         roof_height: height of the roof above the eaves [m].
         ground: height of the ground [m].
     """
@@ -54,7 +75,7 @@ def extruded(
     corners = level_rings(polygon, eaves)[0]
     pitched = None
     if roof != "flat" and roof_height > 0.0:
-        pitched = _slopes_and_gables(roof, polygon, corners, high)
+        pitched = _slopes_and_gables(roof, polygon, corners, high, roof_height)
         # A slope that looks downwards reaches beyond the footprint.
         if pitched is None or (
             long_normals(np.concatenate(pitched[0]))[:, 2].min() < -LEAST_AREA
@@ -81,7 +102,11 @@ def _walls(polygon: Polygon, low: float, high: float) -> np.ndarray:
 
 
 def _slopes_and_gables(
-    roof: str, polygon: Polygon, corners: np.ndarray, high: float
+    roof: str,
+    polygon: Polygon,
+    corners: np.ndarray,
+    high: float,
+    roof_height: float,
 ) -> _Roof | None:
     """Returns the slopes and gables of a roof; None if it cannot be made.
 
@@ -90,15 +115,17 @@ def _slopes_and_gables(
         polygon: the footprint.
         corners: (N, 3) outline of the footprint at the height of the eaves [m].
         high: height of the highest point [m].
+        roof_height: height of the roof above the eaves [m].
     """
-    if roof == "pyramidal" and not polygon.interiors:
-        top = np.array([polygon.centroid.x, polygon.centroid.y, high])
-        following = np.roll(corners, -1, axis=0)
-        tops = np.broadcast_to(top, corners.shape)
-        return [np.stack([corners, following, tops], axis=1)], []
-    if roof not in ("gabled", "hipped") or len(corners) != 4:
-        return None
     if polygon.interiors:
+        return None
+    if roof in _PROFILES:
+        return _rising_rings(corners, polygon, roof_height, _PROFILES[roof]), []
+    if roof == "mansard":
+        return _mansard(corners, polygon, roof_height)
+    if roof == "skillion":
+        return _skillion(corners, polygon, roof_height)
+    if roof not in ("gabled", "hipped") or len(corners) != 4:
         return None
     sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
     # The ridge runs along the two longer sides: from corners 0 and 2.
@@ -120,3 +147,89 @@ def _slopes_and_gables(
     ]
     ends = [np.array([[b, c, end]]), np.array([[d, a, start]])]
     return (slopes + ends, []) if roof == "hipped" else (slopes, ends)
+
+
+def _rising_rings(
+    corners: np.ndarray,
+    polygon: Polygon,
+    roof_height: float,
+    profile: list[tuple[float, float]],
+) -> list[np.ndarray]:
+    """Returns the surface of a roof whose outline shrinks to a point.
+
+    Args:
+        corners: (N, 3) outline at the eaves [m].
+        polygon: the footprint.
+        roof_height: height of the roof [m].
+        profile: see `_PROFILES`.
+    """
+    middle = np.array([polygon.centroid.x, polygon.centroid.y, corners[0, 2]])
+    rings = [
+        middle + size * (corners - middle) + [0.0, 0.0, rise * roof_height]
+        for size, rise in profile
+    ]
+    rings[0] = corners
+    surface = []
+    for below, above in itertools.pairwise(rings):
+        following = np.roll(below, -1, axis=0)
+        surface.append(np.stack([below, following, above], axis=1))
+        if above is not rings[-1]:
+            next_above = np.roll(above, -1, axis=0)
+            surface.append(np.stack([following, next_above, above], axis=1))
+    return surface
+
+
+def _mansard(
+    corners: np.ndarray, polygon: Polygon, roof_height: float
+) -> _Roof | None:
+    """Returns steep slopes around a flat top; None without room for it."""
+    top = polygon.buffer(-_MANSARD_INSET * roof_height, join_style="mitre")
+    if not isinstance(top, Polygon) or top.is_empty:
+        return None
+    ring = level_rings(orient(top), corners[0, 2] + roof_height)[0]
+    if len(ring) != len(corners):
+        return None
+    # Each corner moves inwards, so that the nearest is its own.
+    first = np.linalg.norm(ring[:, :2] - corners[0, :2], axis=1).argmin()
+    ring = np.roll(ring, -int(first), axis=0)
+    following, next_ring = (
+        np.roll(corners, -1, axis=0),
+        np.roll(ring, -1, axis=0),
+    )
+    flat = flat_surface(
+        Polygon(ring[:, :2]), float(ring[0, 2]), "", ImportFaults()
+    )
+    return [
+        np.stack([corners, following, next_ring], axis=1),
+        np.stack([corners, next_ring, ring], axis=1),
+        flat,
+    ], []
+
+
+def _skillion(
+    corners: np.ndarray, polygon: Polygon, roof_height: float
+) -> _Roof:
+    """Returns a roof that rises from the longest side, and its gables."""
+    sides = np.roll(corners, -1, axis=0) - corners
+    longest = int(np.linalg.norm(sides, axis=1).argmax())
+    inwards = np.array([-sides[longest, 1], sides[longest, 0]])
+    away = (corners[:, :2] - corners[longest, :2]) @ inwards
+    low, high = away.min(), away.max()
+
+    def raised(points: np.ndarray) -> np.ndarray:
+        share = (points[..., :2] - corners[longest, :2]) @ inwards
+        found = points.copy()
+        found[..., 2] += roof_height * (share - low) / (high - low)
+        return found
+
+    flat = flat_surface(polygon, float(corners[0, 2]), "", ImportFaults())
+    following = np.roll(corners, -1, axis=0)
+    top, next_top = raised(corners), raised(following)
+    gables = np.concatenate(
+        [
+            np.stack([corners, following, next_top], axis=1),
+            np.stack([corners, next_top, top], axis=1),
+        ]
+    )
+    areas = np.linalg.norm(long_normals(gables), axis=1)
+    return [raised(flat)], [gables[areas > LEAST_AREA]]

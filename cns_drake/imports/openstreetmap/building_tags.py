@@ -85,6 +85,9 @@ def heights(
             levels = TABLES["levels"].get(
                 tags.get("building", ""), _USUAL_LEVELS
             )
+            work = TABLES["works"].get(tags.get("man_made", ""))
+            if work is not None and "building" not in tags:
+                levels = work / STOREY_HEIGHT
         high = STOREY_HEIGHT * levels + (
             roof or STOREY_HEIGHT * (roof_levels or 0.0)
         )
@@ -116,7 +119,8 @@ def why_absent(tags: Mapping[str, str]) -> str | None:
     The reason follows from the building's tags. The result is None if the
     building is not left out.
     """
-    if not ("building" in tags or "building:part" in tags):
+    known = tags.keys() & {"building", "building:part"}
+    if not known and tags.get("man_made") not in TABLES["works"]:
         return "demolished"
     kinds = [tags.get("building", ""), tags.get("building:part", "")]
     reasons: dict[str, str] = TABLES["absent"]

@@ -29,12 +29,13 @@ def element_kind(tags: Tags) -> str:
 def is_building(tags: Tags) -> bool:
     """Returns whether tags describe a building or a part of a building.
 
-    A former building counts as well, if its tags state the date of its
-    demolition.
+    Towers, chimneys, tanks and silos of `man_made` count, too. A former
+    building counts as well, if its tags state the date of its demolition.
     """
     return (
         has_tag(tags, "building")
         or has_tag(tags, "building:part")
+        or tags.get("man_made") in TABLES["works"]
         or ("end_date" in tags and was_building(tags))
     )
 

@@ -207,7 +207,18 @@ def test_dates_match_as_a_whole(tmp_path, key, text, year):
 
 @pytest.mark.parametrize(
     ("roof", "part"),
-    [("flat", 1.0), ("gabled", 0.5), ("pyramidal", 1 / 3), ("hipped", 1 / 3)],
+    [
+        ("flat", 1.0),
+        ("gabled", 0.5),
+        ("pyramidal", 1 / 3),
+        ("hipped", 1 / 3),
+        ("skillion", 0.5),
+        # Sum of dz (s s + s t + t t) / 3 over the frusta between their rings.
+        ("dome", 0.655309),
+        ("onion", 0.444080),
+        # Between 12 m x 6 m and, 1.5 m from each side, 9 m x 3 m.
+        ("mansard", (72 + 27 + 4 * 10.5 * 4.5) / 6 / 72),
+    ],
 )
 @pytest.mark.parametrize("turned", [0, 1])
 def test_roofs_hold_their_volume(tmp_path, roof, part, turned):
@@ -221,6 +232,27 @@ def test_roofs_hold_their_volume(tmp_path, roof, part, turned):
     expected = 72.0 * (6.0 + 3.0 * part)
     assert volume(one.triangles) == pytest.approx(expected, rel=1e-3)
     assert faults == []
+
+
+@pytest.mark.parametrize(
+    ("tags", "height"),
+    [
+        ({"man_made": "chimney"}, 40.0),
+        ({"man_made": "silo", "height": "22"}, 22.0),
+        ({"man_made": "tower", "building": "yes"}, 9.0),
+        ({"man_made": "storage_tank", "roof__shape": "dome"}, 15.0),
+    ],
+)
+def test_towers_and_tanks_are_built(tmp_path, tags, height):
+    city = OsmWriter()
+    ring = [
+        (4 * np.cos(a), 4 * np.sin(a))
+        for a in np.linspace(0, 2 * np.pi, 16, endpoint=False)
+    ]
+    city.way(ring, closed=True, **tags)
+    _, found = import_osm(city.write(tmp_path / "a.osm"))
+    (one,) = (x for x in found.values() if x.object_type == "Building")
+    assert np.ptp(one.triangles[..., 2]) == pytest.approx(height, abs=0.01)
 
 
 @pytest.mark.parametrize(
