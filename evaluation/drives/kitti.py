@@ -305,7 +305,7 @@ def _poses_path(path: Path, notes: list[str]) -> Path:
     if found is None:
         raise InputError(
             f"{path}: KITTI: no poses, neither ../../poses/{given.name}"
-            " nor poses.txt"
+            " nor poses.txt; --poses FILE gives those of the LiDAR"
         )
     return found
 

@@ -28,6 +28,8 @@ _LEAST_LEVELS = 0.5
 _LEAST_HIGH = 1.0
 # Least height of a building from its lowest to its highest point [m].
 _LEAST_HEIGHT = 0.5
+# Greatest height of a roof without `roof:height`, as a share of the building's.
+_MOST_ROOF = 0.5
 # Least height of the walls below a roof [m].
 LEAST_WALL = 0.1
 # Values of `building` and `building:part` for a roof on posts.
@@ -71,6 +73,7 @@ def heights(
     # A building may have no levels of its own if its roof has some.
     levels = number("building:levels", 0.0 if roof_levels else _LEAST_LEVELS)
     roof = metres("roof:height")
+    is_guessed = roof is None
     if roof is None:
         roof = STOREY_HEIGHT * (roof_levels or 1.0)
         if tags.get("roof:shape", "flat") == "flat":
@@ -104,6 +107,9 @@ def heights(
         name, faults = where
         faults.add("building that begins above its top, lowered", name)
     low = min(low, high - _LEAST_HEIGHT)
+    if is_guessed:
+        # No house is only a roof that stands on the ground.
+        roof = min(roof, _MOST_ROOF * (high - low))
     return BuildingHeights(low, high, min(roof, high - low - LEAST_WALL))
 
 

@@ -234,6 +234,12 @@ def test_roofs_hold_their_volume(tmp_path, roof, part, turned):
     assert faults == []
 
 
+def test_a_house_has_walls_below_a_roof_of_unknown_height(tmp_path):
+    corners = [(0, 0), (12, 0), (12, 8), (0, 8)]
+    one, _ = building(tmp_path, corners, height="3", roof__shape="gabled")
+    assert volume(one.triangles) == pytest.approx(96 * 2.25, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("tags", "height"),
     [

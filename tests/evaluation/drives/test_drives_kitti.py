@@ -296,3 +296,19 @@ def test_a_scan_that_cannot_be_used(tmp_path):
     path.unlink()
     with pytest.raises(InputError, match=f"^{path}: No such file"):
         drive.scan(1)
+
+
+def test_poses_of_a_file_replace_those_that_are_missing(tmp_path):
+    folder = tmp_path / "sequences" / "11"
+    for k in range(4):
+        points = make_points(5, seed=k)
+        write_bytes(folder / "velodyne" / f"{k:06d}.bin", xyzi(points))
+    (folder / "times.txt").write_text("0\n0.1\n0.2\n0.3\n")
+    with pytest.raises(InputError, match=r"KITTI: no poses, .* --poses FILE"):
+        open_drive(folder)
+    tum = tmp_path / "poses.tum"
+    tum.write_text("0.05 1 0 0 0 0 0 1\n0.25 3 0 0 0 0 0 1\n")
+    drive = open_drive(folder, poses=tum)
+    assert drive.stamps_ns.tolist() == [100_000_000, 200_000_000]
+    np.testing.assert_allclose(drive.X_WS[:, 0, 3], [1.5, 2.5])
+    assert tum in drive.files
