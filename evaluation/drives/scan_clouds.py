@@ -160,16 +160,26 @@ def _within_range(
         for coordinates, axis in zip(p_S, "xyz", strict=True):
             coordinates[:] = scan[axis]
     X = np.eye(4) if X_FS is None else np.array(X_FS, np.float64, order="C")
-    return _move_and_crop(p_S, X, X_FS is not None, float(half_extent))
+    p_F, rows = np.empty((len(scan), 3)), np.empty(len(scan), np.int64)
+    extent = float(half_extent)
+    number = _move_and_crop(p_S, X, X_FS is not None, extent, p_F, rows)
+    return p_F[:number].copy(), rows[:number].copy()
 
 
 @compiled
 def _move_and_crop(
-    p_S: np.ndarray, X_FS: np.ndarray, is_moved: bool, half_extent: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Moves points (3, N) to F; returns those within range, and their rows."""
-    p_F = np.empty((p_S.shape[1], 3))
-    rows = np.empty(p_S.shape[1], np.int64)
+    p_S: np.ndarray,
+    X_FS: np.ndarray,
+    is_moved: bool,
+    half_extent: float,
+    p_F: np.ndarray,
+    rows: np.ndarray,
+) -> int:
+    """Moves points (3, N) to F; returns how many are within range.
+
+    The first of `p_F` (N, 3) and `rows` (N,) are set to these points and their
+    rows.
+    """
     number = 0
     for row in range(p_S.shape[1]):
         x, y, z = p_S[0, row], p_S[1, row], p_S[2, row]
@@ -191,4 +201,4 @@ def _move_and_crop(
             p_F[number, 2] = z
             rows[number] = row
             number += 1
-    return p_F[:number].copy(), rows[:number].copy()
+    return number

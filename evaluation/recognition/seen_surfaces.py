@@ -13,6 +13,7 @@ farther apart (docs/notes/cities.md).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 import math
@@ -149,49 +150,64 @@ class SeenSurfaces:
         Args:
             points: (N, 3) points in the sensor's frame [m].
         """
-        return _measure_clearances(
-            _contiguous(points), self.points, self.angles_deg, self.starts
-        )
+        clearances = np.full(len(points), math.nan)
+        self._compare(_measure_clearances, points, clearances)
+        return clearances
 
     def hides(self, points: np.ndarray) -> np.ndarray:
         """Returns which points (N, 3) are behind a seen surface, (N,) bool."""
         return self._kinds(points) == _BEHIND
 
     def _kinds(self, points: np.ndarray) -> np.ndarray:
-        return _classify(
-            _contiguous(points), self.points, self.angles_deg, self.starts
-        )
+        kinds = np.full(len(points), _UNKNOWN, np.int8)
+        self._compare(_classify, points, kinds)
+        return kinds
+
+    def _compare(
+        self, loop: Callable[..., None], points: np.ndarray, result: np.ndarray
+    ) -> None:
+        """Compares points with the surfaces, in a compiled loop."""
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        around = np.empty(4, np.int64), np.empty(4)
+        loop(points, self.points, self.angles_deg, self.starts, *around, result)
 
 
-def _contiguous(points: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(points, dtype=np.float64)
+# Few compiled functions, of numbers: each function takes long to compile, and
+# so do new arrays, rows of arrays and named tuples.
 
 
 @compiled
-def _find_nearest_by_quadrant(
-    p: np.ndarray,
+def _look_towards(
+    x: float,
+    y: float,
+    z: float,
+    seen: np.ndarray,
     angles: np.ndarray,
     starts: np.ndarray,
     corners: np.ndarray,
     away: np.ndarray,
-) -> None:
+) -> tuple[int, float, float, float]:
     """Finds the nearest return in each quadrant around a point's direction.
 
-    Fills in (4,) indices of returns, -1 if there is none, and (4,) their
-    angular distances [deg].
-
     Args:
-        p: (3,) the point [m].
-        angles, starts: see `SeenSurfaces`.
-        corners: (4,) indices of the returns, an output.
+        x, y, z: the point [m].
+        seen, angles, starts: see `SeenSurfaces`; `seen` are its points.
+        corners: (4,) indices of the returns, -1 for none, an output.
         away: (4,) angular distances of the returns, infinite for none, an
-            output.
+            output [deg].
+
+    Returns:
+        The number of returns, from 0 to 4; the least of their ranges, infinite
+        without returns [m]; the greatest, 0 without returns [m]; and the least
+        difference between the point's range and that of a return very near to
+        its direction, infinite without one [m].
     """
-    corners[:] = -1
-    away[:] = math.inf
-    flat = math.hypot(p[0], p[1])
-    elevation = math.degrees(math.atan2(p[2], flat)) + 90.0
-    azimuth = math.degrees(math.atan2(p[1], p[0])) + 180.0
+    for quadrant in range(4):
+        corners[quadrant] = -1
+        away[quadrant] = math.inf
+    flat = math.hypot(x, y)
+    elevation = math.degrees(math.atan2(z, flat)) + 90.0
+    azimuth = math.degrees(math.atan2(y, x)) + 180.0
     # A degree of azimuth is a smaller angle at a high elevation.
     shrink = math.sin(math.radians(elevation))
     row = min(int(elevation), _ROWS - 1)
@@ -223,205 +239,141 @@ def _find_nearest_by_quadrant(
                 if distance < away[quadrant]:
                     away[quadrant] = distance
                     corners[quadrant] = k
-
-
-@compiled
-def _fit_plane(
-    seen: np.ndarray, corners: np.ndarray, away: np.ndarray
-) -> tuple[float, float, float, float]:
-    """Returns the plane n p = h through three points of a scan.
-
-    Of the four `corners`, the three with the least distances `away` are used.
-    The normal n need not have unit length.
-
-    Returns:
-        The three components of n, and h.
-    """
-    # In place of `np.argsort`, which takes a second to compile.
-    order = np.empty(4, np.int64)
-    for quadrant in range(4):
-        rank = quadrant
-        while rank > 0 and away[quadrant] < away[order[rank - 1]]:
-            order[rank] = order[rank - 1]
-            rank -= 1
-        order[rank] = quadrant
-    a = seen[corners[order[0]]]
-    u = seen[corners[order[1]]] - a
-    v = seen[corners[order[2]]] - a
-    nx = u[1] * v[2] - u[2] * v[1]
-    ny = u[2] * v[0] - u[0] * v[2]
-    nz = u[0] * v[1] - u[1] * v[0]
-    return nx, ny, nz, nx * a[0] + ny * a[1] + nz * a[2]
-
-
-@compiled
-def _length(p: np.ndarray) -> float:
-    return math.sqrt(p[0] ** 2 + p[1] ** 2 + p[2] ** 2)
-
-
-class _Returns(NamedTuple):
-    """The returns in the four quadrants around a direction.
-
-    Attributes:
-        number: how many there are, from 0 to 4.
-        nearest: the least range [m]; infinite without returns.
-        farthest: the greatest range [m]; 0 without returns.
-        is_one_surface: whether they are on one surface, to which a plane fits.
-    """
-
-    number: int
-    nearest: float
-    farthest: float
-    is_one_surface: bool
-
-
-@compiled
-def _measure_returns(seen: np.ndarray, corners: np.ndarray) -> _Returns:
-    """Returns the ranges of the returns around a direction.
-
-    Args:
-        seen: (N, 3) points of the scan [m].
-        corners: (4,) index of the return in each quadrant, -1 for none.
-    """
+    distance = math.sqrt(x * x + y * y + z * z)
     number = 0
-    nearest = math.inf
+    nearest = gap = math.inf
     farthest = 0.0
-    for corner in corners:
-        if corner >= 0:
-            reach = _length(seen[corner])
-            number += 1
-            nearest, farthest = min(nearest, reach), max(farthest, reach)
-    is_one_surface = number >= 3 and farthest <= _FARTHEST * nearest
-    return _Returns(number, nearest, farthest, is_one_surface)
-
-
-class _PlaneSide(NamedTuple):
-    """Where a point p lies relative to a plane n x = h; all 0 without a plane.
-
-    Attributes:
-        along: n p.
-        h: the plane's h.
-        size: length of the normal n.
-    """
-
-    along: float
-    h: float
-    size: float
+    for quadrant in range(4):
+        k = corners[quadrant]
+        if k < 0:
+            continue
+        a, b, c = seen[k, 0], seen[k, 1], seen[k, 2]
+        reach = math.sqrt(a * a + b * b + c * c)
+        number += 1
+        nearest, farthest = min(nearest, reach), max(farthest, reach)
+        if away[quadrant] <= _NEAR_DEG:
+            gap = min(gap, abs(reach - distance))
+    return number, nearest, farthest, gap
 
 
 @compiled
 def _compare_to_plane(
-    p: np.ndarray,
+    x: float,
+    y: float,
+    z: float,
     seen: np.ndarray,
     corners: np.ndarray,
     away: np.ndarray,
-    around: _Returns,
-) -> _PlaneSide:
-    """Compares a point with the plane through the returns around it.
+) -> tuple[float, float, float]:
+    """Compares a point p with the plane n x = h through three of the returns.
 
-    There is no plane with fewer than three returns.
+    These are the returns in the nearest directions; there are at least three.
+    `corners` and `away` are sorted by these distances. The normal n need not
+    have unit length.
 
     Args:
-        p: (3,) the point [m].
+        x, y, z: the point [m].
         seen: (N, 3) points of the scan [m].
         corners: (4,) index of the return in each quadrant, -1 for none.
         away: (4,) angular distances of these returns [deg].
-        around: the same returns' ranges.
+
+    Returns:
+        n p, h, and the length of n.
     """
-    if around.number < 3:
-        return _PlaneSide(0.0, 0.0, 0.0)
-    x, y, z, h = _fit_plane(seen, corners, away)
-    along = x * p[0] + y * p[1] + z * p[2]
-    return _PlaneSide(along, h, math.sqrt(x * x + y * y + z * z))
-
-
-@compiled
-def _is_beside_return(
-    p: np.ndarray, seen: np.ndarray, corners: np.ndarray, away: np.ndarray
-) -> bool:
-    """Returns whether a return near a point's direction has the point's range.
-
-    Args:
-        p: (3,) the point [m].
-        seen: (N, 3) points of the scan [m].
-        corners: (4,) index of the return in each quadrant, -1 for none.
-        away: (4,) angular distances of these returns [deg], infinite for none.
-    """
-    distance = _length(p)
-    for quadrant in range(4):
-        if away[quadrant] <= _NEAR_DEG:
-            reach = _length(seen[corners[quadrant]])
-            if abs(reach - distance) <= TOLERANCE:
-                return True
-    return False
+    # In place of `np.argsort`, which takes a second to compile.
+    for last in range(3, 0, -1):
+        for k in range(last):
+            if away[k + 1] < away[k]:
+                farther, corner = away[k], corners[k]
+                away[k], corners[k] = away[k + 1], corners[k + 1]
+                away[k + 1], corners[k + 1] = farther, corner
+    a, b, c = corners[0], corners[1], corners[2]
+    ax, ay, az = seen[a, 0], seen[a, 1], seen[a, 2]
+    ux, uy, uz = seen[b, 0] - ax, seen[b, 1] - ay, seen[b, 2] - az
+    vx, vy, vz = seen[c, 0] - ax, seen[c, 1] - ay, seen[c, 2] - az
+    nx = uy * vz - uz * vy
+    ny = uz * vx - ux * vz
+    nz = ux * vy - uy * vx
+    along = nx * x + ny * y + nz * z
+    h = nx * ax + ny * ay + nz * az
+    return along, h, math.sqrt(nx * nx + ny * ny + nz * nz)
 
 
 @compiled
 def _classify(
-    others: np.ndarray, seen: np.ndarray, angles: np.ndarray, starts: np.ndarray
-) -> np.ndarray:
-    """Returns whether M points are shown, hidden or neither, (M,) int8.
+    others: np.ndarray,
+    seen: np.ndarray,
+    angles: np.ndarray,
+    starts: np.ndarray,
+    corners: np.ndarray,
+    away: np.ndarray,
+    kinds: np.ndarray,
+) -> None:
+    """Finds whether M points are shown, hidden or neither.
 
     Args:
         others: (M, 3) the points, in the frame of the scan's sensor [m].
         seen, angles, starts: see `SeenSurfaces`.
+        corners, away: see `_look_towards`.
+        kinds: (M,) int8, all unknown; changed in place.
     """
-    kinds = np.full(len(others), _UNKNOWN, np.int8)
-    corners = np.empty(4, np.int64)
-    away = np.empty(4)
     for i in range(len(others)):
-        p = others[i]
-        _find_nearest_by_quadrant(p, angles, starts, corners, away)
+        x, y, z = others[i, 0], others[i, 1], others[i, 2]
+        number, nearest, farthest, gap = _look_towards(
+            x, y, z, seen, angles, starts, corners, away
+        )
         # Most points of similar scans lie beside a return.
-        if _is_beside_return(p, seen, corners, away):
+        if gap <= TOLERANCE:
             kinds[i] = _SHOWN
             continue
-        around = _measure_returns(seen, corners)
-        distance = _length(p)
-        if around.is_one_surface and (
-            around.nearest - TOLERANCE
-            <= distance
-            <= around.farthest + TOLERANCE
-        ):
-            kinds[i] = _SHOWN
-            continue
-        side = _compare_to_plane(p, seen, corners, away, around)
-        # The plane meets the ray at h / along times the point.
+        distance = math.sqrt(x * x + y * y + z * z)
         if (
-            side.along != 0.0
-            and abs(side.h / side.along - 1.0) * distance <= TOLERANCE
+            number >= 3
+            and farthest <= _FARTHEST * nearest
+            and nearest - TOLERANCE <= distance <= farthest + TOLERANCE
         ):
             kinds[i] = _SHOWN
-        elif around.number > 0 and distance > around.farthest + TOLERANCE:
+            continue
+        along = h = 0.0
+        if number >= 3:
+            along, h, _ = _compare_to_plane(x, y, z, seen, corners, away)
+        # The plane meets the ray at h / along times the point.
+        if along != 0.0 and abs(h / along - 1.0) * distance <= TOLERANCE:
+            kinds[i] = _SHOWN
+        elif number > 0 and distance > farthest + TOLERANCE:
             kinds[i] = _BEHIND
-    return kinds
 
 
 @compiled
 def _measure_clearances(
-    others: np.ndarray, seen: np.ndarray, angles: np.ndarray, starts: np.ndarray
-) -> np.ndarray:
-    """Returns how far M points are in front of the surface, (M,) [m].
+    others: np.ndarray,
+    seen: np.ndarray,
+    angles: np.ndarray,
+    starts: np.ndarray,
+    corners: np.ndarray,
+    away: np.ndarray,
+    clearances: np.ndarray,
+) -> None:
+    """Finds how far M points are in front of the surface.
 
-    See `SeenSurfaces.clearances`; for the arguments, see `_classify`.
+    See `SeenSurfaces.clearances`; for the other arguments, see `_classify`.
+
+    Args:
+        clearances: (M,) the distances [m], all NaN; changed in place.
     """
-    clearances = np.full(len(others), math.nan)
-    corners = np.empty(4, np.int64)
-    away = np.empty(4)
     for i in range(len(others)):
-        p = others[i]
-        _find_nearest_by_quadrant(p, angles, starts, corners, away)
-        around = _measure_returns(seen, corners)
-        distance = _length(p)
-        if around.number == 0:
+        x, y, z = others[i, 0], others[i, 1], others[i, 2]
+        number, nearest, farthest, _ = _look_towards(
+            x, y, z, seen, angles, starts, corners, away
+        )
+        distance = math.sqrt(x * x + y * y + z * z)
+        if number == 0:
             clearances[i] = math.inf
-        elif around.is_one_surface:
-            side = _compare_to_plane(p, seen, corners, away, around)
-            if side.along != 0.0 and side.size != 0.0:
-                towards = math.copysign(1.0, side.along)
-                clearances[i] = towards * (side.h - side.along) / side.size
-        elif distance < around.nearest:
-            clearances[i] = around.nearest - distance
-        elif distance > around.farthest:
-            clearances[i] = around.farthest - distance
-    return clearances
+        elif number >= 3 and farthest <= _FARTHEST * nearest:
+            along, h, size = _compare_to_plane(x, y, z, seen, corners, away)
+            if along != 0.0 and size != 0.0:
+                clearances[i] = math.copysign(1.0, along) * (h - along) / size
+        elif distance < nearest:
+            clearances[i] = nearest - distance
+        elif distance > farthest:
+            clearances[i] = farthest - distance
