@@ -36,6 +36,10 @@ from cns_drake.studies.experiments.conditions import (
     levels_by_case,
 )
 from cns_drake.studies.experiments.experiment import Experiment
+from cns_drake.studies.experiments.experiment_files import (
+    load_experiment,
+    shipped_experiments,
+)
 from cns_drake.studies.experiments.method_variants import method_variants
 from cns_drake.studies.experiments.nested_fields import FLEET, SESSIONS, SIDES
 from cns_drake.studies.experiments.protocol_fields import condition_protocol
@@ -154,6 +158,11 @@ def run_study(
         check_metric_names(metrics, experiment.factor_names)
     engine, cities = plan_study(run, maps)
     results, queries = engine.run(cluster)
+    own = [one.name for one, _ in engine.methods.values() if one.file]
+    notes = [one.to_text() for one in _protocols(run)]
+    if own and (changed := _unlike_shipped(run, maps)):
+        notes.append(f"Shipped results are not shown: {changed}.")
+        own = []
     return write_page(
         results,
         queries,
@@ -163,12 +172,43 @@ def run_study(
         charts=experiment.charts,
         metrics=metrics,
         experiment_text=experiment.text,
-        notes=[one.to_text() for one in _protocols(run)],
+        notes=notes,
         sections=recorded_sections(cities, results, queries, run.output, {})
         if cities
         else [],
+        own_methods=own,
         on_note=on_note,
     )
+
+
+# Fields of an experiment that change no result of a condition.
+_ONLY_SHOWN = frozenset(
+    ("name", "about", "maps", "tasks", "methods", "metrics", "charts", "quick")
+)
+
+
+def _unlike_shipped(run: ExperimentRun, maps: Sequence[str]) -> str:
+    """Returns why a study's conditions are no shipped ones; "" if they are.
+
+    The tables have no column for a field without several values.
+    """
+    experiment = run.experiment
+    if experiment.name not in shipped_experiments():
+        return f"{experiment.name} is no shipped experiment"
+    known = load_experiment(experiment.name).model_dump()
+    changed = [
+        name
+        for name, value in experiment.model_dump().items()
+        if name not in _ONLY_SHOWN and value != known[name]
+    ]
+    if changed:
+        return f"other values of {', '.join(changed)}"
+    other = [
+        str(one)
+        for one in maps or experiment.maps or ()
+        if one not in shipped_cities()
+    ]
+    return f"{other[0]} is no shipped map" if other else ""
 
 
 def plan_study(

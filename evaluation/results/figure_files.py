@@ -2,7 +2,10 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+import re
+import tempfile
 
+from markupsafe import Markup
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
@@ -59,3 +62,18 @@ def save_figure(figure: Figure, stem: Path, kinds: Sequence[str]) -> None:
             options["bbox_inches"] = above
         dpi = _PAGE_DPI if kind == "webp" else _DPI
         write_figure(figure, path, dpi, **options)
+
+
+def figure_svg(figure: Figure, prefix: str) -> Markup:
+    """Returns a figure as an element of a page.
+
+    Args:
+        figure: the figure.
+        prefix: prefix of all ids in the element, which no other element has.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        stem = Path(folder) / "chart"
+        save_figure(figure, stem, ("svg",))
+        text = stem.with_suffix(".svg").read_text()
+    text = text[text.index("<svg") :]
+    return Markup(re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{prefix}-", text))

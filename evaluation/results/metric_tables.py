@@ -225,6 +225,14 @@ def _no_row_text(results: Results, selection: Mapping[str, object]) -> str:
     return f"no row of {chosen}{by} (metrics: {known})"
 
 
+def table_of(
+    name: str, results: Results, selection: Mapping[str, object]
+) -> MetricTable:
+    """Returns the selected rows of a study, see `Results.where`."""
+    rows = results.where(selection).defined()[0].rows
+    return MetricTable(name, _by_method_and_condition(rows), {})
+
+
 def shipped_table(selection: Mapping[str, object]) -> MetricTable:
     """Returns the selected rows of all shipped tables, see `Results.where`."""
     rows = [

@@ -3,8 +3,6 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 import math
 from pathlib import Path
-import re
-import tempfile
 from typing import Any
 
 from markupsafe import Markup
@@ -20,8 +18,8 @@ from cns_drake.base import (
 )
 from evaluation.recognition import Metric, metric_named
 from evaluation.results.charts.chart import NARROW, WIDE
-from evaluation.results.charts.kinds import DrawnChart, draw_chart
-from evaluation.results.figure_files import save_figure
+from evaluation.results.charts.kinds import draw_chart
+from evaluation.results.figure_files import figure_svg, save_figure
 from evaluation.results.keys import KEYS, PROTOCOL_BASE
 from evaluation.results.page_frame import (
     PageSection,
@@ -29,6 +27,7 @@ from evaluation.results.page_frame import (
     page_section,
     value_text,
 )
+from evaluation.results.sections.beside import beside_section
 from evaluation.results.summaries import Summary, summarised
 from evaluation.results.summary_tables import summary_tables
 from evaluation.results.table import QueryRows, Results
@@ -50,6 +49,7 @@ def write_page(
     experiment_text: str = "",
     notes: Iterable[str] = (),
     sections: Iterable[PageSection] = (),
+    own_methods: Sequence[str] = (),
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
     """Writes an experiment's page, `index.html`, which needs no other file.
@@ -76,6 +76,8 @@ def write_page(
         experiment_text: the experiment as YAML.
         notes: further sentences for the page, such as on settings.
         sections: further sections, such as those of recordings.
+        own_methods: methods that the page shows beside the shipped results of
+            the same conditions, if there are such results.
         on_note: is called with a note on each chart that is left out.
 
     Returns:
@@ -92,6 +94,11 @@ def write_page(
     shown, missing = _drawn_charts(known, queries, folder, charts)
     if undefined:
         missing.append(f"{undefined[:1].upper()}{undefined[1:]}.")
+    beside, why_not = beside_section(
+        known, queries, own_methods, metrics, folder
+    )
+    if why_not:
+        missing.append(f"Shipped results are not shown: {why_not}.")
     for note in missing:
         on_note(note)
     protocols = ", ".join(filter(None, results.distinct("protocol")))
@@ -100,6 +107,7 @@ def write_page(
         about or title,
         Markup("<p>{}</p>").format(title) if about else Markup(),
         [
+            *beside,
             *_first_sections(known, shown, metrics),
             *sections,
             *_last_sections(results, queries, numbers, experiment_text),
@@ -136,8 +144,8 @@ def _drawn_charts(
                 alone.figure, folder / f"chart_{number}", ("pdf", "png")
             )
             svgs = {
-                name: _svg(
-                    draw_chart(chart, rows, width, queries=answers),
+                name: figure_svg(
+                    draw_chart(chart, rows, width, queries=answers).figure,
                     f"{name}{number}",
                 )
                 for name, width in (("wide", WIDE), ("narrow", NARROW))
@@ -240,16 +248,6 @@ def _last_sections(
             queries=sum(len(answer.columns["correct"]) for answer in answers),
         ),
     ]
-
-
-def _svg(drawn: DrawnChart, prefix: str) -> Markup:
-    """Returns a drawing as an element whose ids no other drawing has."""
-    with tempfile.TemporaryDirectory() as folder:
-        stem = Path(folder) / "chart"
-        save_figure(drawn.figure, stem, ("svg",))
-        text = stem.with_suffix(".svg").read_text()
-    text = text[text.index("<svg") :]
-    return Markup(re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{prefix}-", text))
 
 
 def _wide_table(results: Results) -> dict[str, Any]:

@@ -36,11 +36,14 @@ from evaluation.results.metric_tables import (
     read_metric_table,
     shipped_table,
     table_name,
+    table_of,
 )
 from evaluation.results.ranking import Ranked, rank_methods
 from evaluation.results.survival import RELATIVE, Survival, judge_survival
 from evaluation.results.table import Answers, Results, Row
 
+# Name of a study's own table.
+_STUDY = "this study"
 # Values that differ by no more are the same result, with the digits that ship.
 _ALIKE = 1e-4
 # Metrics whose ranking is followed by the differences of right answers.
@@ -398,6 +401,42 @@ def compare_tables(
         compared = _compared_values(own, shipped, metric, paths)
     notes += compared.notes
     return replace(compared, task=task, notes=notes)
+
+
+def rows_beside_shipped(results: Results, metric: str) -> tuple[list[Row], str]:
+    """Returns a study's results and the shipped ones of the same conditions.
+
+    Only place recognition without geometric verification counts. Controls count
+    only if all conditions are controls.
+
+    Args:
+        results: the table of the study.
+        metric: name of the metric.
+
+    Returns:
+        The rows of all methods that have all common conditions, each with its
+        label as `method`; and why there are none, else "". A method whose
+        shipped results differ from the study's appears twice.
+    """
+    selection = {"metric": metric, "task": "place", "verified": False}
+    own = table_of(_STUDY, results, selection)
+    if not own.rows:
+        return [], f"{metric} was not measured"
+    shipped = shipped_table(selection)
+    known = set(shipped.conditions)
+    common = [one for one in own.conditions if one in known]
+    if not common:
+        return [], _why_nothing_is_common(own, shipped)
+    common, _ = _without_controls(common)
+    tables = [_reduced_to(table, common) for table in (shipped, own)]
+    entries, _ = _ranked_entries(tables, common)
+    for why in _mismatch_notes(entries, common):
+        return [], why
+    return [
+        replace(table.rows[method, condition], method=name)
+        for name, (table, method) in entries.items()
+        for condition in common
+    ], ""
 
 
 def _only_metric(path: Path) -> Metric:

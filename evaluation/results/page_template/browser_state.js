@@ -48,6 +48,10 @@ function distance(pair, query, place) {
 function fits(query) {
   const method = methodNow();
   if (state.why && method.why[query] !== state.why) return false;
+  if (state.filter === "alone") {
+    return pairNow().methods.every(
+      (one) => (one.ranks[query] === 1) === (one === method));
+  }
   return state.filter === "all" ||
     outcome(pairNow(), method, query) === state.filter;
 }

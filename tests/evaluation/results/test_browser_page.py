@@ -259,6 +259,8 @@ def test_only_wrong_ones(reader):
     assert reader.evaluate('byId("filtered").value') == "0 of 5"
     reader.press("ArrowLeft")
     assert reader.evaluate("state.query") == 2
+    choose(reader, "filter", "alone")
+    assert reader.evaluate('byId("filtered").value') == "2 of 5"
     choose(reader, "filter", "all")
     assert reader.evaluate('byId("filtered").value') == "5 of 5"
 
