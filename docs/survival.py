@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import csv
-from dataclasses import replace
 from pathlib import Path
 import sys
 
@@ -54,10 +53,7 @@ def retained_in_cities(verified: bool) -> list[Row]:
         for name in ("fresh", "stages")
     )
     methods = {row.method for row in fresh}
-    return [row for row in shipped if row.method in methods] + [
-        replace(row, map=f"{row.map}, fresh {row['both.redraw.frozen']}")
-        for row in fresh
-    ]
+    return [*(row for row in shipped if row.method in methods), *fresh]
 
 
 def lines() -> Iterator[tuple[object, ...]]:
@@ -66,7 +62,11 @@ def lines() -> Iterator[tuple[object, ...]]:
         rows = retained_in_cities(verified)
         for one in judge_survival(rows):
             yield "tables", "7.5", "0", *_cells(verified, one)
-        others = [row for row in rows if "metropolis, fresh" not in row.map]
+        others = [
+            row
+            for row in rows
+            if row.map != "metropolis" or row["both.redraw.frozen"] is None
+        ]
         for one in judge_survival(others):
             yield "figure-1", "7.5", "0", *_cells(verified, one)
         yield from _on_networks(verified)
@@ -88,7 +88,9 @@ def lines() -> Iterator[tuple[object, ...]]:
         )
         means = {"mean": table.mean(axis=1), **dict(enumerate(table.T))}
         for draw, of_cities in means.items():
-            one = Survival.of(method, of_cities)
+            one = Survival.of(
+                method, dict(zip(cities, of_cities.tolist(), strict=True))
+            )
             yield "draws", radius, draw, *_cells(verified == "1", one)
 
 

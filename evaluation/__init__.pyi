@@ -31,8 +31,10 @@ from .recognition import judge as judge
 from .recognition import register_metric as register_metric
 from .recognition import retrieve as retrieve
 from .recognition import route_blocks as route_blocks
+from .results import PrintStyle as PrintStyle
 from .results import QueryRows as QueryRows
 from .results import Results as Results
+from .results import draw_chart as draw_chart
 from .results import means as means
 from .verbs import change_between as change_between
 from .verbs import localise as localise

@@ -61,6 +61,8 @@ from .figures import GONE_RGB as GONE_RGB
 from .figures import NEW_RGB as NEW_RGB
 from .figures import UNSEEN_RGB as UNSEEN_RGB
 from .figures import figure_style as figure_style
+from .figures import font_settings as font_settings
+from .figures import parse_length as parse_length
 from .figures import save_figure as save_figure
 from .file_locks import lock_file as lock_file
 from .files import cache_folder as cache_folder

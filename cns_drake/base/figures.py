@@ -6,10 +6,12 @@ from collections.abc import Iterator, Mapping
 import contextlib
 import functools
 from pathlib import Path
+import re
 from typing import TYPE_CHECKING, Any
 import warnings
 
 from cns_drake.base.complete_files import completing
+from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.terminal import note
 
 if TYPE_CHECKING:
@@ -35,6 +37,9 @@ _FURTHER_FONTS = (
 )
 # Part of Matplotlib's warning about a letter that no font has.
 _MISSING = "missing from font"
+
+# Unit of length -> number of them in an inch.
+_IN_AN_INCH = {"in": 1.0, "cm": 2.54, "mm": 25.4, "pt": 72.27}
 
 Rgb = tuple[int, int, int]
 
@@ -88,13 +93,75 @@ def _note_boxes() -> None:
     )
 
 
-def save_figure(figure: Figure, path: Path, dpi: float, **options: Any) -> None:
+def font_settings(font: str) -> dict[str, Any]:
+    """Returns Matplotlib's parameters of a font.
+
+    `serif` is STIX, which resembles Times and comes with Matplotlib.
+
+    Args:
+        font: `serif`, `sans-serif`, `monospace` or the name of an installed
+            font.
+
+    Raises:
+        InputError: no font of this name is installed.
+    """
+    # Imported here: they are slow to load.
+    from matplotlib import font_manager
+
+    there = {one.name for one in font_manager.fontManager.ttflist}
+    known = {
+        "serif": ["STIXGeneral", "DejaVu Serif"],
+        "sans-serif": ["DejaVu Sans"],
+        "monospace": ["DejaVu Sans Mono"],
+    }
+    if font not in known and font not in there:
+        hint = did_you_mean(font, [*known, *there])
+        raise InputError(
+            f"--font: {font!r}: not installed (always there are"
+            f" {', '.join(known)}){hint}"
+        )
+    # By their own names: text is made before its file, with other settings.
+    fonts = [*known.get(font, [font, "DejaVu Sans"]), *_FURTHER_FONTS]
+    formulas = "stix" if font == "serif" else "dejavusans"
+    return {
+        "font.family": [one for one in fonts if one in there],
+        "mathtext.fontset": formulas,
+    }
+
+
+def parse_length(name: str, text: str) -> float:
+    """Returns a length [inches] from text with its unit, such as `3.5in`.
+
+    Args:
+        name: what the length is of, for errors.
+        text: a number and `in`, `cm`, `mm` or `pt`, the point of TeX.
+
+    Raises:
+        InputError: the text is no such length.
+    """
+    found = re.fullmatch(r"(\d+\.?\d*|\.\d+) ?(in|cm|mm|pt)", text.strip())
+    if found is None:
+        raise InputError(
+            f"{name}: {text!r}: a number and in, cm, mm or pt is needed, such"
+            " as 3.5in"
+        )
+    return float(found[1]) / _IN_AN_INCH[found[2]]
+
+
+def save_figure(
+    figure: Figure,
+    path: Path,
+    dpi: float,
+    settings: Mapping[str, Any] | None = None,
+    **options: Any,
+) -> None:
     """Writes a figure to a file; equal figures give equal bytes.
 
     Args:
         figure: the figure.
         path: the file; its ending is the format.
         dpi: resolution [pixels/inch].
+        settings: Matplotlib's parameters with which the figure was drawn.
         options: further options of `Figure.savefig`.
 
     Raises:
@@ -103,5 +170,5 @@ def save_figure(figure: Figure, path: Path, dpi: float, **options: Any) -> None:
     kind = path.suffix.removeprefix(".")
     if kind in _DATES:
         options.setdefault("metadata", {_DATES[kind]: None})
-    with figure_style(_FILES), completing(path) as part:
+    with figure_style({**_FILES, **(settings or {})}), completing(path) as part:
         figure.savefig(part, dpi=dpi, format=kind, **options)

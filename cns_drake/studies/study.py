@@ -72,6 +72,7 @@ from evaluation.results import (
     OWN,
     SETTINGS,
     STAGE,
+    PrintStyle,
     chart_factors,
     check_factors,
     check_metric_names,
@@ -122,6 +123,7 @@ def run_study(
     maps: Sequence[str] = (),
     *,
     source: str = "",
+    printed: PrintStyle | None = None,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
     """Measures all conditions of an experiment; writes tables and a page.
@@ -136,6 +138,7 @@ def run_study(
         cluster: does the work.
         maps: maps that replace the experiment's maps.
         source: file of the experiment, for errors.
+        printed: style of the charts for print; None for the default.
         on_note: is called with notes on what is left out, and on how long the
             study takes.
 
@@ -177,6 +180,7 @@ def run_study(
         if cities
         else [],
         own_methods=own,
+        printed=printed,
         on_note=on_note,
     )
 

@@ -1,4 +1,6 @@
 from .cells import as_factor as as_factor
+from .charts.chart import PrintStyle as PrintStyle
+from .charts.comparison import draw_comparison as draw_comparison
 from .charts.kinds import chart_factors as chart_factors
 from .charts.kinds import check_factors as check_factors
 from .charts.kinds import draw_chart as draw_chart
@@ -40,6 +42,7 @@ from .sections.change_pictures import (
 from .sections.change_pictures import (
     change_section as change_section,
 )
+from .sections.cities import cities_section as cities_section
 from .sections.point_rendering import (
     OrthographicView as OrthographicView,
 )

@@ -1,9 +1,10 @@
 """Files of figures: equal bytes for equal figures."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 import re
 import tempfile
+from typing import Any
 
 from markupsafe import Markup
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -23,23 +24,38 @@ _PAGE_DPI = 130
 _WEBP_QUALITY = 82
 
 
-@figure_style()
-def save_figure(figure: Figure, stem: Path, kinds: Sequence[str]) -> None:
+def save_figure(
+    figure: Figure,
+    stem: Path,
+    kinds: Sequence[str],
+    settings: Mapping[str, Any] | None = None,
+) -> None:
     """Writes a figure as one file for each of several formats.
 
-    Equal figures give equal bytes. SVG and WebP files are for web pages, and do
-    not contain the legend at the bottom of the figure: the page itself writes
-    this legend, in letters that can be read on a phone. The figure is changed:
-    its layout is fixed, and its legends may be hidden.
+    Equal figures give equal bytes. WebP files are for web pages, and do not
+    contain the legend at the bottom of the figure: the page itself writes this
+    legend, in letters that can be read on a phone. The figure is changed: its
+    layout is fixed, and its legends may be hidden.
 
     Args:
         figure: the figure.
         stem: path of the files without the ending.
         kinds: endings of the files, such as `pdf`.
+        settings: Matplotlib's parameters with which the figure was drawn.
 
     Raises:
         InputError: a file cannot be written.
     """
+    with figure_style(settings):
+        _save(figure, stem, kinds, settings)
+
+
+def _save(
+    figure: Figure,
+    stem: Path,
+    kinds: Sequence[str],
+    settings: Mapping[str, Any] | None,
+) -> None:
     FigureCanvasAgg(figure)
     # The layout is computed once for all formats.
     figure.draw_without_rendering()
@@ -52,7 +68,7 @@ def save_figure(figure: Figure, stem: Path, kinds: Sequence[str]) -> None:
     above = Bbox.from_extents(0.0, bottom / figure.dpi, width, height)
     for kind in kinds:
         path = stem.with_name(f"{stem.name}.{kind}")
-        on_page = kind in ("svg", "webp")
+        on_page = kind == "webp"
         for legend in figure.legends:
             legend.set_visible(not on_page)
         options: dict = {}
@@ -61,19 +77,22 @@ def save_figure(figure: Figure, stem: Path, kinds: Sequence[str]) -> None:
         if on_page and figure.legends:
             options["bbox_inches"] = above
         dpi = _PAGE_DPI if kind == "webp" else _DPI
-        write_figure(figure, path, dpi, **options)
+        write_figure(figure, path, dpi, settings, **options)
 
 
-def figure_svg(figure: Figure, prefix: str) -> Markup:
+def figure_svg(
+    figure: Figure, prefix: str, settings: Mapping[str, Any] | None = None
+) -> Markup:
     """Returns a figure as an element of a page.
 
     Args:
         figure: the figure.
-        prefix: prefix of all ids in the element, which no other element has.
+        prefix: beginning of the element's ids, which no other figure has.
+        settings: Matplotlib's parameters with which the figure was drawn.
     """
     with tempfile.TemporaryDirectory() as folder:
         stem = Path(folder) / "chart"
-        save_figure(figure, stem, ("svg",))
+        save_figure(figure, stem, ("svg",), settings)
         text = stem.with_suffix(".svg").read_text()
     text = text[text.index("<svg") :]
     return Markup(re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{prefix}-", text))

@@ -237,13 +237,22 @@ def shipped_table(selection: Mapping[str, object]) -> MetricTable:
     """Returns the selected rows of all shipped tables, see `Results.where`."""
     rows = [
         row
-        for table in _baselines()
+        for table in shipped_tables()
         for row in table.where(selection).defined()[0].rows
     ]
     return MetricTable(SHIPPED, _by_method_and_condition(rows), {})
 
 
+def shipped_pairs(
+    results: Results, selection: Mapping[str, object]
+) -> list[tuple[Row, Row]]:
+    """Returns selected rows of a table, each with the shipped row like it."""
+    own = _by_method_and_condition(results.where(selection).defined()[0].rows)
+    shipped = shipped_table(selection).rows
+    return [(row, shipped[key]) for key, row in own.items() if key in shipped]
+
+
 @functools.cache
-def _baselines() -> list[Results]:
+def shipped_tables() -> list[Results]:
     """Returns the shipped tables."""
     return [Results.read(path) for path in sorted(_BASELINES.glob("*.csv"))]

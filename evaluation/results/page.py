@@ -17,9 +17,13 @@ from cns_drake.base import (
     write_text,
 )
 from evaluation.recognition import Metric, metric_named
-from evaluation.results.charts.chart import NARROW, WIDE
+from evaluation.results.charts.chart import (
+    NARROW,
+    WIDE,
+    FewPointsError,
+    PrintStyle,
+)
 from evaluation.results.charts.kinds import draw_chart
-from evaluation.results.figure_files import figure_svg, save_figure
 from evaluation.results.keys import KEYS, PROTOCOL_BASE
 from evaluation.results.page_frame import (
     PageSection,
@@ -50,6 +54,7 @@ def write_page(
     notes: Iterable[str] = (),
     sections: Iterable[PageSection] = (),
     own_methods: Sequence[str] = (),
+    printed: PrintStyle | None = None,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
     """Writes an experiment's page, `index.html`, which needs no other file.
@@ -78,7 +83,9 @@ def write_page(
         sections: further sections, such as those of recordings.
         own_methods: methods that the page shows beside the shipped results of
             the same conditions, if there are such results.
-        on_note: is called with a note on each chart that is left out.
+        printed: style of the charts for print; None for the default.
+        on_note: is called with a note on each chart that is left out, but
+            for one with too few points.
 
     Returns:
         The path of the page.
@@ -91,7 +98,9 @@ def write_page(
     numbers = summarised(*_charted(results, queries, {}), charts)
     if numbers:
         write_csv(folder / _SUMMARIES, Summary._fields, numbers)
-    shown, missing = _drawn_charts(known, queries, folder, charts)
+    shown, missing, few = _drawn_charts(
+        known, queries, folder, charts, printed or PrintStyle()
+    )
     if undefined:
         missing.append(f"{undefined[:1].upper()}{undefined[1:]}.")
     beside, why_not = beside_section(
@@ -113,7 +122,7 @@ def write_page(
             *_last_sections(results, queries, numbers, experiment_text),
         ],
         made_by=[f"cns-drake {__version__}", f"protocol: {protocols}"],
-        notes=[*notes, *missing],
+        notes=[*notes, *missing, *few],
     )
     path = folder / "index.html"
     write_text(path, text)
@@ -125,31 +134,32 @@ def _drawn_charts(
     queries: QueryRows | None,
     folder: Path,
     charts: Iterable[Mapping[str, Any]],
-) -> tuple[list[dict[str, Any]], list[str]]:
+    printed: PrintStyle,
+) -> tuple[list[dict[str, Any]], list[str], list[str]]:
     """Draws all charts, and writes those for print into a folder.
 
     The arguments are the same as for `write_page`.
 
     Returns:
         For each chart, its title, its legend, and the drawings for the page,
-        by the names in the template; and a note on each chart that is left out,
-        because it has no data.
+        by the names in the template; a note on each chart that is left out,
+        because it has no data; and one on each that would have too few points.
     """
-    drawn, missing = [], []
+    drawn, missing, few = [], [], []
     for number, chart in enumerate(charts, start=1):
         rows, answers = _charted(results, queries, chart)
         try:
-            alone = draw_chart(chart, rows, alone=True, queries=answers)
-            save_figure(
-                alone.figure, folder / f"chart_{number}", ("pdf", "png")
-            )
+            alone = draw_chart(chart, rows, printed=printed, queries=answers)
+            alone.save(folder / f"chart_{number}")
             svgs = {
-                name: figure_svg(
-                    draw_chart(chart, rows, width, queries=answers).figure,
-                    f"{name}{number}",
+                name: draw_chart(chart, rows, width, queries=answers).svg(
+                    f"{name}{number}"
                 )
                 for name, width in (("wide", WIDE), ("narrow", NARROW))
             }
+        except FewPointsError as error:
+            few.append(f"No chart {number}: {error}.")
+            continue
         except InputError as error:
             # What was measured does not depend on it.
             missing.append(f"Chart {number} is left out: {error}.")
@@ -162,7 +172,7 @@ def _drawn_charts(
                 **svgs,
             }
         )
-    return drawn, missing
+    return drawn, missing, few
 
 
 def _charted(

@@ -36,6 +36,20 @@ _OTHERS = (
 # Colours of what belongs to no method.
 INK = "#1C2430"
 PALE = "#7A8594"
+# Matplotlib's parameters in which our figures differ from its defaults: open
+# panels over a pale grid, and legends without a frame.
+FIGURE_STYLE = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": PALE,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": "medium",
+    "figure.labelsize": "medium",
+    "figure.titlesize": "large",
+    "grid.color": "#DDDDDD",
+    "legend.frameon": False,
+    "lines.markersize": 5.0,
+}
 # Colours (red, green, blue) and what they mean.
 Legend = tuple[tuple[tuple[int, int, int], str], ...]
 

@@ -8,13 +8,14 @@ al., JAMA 308, 2012).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cns_drake.base import json_values
 from evaluation.recognition import LEAST_CITIES, Interval, city_interval
+from evaluation.results.keys import FROZEN_REDRAW
 from evaluation.results.ranking import common_conditions
 from evaluation.results.table import Row
 
@@ -36,19 +37,25 @@ class Survival(NamedTuple):
         method: label of the method.
         loss: the mean over cities of the share that is lost.
         interval: its 95 % interval over cities; unknown for fewer than eight.
-        cities: number of cities.
+        of_cities: city -> the share that is lost there.
     """
 
     method: str
     loss: float
     interval: Interval
-    cities: int
+    of_cities: Mapping[str, float]
 
     @classmethod
-    def of(cls, method: str, losses: np.ndarray) -> Survival:
-        """Returns the survival of a method from its loss (C,) in each city."""
+    def of(cls, method: str, of_cities: Mapping[str, float]) -> Survival:
+        """Returns the survival of a method from its loss in each city."""
+        losses = np.array(list(of_cities.values()))
         interval = city_interval(losses, np.ones(len(losses)), (0.0, 1.0))
-        return cls(method, float(losses.mean()), interval, len(losses))
+        return cls(method, float(losses.mean()), interval, of_cities)
+
+    @property
+    def cities(self) -> int:
+        """Number of cities."""
+        return len(self.of_cities)
 
     @property
     def verdict(self) -> str:
@@ -82,7 +89,8 @@ def judge_survival(rows: Iterable[Row]) -> list[Survival]:
     share exceeds 1: a gain on one pair does not make up for a loss on another.
     The loss of a city is the mean over its pairs and seeds. Cities are the
     units, and count equally, because pairs of a city share its streets. See
-    `city_interval` for the interval.
+    `city_interval` for the interval. A frozen redraw of a map is a city of its
+    own: it has the streets of the map, but no building of it.
 
     Args:
         rows: rows of `relative_auc_strict`, measured with the same radius,
@@ -91,24 +99,29 @@ def judge_survival(rows: Iterable[Row]) -> list[Survival]:
     """
     common = common_conditions(rows)
     cities = sorted(
-        {row.map for by_method in common for row in by_method.values()}
+        {_city(row) for by_method in common for row in by_method.values()}
     )
     found = []
     for name in sorted(common[0]) if common else ():
-        losses = np.array(
-            [
+        losses = {
+            city: float(
                 np.mean(
                     [
                         max(0.0, 1.0 - by_method[name].value)
                         for by_method in common
-                        if by_method[name].map == city
+                        if _city(by_method[name]) == city
                     ]
                 )
-                for city in cities
-            ]
-        )
+            )
+            for city in cities
+        }
         found.append(Survival.of(name, losses))
     return sorted(found, key=lambda one: (one.loss, one.method))
+
+
+def _city(row: Row) -> str:
+    redraw = row.factors.get(FROZEN_REDRAW)
+    return row.map if redraw is None else f"{row.map}, fresh {redraw}"
 
 
 def largest_loss_shown(num_cities: int, spread: float) -> float:

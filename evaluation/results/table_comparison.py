@@ -35,6 +35,7 @@ from evaluation.results.metric_tables import (
     MetricTable,
     read_metric_table,
     shipped_table,
+    shipped_tables,
     table_name,
     table_of,
 )
@@ -336,14 +337,16 @@ def compare_tables(
     Args:
         paths: tables of results, or folders with a `results.csv`. The answers
             to queries in a `queries.csv` next to a table are used as well.
+            Without tables, the shipped ones are ranked alone.
         metric: name of the metric to compare, or a Python file that registers
             it. If several tasks have it, the results of `place` are compared.
             If the name is not known, more is taken for better, with a note.
         protocol: name of the protocol whose rows count. By default, rows of the
             same protocol are compared. With `rankings`, the default is
             `random-yaw` or, in a table without this protocol, the table's only
-            protocol. Rows whose protocols differ in anything that changes a
-            number (see `RetrievalProtocol.digest`) are never compared.
+            protocol; without tables, it is `random-yaw`. Rows whose protocols
+            differ in anything that changes a number (see
+            `RetrievalProtocol.digest`) are never compared.
         verified: whether to compare the rows that were measured with geometric
             verification (true) or without (false).
         rankings: whether to compare only the order of the methods in these
@@ -371,7 +374,7 @@ def compare_tables(
         read.append(Results.read(path))
     tasks = {
         row.task
-        for results in read
+        for results in read or shipped_tables()
         for row in results.where(metric=metric).rows
     }
     task = "place" if "place" in tasks else min(tasks, default="")
@@ -380,6 +383,8 @@ def compare_tables(
         "task": task,
         "verified": verified,
     }
+    if protocol is None and not paths:
+        protocol = "random-yaw"
     if protocol is not None:
         selection["protocol"] = protocol
     own: list[MetricTable] = []
@@ -398,6 +403,10 @@ def compare_tables(
         compared = _compared_rankings(own, metric)
     else:
         shipped = shipped_table(selection)
+        if not paths and not shipped.rows:
+            raise InputError(
+                f"the shipped tables have no {metric} like that; give a table"
+            )
         compared = _compared_values(own, shipped, metric, paths)
     notes += compared.notes
     return replace(compared, task=task, notes=notes)
@@ -703,6 +712,8 @@ def _common_conditions(
     Raises:
         InputError: the tables have no condition in common.
     """
+    if not own:
+        return shipped.conditions, []
     common = own[0].conditions
     for table in own[1:]:
         common = [

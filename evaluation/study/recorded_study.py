@@ -40,10 +40,12 @@ from evaluation.results import (
     STAGE,
     PageDrive,
     PageSection,
+    PrintStyle,
     QueryRows,
     Results,
     browser_section,
     change_section,
+    cities_section,
     in_table_order,
     page_section,
     routes_section,
@@ -96,6 +98,7 @@ def study_recordings(
     further_jobs: Iterable[Job] = (),
     space: Space | None = None,
     pages: Mapping[str, str] | None = None,
+    printed: PrintStyle | None = None,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
     """Measures the experiment `stages` on recordings; returns its page.
@@ -119,6 +122,7 @@ def study_recordings(
         space: space on the disk that all jobs need, if known.
         pages: name of a recording -> address of its 3-D page, relative to
             `output`. Pages that do not exist are left out.
+        printed: style of the charts for print; None for the default.
         on_note: is called with notes on what is left out, and on how long the
             study takes.
 
@@ -181,6 +185,7 @@ def study_recordings(
             *recorded_sections(shown, results, queries, output, pages or {}),
             *([_costs_section(output)] if with_costs else []),
         ],
+        printed=printed,
         on_note=on_note,
     )
 
@@ -215,8 +220,10 @@ def recorded_sections(
         for one in cities
         for drive in one.city.recordings
     }
+    among_cities = cities_section(results)
     beside_paper = paper_section(results, queries, stages)
     return [
+        *([among_cities] if among_cities is not None else []),
         *([browser_section(outcomes, drives, there)] if outcomes else []),
         routes_section(
             {name: found.values() for name, found in drives_of.items()}, there

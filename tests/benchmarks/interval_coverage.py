@@ -450,7 +450,7 @@ def rare_failures(
         for _ in range(runs):
             fails = rng.random(networks) < chance
             losses = np.repeat(0.5 * fails, 12 // networks)
-            one = Survival.of("solid", losses)
+            one = Survival.of("solid", dict(enumerate(losses.tolist())))
             count.add(one.interval, one.verdict == "survives")
         yield {
             "part": "rare",

@@ -35,6 +35,9 @@ def study(
     allow_code: Annotated[bool, typer.Option("--allow-code")] = False,
     jobs: shared_options.Jobs = None,
     scheduler: shared_options.Scheduler = None,
+    width: shared_options.Width = None,
+    font: shared_options.Font = None,
+    title: shared_options.Title = True,
     list_all: Annotated[bool, typer.Option("--list")] = False,
     show: Annotated[bool, typer.Option("--show")] = False,
 ) -> None:
@@ -116,7 +119,9 @@ def study(
         from cns_drake.base import choose_cluster
         from cns_drake.studies import run_study
         from evaluation.command_line import show_results
+        from evaluation.results import PrintStyle
 
+    printed = PrintStyle.checked(width, font, title)
     with resumable():
         page = run_study(
             experiment,
@@ -124,6 +129,7 @@ def study(
             choose_cluster(jobs, scheduler),
             maps or (),
             source=name,
+            printed=printed,
             on_note=note,
         )
     show_results(page)

@@ -8,27 +8,39 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import number_text, shared_options, terminal
+from cns_drake.base import InputError, number_text, shared_options, terminal
 from evaluation.command_line.printed_text import spaced_interval
+
+# Endings of figures.
+_FIGURES = (".pdf", ".svg", ".png")
 
 GROUP = "Recognise places"
 
 
 def compare(
-    tables: Annotated[list[Path], typer.Argument(metavar="RESULTS")],
+    tables: Annotated[
+        list[Path] | None, typer.Argument(metavar="[RESULTS]...")
+    ] = None,
     metric: str = "auc",
     protocol: Annotated[
         str | None, typer.Option(metavar="random-yaw|paper|recorded|own")
     ] = None,
     verified: Annotated[bool, typer.Option("--verified")] = False,
     rankings: Annotated[bool, typer.Option("--rankings")] = False,
+    output: Annotated[
+        Path | None, typer.Option(metavar="FILE.pdf|svg|png")
+    ] = None,
+    width: shared_options.Width = None,
+    font: shared_options.Font = None,
+    title: shared_options.Title = True,
     json: shared_options.Json = False,
 ) -> None:
     """Rank the methods in tables of results.
 
     RESULTS are files like results.csv, or folders that contain such a file. The
     command ranks the methods in these tables and in the shipped tables by their
-    means over the conditions that all tables share.
+    means over the conditions that all tables share. Without RESULTS, it ranks
+    those of the shipped tables.
 
     From eight maps on, each mean has a 95 % interval over maps. With a
     queries.csv next to each table, the command also prints the difference in
@@ -50,14 +62,29 @@ def compare(
         rankings: Compare only how the tables rank the methods, each over its
             own conditions, such as of simulated and of real drives: prints
             Kendall's tau.
+        output: File for a figure of the ranking.
 
     Example:
         cns-eval compare mine/results.csv
     """
-    from evaluation.results import compare_tables
+    from evaluation.results import (
+        PrintStyle,
+        compare_tables,
+        draw_comparison,
+        save_figure,
+    )
 
+    printed = PrintStyle.checked(width, font, title)
+    if output is None and printed != PrintStyle():
+        raise InputError("--output: missing, the file of the figure")
+    if output is not None and output.suffix not in _FIGURES:
+        raise InputError(
+            f"--output: {output}: the name must end in {', '.join(_FIGURES)}"
+        )
+    if output is not None and rankings:
+        raise InputError("--output: --rankings has no figure")
     found = compare_tables(
-        tables, metric, protocol, verified=verified, rankings=rankings
+        tables or (), metric, protocol, verified=verified, rankings=rankings
     )
     for note in found.notes:
         terminal.note(note)
@@ -109,6 +136,11 @@ def compare(
             )
         )
     terminal.show(found.to_json(), rows, json=json)
+    if output is not None:
+        figure = draw_comparison(found, printed)
+        kinds = [output.suffix.removeprefix(".")]
+        save_figure(figure, output.with_suffix(""), kinds, printed.settings)
+        terminal.note(f"wrote {output}")
 
 
 def _p_text(p_value: float) -> str:

@@ -24,6 +24,9 @@ def report(
     jobs: shared_options.Jobs = None,
     scheduler: shared_options.Scheduler = None,
     costs: shared_options.Costs = True,
+    width: shared_options.Width = None,
+    font: shared_options.Font = None,
+    title: shared_options.Title = True,
     *,
     protocols: dict[str, RetrievalProtocol],
 ) -> None:
@@ -43,12 +46,14 @@ def report(
     """
     from cns_drake.base import choose_cluster
     from evaluation.command_line.suggestions import show_results
+    from evaluation.results import PrintStyle
     from evaluation.study import (
         choose_methods,
         find_recordings,
         study_recordings,
     )
 
+    printed = PrintStyle.checked(width, font, title)
     cluster = choose_cluster(jobs, scheduler)
     chosen = choose_methods(method or (), parameter or ())
     found = find_recordings(recordings, terminal.note, lidar, columns)
@@ -65,6 +70,7 @@ def report(
         protocols,
         source=str(recordings),
         with_costs=costs,
+        printed=printed,
         on_note=terminal.note,
     )
     show_results(page)

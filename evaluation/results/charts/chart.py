@@ -1,12 +1,16 @@
 """A chart: its description, the rows that it shows, and its panels."""
 
+from __future__ import annotations
+
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 import math
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from cns_drake.base import InputError, font_settings, parse_length
 from evaluation.recognition import METRICS
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.styles import MethodStyle
@@ -16,12 +20,80 @@ from evaluation.results.table import QueryRows, Results, Row
 WIDE = 860
 # Width of a chart on a phone [px].
 NARROW = 358
+# From this width on, two panels are side by side [px].
+_TWO_PANELS = 600
 # A pixel of a page [inches].
 PX = 1.0 / 96.0
 # Size of letters [pt]; more than 12 px, on a phone of 360 px as well.
 FONT = 10.0
+# Size of letters in a chart whose width was chosen for a paper [pt].
+_PAPER_FONT = 8.0
 # Height of a row of values or names [px].
 ROW = 22.0
+
+
+class FewPointsError(InputError):
+    """A chart would show too few points for what it is about."""
+
+
+@dataclass(frozen=True)
+class PrintStyle:
+    """How charts for print look.
+
+    Attributes:
+        width: width [inches], at which letters have 8 pt; None for the width
+            of a chart on a screen, with letters of 10 pt.
+        font: `serif`, `sans-serif`, `monospace` or the name of an installed
+            font.
+        title: whether the chart's title stands above it.
+    """
+
+    width: float | None = None
+    font: str = "sans-serif"
+    title: bool = True
+
+    @classmethod
+    def checked(
+        cls, width: str | None, font: str | None, title: bool
+    ) -> PrintStyle:
+        """Returns the style that options of a command name.
+
+        Args:
+            width: a length with its unit, such as `3.5in`.
+            font: see the attribute.
+            title: see the attribute.
+
+        Raises:
+            InputError: the width is no length from 2 to 20 inches, or the font
+                is not installed.
+        """
+        style = cls(
+            None if width is None else parse_length("--width", width),
+            font or cls.font,
+            title,
+        )
+        if style.width is not None and not 2.0 <= style.width <= 20.0:
+            raise InputError(f"--width: {width}: not from 2in to 20in")
+        font_settings(style.font)
+        return style
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Matplotlib's parameters of the style."""
+        size = FONT if self.width is None else _PAPER_FONT
+        return {**font_settings(self.font), "font.size": size}
+
+    @property
+    def px(self) -> float:
+        """A pixel of the chart's layout [inches], relative to its letters."""
+        return PX if self.width is None else self.width / self.layout_width
+
+    @property
+    def layout_width(self) -> int:
+        """Width of the layout [px]."""
+        if self.width is None:
+            return WIDE
+        return round(self.width / PX * FONT / _PAPER_FONT)
 
 
 @dataclass(frozen=True)
@@ -35,6 +107,7 @@ class Chart:
         rows: the selected rows of the chart's metric.
         styles: method as in the legend -> its style.
         width: width of the drawing [px].
+        px: a pixel of the drawing [inches].
         queries: the answers from which the table was made; None if unknown.
     """
 
@@ -43,7 +116,13 @@ class Chart:
     rows: Sequence[Row]
     styles: Mapping[str, MethodStyle]
     width: int
+    px: float
     queries: QueryRows | None
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether two panels are side by side."""
+        return self.width >= _TWO_PANELS
 
     @property
     def metric(self) -> str:
@@ -66,7 +145,7 @@ class Chart:
         self, height: float, titles: Collection[str]
     ) -> tuple[Figure, list[Axes]]:
         """Returns a figure and its panels, which have a given height [px]."""
-        columns = 1 if self.width < WIDE else min(2, len(titles))
+        columns = min(2, len(titles)) if self.is_wide else 1
         lines = math.ceil(len(titles) / columns)
         figure = self.figure(lines * height)
         grid = figure.subplots(lines, columns, squeeze=False, sharey=True)
@@ -78,7 +157,7 @@ class Chart:
 
     def figure(self, height: float) -> Figure:
         """Returns an empty figure of a given height [px]."""
-        size = self.width * PX, height * PX
+        size = self.width * self.px, height * self.px
         return Figure(figsize=size, layout="constrained")
 
 

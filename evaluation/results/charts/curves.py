@@ -5,7 +5,7 @@ import numpy as np
 
 from cns_drake.base import InputError, repeated
 from evaluation.recognition import pr_curve
-from evaluation.results.charts.chart import FONT, Chart
+from evaluation.results.charts.chart import Chart
 from evaluation.results.method_names import title
 from evaluation.results.table import Row
 
@@ -45,10 +45,9 @@ def draw_curves(chart: Chart) -> Figure:
                 linestyle=line,
                 color=colour,
                 marker=marker,
-                markersize=4,
                 markevery=0.2,
             )
         axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02), xlabel="recall")
-        axes.grid(alpha=0.3)
-    figure.supylabel("precision", fontsize=FONT)
+        axes.grid()
+    figure.supylabel("precision")
     return figure

@@ -13,13 +13,7 @@ import numpy as np
 
 from cns_drake.base import InputError
 from evaluation.recognition import kept_share
-from evaluation.results.charts.chart import (
-    FONT,
-    ROW,
-    WIDE,
-    Chart,
-    start_at_zero,
-)
+from evaluation.results.charts.chart import ROW, Chart, start_at_zero
 from evaluation.results.charts.words import in_words, value_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import STAGE
@@ -55,12 +49,13 @@ def draw_dumbbell(chart: Chart) -> Figure:
         _draw_methods(axes, chart, ends, both, verified)
         if len(panels) > 1:
             axes.set_title(_PANELS[verified], loc="left")
-        axes.grid(axis="x", alpha=0.3)
+        axes.grid(axis="x")
         axes.tick_params(length=0)
+        axes.spines["left"].set_visible(False)
         start_at_zero(axes, x=chart.metric)
     number = max(map(len, ends.values()))
     text = textwrap.fill(_axis_text(chart, *both, number), chart.width // 9)
-    figure.supxlabel(escape_dollars(text), fontsize=FONT)
+    figure.supxlabel(escape_dollars(text))
     return figure
 
 
@@ -101,10 +96,10 @@ def _panels(chart: Chart, number: int) -> tuple[Figure, list[Axes]]:
     On a phone, one is below the other.
     """
     height = (1.6 * len(chart.styles) + 2) * ROW
-    is_wide = chart.width >= WIDE
-    figure = chart.figure((1 if is_wide else number) * height + 2 * ROW)
-    shape = (1, number) if is_wide else (number, 1)
-    grid = figure.subplots(*shape, squeeze=False, sharex=True, sharey=is_wide)
+    wide = chart.is_wide
+    figure = chart.figure((1 if wide else number) * height + 2 * ROW)
+    shape = (1, number) if wide else (number, 1)
+    grid = figure.subplots(*shape, squeeze=False, sharex=True, sharey=wide)
     return figure, list(grid.flat)
 
 

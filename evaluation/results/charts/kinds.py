@@ -3,31 +3,39 @@
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
+from pathlib import Path
 import re
 import textwrap
 from typing import Any, NamedTuple, TypeVar
 
+from markupsafe import Markup
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cns_drake.base import InputError, did_you_mean, figure_style
 from evaluation.recognition import METRICS, metric_named
-from evaluation.results.charts.chart import FONT, PX, ROW, WIDE, Chart
+from evaluation.results.charts.chart import ROW, WIDE, Chart, PrintStyle
 from evaluation.results.charts.curves import draw_curves
 from evaluation.results.charts.dumbbell import draw_dumbbell
 from evaluation.results.charts.lines import draw_lines
 from evaluation.results.charts.matrix import draw_matrix
 from evaluation.results.charts.scatter import draw_scatter
 from evaluation.results.charts.words import in_words
+from evaluation.results.figure_files import save_figure, figure_svg
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import RESERVED, SETTINGS
 from evaluation.results.method_names import in_table_order, title
-from evaluation.results.styles import MethodStyle, method_styles
+from evaluation.results.styles import (
+    FIGURE_STYLE,
+    MethodStyle,
+    method_styles,
+)
 from evaluation.results.table import Answers, QueryRows, Results, Row
 
 _Measured = TypeVar("_Measured", Row, Answers)
-# Width for a name in a legend [px].
-_LEGEND_COLUMN = 220
+# Width of a line in a legend, and of a letter of a name [px].
+_LEGEND_LINE = 60
+_LEGEND_LETTER = 8
 
 
 @dataclass(frozen=True)
@@ -40,12 +48,22 @@ class DrawnChart:
         figure: the drawing.
         legend: name of a method -> its style; the mapping is empty if the
             drawing itself contains the names.
+        settings: Matplotlib's parameters with which it was drawn.
     """
 
     title: str
     source: str
     figure: Figure
     legend: Mapping[str, MethodStyle]
+    settings: Mapping[str, Any]
+
+    def save(self, stem: Path, kinds: Sequence[str] = ("pdf", "png")) -> None:
+        """Writes the drawing, see `save_figure`."""
+        save_figure(self.figure, stem, kinds, self.settings)
+
+    def svg(self, prefix: str) -> Markup:
+        """Returns the drawing for a page, see `figure_svg`."""
+        return figure_svg(self.figure, prefix, self.settings)
 
 
 def draw_chart(
@@ -53,7 +71,7 @@ def draw_chart(
     results: Results,
     width: int = WIDE,
     *,
-    alone: bool = False,
+    printed: PrintStyle | None = None,
     queries: QueryRows | None = None,
 ) -> DrawnChart:
     """Returns a chart, drawn from a table of results.
@@ -61,9 +79,9 @@ def draw_chart(
     Args:
         chart: description of the chart, as in an experiment's file.
         results: the table.
-        width: width of the drawing [px].
-        alone: whether the drawing is shown without a page, and therefore
-            includes its title and legend.
+        width: width of the drawing on a page [px].
+        printed: style of a drawing for print, which includes its legend; None
+            for a drawing on a page.
         queries: the answers from which the table was made, for `curves`; None
             if they are unknown.
 
@@ -81,18 +99,21 @@ def draw_chart(
     shown = {title(row.label) for row in rows}
     styles = {name: one for name, one in of_table.items() if name in shown}
     kind = chart["kind"]
-    with figure_style({"font.size": FONT, "axes.titlesize": "medium"}):
-        figure = _KINDS[kind].draw(
-            Chart(keys, results, rows, styles, width, queries)
-        )
+    look = printed or PrintStyle()
+    width = printed.layout_width if printed else width
+    settings = {**FIGURE_STYLE, **look.settings}
+    with figure_style(settings):
+        drawn = Chart(keys, results, rows, styles, width, look.px, queries)
+        figure = _KINDS[kind].draw(drawn)
         name = _title(keys)
         legend = {}
         if kind in ("curves", "lines", "scatter"):
             legend = _legend(figure, styles)
-        if alone:
+        if look.title and printed:
             figure.suptitle(escape_dollars(textwrap.fill(name, width // 9)))
-            _add_legend(figure, legend, width)
-    return DrawnChart(name, source, figure, legend)
+        if printed:
+            _add_legend(drawn, figure, legend)
+    return DrawnChart(name, source, figure, legend, settings)
 
 
 def _title(keys: Mapping[str, str]) -> str:
@@ -196,7 +217,7 @@ def _legend(
 
 
 def _add_legend(
-    figure: Figure, legend: Mapping[str, MethodStyle], width: int
+    chart: Chart, figure: Figure, legend: Mapping[str, MethodStyle]
 ) -> None:
     """Adds a legend below a figure, and makes room for the legend's rows."""
     if not legend:
@@ -206,9 +227,10 @@ def _add_legend(
         options: dict = {"linestyle": style.line, "marker": style.marker}
         options["label"] = escape_dollars(name)
         handles.append(Line2D([], [], color=style.colour, **options))
-    columns = max(1, width // _LEGEND_COLUMN)
+    column = _LEGEND_LINE + _LEGEND_LETTER * max(map(len, legend))
+    columns = max(1, chart.width // column)
     lines = math.ceil(len(handles) / columns)
-    figure.set_figheight(figure.get_figheight() + lines * ROW * PX)
+    figure.set_figheight(figure.get_figheight() + lines * ROW * chart.px)
     figure.legend(handles=handles, loc="outside lower center", ncols=columns)
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from cns_drake.base import InputError
 from evaluation.recognition import metric_named
-from evaluation.results.charts.chart import FONT, Chart, start_at_zero
+from evaluation.results.charts.chart import Chart, start_at_zero
 from evaluation.results.charts.words import in_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.method_names import title
@@ -36,16 +36,16 @@ def draw_lines(chart: Chart) -> Figure:
                 for end in ("value", "least", "greatest")
             )
             axes.fill_between(x, low, high, color=colour, alpha=0.15, lw=0)
-            axes.plot(x, y, linestyle=style, marker=marker, color=colour, ms=5)
+            axes.plot(x, y, linestyle=style, marker=marker, color=colour)
         _spread_axis(axes, at)
         if metric_named(chart.metric).grows:
             axes.set_yscale("log")
         else:
             start_at_zero(axes, y=chart.metric)
-        axes.grid(alpha=0.3)
+        axes.grid()
         # A label of the whole figure would lie below its legend.
         axes.set_xlabel(escape_dollars(in_words(over)))
-    figure.supylabel(escape_dollars(in_words(chart.metric)), fontsize=FONT)
+    figure.supylabel(escape_dollars(in_words(chart.metric)))
     return figure
 
 

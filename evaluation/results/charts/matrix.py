@@ -6,39 +6,42 @@ from typing import Any, NamedTuple
 
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 import numpy as np
 
 from evaluation.recognition import metric_named
-from evaluation.results.charts.chart import FONT, ROW, Chart
+from evaluation.results.charts.chart import ROW, Chart
 from evaluation.results.charts.words import in_words, value_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.method_names import title
 from evaluation.results.summaries import means
 from evaluation.results.table import Row
 
-# Least height of all that stands around the cells of a panel [px].
-_LEAST_AROUND = 220.0
 # Told apart by all kinds of colour vision, and light enough for letters.
 _COLOURS = LinearSegmentedColormap.from_list(
     "shares", colormaps["RdYlBu"](np.linspace(0.15, 0.8, 64))
 )
-# Height of the titles and the caption of a matrix [px].
-_CAPTIONS = 130.0
-# Height of a letter of a slanted name [px].
-_LETTER = 6.0
-# Characters in a line of a method's name below a chart.
+# Height of the titles, the key and the caption of a matrix [px].
+_CAPTIONS = 150.0
+# Width of a letter, and height of one of a slanted name [px].
+_LETTER = 8.0
+_SLANTED = 6.0
+# Characters in a line of a slanted name.
 _NAME_WIDTH = 32
+# Height of the strips above a number, of a row's.
+_STRIPS = 0.3
 
 
 class _Cell(NamedTuple):
-    """A cell of a matrix: the shares of its strips, in order.
+    """A cell of a matrix: its strips and their shares, in order.
 
     `is_loss` says whether the last share is significantly below 1.
     """
 
+    strips: tuple[Any, ...]
     shares: tuple[float, ...]
     is_loss: bool
 
@@ -56,29 +59,61 @@ def draw_matrix(chart: Chart) -> Figure:
         for row in chart.rows
         if metric_named(chart.metric).share_of and row.high < 1.0
     }
-    below = [textwrap.fill(name, _NAME_WIDTH) for name in names]
-    longest = max(len(line) for name in below for line in name.split("\n"))
-    # Names of methods and the caption stand below.
-    around = max(_LEAST_AROUND, _CAPTIONS + _LETTER * longest)
-    figure, panels = chart.panels(around + len(values) * ROW, chart.panel_rows)
-    most_strips = 1
+    rows_text = [value_words(value, over) for value in values]
+    above, is_slanted = _column_names(chart, names, rows_text)
+    lines = [line for name in above for line in name.split("\n")]
+    height = _SLANTED * max(map(len, lines)) if is_slanted else 2.0 * ROW
+    figure, panels = chart.panels(
+        _CAPTIONS + height + len(values) * ROW, chart.panel_rows
+    )
+    strips_shown: dict[Any, None] = {}
+    has_loss = False
     for axes, rows in zip(panels, chart.panel_rows.values(), strict=True):
         cells = _cells(rows, columns, losses)
         for (name, value), cell in cells.items():
             _draw_cell(axes, names.index(name), values.index(value), cell)
-            most_strips = max(most_strips, len(cell.shares))
-        _draw_frame(axes, below, [value_words(v, over) for v in values])
-    text = f"{in_words(chart.metric)} in per cent"
-    if strips is not None and most_strips > 1:
-        text += (
-            f"; a strip for each value of {in_words(strips)}, the number is of"
-            " the last"
+            has_loss |= cell.is_loss
+            if len(cell.shares) > 1:
+                strips_shown |= dict.fromkeys(cell.strips)
+        _draw_frame(axes, above, rows_text, is_slanted)
+    key = figure.colorbar(
+        ScalarMappable(Normalize(0.0, 100.0), _COLOURS),
+        ax=panels,
+        location="bottom",
+        aspect=30.0,
+        shrink=0.6,
+        label=escape_dollars(f"{in_words(chart.metric)} [%]"),
+    )
+    key.outline.set_visible(False)
+    texts = []
+    if strips is not None and strips_shown:
+        among = ", ".join(value_words(value, strips) for value in strips_shown)
+        texts.append(
+            f"strips from the left: {in_words(strips)} {among}; number: the"
+            " last"
         )
-    if losses:
-        text += "; bold where its 95 % interval lies below 100"
-    text = textwrap.fill(text, chart.width // 8)
-    figure.supxlabel(escape_dollars(text), fontsize=FONT)
+    if has_loss:
+        texts.append("bold: 95 % interval below 100")
+    if texts:
+        text = textwrap.fill("; ".join(texts), chart.width // 8)
+        figure.supxlabel(escape_dollars(text))
     return figure
+
+
+def _column_names(
+    chart: Chart, names: Sequence[str], rows_text: Sequence[str]
+) -> tuple[list[str], bool]:
+    """Returns the names of the columns, and whether they must be slanted.
+
+    Names are slanted where their words are wider than a column.
+    """
+    panels = min(2, len(chart.panel_rows)) if chart.is_wide else 1
+    letters = chart.width / _LETTER / panels - max(map(len, rows_text)) - 2
+    letters = int(letters / len(names))
+    longest = max(len(word) for name in names for word in name.split())
+    slanted = letters < longest or max(map(len, names)) > 2 * letters
+    width = _NAME_WIDTH if slanted else letters
+    return [textwrap.fill(name, width) for name in names], slanted
 
 
 def _cells(
@@ -96,10 +131,10 @@ def _cells(
         )
     found = {}
     for key, cell_strips in strips.items():
-        _, shares, are_losses = zip(
+        names, shares, are_losses = zip(
             *sorted(cell_strips, key=_strip_order), strict=True
         )
-        found[key] = _Cell(shares, are_losses[-1])
+        found[key] = _Cell(names, shares, are_losses[-1])
     return found
 
 
@@ -108,40 +143,45 @@ def _strip_order(strip: tuple[Any, float, bool]) -> tuple[bool, Any]:
 
 
 def _draw_cell(axes: Axes, x: int, y: int, cell: _Cell) -> None:
+    """Fills a cell with its last share, below strips if it has several."""
     number = len(cell.shares)
-    for k, share in enumerate(cell.shares):
+    top = _STRIPS if number > 1 else 0.0
+    boxes = [(cell.shares[-1], x, top, 1.0 - top, 1.0)]
+    if number > 1:
+        boxes += [
+            (share, x + k / number, 0.0, top, 1.0 / number)
+            for k, share in enumerate(cell.shares)
+        ]
+    for share, left, down, height, width in boxes:
         axes.add_patch(
             Rectangle(
-                (x + k / number, y),
-                1.0 / number,
-                1.0,
-                color=_COLOURS(min(share, 1.0)),
-                lw=0,
+                (left, y + down), width, height,
+                color=_COLOURS(min(share, 1.0)), lw=0,
             )
-        )
+        )  # fmt: skip
     axes.text(
         x + 0.5,
-        y + 0.5,
+        y + 0.5 + top / 2.0,
         f"{100.0 * cell.shares[-1]:.0f}",
         weight="bold" if cell.is_loss else "normal",
         ha="center",
-        va="center",
+        va="center_baseline",
     )
 
 
 def _draw_frame(
-    axes: Axes, names: Sequence[str], values: Sequence[str]
+    axes: Axes, names: Sequence[str], values: Sequence[str], is_slanted: bool
 ) -> None:
     """Names the columns and rows of a matrix, and separates its cells."""
     axes.set(xlim=(0, len(names)), ylim=(len(values), 0))
     axes.set_xticks(
         np.arange(len(names)) + 0.5,
         [escape_dollars(name) for name in names],
-        rotation=45,
-        ha="right",
+        **{"rotation": 45, "rotation_mode": "anchor", "ha": "left"}
+        if is_slanted
+        else {},
     )
-    for label in axes.get_xticklabels():
-        label.set_rotation_mode("anchor")
+    axes.xaxis.tick_top()
     axes.set_yticks(
         np.arange(len(values)) + 0.5,
         [escape_dollars(value) for value in values],

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from cns_drake.base import InputError
-from evaluation.results.charts.chart import Chart, start_at_zero
+from evaluation.results.charts.chart import Chart, FewPointsError, start_at_zero
 from evaluation.results.charts.words import in_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.method_names import title
@@ -27,9 +27,9 @@ def draw_scatter(chart: Chart) -> Figure:
         raise InputError(f"charts: scatter: no {y_name} has a {x_name}")
     number = len({row.without("method") for row, _ in points})
     if number < LEAST_POINTS:
-        raise InputError(
-            f"charts: scatter: a trend of {y_name} over {x_name} needs"
-            f" {LEAST_POINTS} points or more, not {number}"
+        raise FewPointsError(
+            f"a trend of {in_words(y_name)} over {in_words(x_name)} needs"
+            f" {LEAST_POINTS} pairs of drives or more, not {number}"
         )
     figure = chart.figure(380.0)
     axes = figure.subplots()
@@ -40,7 +40,7 @@ def draw_scatter(chart: Chart) -> Figure:
         if not known:
             continue
         x, y = np.array(known).T
-        axes.plot(x, y, marker, color=colour, mew=0, ms=5.0, alpha=0.55)
+        axes.plot(x, y, marker, color=colour, mew=0, alpha=0.55)
         for curve in curves(x, y):
             axes.plot(curve.x, curve.y, style, color=colour)
     axes.set(
@@ -50,7 +50,7 @@ def draw_scatter(chart: Chart) -> Figure:
     start_at_zero(axes, x=x_name, y=y_name)
     # On a phone there is room for a few numbers.
     axes.locator_params(axis="x", nbins=6)
-    axes.grid(alpha=0.3)
+    axes.grid()
     return figure
 
 

@@ -16,6 +16,7 @@ import pytest
 from cns_drake.base import InputError
 from evaluation.results import (
     Answers,
+    PrintStyle,
     QueryRows,
     Results,
     Row,
@@ -123,9 +124,11 @@ def test_a_matrix_has_strips_and_the_last_number():
         "metric": "relative_auc",
     }
     drawn = draw_chart(chart, caused())
-    (axes,) = drawn.figure.axes
-    # Three methods, one strip without a cause and three with one.
-    assert len(axes.patches) == 3 * (1 + 3)
+    axes, _ = drawn.figure.axes
+    # Three methods: one box without a cause; with one, three strips above it.
+    assert len(axes.patches) == 3 * (1 + 1 + 3)
+    said = drawn.figure.get_supxlabel()
+    assert said.startswith("strips from the left: level 1, 2, 4; number: the")
     numbers = [text.get_text() for text in axes.texts]
     assert sorted(numbers) == ["100"] * 5 + ["60"]
     assert [t.get_text() for t in axes.get_yticklabels()] == [
@@ -153,8 +156,8 @@ def test_long_settings_leave_room_for_the_matrix(tmp_path, values, shown):
         for cause in ("none", "age")
     )
     chart = {"kind": "matrix", "over": "cause", "metric": "r1"}
-    drawn = draw_chart(chart, results, alone=True)
-    (axes,) = drawn.figure.axes
+    drawn = draw_chart(chart, results, printed=PrintStyle())
+    axes, _ = drawn.figure.axes
     names = [one.get_text() for one in axes.get_xticklabels()]
     assert shown in [name.replace("\n", " ") for name in names]
     assert max(len(line) for name in names for line in name.split("\n")) <= 32
@@ -223,12 +226,12 @@ def test_a_loss_that_is_certain_is_bold():
         chart = {"kind": "matrix", "over": "cause", "metric": metric}
         figure = draw_chart(chart, Results.of(rows)).figure
         caption = " ".join(figure.get_supxlabel().split())
-        (axes,) = figure.axes
+        axes, _ = figure.axes
         return caption, [text.get_fontweight() for text in axes.texts]
 
     caption, found = weights("relative_auc")
     assert found == ["bold", "normal", "normal", "normal"]
-    assert caption.endswith("bold where its 95 % interval lies below 100")
+    assert caption.endswith("bold: 95 % interval below 100")
     caption, found = weights("auc")
     assert found == ["normal"] * 3
     assert "bold" not in caption
@@ -264,7 +267,7 @@ def test_a_loss_that_is_certain_is_bold():
 def test_values_of_factors_are_words(factor, words):
     rows = Results.of(row(0.5, {factor: value}) for value in words)
     chart = {"kind": "matrix", "over": factor, "metric": "auc"}
-    (axes,) = draw_chart(chart, rows).figure.axes
+    axes, _ = draw_chart(chart, rows).figure.axes
     found = [label.get_text() for label in axes.get_yticklabels()]
     assert [" ".join(one.split()) for one in found] == list(words.values())
 
@@ -376,7 +379,7 @@ def test_a_scatter_of_points_on_a_line(number):
 @pytest.mark.parametrize("number", [1, 4])
 def test_a_few_points_are_no_scatter(number):
     chart = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
-    words = f"needs 5 points or more, not {number}$"
+    words = f"needs 5 pairs of drives or more, not {number}$"
     with pytest.raises(InputError, match=words):
         draw_chart(chart, scattered(number))
 
@@ -398,7 +401,7 @@ def test_maps_may_be_the_lines_of_a_matrix():
     ]
     chart = {"kind": "matrix", "over": "map", "metric": "miou"}
     drawn = draw_chart(chart, Results.of(rows))
-    (axes,) = drawn.figure.axes
+    axes, _ = drawn.figure.axes
     assert [t.get_text() for t in axes.get_yticklabels()] == ["x", "y"]
 
 
@@ -546,7 +549,8 @@ def test_a_legend_covers_nothing(keys, width):
         for year in (0, 10)
         for town in ("a", "b", "c")
     ]
-    figure = draw_chart(keys, Results.of(rows), width, alone=True).figure
+    look = PrintStyle(width / 120)
+    figure = draw_chart(keys, Results.of(rows), printed=look).figure
     FigureCanvasAgg(figure).draw()
     (legend,) = figure.legends
     box = legend.get_window_extent()
@@ -589,9 +593,49 @@ def test_no_chart_shows_what_cannot_be(tmp_path, chart, results, value):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("width", ["3.5in", "8.89cm", "88.9 mm", "252.945pt"])
+def test_a_chart_for_a_paper_has_its_width_its_font_and_no_title(
+    tmp_path, width
+):
+    look = PrintStyle.checked(width, "serif", False)
+    keys = {"kind": "lines", "over": YEARS, "metric": "auc"}
+    drawn = draw_chart(keys, aged(), printed=look)
+    drawn.save(tmp_path / "chart")
+    figure = drawn.figure
+    assert figure.get_figwidth() == pytest.approx(3.5)
+    assert not figure.get_suptitle()
+    texts = [text for text in figure.findobj(Text) if text.get_text()]
+    assert len(texts) > 8
+    for text in texts:
+        assert text.get_fontsize() >= 8.0
+        assert text.get_fontfamily()[0] == "STIXGeneral"
+    box = figure.get_tightbbox()
+    assert box.x0 >= -0.01
+    assert box.x1 <= 3.51
+    fonts = set(
+        re.findall(rb"/BaseFont /(\S+)", (tmp_path / "chart.pdf").read_bytes())
+    )
+    assert fonts
+    assert all(b"STIX" in name for name in fonts)
+
+
+@pytest.mark.parametrize(
+    ("width", "font", "words"),
+    [
+        ("3.5", None, "--width: '3.5': a number and in, cm"),
+        ("1e9in", None, "--width: '1e9in': a number"),
+        ("1in", None, "--width: 1in: not from 2in to 20in"),
+        (None, "Sanserif", "--font: 'Sanserif': not installed"),
+    ],
+)
+def test_faults_of_a_style_are_named(width, font, words):
+    with pytest.raises(InputError, match=re.escape(words)):
+        PrintStyle.checked(width, font, True)
+
+
 def test_a_picture_for_print_has_its_legend(tmp_path):
     keys = {"kind": "lines", "over": YEARS, "metric": "auc"}
-    figure = draw_chart(keys, aged(), alone=True).figure
+    figure = draw_chart(keys, aged(), printed=PrintStyle()).figure
     save_figure(figure, tmp_path / "chart", ("pdf", "png"))
     assert figure.legends[0].get_visible()
 
@@ -825,7 +869,7 @@ def draw_all(folder):
         ),
         ({"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered()),
     ):
-        drawn = draw_chart(chart, results, alone=True)
+        drawn = draw_chart(chart, results, printed=PrintStyle())
         save_figure(drawn.figure, folder / chart["kind"], ("svg", "png"))
 
 

@@ -1,15 +1,28 @@
 """Survival: non-inferiority over cities, from made-up retained shares."""
 
+from dataclasses import replace
+from importlib import resources
 import math
+from pathlib import Path
 
 import pytest
 
 from evaluation.results import (
+    FROZEN_REDRAW,
+    Results,
     Row,
+    cities_section,
+    compare_tables,
     judge_survival,
     largest_loss_shown,
     rank_methods,
 )
+
+
+def shipped_results():
+    """Returns the table of the shipped cities."""
+    folder = resources.files("evaluation.results") / "baselines"
+    return Results.read(Path(str(folder)) / "stages.csv")
 
 
 def rows(shares, method="solid"):
@@ -90,3 +103,38 @@ def test_power_grows_with_cities_and_falls_with_their_spread():
     assert many < largest_loss_shown(20, 0.01)
     # Eight cities that differ this much cannot show even a loss of nothing.
     assert math.isnan(largest_loss_shown(8, 0.1))
+
+
+def test_a_page_says_which_shipped_city_was_measured():
+    """By its results, and not by its name."""
+    shipped = shipped_results().where(map="metropolis")
+    section = cities_section(shipped)
+    assert "<h2>Metropolis: 1 of 12 cities</h2>" in section.body
+    renamed = [replace(row, map="elsewhere") for row in shipped.rows]
+    other = [replace(row, value=row.value - 0.1) for row in shipped.rows]
+    for some in (renamed, other):
+        assert cities_section(Results.of(some)) is None
+
+
+def test_a_redraw_is_a_city_of_its_own():
+    some = rows([[0.9]] * 4)
+    some += [replace(row, factors={FROZEN_REDRAW: 1}) for row in some]
+    (found,) = judge_survival(some)
+    assert set(found.of_cities) == {
+        f"city {number}{end}"
+        for number in range(4)
+        for end in ("", ", fresh 1")
+    }
+
+
+def test_shipped_tables_are_compared_alone():
+    found = compare_tables([], "relative_auc_strict", verified=True)
+    assert {one.cities for one in found.survival} == {12}
+    wanted = judge_survival(
+        row
+        for row in shipped_results().where(metric="relative_auc_strict").rows
+        if row.method == "btc" and row.verified and row["both.stage"] == "own"
+    )
+    (btc,) = (one for one in found.survival if one.method == "btc")
+    for city, loss in wanted[0].of_cities.items():
+        assert btc.of_cities[city] == pytest.approx(loss)
