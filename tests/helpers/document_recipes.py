@@ -350,6 +350,22 @@ RECIPES = {
         after=("table of an entrant",),
         prints=("mine ", "layered-overlap "),
     ),
+    "compare shipped tables": Recipe(
+        ".venv/bin/cns-eval compare --metric relative_auc_strict",
+        prints=("layered-overlap, loss in 12 cities ", "survives"),
+    ),
+    "figure of a comparison": Recipe(
+        ".venv/bin/cns-eval compare --output survival.pdf",
+        makes=("survival.pdf",),
+    ),
+    "figure in Python": Recipe(
+        "from pathlib import Path\n\nfrom evaluation import PrintStyle",
+        changes=(('"results.csv"', '"mine.csv"'),),
+        after=("table of an entrant",),
+        file="figure.py",
+        command=".venv/bin/python figure.py",
+        makes=("matrix.pdf",),
+    ),
     "means of a table": Recipe(
         "from pathlib import Path\n\nfrom evaluation import Results, means",
         changes=(('"results.csv"', '"mine.csv"'),),
@@ -980,6 +996,7 @@ NOT_RUN = {
     "all of them",
     ".venv/bin/python -m pytest -m unit": "the quick tests in one of "
     "them; `.ci/run` runs all",
+    "\\includegraphics": "a line for LaTeX",
     "mcap recover": "a program of others",
     "ros2 bag": "needs ROS 2; test_mcap_recorder and others read "
     "recordings with rosbags' reader of rosbag2 folders",

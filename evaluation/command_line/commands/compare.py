@@ -19,7 +19,7 @@ GROUP = "Recognise places"
 
 def compare(
     tables: Annotated[
-        list[Path] | None, typer.Argument(metavar="[RESULTS]...")
+        list[Path] | None, typer.Argument(metavar="RESULTS")
     ] = None,
     metric: str = "auc",
     protocol: Annotated[

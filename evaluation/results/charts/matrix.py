@@ -146,7 +146,7 @@ def _draw_cell(axes: Axes, x: int, y: int, cell: _Cell) -> None:
     """Fills a cell with its last share, below strips if it has several."""
     number = len(cell.shares)
     top = _STRIPS if number > 1 else 0.0
-    boxes = [(cell.shares[-1], x, top, 1.0 - top, 1.0)]
+    boxes = [(cell.shares[-1], float(x), top, 1.0 - top, 1.0)]
     if number > 1:
         boxes += [
             (share, x + k / number, 0.0, top, 1.0 / number)
@@ -175,13 +175,12 @@ def _draw_frame(
     """Names the columns and rows of a matrix, and separates its cells."""
     axes.set(xlim=(0, len(names)), ylim=(len(values), 0))
     axes.set_xticks(
-        np.arange(len(names)) + 0.5,
-        [escape_dollars(name) for name in names],
-        **{"rotation": 45, "rotation_mode": "anchor", "ha": "left"}
-        if is_slanted
-        else {},
+        np.arange(len(names)) + 0.5, [escape_dollars(name) for name in names]
     )
     axes.xaxis.tick_top()
+    if is_slanted:
+        for label in axes.get_xticklabels():
+            label.set(rotation=45, rotation_mode="anchor", ha="left")
     axes.set_yticks(
         np.arange(len(values)) + 0.5,
         [escape_dollars(value) for value in values],

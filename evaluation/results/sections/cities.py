@@ -37,6 +37,7 @@ def cities_section(results: Results) -> PageSection | None:
         "Cities",
         "the shipped tables; results.csv: relative_auc_strict with geometric"
         " verification",
+        is_open=True,
         maps=sorted(maps),
         number=found.survival[0].cities,
         picture=figure_svg(draw_comparison(found, marked=maps), "cities"),
