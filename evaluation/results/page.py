@@ -93,18 +93,17 @@ def write_page(
     Raises:
         InputError: a file cannot be written.
     """
+    printed = printed or PrintStyle()
     make_folder(folder)
     known, undefined = results.defined()
     numbers = summarised(*_charted(results, queries, {}), charts)
     if numbers:
         write_csv(folder / _SUMMARIES, Summary._fields, numbers)
-    shown, missing, few = _drawn_charts(
-        known, queries, folder, charts, printed or PrintStyle()
-    )
+    shown, missing, few = _drawn_charts(known, queries, folder, charts, printed)
     if undefined:
         missing.append(f"{undefined[:1].upper()}{undefined[1:]}.")
     beside, why_not = beside_section(
-        known, queries, own_methods, metrics, folder
+        known, queries, own_methods, metrics, folder, printed
     )
     if why_not:
         missing.append(f"Shipped results are not shown: {why_not}.")

@@ -21,7 +21,7 @@ from evaluation.results.charts.lines import draw_lines
 from evaluation.results.charts.matrix import draw_matrix
 from evaluation.results.charts.scatter import draw_scatter
 from evaluation.results.charts.words import in_words
-from evaluation.results.figure_files import save_figure, figure_svg
+from evaluation.results.figure_files import figure_svg, save_figure
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import RESERVED, SETTINGS
 from evaluation.results.method_names import in_table_order, title

@@ -1,6 +1,7 @@
 """The section with the user's methods beside the shipped results."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 import itertools
 import math
 from pathlib import Path
@@ -11,11 +12,10 @@ from matplotlib.figure import Figure
 from cns_drake.base import figure_style
 from evaluation.recognition import Metric, metric_named
 from evaluation.results.charts.chart import (
-    FONT,
     NARROW,
-    PX,
     ROW,
     WIDE,
+    PrintStyle,
     start_at_zero,
 )
 from evaluation.results.figure_files import figure_svg, save_figure
@@ -24,16 +24,15 @@ from evaluation.results.keys import LAST, STAGE
 from evaluation.results.method_names import title
 from evaluation.results.page_frame import PageSection, page_section
 from evaluation.results.ranking import Ranked, rank_methods
-from evaluation.results.styles import PALE, method_style
+from evaluation.results.styles import FIGURE_STYLE, PALE, method_style
 from evaluation.results.table import QueryRows, Results, Row
 from evaluation.results.table_comparison import rows_beside_shipped
 
 _METRIC = "auc_strict"
 # Colours of methods without a style of their own; all others are grey.
 _COLOURS = ("#D81B60", "#8C564B", "#44AA99", "#999933")
-# Width of a column of a paper [px], and its letters [pt].
-_COLUMN = 336
-_COLUMN_FONT = 8.0
+# Width of a column of a paper [inches].
+_COLUMN = 3.5
 # Part of a row's height over which its single results are spread.
 _SPREAD = 0.56
 
@@ -44,10 +43,12 @@ def beside_section(
     own_methods: Sequence[str],
     metrics: Sequence[Metric],
     folder: Path,
+    printed: PrintStyle,
 ) -> tuple[list[PageSection], str]:
     """Returns the user's methods beside the shipped ones, and writes a figure.
 
-    The figure, `beside.pdf` and `beside.png`, is as wide as a column of paper.
+    The figure, `beside.pdf` and `beside.png`, is as wide as a column of paper,
+    unless its style has another width.
 
     Args:
         results: the table of the study, with defined values only.
@@ -56,6 +57,7 @@ def beside_section(
         metrics: the metrics that the page shows; the first is compared, or the
             AUC strict.
         folder: folder of the page.
+        printed: style of the figure.
 
     Returns:
         The section, if the shipped tables have results of the same conditions;
@@ -75,15 +77,18 @@ def beside_section(
     colours = _colours([m for m in of_method if m in labels])
     if not colours:
         return [], "no method of yours has all of their conditions"
+    shown = ranked, of_method, colours, metric
     figures = {
-        name: _draw(ranked, of_method, colours, metric, width, font)
-        for name, width, font in (
-            ("wide", WIDE, FONT),
-            ("narrow", NARROW, FONT),
-            ("column", _COLUMN, _COLUMN_FONT),
-        )
+        name: _draw(*shown, width, PrintStyle())
+        for name, width in (("wide", WIDE), ("narrow", NARROW))
     }
-    save_figure(figures.pop("column"), folder / "beside", ("pdf", "png"))
+    column = replace(printed, width=printed.width or _COLUMN)
+    save_figure(
+        _draw(*shown, column.layout_width, column),
+        folder / "beside",
+        ("pdf", "png"),
+        column.settings,
+    )
     number = len(of_method[ranked[0].method])
     return [
         page_section(
@@ -214,7 +219,7 @@ def _draw(
     colours: Mapping[str, str],
     metric: str,
     width: int,
-    font: float,
+    look: PrintStyle,
 ) -> Figure:
     """Returns the chart: a row for each method, the best first.
 
@@ -222,10 +227,10 @@ def _draw(
     interval.
     """
     number = len(of_method[ranked[0].method])
-    scale = font / FONT
-    height = scale * ROW * (len(ranked) * max(1.0, 0.3 * number) + 2.5)
-    with figure_style({"font.size": font}):
-        figure = Figure(figsize=(width * PX, height * PX), layout="constrained")
+    height = ROW * (len(ranked) * max(1.0, 0.3 * number) + 2.5)
+    with figure_style({**FIGURE_STYLE, **look.settings}):
+        size = width * look.px, height * look.px
+        figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots()
         side = axes.get_yaxis_transform()
         for y, one in enumerate(ranked):
@@ -238,7 +243,7 @@ def _draw(
                     )
                 if number > 1:
                     axes.plot(row.value, at, ".", c=colour, ms=4)
-            axes.plot(one.value, y, "o", c=colour, ms=8 * scale, zorder=3)
+            axes.plot(one.value, y, "o", c=colour, ms=7, zorder=3)
             axes.text(
                 1.02,
                 y,
@@ -255,8 +260,8 @@ def _draw(
                 label.set(color=colours[one.method], fontweight="bold")
         axes.set_ylim(len(ranked) - 0.4, -0.6)
         axes.tick_params(length=0)
-        axes.grid(axis="x", alpha=0.3)
-        axes.spines[["top", "right", "left"]].set_visible(False)
+        axes.grid(axis="x")
+        axes.spines["left"].set_visible(False)
         axes.set_xlabel(escape_dollars(metric_named(metric).label))
         start_at_zero(axes, x=metric)
     return figure
