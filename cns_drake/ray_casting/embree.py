@@ -13,8 +13,8 @@ import importlib
 import importlib.util
 from pathlib import Path
 
-from llvmlite import ir
 from numba import types
+from numba.core.cgutils import ir
 
 # With this import, numba accepts functions as arguments of compiled functions.
 from numba.extending import intrinsic
