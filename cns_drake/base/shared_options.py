@@ -55,23 +55,22 @@ Width = Annotated[
     str | None,
     typer.Option(
         metavar="LENGTH",
-        help="Width of the charts for print, such as 3.5in, 89mm or 252pt: as "
-        "wide as a column, with letters of 8 pt.",
+        help="Width of the charts for print, such as 3.5in, 89mm or 252pt; "
+        "their letters then have 8 pt.",
     ),
 ]
 Font = Annotated[
     str | None,
     typer.Option(
         metavar="serif|sans-serif|monospace|NAME",
-        help="Font of the charts for print: a kind of font, or the name of an "
-        "installed one. By default sans-serif.",
+        help="Font of the charts for print; NAME is an installed one.",
     ),
 ]
 Title = Annotated[
     bool,
     typer.Option(
         "--title/--no-title",
-        help="Whether the charts for print have a title above them.",
+        help="Whether the charts for print have a title.",
     ),
 ]
 Json = Annotated[
