@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
 from cns_drake.base import Job, Reporter, doing, make_folder
@@ -98,11 +97,10 @@ def add_city(
     """
     with_map = ChangeTask.name in engine.tasks
     planned = engine.add(
-        pairs, distractors, partial(_ExtractionJobs, with_map=with_map)
+        pairs, distractors, _ExtractionJobs if with_map else Jobs
     )
-    if not (with_map and pairs):
+    if not (isinstance(planned, _ExtractionJobs) and pairs):
         return None
-    assert isinstance(planned, _ExtractionJobs)
     shown = ShownCity(
         city,
         _draw_drives(city, pairs, planned, engine.pictures),
@@ -126,7 +124,7 @@ _MAP_COST = 19.0
 
 @dataclass
 class _ExtractionJobs(Jobs):
-    """Jobs of a study that read each drive once.
+    """Jobs of a study with maps, which read each drive once.
 
     One job extracts the features of a drive: it maps the drive, describes its
     places and its queries by all methods, and keeps their scans. If pairs use
@@ -134,13 +132,8 @@ class _ExtractionJobs(Jobs):
     further protocol that chooses the same scans and changes only how queries
     are seen; see `RetrievalProtocol.with_queries_of`. For any other protocol,
     the drive is read again.
-
-    Attributes:
-        with_map: whether a map is made. Without a map, the job serves only the
-            main protocol.
     """
 
-    with_map: bool = True
     # Drive -> its roles. They are known before the first job is added.
     _roles: dict[str, set[Role]] = field(default_factory=dict)
     # Drive -> key of descriptors -> the descriptors by a further protocol.
@@ -212,28 +205,20 @@ class _ExtractionJobs(Jobs):
                 protocol,
                 files,
                 with_scans=bool(roles),
-                with_map=self.with_map,
                 further=tuple(self._further[drive.name].values()),
             )
             # All scans are read for the map.
-            cost = STARTING_COST + self.with_map * _MAP_COST * drive.share
+            cost = STARTING_COST + _MAP_COST * drive.share
             for role in roles:
                 cost += self.description_cost(drive, role, protocol)
-                if not self.with_map:
-                    cost += self.reading_cost(drive, role, protocol)
             title = drive.title or drive.name
             self.jobs[name] = Job(name, step, drive.needs, cost, title)
         return files
 
     def _chooses_same_scans(self, protocol: RetrievalProtocol) -> bool:
-        """Returns whether a protocol needs no other scans than the main one.
-
-        The kept scans, from which overlaps are computed, are as recorded only
-        if there is a map.
-        """
+        """Returns whether a protocol needs no other scans than the main one."""
         assert self._protocol is not None
-        if self.with_map:
-            protocol = protocol.with_queries_of(self._protocol)
+        protocol = protocol.with_queries_of(self._protocol)
         return (
             protocol.descriptor_options() == self._protocol.descriptor_options()
         )
