@@ -24,7 +24,7 @@ from evaluation.results.charts.chart import (
     PrintStyle,
 )
 from evaluation.results.charts.kinds import draw_chart
-from evaluation.results.keys import KEYS, PROTOCOL_BASE
+from evaluation.results.keys import KEYS, PROTOCOL_BASE, STAGE
 from evaluation.results.page_frame import (
     PageSection,
     framed_page,
@@ -32,6 +32,7 @@ from evaluation.results.page_frame import (
     value_text,
 )
 from evaluation.results.sections.beside import beside_section
+from evaluation.results.sections.found import found_section, lacks_baseline
 from evaluation.results.summaries import Summary, summarised
 from evaluation.results.summary_tables import summary_tables
 from evaluation.results.table import QueryRows, Results
@@ -75,7 +76,9 @@ def write_page(
         charts: descriptions of the charts, see `evaluation.results.charts`. A
             chart without data in the table is left out, with a note. If the
             experiment has several protocols, a chart shows the first, unless it
-            names the factor `protocol.base`.
+            names the factor `protocol.base`. If no drives were compared without
+            the change, the page says who found how many places instead of a
+            chart over the stage.
         metrics: the metrics that the summary of each task shows, if the task
             has them; by default, its main metrics.
         experiment_text: the experiment as YAML.
@@ -95,6 +98,10 @@ def write_page(
     """
     printed = printed or PrintStyle()
     make_folder(folder)
+    first = []
+    if queries is not None and lacks_baseline(results):
+        first.append(found_section(queries))
+        charts = [one for one in charts if one.get("over") != STAGE]
     known, undefined = results.defined()
     numbers = summarised(*_charted(results, queries, {}), charts)
     if numbers:
@@ -116,6 +123,7 @@ def write_page(
         Markup("<p>{}</p>").format(title) if about else Markup(),
         [
             *beside,
+            *first,
             *_first_sections(known, shown, metrics),
             *sections,
             *_last_sections(results, queries, numbers, experiment_text),

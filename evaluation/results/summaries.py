@@ -384,7 +384,10 @@ def growths(results: Results, over: str, metric: str) -> list[Summary]:
 
 
 def correlations(
-    results: Results, x: str, metric: str = "auc"
+    results: Results,
+    x: str,
+    metric: str = "auc",
+    selection: Mapping[str, object] | None = None,
 ) -> list[Summary]:
     """Returns how well a factor or metric predicts where each method fails.
 
@@ -399,9 +402,14 @@ def correlations(
             geometric verification, or all rows without.
         x: name of the factor or metric.
         metric: name of a metric of place recognition.
+        selection: name of a column -> value in the rows of `metric` that count,
+            so that no control is pooled with what it controls.
     """
+    shown = {row.identity for row in results.where(selection).rows}
     points: dict[str, list[tuple[float, float]]] = {}
     for row, at in paired_values(results, x, metric):
+        if row.identity not in shown:
+            continue
         points.setdefault(row.label, []).append((1.0 - row.value, at))
     found = []
     for method, rows in points.items():
@@ -511,7 +519,12 @@ def summarised(
         over, metric = str(chart.get("over")), str(chart.get("metric"))
         if chart.get("kind") == "scatter":
             x, y = str(chart.get("x")), str(chart.get("y"))
-            found += correlations(results.where(verified=False), x, y)
+            chosen = {
+                name: value
+                for name, value in chart.items()
+                if name not in ("kind", "x", "y")
+            }
+            found += correlations(results.where(verified=False), x, y, chosen)
         elif over == MAINTAIN:
             found += worths(results, metric)
         elif chart.get("kind") == "lines" and metric_named(metric).share_of:

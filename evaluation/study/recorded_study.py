@@ -47,6 +47,7 @@ from evaluation.results import (
     change_section,
     cities_section,
     in_table_order,
+    lacks_baseline,
     page_section,
     routes_section,
     write_page,
@@ -82,6 +83,8 @@ _SEED = 1
 _TASKS: Mapping[str, type[Task]] = {
     task.name: task for task in (PlaceTask, PoseTask, ChangeTask)
 }
+# The question if nothing was measured without the change.
+_ALONE = "Who finds how many places again?"
 # Expected time to measure costs [s].
 _COSTS_COST = 5.0
 
@@ -173,7 +176,7 @@ def study_recordings(
         queries,
         output,
         title=STAGES_FILE.stem,
-        about=experiment["about"],
+        about=_ALONE if lacks_baseline(results) else experiment["about"],
         charts=experiment["charts"],
         experiment_text=_experiment_text(experiment, methods, protocols),
         notes=[

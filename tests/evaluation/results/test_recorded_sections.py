@@ -38,7 +38,7 @@ def test_page_stands_alone(text):
 def test_links_lead_to_sections(text):
     links = re.findall(r'<a href="#(\w+)">', text)
     assert links == [
-        "means", "browser", "routes", "change", "conditions",
+        "found", "means", "browser", "routes", "change", "conditions",
         "made_by",
     ]  # fmt: skip
     assert re.findall(r'<section id="(\w+)">', text) == links

@@ -208,6 +208,31 @@ def test_a_trend_needs_five_points(tmp_path, number, is_shown, sign):
         assert one.value == -sign
 
 
+def test_controls_are_not_pooled(tmp_path):
+    """A chart of three pairs has no correlation; its controls add none."""
+    rows = [
+        one
+        for k in range(3)
+        for stage in ("last", "own")
+        for one in (
+            row(0.5 + 0.1 * k, {"both.stage": stage, "k": k}),
+            row(
+                0.1 * k,
+                {"both.stage": stage, "k": k},
+                method="",
+                metric="tcr_sym",
+                task="change",
+            ),
+        )
+    ]
+    chart = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
+    (pooled,) = summarised(tmp_path / "all", rows, [chart])
+    assert pooled.n == "6"
+    assert not summarised(
+        tmp_path / "own", rows, [{**chart, "both.stage": "own"}]
+    )
+
+
 @pytest.mark.slow
 def test_summaries_of_charts(tmp_path):
     rows = [
