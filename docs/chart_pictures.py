@@ -27,18 +27,14 @@ from docs.picture_parts import (
     add_heading,
     make_plain,
 )
-from docs.survival import retained_in_cities
-from evaluation.methods import METHODS, shipped_methods
+from evaluation.methods import shipped_methods
 from evaluation.results import (
     INK,
-    MARGIN,
     PALE,
     Results,
     Row,
     in_table_order,
-    judge_survival,
     method_style,
-    method_styles,
     rank_methods,
     title,
 )
@@ -48,65 +44,6 @@ METHOD_STYLES = {
     for name in in_table_order(shipped_methods())
     if (style := method_style(name))
 }
-# The methods that this project made; all others are published ones.
-OURS = {name for name in shipped_methods() if not METHODS[name].source}
-
-
-def survival(path: Path) -> None:
-    """Draws what methods retain of their AUC strict in rebuilt cities.
-
-    Cities are the units: a point is the mean over the cities, and a bar is the
-    95 % interval over them, with geometric verification. A gain in a city does
-    not make up for a loss in another, see `judge_survival`.
-    """
-    rows = {
-        verified: retained_in_cities(verified) for verified in (False, True)
-    }
-    judged = {verified: judge_survival(some) for verified, some in rows.items()}
-    # The best method with geometric verification is on top.
-    order = [one.method for one in judged[True]]
-    styles = method_styles(order)
-    without = {one.method: 100.0 * (1.0 - one.loss) for one in judged[False]}
-    figure = Figure(figsize=(WIDTH, 6.2), layout="constrained")
-    axes = figure.subplots()
-    least = 100.0 * (1.0 - MARGIN)
-    axes.axvspan(least, 130.0, color=PALE, alpha=0.25, lw=0)
-    axes.text(
-        least + 0.5, -0.75, "whole bar here:\nit survives",
-        va="bottom", fontsize=11,
-    )  # fmt: skip
-    for y, one in enumerate(judged[True]):
-        colour = styles[title(one.method)][0]
-        ends = [1.0 - one.interval.high, 1.0 - one.interval.low]
-        axes.plot(
-            100.0 * np.array(ends), [y, y], color=colour, lw=9, alpha=0.3,
-            solid_capstyle="butt",
-        )  # fmt: skip
-        cities = {row.map for row in rows[True]}
-        kept = [
-            np.mean([min(1.0, row.value) for row in rows[True]
-                     if (row.map, row.method) == (city, one.method)])
-            for city in sorted(cities)
-        ]  # fmt: skip
-        axes.plot(
-            100.0 * np.array(kept), [y + 0.3] * len(kept),
-            "|", color="#777777", ms=8, mew=1.5,
-        )  # fmt: skip
-        at = 100.0 * (1.0 - one.loss)
-        axes.plot([without[one.method], at], [y, y], color=colour, lw=1.5)
-        axes.plot(without[one.method], y, "o", color=colour, mfc="white", ms=9)
-        axes.plot(at, y, "o", color=colour, ms=9)
-    axes.set(xlim=(-4.0, 112.0), ylim=(len(order) - 0.5, -0.8))
-    figure.supxlabel(
-        "retained AUC strict [%]:  ○ without, ● with geometric verification\n"
-        "bar: 95 % interval over cities;  | one city;  * made by this project",
-        fontsize=12,
-    )
-    names = [f"{title(n)}*" if n in OURS else title(n) for n in order]
-    axes.set_yticks(range(len(order)), names)
-    make_plain(axes)
-    add_heading(figure, "Retained AUC strict in twelve rebuilt cities")
-    figure.savefig(path, dpi=DPI)
 
 
 def assumptions(path: Path) -> None:

@@ -9,6 +9,7 @@ import textwrap
 from matplotlib.figure import Figure
 
 from cns_drake.base import figure_style
+from evaluation.recognition import metric_named
 from evaluation.results.charts.chart import ROW, WIDE, PrintStyle, start_at_zero
 from evaluation.results.charts.words import in_words
 from evaluation.results.figure_text import escape_dollars
@@ -53,7 +54,8 @@ def draw_comparison(
             for one in found.survival
         ]
         number = len(found.survival[0].of_cities)
-        text = f"{in_words(found.metric)} in {number} cities [%]"
+        kept = in_words(metric_named(found.metric).share_of)
+        text = f"retained {kept} in {number} cities [%]"
         says = (
             "bar: 95\N{NO-BREAK SPACE}% interval; tick: a city; grey: where"
             " methods survive"
@@ -74,18 +76,23 @@ def draw_comparison(
         figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots()
         if found.survival:
-            axes.axvspan(100.0 * (1.0 - MARGIN), 100.0, color=PALE, alpha=0.2)
+            axes.axvspan(
+                100.0 * (1.0 - MARGIN), 100.0, color=PALE, alpha=0.2, lw=0
+            )
         for y, (name, (_, value, low, high, of_cities)) in enumerate(
             zip(names, rows, strict=True)
         ):
             colour, _, marker = styles[name]
             if not math.isnan(low):
-                axes.plot([low, high], [y, y], color=colour, lw=5, alpha=0.4)
+                axes.plot(
+                    [low, high], [y, y], color=colour, lw=5, alpha=0.4,
+                    solid_capstyle="butt",
+                )  # fmt: skip
             axes.plot(value, y, marker, color=colour, ms=8)
-            for city, kept in of_cities.items():
+            for city, share in of_cities.items():
                 mine = city in marked
                 axes.plot(
-                    kept, y + 0.35, "|", color=INK if mine else PALE,
+                    share, y + 0.35, "|", color=INK if mine else PALE,
                     ms=9 if mine else 6, mew=2.5 if mine else 1.0,
                 )  # fmt: skip
         axes.set_yticks(range(len(rows)), list(map(escape_dollars, names)))

@@ -15,12 +15,15 @@ import pytest
 
 from cns_drake.base import InputError
 from evaluation.results import (
+    INK,
     Answers,
     PrintStyle,
     QueryRows,
     Results,
     Row,
+    compare_tables,
     draw_chart,
+    draw_comparison,
     draw_track,
     method_styles,
     save_figure,
@@ -888,3 +891,18 @@ def test_settings_of_the_user_do_not_reach_our_figures(tmp_path):
     for file in files:
         other = tmp_path / "changed" / file.name
         assert file.read_bytes() == other.read_bytes(), file.name
+
+
+def test_a_comparison_has_a_row_for_each_method_and_marks_a_city():
+    found = compare_tables([], "relative_auc_strict", verified=True)
+    figure = draw_comparison(found, PrintStyle(3.5), ["suburbia"])
+    (axes,) = figure.axes
+    names = [label.get_text() for label in axes.get_yticklabels()]
+    assert names[0] == "Layered overlap"
+    assert len(names) == len(found.survival)
+    ticks = [line for line in axes.get_lines() if line.get_marker() == "|"]
+    assert len(ticks) == 12 * len(names)
+    marked = [float(t.get_xdata()[0]) for t in ticks if t.get_color() == INK]
+    np.testing.assert_allclose(
+        marked, [100 * (1 - o.of_cities["suburbia"]) for o in found.survival]
+    )
