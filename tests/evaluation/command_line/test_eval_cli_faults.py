@@ -165,3 +165,18 @@ def test_a_drive_that_finds_itself_gets_a_note(capsys, towns):
     _, out, err = run(capsys, "pr", town, town, "--method", "solid")
     assert "every scan finds itself (--exclude-recent" in err
     assert "1.0000" in out
+
+
+def test_bad_figures(capsys, tmp_path):
+    file = tmp_path / "a.pdf"
+    for words, fault in (
+        (["--width", "3in"], "--output: missing"),
+        (["--no-title"], "--output: missing"),
+        (["--output", tmp_path / "a.jpg"], "the name must end in .pdf"),
+        (["--output", file, "--rankings"], "--rankings has no figure"),
+        (["--output", file, "--font", "nofont"], "--font: 'nofont'"),
+        (["--output", file, "--width", "3.5"], "--width: '3.5'"),
+        (["--metric", "tcr_sym"], "the shipped tables have no tcr_sym"),
+    ):
+        assert_refused(capsys, ["compare", *words], fault)
+    assert not file.exists()

@@ -74,7 +74,7 @@ def asked_studies(patch):
     Returns:
         A list that gets the experiment, the maps and the source of each study.
     """
-    from cns_drake.studies import study
+    from cns_drake import studies
 
     calls = []
 
@@ -82,7 +82,7 @@ def asked_studies(patch):
         calls.append((experiment, tuple(maps), options["source"]))
         return Path(output) / "index.html"
 
-    patch.setattr(study, "run_study", run_study)
+    patch.setattr(studies, "run_study", run_study)
     return calls
 
 
