@@ -25,7 +25,7 @@ class MethodStyle(NamedTuple):
 # distinguish the colours of the standard methods, by Okabe and Ito. Line styles
 # and markers are for prints without colour.
 _OTHERS = (
-    MethodStyle("#000000", "-.", "X"),
+    MethodStyle("#D81B60", "-.", "X"),
     MethodStyle("#8C564B", ":", "p"),
     MethodStyle("#882255", "-", "<"),
     MethodStyle("#44AA99", "--", ">"),

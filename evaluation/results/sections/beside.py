@@ -21,16 +21,14 @@ from evaluation.results.charts.chart import (
 from evaluation.results.figure_files import figure_svg, save_figure
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import LAST, STAGE
-from evaluation.results.method_names import title
+from evaluation.results.method_names import in_table_order, title
 from evaluation.results.page_frame import PageSection, page_section
 from evaluation.results.ranking import Ranked, rank_methods
-from evaluation.results.styles import FIGURE_STYLE, PALE, method_style
+from evaluation.results.styles import FIGURE_STYLE, PALE, method_styles
 from evaluation.results.table import QueryRows, Results, Row
 from evaluation.results.table_comparison import rows_beside_shipped
 
 _METRIC = "auc_strict"
-# Colours of methods without a style of their own; all others are grey.
-_COLOURS = ("#D81B60", "#8C564B", "#44AA99", "#999933")
 # Width of a column of a paper [inches].
 _COLUMN = 3.5
 # Part of a row's height over which its single results are spread.
@@ -74,7 +72,11 @@ def beside_section(
     of_method: dict[str, list[Row]] = {one.method: [] for one in ranked}
     for row in rows:
         of_method[row.method].append(row)
-    colours = _colours([m for m in of_method if m in labels])
+    # As in all charts of the page; the shipped ones are grey.
+    styles = method_styles(in_table_order(row.label for row in results.rows))
+    colours = {
+        name: styles[title(name)].colour for name in of_method if name in labels
+    }
     if not colours:
         return [], "no method of yours has all of their conditions"
     shown = ranked, of_method, colours, metric
@@ -95,7 +97,7 @@ def beside_section(
             "beside",
             "Your method",
             f"results.csv and the shipped tables: {len(rows)} rows of {metric}"
-            f" in {number} conditions with the change, verified 0",
+            f" in {number} conditions, verified 0",
             is_open=True,
             title_of=title,
             metric=metric_named(metric).label,
@@ -122,14 +124,6 @@ def beside_section(
             alone=_alone(queries, own_methods),
         )
     ], ""
-
-
-def _colours(own: Sequence[str]) -> dict[str, str]:
-    colours = itertools.cycle(_COLOURS)
-    return {
-        name: style.colour if (style := method_style(name)) else next(colours)
-        for name in own
-    }
 
 
 class _Against(NamedTuple):
