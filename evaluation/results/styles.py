@@ -46,7 +46,7 @@ FIGURE_STYLE = {
     "axes.titlesize": "medium",
     "figure.labelsize": "medium",
     "figure.titlesize": "large",
-    "grid.color": "#DDDDDD",
+    "grid.alpha": 0.4,
     "legend.frameon": False,
     "lines.markersize": 5.0,
 }

@@ -16,7 +16,6 @@ from evaluation.results.figure_text import escape_dollars
 from evaluation.results.method_names import title
 from evaluation.results.styles import (
     FIGURE_STYLE,
-    INK,
     PALE,
     method_styles,
 )
@@ -28,6 +27,7 @@ def draw_comparison(
     found: Comparison,
     printed: PrintStyle | None = None,
     marked: Collection[str] = (),
+    width: int = WIDE,
 ) -> Figure:
     """Returns the figure of a comparison.
 
@@ -38,10 +38,11 @@ def draw_comparison(
     Args:
         found: the comparison.
         printed: style of a figure for print; None for one on a page.
-        marked: names of cities whose ticks are black.
+        marked: names of cities whose ticks have the method's colour.
+        width: width of a figure on a page [px].
     """
     look = printed or PrintStyle()
-    width = look.layout_width if printed else WIDE
+    width = look.layout_width if printed else width
     if found.survival:
         rows = [
             (
@@ -92,7 +93,7 @@ def draw_comparison(
             for city, share in of_cities.items():
                 mine = city in marked
                 axes.plot(
-                    share, y + 0.35, "|", color=INK if mine else PALE,
+                    share, y + 0.35, "|", color=colour if mine else PALE,
                     ms=9 if mine else 6, mew=2.5 if mine else 1.0,
                 )  # fmt: skip
         axes.set_yticks(range(len(rows)), list(map(escape_dollars, names)))
@@ -104,7 +105,7 @@ def draw_comparison(
         if any(not math.isnan(row[2]) for row in rows):
             text = f"{text}; {says}"
         if marked:
-            text += f"; black: {', '.join(sorted(marked))}"
+            text += f"; tick in colour: {', '.join(sorted(marked))}"
         figure.supxlabel(escape_dollars(textwrap.fill(text, width // 9)))
         if printed and look.title:
             figure.suptitle(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from evaluation.results.charts.chart import NARROW, WIDE
 from evaluation.results.charts.comparison import draw_comparison
 from evaluation.results.figure_files import figure_svg
 from evaluation.results.keys import OWN, STAGE
@@ -40,5 +41,12 @@ def cities_section(results: Results) -> PageSection | None:
         is_open=True,
         maps=sorted(maps),
         number=found.survival[0].cities,
-        picture=figure_svg(draw_comparison(found, marked=maps), "cities"),
+        wide=WIDE,
+        svgs={
+            name: figure_svg(
+                draw_comparison(found, marked=maps, width=width),
+                f"cities-{name}",
+            )
+            for name, width in (("wide", WIDE), ("narrow", NARROW))
+        },
     )

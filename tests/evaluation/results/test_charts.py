@@ -15,7 +15,7 @@ import pytest
 
 from cns_drake.base import InputError
 from evaluation.results import (
-    INK,
+    PALE,
     Answers,
     PrintStyle,
     QueryRows,
@@ -902,7 +902,7 @@ def test_a_comparison_has_a_row_for_each_method_and_marks_a_city():
     assert len(names) == len(found.survival)
     ticks = [line for line in axes.get_lines() if line.get_marker() == "|"]
     assert len(ticks) == 12 * len(names)
-    marked = [float(t.get_xdata()[0]) for t in ticks if t.get_color() == INK]
+    marked = [float(t.get_xdata()[0]) for t in ticks if t.get_color() != PALE]
     np.testing.assert_allclose(
         marked, [100 * (1 - o.of_cities["suburbia"]) for o in found.survival]
     )
