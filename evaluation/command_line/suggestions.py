@@ -3,14 +3,26 @@
 from pathlib import Path
 
 from cns_drake.base import next_page, note
-from evaluation.results import QUERIES, RESULTS, Results, summary_lines
+from evaluation.results import (
+    QUERIES,
+    RESULTS,
+    QueryRows,
+    Results,
+    found_lines,
+    lacks_baseline,
+    summary_lines,
+)
 
 
 def show_results(page: Path) -> None:
     """Prints a study's main results, and where its page and tables are."""
     table = page.parent / RESULTS
     if table.is_file():
-        for line in summary_lines(Results.read(table)):
+        results = Results.read(table)
+        if lacks_baseline(results):
+            for line in found_lines(QueryRows.read(page.parent)):
+                print(line)
+        for line in summary_lines(results):
             print(line)
     print(page)
     if table.is_file():

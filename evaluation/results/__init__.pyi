@@ -43,6 +43,7 @@ from .sections.change_pictures import (
     change_section as change_section,
 )
 from .sections.cities import cities_section as cities_section
+from .sections.found import found_lines as found_lines
 from .sections.found import lacks_baseline as lacks_baseline
 from .sections.point_rendering import (
     OrthographicView as OrthographicView,

@@ -14,6 +14,7 @@ from evaluation.results import (
     QueryRows,
     Results,
     Row,
+    found_lines,
     write_page,
 )
 
@@ -27,8 +28,8 @@ RIGHT = {
 }
 
 
-def written(folder, stages=(OWN,), has_match=(1, 1, 1, 0)):
-    rows, answers, notes = [], [], []
+def tables(stages=(OWN,), has_match=(1, 1, 1, 0)):
+    rows, answers = [], []
     for (method, query), right in RIGHT.items():
         for stage in stages:
             key = place_key(factors={STAGE: stage}, method=method)
@@ -46,9 +47,13 @@ def written(folder, stages=(OWN,), has_match=(1, 1, 1, 0)):
                 "has_match": np.ones(4, bool),
             }
             answers.append(Answers(**key, columns=columns))
+    return Results.of(rows), QueryRows.of(answers)
+
+
+def written(folder, *options):
+    notes = []
     path = write_page(
-        Results.of(rows),
-        QueryRows.of(answers),
+        *tables(*options),
         folder,
         title="stages",
         charts=[CHART],
@@ -71,6 +76,15 @@ def test_who_found_how_many(tmp_path):
     ]
 
 
+def test_lines_for_a_terminal():
+    assert [*found_lines(tables()[1])] == [
+        "Places found, of 6",
+        "RING++  3",
+        "BTC     2",
+        "",
+    ]
+
+
 @pytest.mark.parametrize("stages", [(LAST, OWN), (None,)])
 def test_with_a_baseline_the_change_is_shown(tmp_path, stages):
     """So it is in an experiment without stages."""
@@ -80,6 +94,6 @@ def test_with_a_baseline_the_change_is_shown(tmp_path, stages):
 
 
 def test_drives_that_do_not_meet(tmp_path):
-    text, _ = written(tmp_path, has_match=(0, 0, 0, 0))
+    text, _ = written(tmp_path, (OWN,), (0, 0, 0, 0))
     assert "No place to be found" in text
     assert "0 of 0" not in text
