@@ -108,7 +108,7 @@ def write_page(
         write_csv(folder / _SUMMARIES, Summary._fields, numbers)
     shown, missing, few = _drawn_charts(known, queries, folder, charts, printed)
     if undefined:
-        missing.append(f"{undefined[:1].upper()}{undefined[1:]}.")
+        few.append(f"{undefined[:1].upper()}{undefined[1:]}.")
     beside, why_not = beside_section(
         known, queries, own_methods, metrics, folder, printed
     )
