@@ -1015,7 +1015,6 @@ NOT_RUN = {
     "test_scenario_traffic has one in degrees",
     ".venv/bin/cns-drake study stages --method heights.py": "drives through "
     "shipped cities, for an hour",
-    "method           auc, mean": "is what the recipe compare prints",
     ".venv/bin/cns-eval pr --method network.py": "needs PyTorch; "
     "test_own_methods has a network",
     "cns-eval pr --method map-closures": "needs an extra",
