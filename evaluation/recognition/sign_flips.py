@@ -34,12 +34,9 @@ LEAST_CITIES = 8
 # both sides of a border are alike, so that the units are independent only if
 # blocks are long; see docs/verification.md.
 _BLOCK_LENGTHS = range(320, 79, -20)
-# Least number of blocks of a drive whose blocks are longer than 80 m: with ten,
-# the differences of six methods can be significant.
-_ENOUGH_BLOCKS = 10
-# Neighbouring blocks of street are a little alike. p-values of differences are
-# multiplied by this, so that equal methods differ in at most 5 % of studies.
-_ALIKE = 1.5
+# Least number of blocks of a drive whose blocks are longer than 80 m: two
+# drives of eight can show a difference of two of six methods.
+_ENOUGH_BLOCKS = 8
 # How far imaginary cities lie beyond all others, see `city_interval`.
 _BEYOND = 2.0
 # Up to this number of units, all splits of the units are counted: 14 cities or
@@ -158,9 +155,9 @@ def route_blocks(
         positions: (N, 3) positions of the sensor along the drive [m].
         frames: (Q,) frame numbers of the queries.
         length: least distance between the centres of blocks [m]. By default
-            the greatest of 320, 300, ..., 80 m that gives at least ten blocks,
-            or 80 m. Few long blocks are less alike than many short ones (Canay,
-            Romano and Shaikh, Econometrica 85, 2017).
+            the greatest of 320, 300, ..., 80 m that gives at least eight
+            blocks, or 80 m. Few long blocks are less alike than many short ones
+            (Canay, Romano and Shaikh, Econometrica 85, 2017).
 
     Example:
         from evaluation import evaluate, judge, route_blocks
@@ -372,7 +369,7 @@ def compared_by_right_answers(
             float(np.mean(shares[first] - shares[second])),
             right[first] - right[second],
             np.maximum(asked[first], asked[second]),
-            _ALIKE * len(pairs),
+            float(len(pairs)),
         )
         for first, second in pairs
     ]
