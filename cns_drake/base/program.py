@@ -254,6 +254,8 @@ def _failure_of(error: BaseException) -> tuple[str | None, int] | None:
         return "error: not enough memory for this input", 2
     if isinstance(error, OSError):
         if error.filename is None:
+            if fault := plugin_fault(error):
+                return f"error: {fault}", 2
             _forget_results()
         where = error.filename or "standard output"
         return f"error: {where}: {error.strerror or error}", 2

@@ -82,6 +82,8 @@ def check_interface(drive: Drive) -> None:
         ):
             kind = "integers" if kinds == "iu" else "floating-point numbers"
             raise InputError(f"{name}: no array of {kind} of shape {shape}")
+        if not np.isfinite(value).all():
+            raise InputError(f"{name}: values that are not finite")
     if number:
         scan = drive.scan(0)
         names = getattr(getattr(scan, "dtype", None), "names", None) or ()

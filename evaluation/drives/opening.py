@@ -156,9 +156,9 @@ def _open_others(
     with errors_at(f"{path}: data set {data_set.title}"):
         try:
             drive = data_set.open(path, *words, **named)
+            check_interface(drive)
         except TypeError as error:  # Such as an incomplete class.
             raise InputError(error) from error
-        check_interface(drive)
     return drive
 
 
@@ -169,7 +169,7 @@ def register_data_set(data_set: DataSet) -> DataSet:
         data_set: the data set; all commands take its drives.
 
     Raises:
-        InputError: it is no data set.
+        InputError: it is no data set, or a field has another type.
         ValueError: there is another data set with this title.
 
     Example:
@@ -181,6 +181,14 @@ def register_data_set(data_set: DataSet) -> DataSet:
     """
     if not isinstance(data_set, DataSet):
         raise InputError(f"{data_set!r} is no DataSet")
+    for name in ("title", "files"):
+        if not isinstance(getattr(data_set, name), str):
+            raise InputError(f"data set {data_set.title!r}: {name}: no text")
+    for name in ("holds", "open"):
+        if not callable(getattr(data_set, name)):
+            raise InputError(
+                f"data set {data_set.title!r}: {name}: no function"
+            )
     _DATA_SETS.load_own()
     _add(data_set)
     return data_set

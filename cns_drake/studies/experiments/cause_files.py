@@ -130,6 +130,8 @@ def _read(cause: Path | str | Mapping[str, Any]) -> Cause:
     if isinstance(cause, Mapping):
         name = cause.get("name")
         return validated(Cause, cause, f"cause {name!r}" if name else "cause")
+    if not isinstance(cause, Path | str):
+        raise InputError(f"{cause!r} is neither a cause nor its file")
     path = Path(cause)
     return validated(Cause, {"name": path.stem, **read_yaml(path)}, path)
 

@@ -46,6 +46,11 @@ class PrintStyle:
         font: `serif`, `sans-serif`, `monospace` or the name of an installed
             font.
         title: whether the chart's title stands above it.
+
+    Example:
+        from evaluation import PrintStyle
+
+        column = PrintStyle(width=3.5, font="serif", title=False)
     """
 
     width: float | None = None

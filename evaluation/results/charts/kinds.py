@@ -87,6 +87,13 @@ def draw_chart(
 
     Raises:
         InputError: the chart has an unknown kind or column, or selects no rows.
+
+    Example:
+        from evaluation import Results, draw_chart
+
+        chart = {"kind": "matrix", "over": "map", "metric": "auc"}
+        table = Results.read(Path("results.csv"))
+        draw_chart(chart, table).save(Path("matrix"), ["pdf"])
     """
     keys = check_chart(chart)
     if names_of := _file_names(results.rows):
