@@ -55,7 +55,8 @@ class DataSet:
     @property
     def is_own(self) -> bool:
         """Whether it is a module of this package."""
-        return self.holds.__module__.startswith(f"{__package__}.")
+        home = getattr(self.open, "__module__", "")
+        return home.startswith(f"{__package__}.")
 
 
 def check_interface(drive: Drive) -> None:

@@ -176,7 +176,7 @@ def _mutate_tree(tree, rng):
 
 
 def _tangled(corners, rng):
-    """Returns corners of many laps, one after the other or to and fro."""
+    """Returns corners of many laps, one after the other or to and from."""
     laps = (corners * int(_pick(rng, (2, 50, 2000))))[:20_000]
     if rng.random() < 0.5:
         laps = [laps[k] for k in rng.permutation(len(laps))]

@@ -8,7 +8,6 @@ import pytest
 from cns_drake.base import InputModel
 from cns_drake.city import BuildingPlan
 from cns_drake.sensors import LidarSection
-from evaluation.methods import MethodConfig
 
 
 class _Switches(InputModel):
@@ -28,7 +27,6 @@ class _Switches(InputModel):
         (LidarSection, {"xyz": [0.0, False, 1.6]}),
         (LidarSection, {"rate": True}),
         (BuildingPlan, {"archetype": "villa", "at": [True, 0.0], "height": 9}),
-        (MethodConfig, {"sequence": True}),
     ],
 )
 def test_truth_is_no_number(kind, values):

@@ -457,7 +457,8 @@ def test_a_driver_without_lanes_comes_with_a_note(
     def refuse(scenario, output, **options):
         raise InputError(f"wander {scenario.driver.wander}")
 
-    monkeypatch.setattr("cns_drake.simulation.simulation.simulate", refuse)
+    start = "cns_drake.command_line.drive_script.import_simulation"
+    monkeypatch.setattr(start, lambda: refuse)
     for name, notes in (("drive", 0), ("tour", 1)):
         with pytest.raises(InputError, match=r"wander 0\.35"):
             run_drive(tmp_path / f"{name}.yaml", tmp_path, driver="real")

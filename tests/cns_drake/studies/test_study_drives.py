@@ -355,7 +355,7 @@ SESSION_FAULTS = [
         r"database\.sessions\.1\.hide_sector: it is a field of query",
     ),
     ({"sessions": [{"snow": 1}]}, r"database\.sessions\.1: snow: "),
-    ({"keep": 0}, r"database\.keep: 0 is neither all, latest nor a whole"),
+    ({"keep": 0}, r"database\.keep: 0 is neither all, latest nor a positive"),
     ({"keep": True}, r"database\.keep: True is neither"),
     ({"keep": "newest"}, r"database\.keep: 'newest' is neither"),
     (

@@ -442,7 +442,7 @@ def test_faults_of_an_own_method(streets, tmp_path, capsys, name):
 
 def test_numbers_of_jobs(streets, capsys):
     command = ["localise", streets["map"], streets["query"], "--method", "icp"]
-    for jobs in (0, -1, 1025, 10**11):
+    for jobs in (0, -1):
         assert_refused(capsys, [*command, "--jobs", jobs], f"--jobs: {jobs}")
 
 
@@ -509,7 +509,7 @@ def test_bad_input(streets, tmp_path, capsys, monkeypatch):
         ),
         (
             [tmp_path / "street.npy", pair[1], *gicp, "--align", "always"],
-            "--align: ",
+            "--align always: ",
             "street.npy",
         ),
         ([*pair, *gicp, "--set", "width=x"], "--set: width"),

@@ -1243,6 +1243,7 @@ def _(folder):
 NO_FILES = {
     "cns_drake.base.decode_text": "bytes that are in memory",
     "cns_drake.base.import_modules": "modules of this project",
+    "cns_drake.base.parse_length": "a word",
     "cns_drake.base.read_bytes": "bounded by its limit",
     "cns_drake.base.read_text": "bounded by its limit",
     "cns_drake.base.read_only": "an array",

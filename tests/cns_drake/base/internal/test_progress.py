@@ -134,7 +134,7 @@ def test_bars_on_a_terminal(clock, monkeypatch, width):
     assert "a note\r\n" in shown
     assert "a result of " + 50 * "long " in shown
     lines = shown.splitlines()
-    for start in ("0 of 2 jobs", "a: describ"):
+    for start in ("0 of 2 jobs", "a: desc"):
         (line, *_) = [one for one in lines if one.startswith(start)]
         assert len(line.rstrip()) <= width
         assert ("━" in line) == (width > 30)
