@@ -73,6 +73,15 @@ Title = Annotated[
         help="Whether the charts for print have a title.",
     ),
 ]
+# What an option means in each command that has it.
+LIDAR = (
+    "LiDAR whose scans are read, if a recording has several LiDARs. Give NAME "
+    "from the topic /NAME/points, or the whole topic."
+)
+COLUMNS = (
+    "Number of float32 values per point in .bin files, including x, y and z. "
+    "By default four, or five in files named *.pcd.bin, as those of nuScenes."
+)
 Json = Annotated[
     bool, typer.Option("--json", help="Print the results as one JSON object.")
 ]
@@ -81,8 +90,7 @@ LidarName = Annotated[
     typer.Option(
         "--lidar",
         metavar="NAME",
-        help="LiDAR whose scans are read, if a recording has several LiDARs. "
-        "Give NAME from the topic /NAME/points, or the whole topic.",
+        help=LIDAR,
     ),
 ]
 Columns = Annotated[
@@ -91,8 +99,6 @@ Columns = Annotated[
         "--columns",
         metavar="N",
         min=3,  # x, y, z
-        help="Number of float32 values per point in .bin files, including x, y "
-        "and z. By default four, or five in files named *.pcd.bin, as those of "
-        "nuScenes.",
+        help=COLUMNS,
     ),
 ]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from cns_drake.base import InputError, terminal
+from cns_drake.base import InputError, shared_options, terminal
 
 if TYPE_CHECKING:
     from evaluation.verbs import Measured
@@ -30,24 +30,21 @@ MethodName = Annotated[
         "or a Python file with your own method.",
     ),
 ]
-# Options of commands that compare drives: each once for all drives, or once for
-# each, in order.
+# Options of commands that compare drives.
+_EACH = " Give it once for all drives, or once for each, in order."
 Lidars = Annotated[
     list[str] | None,
     typer.Option(
         "--lidar",
         metavar="NAME",
-        help="LiDAR whose scans are read, if a recording has several LiDARs: "
-        "NAME of the topic /NAME/points, or the whole topic. Give it once for "
-        "all drives, or once for each, in order.",
+        help=shared_options.LIDAR + _EACH,
     ),
 ]
 Odometry = Annotated[
     list[str] | None,
     typer.Option(
         metavar="TOPIC",
-        help="Topic of the poses, if a recording has several. Give it once for "
-        "all drives, or once for each, in order.",
+        help=f"Topic of the poses, if a recording has several.{_EACH}",
     ),
 ]
 Poses = Annotated[
@@ -56,8 +53,7 @@ Poses = Annotated[
         metavar="FILE",
         help="File with poses of the LiDAR that are used instead of those of "
         "the recording, in the form of TUM (seconds, x y z, quaternion x y z "
-        "w) or of KITTI (a 3 x 4 matrix for each scan). Give it once for all "
-        "drives, or once for each, in order.",
+        f"w) or of KITTI (a 3 x 4 matrix for each scan).{_EACH}",
     ),
 ]
 Columns = Annotated[
@@ -65,9 +61,7 @@ Columns = Annotated[
     typer.Option(
         metavar="N",
         min=3,  # x, y, z
-        help="Number of float32 values per point in .bin files, including x, y "
-        "and z; by default four, or five in files named *.pcd.bin. Give it "
-        "once for all drives, or once for each, in order.",
+        help=shared_options.COLUMNS + _EACH,
     ),
 ]
 Tables = Annotated[
