@@ -68,13 +68,14 @@ class RosbagFile:
         return {
             topic: sorted({f"{one.msgtype} in cdr" for one in connections})
             for topic, connections in self._connections.items()
-            if len(self.locate(topic))
+            if any(one.msgcount for one in connections)
         }
 
     @property
     def empty_topics(self) -> list[str]:
         """Topics without a message."""
-        return [one for one in self._names if not len(self.locate(one))]
+        used = self.topics
+        return [one for one in self._names if one not in used]
 
     def locate(self, topic: str) -> np.ndarray:
         """Returns the locations (N,) of a topic's messages, in their order."""
