@@ -80,7 +80,8 @@ def read_trajectory(path: Path, stamps_ns: np.ndarray) -> StampedPoses:
     Raises:
         InputError: the file has neither form, or another number of matrices.
     """
-    columns = read_numbers(path, float).shape[1]
+    numbers = read_numbers(path, float)
+    columns = numbers.shape[1]
     if columns == len(_COLUMNS):
         rows = read_numbers(path, [("stamp", "U40"), ("values", "f8", 7)])
         with value_errors(f"{path}: time"):
@@ -92,7 +93,7 @@ def read_trajectory(path: Path, stamps_ns: np.ndarray) -> StampedPoses:
             f"{path}: rows of {columns} numbers; TUM has 8 (seconds x y z qx qy"
             " qz qw), KITTI 12"
         )
-    X_WS = read_poses(path)
+    X_WS = pose_matrices(path, numbers)
     if len(X_WS) != len(stamps_ns):
         raise InputError(
             f"{path}: {len(X_WS)} poses without times, for {len(stamps_ns)}"
