@@ -166,6 +166,15 @@ class Chart:
         return Figure(figsize=size, layout="constrained")
 
 
+def rows_of_methods(axes: Axes, names: Sequence[str]) -> None:
+    """Gives each method a row of a panel, the first on top."""
+    axes.set_yticks(range(len(names)), list(map(escape_dollars, names)))
+    axes.set_ylim(len(names) - 0.4, -0.6)
+    axes.grid(axis="x")
+    axes.tick_params(length=0)
+    axes.spines["left"].set_visible(False)
+
+
 def start_at_zero(axes: Axes, x: str = "", y: str = "") -> None:
     """Makes an axis start at 0 if its metric cannot be negative.
 

@@ -10,7 +10,13 @@ from matplotlib.figure import Figure
 
 from cns_drake.base import figure_style
 from evaluation.recognition import metric_named
-from evaluation.results.charts.chart import ROW, WIDE, PrintStyle, start_at_zero
+from evaluation.results.charts.chart import (
+    ROW,
+    WIDE,
+    PrintStyle,
+    rows_of_methods,
+    start_at_zero,
+)
 from evaluation.results.charts.words import in_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.method_names import title
@@ -96,12 +102,8 @@ def draw_comparison(
                     share, y + 0.35, "|", color=colour if mine else PALE,
                     ms=9 if mine else 6, mew=2.5 if mine else 1.0,
                 )  # fmt: skip
-        axes.set_yticks(range(len(rows)), list(map(escape_dollars, names)))
+        rows_of_methods(axes, names)
         start_at_zero(axes, x=found.metric)
-        axes.set_ylim(len(rows) - 0.4, -0.6)
-        axes.grid(axis="x")
-        axes.tick_params(length=0)
-        axes.spines["left"].set_visible(False)
         if any(not math.isnan(row[2]) for row in rows):
             text = f"{text}; {says}"
         if marked:

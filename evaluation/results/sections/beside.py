@@ -16,6 +16,7 @@ from evaluation.results.charts.chart import (
     ROW,
     WIDE,
     PrintStyle,
+    rows_of_methods,
     start_at_zero,
 )
 from evaluation.results.figure_files import figure_svg, save_figure
@@ -92,6 +93,14 @@ def beside_section(
         column.settings,
     )
     number = len(of_method[ranked[0].method])
+    against = {
+        own: {
+            one.method: _against(of_method[own], of_method[one.method])
+            for one in ranked
+            if one.method != own
+        }
+        for own in colours
+    }
     return [
         page_section(
             "beside",
@@ -107,18 +116,13 @@ def beside_section(
                 name: figure_svg(figure, f"beside-{name}")
                 for name, figure in figures.items()
             },
-            verdicts=[_verdict(name, ranked, of_method) for name in colours],
+            verdicts=[
+                _verdict(own, ranked, of_others, number)
+                for own, of_others in against.items()
+            ],
             own=list(colours),
             ranked=[
-                (
-                    one,
-                    [
-                        _against(of_method[own], of_method[one.method])
-                        if own != one.method
-                        else None
-                        for own in colours
-                    ],
-                )
+                (one, [others.get(one.method) for others in against.values()])
                 for one in ranked
             ],
             alone=_alone(queries, own_methods),
@@ -156,21 +160,30 @@ def _against(own: Sequence[Row], other: Sequence[Row]) -> _Against:
 
 
 def _verdict(
-    own: str, ranked: Sequence[Ranked], of_method: Mapping[str, Sequence[Row]]
+    own: str,
+    ranked: Sequence[Ranked],
+    against: Mapping[str, _Against],
+    number: int,
 ) -> dict[str, Any]:
-    """Returns a method's rank, and which methods are surely worse or better."""
-    number = len(of_method[own])
-    against = {
-        title(one.method): _against(of_method[own], of_method[one.method])
-        for one in ranked
-    }
+    """Returns a method's rank, and which methods are surely worse or better.
+
+    Args:
+        own: the method.
+        ranked: all methods, the best first.
+        against: the method against each other one.
+        number: number of conditions.
+    """
     place = next(k for k, one in enumerate(ranked, 1) if one.method == own)
     return {
         "name": title(own),
         "place": place,
         "value": ranked[place - 1].value,
-        "worse": [n for n, one in against.items() if one.better == number],
-        "better": [n for n, one in against.items() if one.worse == number],
+        "worse": [
+            title(name) for name, one in against.items() if one.better == number
+        ],
+        "better": [
+            title(name) for name, one in against.items() if one.worse == number
+        ],
     }
 
 
@@ -247,15 +260,10 @@ def _draw(
                 # Black is white on a dark page.
                 color=colours.get(one.method, "black"),
             )
-        names = [escape_dollars(title(one.method)) for one in ranked]
-        axes.set_yticks(range(len(ranked)), names)
+        rows_of_methods(axes, [title(one.method) for one in ranked])
         for one, label in zip(ranked, axes.get_yticklabels(), strict=True):
             if one.method in colours:
                 label.set(color=colours[one.method], fontweight="bold")
-        axes.set_ylim(len(ranked) - 0.4, -0.6)
-        axes.tick_params(length=0)
-        axes.grid(axis="x")
-        axes.spines["left"].set_visible(False)
         axes.set_xlabel(escape_dollars(metric_named(metric).label))
         start_at_zero(axes, x=metric)
     return figure
