@@ -8,6 +8,7 @@ import pytest
 from cns_drake.base import InputModel
 from cns_drake.city import BuildingPlan
 from cns_drake.sensors import LidarSection
+from evaluation.methods import MethodConfig
 
 
 class _Switches(InputModel):
@@ -16,6 +17,10 @@ class _Switches(InputModel):
     shares: dict[str, list[int]] | None = None
     either: bool | int = 2
     switch: bool = False
+
+
+class _Settings(MethodConfig):
+    candidates: int = 20
 
 
 @pytest.mark.parametrize(
@@ -27,6 +32,7 @@ class _Switches(InputModel):
         (LidarSection, {"xyz": [0.0, False, 1.6]}),
         (LidarSection, {"rate": True}),
         (BuildingPlan, {"archetype": "villa", "at": [True, 0.0], "height": 9}),
+        (_Settings, {"candidates": True}),
     ],
 )
 def test_truth_is_no_number(kind, values):

@@ -260,7 +260,11 @@ def test_command_tcr(capsys, recordings, truth):
     status, out, err = run(capsys, "tcr", *paths, "--align", "never")
     assert status == 2
     fault = err.splitlines()[-1]
-    assert "second: poses in frame 'odom', those of first in 'map' (" in fault
+    assert fault.endswith(
+        "second: poses in frame 'odom', those of first in 'map' (recordings"
+        " share a world if their poses are in one frame; --odometry TOPIC and"
+        " --poses FILE choose others)"
+    )
 
 
 @pytest.mark.night
