@@ -172,6 +172,8 @@ def describe_validation_error(
     fault = min(error.errors(), key=_urgency)
     # pydantic puts this before the message of one of our validators.
     message = fault["msg"].removeprefix("Value error, ")
+    if fault["type"] in _WORDS:
+        message = _WORDS[fault["type"]].format_map(fault.get("ctx", {}))
     message += _advice(fault, model)
     field = ".".join(str(part) for part in fault["loc"])
     if not field and fault["type"] == "value_error":
@@ -180,9 +182,24 @@ def describe_validation_error(
     return f"{source}: {field or '(top level)'}: {message}"
 
 
+# Faults for which pydantic has words of Python -> words of YAML.
+_WORDS = {
+    "dict_type": "not a mapping",
+    "int_type": "not a whole number",
+    "list_type": "not a list",
+    "model_type": "not a mapping",
+    "string_type": "not a text",
+    "too_short": "at least {min_length} needed",
+    "tuple_type": "not a list",
+}
+
+
 def _urgency(fault: Mapping[str, Any]) -> int:
     if fault["type"] == "extra_forbidden":
         return 0
+    # Wrong values of a list are missing from it, too.
+    if fault["type"] == "too_short":
+        return 3
     return 2 if fault["type"] == "missing" or fault["input"] is None else 1
 
 

@@ -580,6 +580,11 @@ def _check_recordable(
                 f"{source}: {STAGE}: databases of several"
                 " recordings have no control"
             )
+    elif "keep" in sides["database"]:
+        raise InputError(
+            f"{source}: database.keep: of recordings, it selects places of"
+            f" database.{SESSIONS}; name them, too"
+        )
     given += [CAUSE] if condition.causes else []
     for name in given:
         if name != STAGE:

@@ -1,7 +1,7 @@
 """Measures place recognition between two drives."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 import itertools
 import math
@@ -233,20 +233,45 @@ class PlaceComparison(NamedTuple):
         )
 
 
+@dataclass(frozen=True)
+class ScansOf:
+    """The scans of a comparison by any method, for `shown_overlaps`.
+
+    Attributes:
+        compared: the comparison; the poses of the scans are read from the
+            descriptors of its first method.
+    """
+
+    compared: PlaceComparison
+
+    def identity(self) -> list[object]:
+        """Returns what determines scans and poses; other methods share them."""
+        compared = self.compared
+        (scans, *_), (asked, *_) = compared.stored
+        files = scans, asked, *(parts[0] for parts in compared.beside)
+        protocol = compared.protocol.of(compared.methods[0].make())
+        return [
+            [one.identity() for one in files],
+            protocol.to_json(),
+            list(compared.radii),
+            compared.keep,
+        ]
+
+
 def shown_overlaps(
-    reporter: Reporter, compared: PlaceComparison
+    reporter: Reporter, scans_of: ScansOf
 ) -> dict[float, np.ndarray]:
     """Returns the share of each query's scan that its best match shows.
 
     Args:
         reporter: unused.
-        compared: the comparison by any method, from whose descriptors the poses
-            are read. The files of scans contain a `KeptScans`, or a list of
+        scans_of: the scans. Their files contain a `KeptScans`, or a list of
             scans.
 
     Returns:
         Radius -> (Q,) overlaps; NaN without a match.
     """
+    compared = scans_of.compared.by_methods([0])
     # The method registers the type of its descriptors.
     method = compared.methods[0].make()
     (scans, described), (asked_scans, described_query) = compared.stored

@@ -137,6 +137,8 @@ def _name_or_made_map(value: Any) -> str | MadeMap:
     """Returns the name of a map, or how to make one."""
     if isinstance(value, str | MadeMap):
         return value
+    if not isinstance(value, Mapping):
+        raise ValueError("neither a name nor how to make a map")
     try:
         return validated(MadeMap, value, "to be made")
     except InputError as error:

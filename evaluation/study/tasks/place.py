@@ -16,6 +16,7 @@ from evaluation.recognition import (
 from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import (
     PlaceComparison,
+    ScansOf,
     measure_places,
     shown_overlaps,
 )
@@ -67,7 +68,7 @@ class PoseTask(Task):
             shown = MakePart(
                 overlaps,
                 shown_overlaps,
-                (compared.by_methods([0]),),
+                (ScansOf(compared),),
                 PlaceTask.version,
             )
             compared = compared._replace(overlaps=overlaps)

@@ -127,7 +127,7 @@ def test_the_drive_keeps_to_waypoints_and_speeds(yard):
         ),
         ({"world": "gone.sdf"}, r"world: .*gone\.sdf: no such file"),
         ({"waypoints": "gone.csv"}, r"waypoints: .*gone\.csv: no such file"),
-        ({"waypoints": 7}, r"waypoints: Input should be a valid string"),
+        ({"waypoints": 7}, r"waypoints: not a text"),
     ],
 )
 def test_faults_name_the_field(yard, change, fault):

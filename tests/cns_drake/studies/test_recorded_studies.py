@@ -15,7 +15,7 @@ from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition import RANDOM_YAW_PROTOCOL, RetrievalProtocol
 from evaluation.results import Results
-from evaluation.study import MethodChoice, Part
+from evaluation.study import MethodChoice
 
 
 @pytest.fixture(scope="module")
@@ -176,6 +176,7 @@ def test_drives_without_a_control(tmp_path):
         ({"database": {"years": [0, 5]}}, "database.years: the recordings"),
         ({"database": {"distractors": 9}}, "database.distractors: the rec"),
         ({"query": {"hide_sector": 90}}, "query.hide_sector: the recordings"),
+        ({"database": {"keep": 2}}, "database.keep: .* database.sessions; nam"),
         ({"query": {"stage": "last"}}, "query.stage: the recordings"),
         ({"database": {"stage": "last"}}, "database.stage: the recordings"),
         ({"both": {"lidar": "vlp-16"}}, "both.lidar: the recordings"),
@@ -305,10 +306,8 @@ def test_sessions_later_than_the_query(tmp_path):
 
 @pytest.mark.night
 @pytest.mark.slow
-def test_a_recording_is_read_once_and_its_descriptions_are_removed(
-    folder, tmp_path
-):
-    """They are made again for a further method, as in a study of its own."""
+def test_a_recording_is_read_once(folder, tmp_path):
+    """A further method leaves what others found, as in a study of its own."""
     fields = {
         "drives": "both-ways",
         "both": {"stage": ["last", "own"]},
@@ -321,11 +320,6 @@ def test_a_recording_is_read_once_and_its_descriptions_are_removed(
     features = sorted(path.name for path in (parts / "features").iterdir())
     assert features == sorted(path.name for path in folder.iterdir())
     assert not (parts / "mapped").exists()
-    described = list(parts.rglob("described_*.data"))
-    assert len(described) == len(features)
-    for path in described:
-        with pytest.raises(InputError, match="its value was removed"):
-            Part(path).read()
     kept = {
         path: path.read_bytes() for path in sorted((parts / "place").iterdir())
     }

@@ -20,6 +20,7 @@ from evaluation.study import (
 from evaluation.study.feature_extraction import FeatureExtraction
 from evaluation.study.place_measurements import (
     PlaceComparison,
+    ScansOf,
     measure_places,
     shown_overlaps,
 )
@@ -109,7 +110,7 @@ def test_drives_that_are_longer_than_the_memory_give_the_same(
         return pair(root, tmp_path / "pair.data", query=query).arguments[0]
 
     def measured(compared):
-        shown = shown_overlaps(Reporter(), compared.by_methods([0]))
+        shown = shown_overlaps(Reporter(), ScansOf(compared))
         return measure_places(Reporter(), compared), shown
 
     expected, expected_shown = measured(compared(folder))
