@@ -488,9 +488,7 @@ def _cause_text(cause: str, level: object) -> str:
     if cause == "all":
         return "All at once"
     sheet = yaml.safe_load(
-        (
-            ROOT / f"cns_drake/studies/experiments/causes/{cause}.yaml"
-        ).read_text()
+        (ROOT / f"evaluation/study/experiments/causes/{cause}.yaml").read_text()
     )
     value: Any = sheet["strengths"]["ladder"]
     while isinstance(value, dict):

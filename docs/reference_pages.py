@@ -66,11 +66,8 @@ from cns_drake.sensors import (
 )
 from cns_drake.studies import (
     DrawnRoute,
-    Experiment,
     Fleet,
     Losses,
-    MadeMap,
-    causes,
 )
 from cns_drake.units import (
     LIDAR_PRESETS,
@@ -92,6 +89,11 @@ from evaluation.methods import (
 )
 from evaluation.recognition import METRICS, Metric
 from evaluation.results import in_table_order
+from evaluation.study import (
+    Experiment,
+    MadeMap,
+    causes,
+)
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 Sections = dict[str, type[BaseModel]]

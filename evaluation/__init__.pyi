@@ -36,6 +36,8 @@ from .results import QueryRows as QueryRows
 from .results import Results as Results
 from .results import draw_chart as draw_chart
 from .results import means as means
+from .study import causes as causes
+from .study import register_cause as register_cause
 from .verbs import change_between as change_between
 from .verbs import localise as localise
 from .verbs import recognise as recognise

@@ -79,6 +79,8 @@ from .files import user_errors as user_errors
 from .images import open_image as open_image
 from .images import to_jpeg as to_jpeg
 from .input_models import InputModel as InputModel
+from .input_models import Name as Name
+from .input_models import Section as Section
 from .interrupts import (
     ended_by_interrupts as ended_by_interrupts,
 )

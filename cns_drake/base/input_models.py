@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-from pydantic import BaseModel, ValidationInfo, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    StringConstraints,
+    ValidationInfo,
+    field_validator,
+)
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+# The name of a drive or of a map, which names a folder.
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]*$")]
 
 
 class InputModel(BaseModel):
@@ -47,3 +59,17 @@ def _refuse_truth(value: Any) -> None:
     if isinstance(value, list | tuple):
         for entry in value:
             _refuse_truth(entry)
+
+
+class Section(InputModel):
+    """A section of a scenario or of an experiment.
+
+    Unknown fields and numbers that are not finite are errors. You cannot change
+    a section after it was made.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def replaced(self, **fields: Any) -> Self:
+        """Returns a copy with some fields replaced, without checks."""
+        return self.model_copy(update=fields)

@@ -27,7 +27,13 @@ def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
         InputError: the experiment cannot be used, or a file is in the way.
     """
     from cns_drake.scenarios import check_written_scenarios, write_scenarios
-    from cns_drake.studies import ExperimentRun, load_experiment, study_drives
+    from cns_drake.studies import (
+        ExperimentRun,
+        study_drives,
+    )
+    from evaluation.study import (
+        load_experiment,
+    )
 
     # Nothing is measured, and no program of the experiment runs.
     unused = {"tasks": {"place": {}}, "methods": {"solid": {}}, "charts": []}

@@ -21,7 +21,6 @@ from .provenance import (
 )
 from .scenario import SUMO_INSTEAD as SUMO_INSTEAD
 from .scenario import DriverConfig as DriverConfig
-from .scenario import Name as Name
 from .scenario import RideConfig as RideConfig
 from .scenario import Scenario as Scenario
 from .scenario import TrafficConfig as TrafficConfig

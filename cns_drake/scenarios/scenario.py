@@ -5,20 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 import operator
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import (
     BaseModel,
     Field,
     PrivateAttr,
-    StringConstraints,
     ValidationInfo,
     field_validator,
     model_validator,
 )
 
-from cns_drake.base import validated
+from cns_drake.base import (
+    Name,
+    Section,
+    validated,
+)
 from cns_drake.drives import check_sensor_name
 from cns_drake.motion import RoadProfile, RoughnessClass
 from cns_drake.roads import Route, Speeds
@@ -30,7 +33,6 @@ from cns_drake.sensors import (
     ImuSection,
     LidarSection,
     OdometrySection,
-    Section,
     SensorConfig,
     WeatherConfig,
     check_rate,
@@ -38,7 +40,6 @@ from cns_drake.sensors import (
 )
 from cns_drake.units import LidarSheet
 
-Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]*$")]
 # Defaults are validated as well, because a rule may depend on another field.
 _Optional = Field(default=None, validate_default=True)
 # Names of systems and ports in a drive's Diagram that no sensor can have.

@@ -63,7 +63,6 @@ from .returns.calibrated import (
     CalibratedReturns as CalibratedReturns,
 )
 from .returns.weather import Weather as Weather
-from .sensor_config import Section as Section
 from .sensor_config import SensorConfig as SensorConfig
 from .sensor_config import Triple as Triple
 from .sensor_config import check_rate as check_rate

@@ -35,7 +35,11 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
 from pydrake.systems.primitives import ZeroOrderHold
 
-from cns_drake.base import describe_validation_error, one_line
+from cns_drake.base import (
+    Section,
+    describe_validation_error,
+    one_line,
+)
 from cns_drake.scene import find_bus
 from cns_drake.sensors import odometry
 from cns_drake.sensors.imu.config import ImuDescription, ImuSection
@@ -47,7 +51,6 @@ from cns_drake.sensors.lidar_config import (
     LidarSection,
     make_lidar_model,
 )
-from cns_drake.sensors.sensor_config import Section
 from cns_drake.sensors.system_names import check_unused_names
 from cns_drake.units import DEFAULT_PRESET, LONGEST_PERIOD
 

@@ -22,13 +22,16 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base import InputError, validated
+from cns_drake.base import (
+    InputError,
+    Section,
+    validated,
+)
 from cns_drake.drives import LayoutName
 from cns_drake.sensors.lidar.measurement import Echoes, MeasurementModel
 from cns_drake.sensors.lidar.patterns import SpinningPattern
 from cns_drake.sensors.sensor_config import (
     Mount,
-    Section,
     Triple,
     field_off_by_default,
 )

@@ -1,6 +1,8 @@
 """The description of odometry, which is read without Drake."""
 
-from cns_drake.sensors.sensor_config import Section
+from cns_drake.base import (
+    Section,
+)
 
 
 class OdometrySection(Section):

@@ -9,16 +9,15 @@ from __future__ import annotations
 import abc
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
-from cns_drake.base import NS_PER_S, InputModel
+from cns_drake.base import NS_PER_S, Section
 from cns_drake.sensors.lidar.beams import HIGHEST_RATE
 
 if TYPE_CHECKING:
     from pydrake.geometry import SceneGraph
     from pydrake.multibody.tree import RigidBody
     from pydrake.systems.framework import DiagramBuilder, OutputPort, System
-    from typing_extensions import Self
 
     from cns_drake.recording import Topic
 
@@ -27,20 +26,6 @@ if TYPE_CHECKING:
 Place = Annotated[float, Field(ge=-1000.0, le=1000.0)]
 Triple = tuple[Place, Place, Place]
 Angle = Annotated[float, Field(ge=-3600.0, le=3600.0)]
-
-
-class Section(InputModel):
-    """A section of a scenario file.
-
-    Unknown fields and numbers that are not finite are errors. You cannot change
-    a section after it was made.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-    def replaced(self, **fields: Any) -> Self:
-        """Returns a copy with some fields replaced, without checks."""
-        return self.model_copy(update=fields)
 
 
 def field_off_by_default(default: Any, **constraints: Any) -> Any:

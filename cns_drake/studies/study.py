@@ -30,19 +30,6 @@ from cns_drake.scenarios import (
 )
 from cns_drake.scene import MapFolder
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
-from cns_drake.studies.experiments.conditions import (
-    Condition,
-    baseline_values,
-    levels_by_case,
-)
-from cns_drake.studies.experiments.experiment import Experiment
-from cns_drake.studies.experiments.experiment_files import (
-    load_experiment,
-    shipped_experiments,
-)
-from cns_drake.studies.experiments.method_variants import method_variants
-from cns_drake.studies.experiments.nested_fields import FLEET, SESSIONS, SIDES
-from cns_drake.studies.experiments.protocol_fields import condition_protocol
 from cns_drake.studies.maps.experiment_maps import (
     ExperimentRun,
     MapPairs,
@@ -79,10 +66,15 @@ from evaluation.results import (
     write_page,
 )
 from evaluation.study import (
+    FLEET,
+    SESSIONS,
+    SIDES,
     STANDARD,
     ChangeTask,
+    Condition,
     CostTask,
     Engine,
+    Experiment,
     LocaliseTask,
     MapDrives,
     MethodChoice,
@@ -95,11 +87,17 @@ from evaluation.study import (
     StudyFiles,
     Task,
     add_city,
+    baseline_values,
     choose_methods,
     chosen_recordings,
+    condition_protocol,
+    levels_by_case,
+    load_experiment,
     made_tasks,
+    method_variants,
     recorded_pairs,
     recorded_sections,
+    shipped_experiments,
 )
 
 TASKS: Mapping[str, type[Task]] = {

@@ -6,6 +6,32 @@ from .chosen_methods import expanded_names as expanded_names
 from .chosen_methods import method_settings as method_settings
 from .engine import Engine as Engine
 from .engine import made_tasks as made_tasks
+from .experiments import STAGES_FILE as STAGES_FILE
+from .experiments.cause_files import Cause as Cause
+from .experiments.cause_files import causes as causes
+from .experiments.cause_files import register_cause as register_cause
+from .experiments.conditions import Condition as Condition
+from .experiments.conditions import baseline_values as baseline_values
+from .experiments.conditions import levels_by_case as levels_by_case
+from .experiments.experiment import Experiment as Experiment
+from .experiments.experiment import MadeMap as MadeMap
+from .experiments.experiment import named_programs as named_programs
+from .experiments.experiment_files import experiment_text as experiment_text
+from .experiments.experiment_files import load_experiment as load_experiment
+from .experiments.experiment_files import (
+    shipped_experiments as shipped_experiments,
+)
+from .experiments.method_variants import method_variants as method_variants
+from .experiments.nested_fields import FLEET as FLEET
+from .experiments.nested_fields import SESSIONS as SESSIONS
+from .experiments.nested_fields import SIDES as SIDES
+from .experiments.nested_fields import Changes as Changes
+from .experiments.protocol_fields import (
+    condition_protocol as condition_protocol,
+)
+from .experiments.protocol_fields import (
+    protocol_from_fields as protocol_from_fields,
+)
 from .feature_extraction import (
     extract_features as extract_features,
 )
@@ -22,7 +48,6 @@ from .recorded_study import (
     recorded_sections as recorded_sections,
 )
 from .recorded_study import study_recordings as study_recordings
-from .recordings import STAGES_FILE as STAGES_FILE
 from .recordings.map_drives import MapDrives as MapDrives
 from .recordings.map_drives import (
     RecordingInfo as RecordingInfo,

@@ -54,10 +54,12 @@ from evaluation.results import (
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine, made_tasks
+from evaluation.study.experiments import (
+    STAGES_FILE,
+)
 from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import PlaceComparison
 from evaluation.study.recorded_city import ShownCity, add_city
-from evaluation.study.recordings import STAGES_FILE
 from evaluation.study.recordings.map_drives import (
     RecordingInfo,
     drives_by_map,

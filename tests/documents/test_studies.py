@@ -9,11 +9,13 @@ import yaml
 
 from cns_drake.studies import (
     TASKS,
+)
+from evaluation.results import Results, Row
+from evaluation.study import (
     Experiment,
     load_experiment,
     shipped_experiments,
 )
-from evaluation.results import Results, Row
 
 PAGE = documents.read("docs/studies.md")
 

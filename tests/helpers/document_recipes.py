@@ -974,7 +974,7 @@ NOT_RUN = {
     "pip install ./mine": "test_plugins installs it",
     "cns-eval pr --method mean-heights": "test_plugins finds the method",
     "pip uninstall mine": "test_plugins uninstalls it",
-    "import numpy as np\n\nfrom cns_drake import register_cause": (
+    "import numpy as np\n\nfrom evaluation import DataSet": (
         "test_plugins installs it"
     ),
     ".ci/oldest": "installs from the network; the workflow runs it",

@@ -64,7 +64,11 @@ def pairs(
     with ended_by_interrupts("cns-drake"):
         from cns_drake.base import choose_cluster
         from cns_drake.scenarios import load_scenario
-        from cns_drake.studies import ExportOptions, claim_pairs, export_pairs
+        from cns_drake.training import (
+            ExportOptions,
+            claim_pairs,
+            export_pairs,
+        )
 
     cluster = choose_cluster(jobs, scheduler)
     if vary is not None:  # Its scenarios are written to the same folder.

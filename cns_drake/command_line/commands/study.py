@@ -79,13 +79,13 @@ def study(
         cns-drake study ladder suburbia --quick --output ladder
     """
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.studies import (
+        from evaluation.study import (
+            expanded_names,
             experiment_text,
             load_experiment,
             named_programs,
             shipped_experiments,
         )
-        from evaluation.study import expanded_names
 
     if list_all:
         for known in shipped_experiments():

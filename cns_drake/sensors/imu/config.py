@@ -7,11 +7,16 @@ from typing import Annotated
 
 from pydantic import Field
 
-from cns_drake.base import InputError, read_yaml, validated, value_errors
+from cns_drake.base import (
+    InputError,
+    Section,
+    read_yaml,
+    validated,
+    value_errors,
+)
 from cns_drake.sensors.imu.noise import ImuNoise
 from cns_drake.sensors.sensor_config import (
     Mount,
-    Section,
     Triple,
     check_rate,
     field_off_by_default,

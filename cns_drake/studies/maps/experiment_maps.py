@@ -15,12 +15,17 @@ from cns_drake.scenarios import (
     shipped_maps,
 )
 from cns_drake.scene import MapFolder
-from cns_drake.studies.experiments.experiment import Experiment, MadeMap
 from cns_drake.studies.maps.frozen_redraws import redraw_frozen
 from cns_drake.studies.maps.made_maps import made_map_step
 from cns_drake.studies.maps.map_step import make_maps
 from evaluation.results import FROZEN_REDRAW
-from evaluation.study import MapDrives, drives_by_map, find_recordings
+from evaluation.study import (
+    Experiment,
+    MadeMap,
+    MapDrives,
+    drives_by_map,
+    find_recordings,
+)
 
 
 @dataclass(frozen=True)

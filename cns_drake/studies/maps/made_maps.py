@@ -21,12 +21,15 @@ from cns_drake.base import (
     fingerprint,
     read_bytes,
 )
-from cns_drake.imports import ImportOptions, import_city
+from cns_drake.imports import ImportOptions, import_city, map_sources
 from cns_drake.scenarios import Scenario, digest_file
 from cns_drake.scene import MapFolder
-from cns_drake.studies.experiments.experiment import Experiment, MadeMap
 from cns_drake.studies.maps.map_step import MakeMap, make_maps
 from cns_drake.studies.maps.redrawing import RedrawCity
+from evaluation.study import (
+    Experiment,
+    MadeMap,
+)
 
 _FACTOR = "factor"
 # Seeds of redraws are below this number.
@@ -249,6 +252,12 @@ def made_map_step(
         digest = hashlib.sha256(read_bytes(path)).hexdigest()
         if digest != made.sha256:
             raise InputError(f"{path}: not the file of {made.name}: its sha256")
+    for source in map_sources() if made.grow is not None else ():
+        if path.suffix in source.suffixes and source.has_stages:
+            raise InputError(
+                f"{experiment.name}: maps: {made.name}.grow: a map from"
+                f" {source.title} has two stages anyway; leave it out"
+            )
     options = ImportOptions(
         seed=made.seed, grow=made.grow, dressed=not made.plain
     )

@@ -34,17 +34,18 @@ from cns_drake.studies.drives.side_fields import (
     checked_maintainer,
 )
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
-from cns_drake.studies.experiments.conditions import Condition
-from cns_drake.studies.experiments.nested_fields import (
-    FLEET,
-    SESSIONS,
-    Changes,
-)
-from cns_drake.studies.experiments.protocol_fields import protocol_from_fields
 from evaluation.map_update import NOT_MAINTAINED
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
 from evaluation.results import CAUSE, LEVEL, NO_CAUSE, OWN
-from evaluation.study import USUAL_LENGTH, factors_in_words
+from evaluation.study import (
+    FLEET,
+    SESSIONS,
+    USUAL_LENGTH,
+    Changes,
+    Condition,
+    factors_in_words,
+    protocol_from_fields,
+)
 
 # Greatest length of a value in the name of a drive, which names its folder.
 _LONGEST_LABEL = 48

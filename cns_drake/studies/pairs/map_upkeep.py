@@ -9,9 +9,10 @@ import tempfile
 import numpy as np
 
 from cns_drake.base import Reporter
-from cns_drake.studies.ground_truth.exact_labels import is_there, label_points
-from cns_drake.studies.ground_truth.labelled_drive import (
+from cns_drake.ground_truth import (
     LabelledDrive,
+    is_there,
+    label_points,
     labelled_drive,
 )
 from evaluation.map_update import (

@@ -8,8 +8,6 @@ from cns_drake.base import Job, fingerprint
 from cns_drake.scenarios import Scenario
 from cns_drake.simulation import SimulationSource
 from cns_drake.studies.drives.named_stages import MissingError
-from cns_drake.studies.experiments.conditions import Condition
-from cns_drake.studies.experiments.protocol_fields import condition_protocol
 from cns_drake.studies.maps.experiment_maps import ExperimentRun, MapPairs
 from cns_drake.studies.maps.made_maps import MadeMaps
 from cns_drake.studies.pairs.comparisons import ComparedDrives, PairMaker
@@ -24,11 +22,13 @@ from evaluation.recognition import RetrievalProtocol
 from evaluation.results import CAUSE
 from evaluation.study import (
     OPENING_COST,
+    Condition,
     MakePart,
     NamedDrive,
     Pair,
     RecordingSource,
     StudyFiles,
+    condition_protocol,
     job_name,
 )
 

@@ -5,9 +5,11 @@ from pathlib import Path
 import tempfile
 
 from cns_drake.base import Reporter
+from cns_drake.ground_truth import (
+    labelled_drive,
+    write_truth,
+)
 from cns_drake.simulation import SimulationSource
-from cns_drake.studies.ground_truth.labelled_drive import labelled_drive
-from cns_drake.studies.ground_truth.map_truth import write_truth
 from evaluation.map_update import BASELINES
 from evaluation.study import (
     TRUTH,

@@ -1,6 +1,1 @@
 """Finds recordings, sorts them by map and stage, and forms their pairs."""
-
-from pathlib import Path
-
-# The experiment `stages`, which is measured on recordings as well.
-STAGES_FILE = Path(__file__).with_name("stages.yaml")

@@ -5,8 +5,11 @@ from helpers.internal.studies import asked_studies
 import pytest
 
 from cns_drake.__main__ import main
-from cns_drake.studies import load_experiment, shipped_experiments
 from evaluation.methods import shipped_methods
+from evaluation.study import (
+    load_experiment,
+    shipped_experiments,
+)
 
 
 def run(capsys, *words):

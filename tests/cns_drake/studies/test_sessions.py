@@ -5,11 +5,13 @@ import pytest
 
 from cns_drake.base import Cluster
 from cns_drake.studies import (
-    Experiment,
-    load_experiment,
     run_study,
 )
 from evaluation.results import Results
+from evaluation.study import (
+    Experiment,
+    load_experiment,
+)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,6 @@ from cns_drake.base import Cluster, InputError
 from cns_drake.scenarios import load_scenario
 from cns_drake.simulation import SimulationSource
 from cns_drake.studies import (
-    Experiment,
     run_study,
 )
 from evaluation.change import DriveMap
@@ -22,6 +21,9 @@ from evaluation.maps import CELL_SIZE, VoxelAccumulator
 from evaluation.methods import make_method
 from evaluation.recognition import RetrievalProtocol
 from evaluation.results import QueryRows, Results
+from evaluation.study import (
+    Experiment,
+)
 
 TABLES = ("results.csv", "queries.csv")
 

@@ -11,8 +11,10 @@ from cns_drake.scenarios import load_scenario
 from cns_drake.sensors import make_pattern
 from cns_drake.studies import (
     ExperimentRun,
-    load_experiment,
     study_drives,
+)
+from evaluation.study import (
+    load_experiment,
 )
 
 # What a cause of the ladder may change, apart from the drive's name.

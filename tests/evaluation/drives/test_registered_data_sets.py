@@ -7,9 +7,13 @@ from helpers.towns import TownDrive
 import numpy as np
 import pytest
 
-from cns_drake import register_cause
 from cns_drake.base import InputError
-from evaluation import DataSet, data_set_checks, register_data_set
+from evaluation import (
+    DataSet,
+    data_set_checks,
+    register_cause,
+    register_data_set,
+)
 
 
 @pytest.mark.parametrize(

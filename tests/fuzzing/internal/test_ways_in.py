@@ -113,7 +113,7 @@ YAML = {
     "cns_drake.units.find_sheet": (),
     "cns_drake.ageing.read_rates": (),
     "cns_drake.motion.load_suspension_rates": (),
-    "cns_drake.studies.load_experiment": (),
+    "evaluation.study.load_experiment": (),
     "cns_drake.base.read_yaml": (),
 }
 
@@ -209,8 +209,8 @@ methods: {solid: {ranges: {from: 1, to: 1000, count: 1000}}}
 for _name, _text in FACTORS.items():
 
     @way(
-        f"experiment: {_name}", "x.yaml", "cns_drake.studies.load_experiment",
-        use=at_door("cns_drake.studies", "load_experiment", "x.yaml"),
+        f"experiment: {_name}", "x.yaml", "evaluation.study.load_experiment",
+        use=at_door("evaluation.study", "load_experiment", "x.yaml"),
     )  # fmt: skip
     def _(folder, text=_text):
         (folder / "x.yaml").write_text(text)
@@ -1254,7 +1254,7 @@ NO_FILES = {
     "cns_drake.scene.find_bus": "an object",
     "cns_drake.simulation.load_drive": "reads by load_world",
     "cns_drake.simulation.load_stage": "reads by load_world",
-    "cns_drake.studies.open_labelled": "reads by open_drive",
+    "cns_drake.ground_truth.open_labelled": "reads by open_drive",
     "evaluation.drives.find_data_sets": "names of files alone",
     "evaluation.localisation.read_queries": "an open drive",
     "evaluation.methods.find_method": "a name",

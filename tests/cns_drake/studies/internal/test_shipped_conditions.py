@@ -5,8 +5,13 @@ from pathlib import Path
 import pytest
 
 from cns_drake.base import Cluster
-from cns_drake.studies import load_experiment, study
+from cns_drake.studies import (
+    study,
+)
 from cns_drake.studies.maps.experiment_maps import ExperimentRun
+from evaluation.study import (
+    load_experiment,
+)
 
 
 def why(name, maps=(), *changes, **options):

@@ -10,13 +10,16 @@ from helpers.small_city import write_small_city
 import pytest
 
 from cns_drake.ageing import DEFAULT_RATES
-from cns_drake.base import Reporter, draft_folder
+from cns_drake.base import InputError, Reporter, draft_folder
 from cns_drake.city import generate_city
 from cns_drake.scene import MapFolder
-from cns_drake.studies import MadeMap
 from cns_drake.studies.maps import map_step
-from cns_drake.studies.maps.made_maps import AgeCity
+from cns_drake.studies.maps.made_maps import AgeCity, made_map_step
 from cns_drake.studies.maps.map_step import MakeMap
+from evaluation.study import (
+    Experiment,
+    MadeMap,
+)
 
 DRIVE = """
 map: .
@@ -123,3 +126,11 @@ def test_a_killed_study_leaves_no_half_of_a_map(tmp_path, monkeypatch):
 
 def made(**fields):
     return MadeMap.model_validate({"name": "delft", "seed": 3, **fields})
+
+
+def test_a_source_with_stages_of_its_own_does_not_grow(tmp_path):
+    (tmp_path / "a.xodr").write_text("<OpenDRIVE/>")
+    made = MadeMap(name="a", **{"import": "a.xodr"}, seed=1, grow=0.3)
+    experiment = Experiment(name="x", maps=[made], files=str(tmp_path))
+    with pytest.raises(InputError, match=r"a\.grow: a map from OpenDRIVE"):
+        made_map_step(made, experiment, tmp_path / "a", {})

@@ -8,7 +8,9 @@ import pytest
 
 from cns_drake.base import Cluster, InputError, fingerprint
 from cns_drake.scenarios import make_scenario, worlds_folder
-from cns_drake.studies import ExperimentRun, load_experiment
+from cns_drake.studies import (
+    ExperimentRun,
+)
 from cns_drake.studies.maps.experiment_maps import pairs_by_map
 from cns_drake.studies.pairs.comparisons import ComparedDrives
 from cns_drake.studies.pairs.simulated_pairs import SimulatedPairs
@@ -19,6 +21,9 @@ from cns_drake.studies.study import (
     plan_study,
 )
 from evaluation.recognition import RECORDED_PROTOCOL
+from evaluation.study import (
+    load_experiment,
+)
 
 TABLE = "levels.csv"
 

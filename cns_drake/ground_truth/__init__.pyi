@@ -1,0 +1,9 @@
+from .exact_labels import is_there as is_there
+from .exact_labels import label_points as label_points
+from .exact_overlap import VisibleSurfaces as VisibleSurfaces
+from .exact_overlap import exact_overlaps as exact_overlaps
+from .exact_overlap import sights_of as sights_of
+from .labelled import LabelledDrive as LabelledDrive
+from .labelled import labelled_drive as labelled_drive
+from .labelled import open_labelled as open_labelled
+from .map_truth import write_truth as write_truth

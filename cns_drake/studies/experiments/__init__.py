@@ -1,1 +1,0 @@
-"""Experiments: fields of their files, factors, conditions; shipped files."""

@@ -1,1 +1,0 @@
-"""Exact ground truth of simulated drives, from rays cast in worlds."""

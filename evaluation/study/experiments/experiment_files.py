@@ -1,0 +1,291 @@
+"""Reads experiments from files, with changes to single fields."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+import contextlib
+from pathlib import Path
+import re
+from typing import Any, NamedTuple
+
+import yaml
+
+from cns_drake.base import (
+    InputError,
+    did_you_mean,
+    errors_at,
+    merged,
+    nested,
+    parse_changes,
+    read_yaml,
+    validated,
+    value_errors,
+)
+from evaluation.results import (
+    SETTINGS,
+    as_factor,
+    chart_factors,
+    check_factors,
+)
+from evaluation.study.experiments import (
+    STAGES_FILE,
+)
+from evaluation.study.experiments.cause_files import (
+    with_cases,
+)
+from evaluation.study.experiments.experiment import (
+    Experiment,
+    in_long_form,
+    named_programs,
+)
+from evaluation.study.experiments.nested_fields import (
+    Changes,
+)
+from evaluation.study.tasks.place import (
+    CostTask,
+)
+
+_FOLDER = Path(__file__).parent
+
+
+def shipped_experiments() -> dict[str, Path]:
+    """Returns name -> file of the shipped experiments."""
+    files = [*_FOLDER.glob("*.yaml"), STAGES_FILE]
+    return {path.stem: path for path in sorted(files, key=lambda p: p.stem)}
+
+
+def experiment_text(name_or_file: str | Path) -> str:
+    """Returns an experiment's file, with the cases for which its causes stand.
+
+    Raises:
+        InputError: there is no such experiment, or it cannot be used.
+    """
+    load_experiment(name_or_file)
+    path = _experiment_file(name_or_file)
+    text = path.read_text("utf-8")
+    values = read_yaml(path)
+    if "causes" not in values:
+        return text
+    cases = yaml.safe_dump(
+        {"cases": with_cases(values, path)["cases"]},
+        sort_keys=False,
+        default_flow_style=None,
+        allow_unicode=True,
+        width=79,
+    )
+    line = re.compile(r"^causes:.*\n(?:[ #].*\n)*", re.MULTILINE)
+    return line.sub(lambda _: cases, text)
+
+
+def load_experiment(
+    name_or_file: str | Path,
+    overrides: Iterable[str | tuple[str, Any]] = (),
+    *,
+    quick: bool = False,
+    tasks: Sequence[str] = (),
+    methods: Sequence[str] = (),
+) -> Experiment:
+    """Reads an experiment.
+
+    Args:
+        name_or_file: a shipped experiment by name, or a file.
+        overrides: fields to change. Each is a text `FIELD=VALUE`, or a pair of
+            a top-level field and its value. In a text, VALUE is YAML and dots
+            separate nested fields, as in `database.years=[0, 5]`.
+        quick: whether the fields in the section `quick` of the experiment
+            replace its other fields.
+        tasks: tasks to measure instead of the experiment's tasks; the settings
+            of the experiment stay.
+        methods: methods to run, in the same way.
+
+    Raises:
+        InputError: there is no such experiment, or a field is unknown or not
+            usable.
+    """
+    path = _experiment_file(name_or_file)
+    values = read_yaml(path)
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: not a mapping of an experiment's fields")
+    values = with_cases(values, path)
+    values = in_long_form({"name": path.stem, **values})
+    short = values.get("quick")
+    overrides = list(overrides)
+    chosen = {"tasks": tasks, "methods": methods}
+    if quick:
+        if not isinstance(short, dict):
+            raise InputError(
+                f"{path}: quick: missing, or no mapping; --quick needs this"
+                " section, with the fields to replace"
+            )
+        changed = _chosen_anew(values, short)
+        return _checked(changed, values, path, overrides, chosen)
+    found = _checked(values, values, path, overrides, chosen)
+    if isinstance(short, dict) and short:
+        # A fault of the section is told before it is used.
+        with errors_at(f"{path}: quick", f"{path}: "):
+            changed = _chosen_anew(values, short)
+            _checked(changed, values, path, overrides, chosen)
+    return found
+
+
+def _checked(
+    values: Changes,
+    written: Changes,
+    path: Path,
+    overrides: Iterable[str | tuple[str, Any]],
+    chosen: Mapping[str, Sequence[str]],
+) -> Experiment:
+    """Returns an experiment whose conditions are known to be usable.
+
+    Args:
+        values: the fields of the experiment, in long form.
+        written: the fields of the file without those of `quick`, whose factors
+            charts may name, too.
+        path: the file.
+        overrides: see `load_experiment`.
+        chosen: names of tasks and methods that replace those of the experiment.
+    """
+    for one in overrides:
+        values = _overridden(values, one)
+    values = in_long_form(dict(values))
+    for field, names in chosen.items():
+        if names:
+            given = values.get(field)
+            given = given if isinstance(given, dict) else {}
+            values[field] = {name: given.get(name, {}) for name in names}
+    experiment = validated(Experiment, values, path)
+    with value_errors(path):
+        known = _Measured.of(experiment)
+    if values != written:
+        # What an option has left out is still known.
+        with contextlib.suppress(InputError, ValueError):
+            known = known.joined(
+                _Measured.of(validated(Experiment, written, path))
+            )
+    _check_charts(experiment, known, path)
+    return experiment
+
+
+class _Measured(NamedTuple):
+    """What charts can show: factors, their values, and tasks.
+
+    Attributes:
+        factors: names of the factors.
+        values: column -> the values that rows can have there. Columns whose
+            values are known only after the study are left out.
+    """
+
+    factors: tuple[str, ...]
+    values: Mapping[str, Collection[Any]]
+
+    @classmethod
+    def of(cls, experiment: Experiment) -> _Measured:
+        # The task `cost` is added to some studies.
+        tasks = (*experiment.tasks, CostTask.name)
+        values: dict[str, dict[Any, None]] = {"task": dict.fromkeys(tasks)}
+        for condition in experiment.conditions:
+            for name, value in condition.factors.items():
+                values.setdefault(name, {})[as_factor(value)] = None
+        return cls(tuple(experiment.factor_names), values)
+
+    def joined(self, other: _Measured) -> _Measured:
+        return _Measured(
+            (*self.factors, *other.factors),
+            {
+                name: dict.fromkeys(
+                    [*self.values.get(name, ()), *other.values.get(name, ())]
+                )
+                for name in (*self.values, *other.values)
+            },
+        )
+
+
+def _check_charts(experiment: Experiment, known: _Measured, path: Path) -> None:
+    """Checks that charts show what an experiment measures.
+
+    Settings of methods, and metrics of the user, are known once their files
+    have run: `run_study` checks them.
+
+    Raises:
+        InputError: a chart names something else, or cannot be used.
+    """
+    has_own = bool(named_programs(experiment.metrics))
+    factors = [*dict.fromkeys(known.factors)]
+    for chart in experiment.charts:
+        with errors_at(path):
+            names = [
+                name
+                for name in chart_factors(chart)
+                if not name.startswith(SETTINGS)
+                and not (has_own and name in (chart.get("x"), chart.get("y")))
+            ]
+            check_factors(chart, names, factors)
+            if chart["kind"] == "lines":
+                for one in known.values.get(chart["over"], ()):
+                    if isinstance(one, str):
+                        raise InputError(
+                            f"charts: lines: over: {chart['over']}: {one!r} is"
+                            " no number; take dumbbell or matrix"
+                        )
+            for name, value in chart.items():
+                chosen = value if isinstance(value, list) else [value]
+                there = known.values.get(name, chosen)
+                for one in chosen:
+                    if one not in there:
+                        listed = ", ".join(map(str, there))
+                        raise InputError(
+                            f"charts: {chart['kind']}: {name}: {one!r} is none"
+                            f" of {listed}"
+                        )
+
+
+def _experiment_file(name_or_file: str | Path) -> Path:
+    shipped = shipped_experiments()
+    path = shipped.get(str(name_or_file), Path(name_or_file))
+    if not path.is_file():
+        raise InputError(
+            f"{name_or_file}: neither an experiment of this package "
+            f"({', '.join(shipped)}) nor a file"
+            f"{did_you_mean(name_or_file, shipped)}"
+        )
+    return path
+
+
+def _chosen_anew(values: Changes, changes: Changes) -> dict[str, Any]:
+    """Returns `merged` fields, with tasks and methods replaced as a whole."""
+    chosen = {n: changes[n] for n in ("tasks", "methods") if n in changes}
+    return {**merged(values, changes), **chosen}
+
+
+def _overridden(
+    values: Changes, override: str | tuple[str, Any]
+) -> dict[str, Any]:
+    """Returns fields of an experiment with an override."""
+    if not isinstance(override, str):
+        return {**values, **dict([override])}
+    fields = parse_changes([override])
+    if "." not in override.partition("=")[0]:
+        return _chosen_anew(values, fields)
+    (first,) = fields
+    if first not in Experiment.model_fields:
+        return _with_method_setting(values, override)
+    return merged(values, fields)
+
+
+def _with_method_setting(values: Changes, override: str) -> dict[str, Any]:
+    """Returns an experiment's fields, changed by METHOD.SETTING=VALUE.
+
+    If METHOD is not the name of a method, it becomes an unknown field.
+    """
+    from evaluation.methods import known_methods, shipped_methods
+
+    fields = parse_changes([override])
+    methods = values.get("methods") or {one: {} for one in shipped_methods()}
+    name, _, value = override.partition("=")
+    method, _, setting = name.partition(".")
+    if method not in (*methods, *known_methods()):
+        return merged(values, fields)
+    if "," in value and not value.lstrip().startswith("["):
+        # One list, as on the command lines without factors.
+        fields = {method: nested(setting, [value.split(",")])}
+    return merged({**values, "methods": methods}, {"methods": fields})
