@@ -68,14 +68,12 @@ def from_xyz(coordinates: np.ndarray) -> np.ndarray:
 def to_xyzi(scan: np.ndarray) -> np.ndarray:
     """Returns x, y, z and intensity of a scan as (N, 4) little-endian float32.
 
-    Raises:
-        ValueError: if the scan lacks one of these fields.
+    The intensity is 0 if the scan has none.
     """
-    xyzi = np.empty((len(scan), 4), dtype="<f4")
+    xyzi = np.zeros((len(scan), 4), dtype="<f4")
     for column, name in enumerate(_XYZI):
-        if name not in (scan.dtype.names or ()):
-            raise ValueError(f"its points have no field {name}")
-        xyzi[:, column] = scan[name]
+        if name in (scan.dtype.names or ()):
+            xyzi[:, column] = scan[name]
     return xyzi
 
 

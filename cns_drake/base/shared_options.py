@@ -1,6 +1,7 @@
 """Options that both command-line programs have."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -85,6 +86,37 @@ COLUMNS = (
 Json = Annotated[
     bool, typer.Option("--json", help="Print the results as one JSON object.")
 ]
+# Options of commands that open one drive or several.
+_EACH = " Give it once for all drives, or once for each, in order."
+Lidars = Annotated[
+    list[str] | None,
+    typer.Option("--lidar", metavar="NAME", help=LIDAR + _EACH),
+]
+Odometry = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="TOPIC",
+        help=f"Topic of the poses, if a recording has several.{_EACH}",
+    ),
+]
+Poses = Annotated[
+    list[Path] | None,
+    typer.Option(
+        metavar="FILE",
+        help="File with poses of the LiDAR that are used instead of those of "
+        "the recording, in the form of TUM (seconds, x y z, quaternion x y z "
+        f"w) or of KITTI (a 3 x 4 matrix for each scan).{_EACH}",
+    ),
+]
+ColumnsOfEach = Annotated[
+    list[int] | None,
+    typer.Option(
+        "--columns",
+        metavar="N",
+        min=3,  # x, y, z
+        help=COLUMNS + _EACH,
+    ),
+]
 LidarName = Annotated[
     str | None,
     typer.Option(
@@ -102,3 +134,19 @@ Columns = Annotated[
         help=COLUMNS,
     ),
 ]
+
+
+def readings(
+    lidar: list[str] | None,
+    odometry: list[str] | None,
+    poses: list[Path] | None,
+    columns: list[int] | None,
+) -> dict[str, Any]:
+    """Returns how drives are read, from the options that were given."""
+    given = {
+        "lidar": lidar,
+        "odometry": odometry,
+        "poses": poses,
+        "columns": columns,
+    }
+    return {name: values for name, values in given.items() if values}

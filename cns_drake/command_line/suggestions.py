@@ -39,12 +39,17 @@ def suggest_export(recording: Path, scenario: Scenario) -> None:
 
 
 def suggest_evaluation(
-    recording: Path, lidar: str | None, exported: Path
+    recording: Path, exported: Path, *, is_plain: bool
 ) -> None:
     """Names a command that evaluates an exported drive.
 
     This is the measurement of loop closure if the drive returns to a place, and
     otherwise the comparison of the export with the recording.
+
+    Args:
+        recording: the drive that was exported.
+        exported: the export.
+        is_plain: whether the drive is opened without options.
     """
     from evaluation.drives import open_drive
 
@@ -55,7 +60,7 @@ def suggest_evaluation(
     if has_loop(drive):
         words = ("--method", "solid", "--exclude-recent", _EXCLUDED)
         next_command("cns-eval", "pr", exported, exported, *words)
-    elif lidar is None:
+    elif is_plain:
         next_command("cns-eval", "tcr", recording, exported)
 
 

@@ -6,7 +6,6 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from cns_drake.base import InputError, poses
 from cns_drake.drives.drive import Drive
-from cns_drake.drives.mcap_drive import McapDrive
 
 # Number of poses before and after a scan from which its motion is interpolated.
 # The splines have free ends; the error that this causes falls to about a
@@ -18,17 +17,9 @@ _REACH = 4
 _MOST_RATIO = 300.0
 
 
-def _known_distortion(drive: Drive) -> str | None:
-    """Returns the note on a drive's motion distortion; None if none is known.
-
-    Only a simulated recording states whether its scans are distorted.
-    """
-    return drive.distortion_note if isinstance(drive, McapDrive) else None
-
-
 def deskewed_notes(drive: Drive) -> list[str]:
     """Returns the notes on a drive whose scans `deskewed_scan` reads."""
-    known = _known_distortion(drive)
+    known = drive.distortion_note
     taken_out = (
         f"{drive.name}: taken while the LiDAR moved; the motion is taken out,"
         " and all points are as at the scan's stamp"
@@ -42,7 +33,7 @@ def deskewed_scan(drive: Drive, index: int) -> np.ndarray:
     Raises:
         InputError: see `deskew`.
     """
-    if _known_distortion(drive) is None:
+    if drive.distortion_note is None:
         return drive.scan(index)
     return deskew(drive, index)
 

@@ -158,6 +158,25 @@ class Drive(abc.ABC):
         return None
 
     @property
+    def X_BS(self) -> np.ndarray | None:
+        """Pose (4, 4) of the LiDAR on the vehicle B; None if not recorded."""
+        return None
+
+    @property
+    def X_BI(self) -> np.ndarray | None:
+        """Pose (4, 4) of the IMU I on the vehicle B; None if not recorded."""
+        return None
+
+    @property
+    def kalibr(self) -> str | None:
+        """Noise of the IMU as text in Kalibr's file format; None without noise.
+
+        Raises:
+            InputError: what was recorded is no text.
+        """
+        return None
+
+    @property
     def image_stamps_ns(self) -> np.ndarray:
         """(M,) int64 time of each image of the first camera [ns]."""
         return np.zeros(0, np.int64)
@@ -201,6 +220,29 @@ class Drive(abc.ABC):
     def notes(self) -> tuple[str, ...]:
         """Notes for the user on how the recording was read."""
         return ()
+
+    @property
+    def distortion_note(self) -> str | None:
+        """A note for the user if the scans contain motion distortion.
+
+        The value is None if the scans contain no motion distortion, and for
+        recordings of real LiDARs, which do not state whether their scans are
+        distorted.
+        """
+        return None
+
+    @property
+    def lidar_names(self) -> tuple[str, ...]:
+        """Names of the LiDARs; the first is the one that is read by default.
+
+        The names are unknown, and so empty, if the format has none.
+        """
+        return ()
+
+    @property
+    def lidar_name(self) -> str:
+        """Name of the LiDAR whose scans are read; empty if unknown."""
+        return ""
 
     @property
     def scenario(self) -> Mapping | None:

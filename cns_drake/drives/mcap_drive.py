@@ -222,14 +222,12 @@ class McapDrive(Drive):
 
     @property
     def lidar_names(self) -> tuple[str, ...]:
-        """Names of the LiDARs; the first is the one that is read by default."""
         clouds = self._topics.of_types(*_CLOUDS.types)
         clouds.sort(key=lambda topic: topic != _LIDAR_TOPIC)
         return tuple(map(_lidar_name, clouds))
 
     @property
     def lidar_name(self) -> str:
-        """Name of the LiDAR whose scans are read."""
         return _lidar_name(self._lidar_topic)
 
     @cached_property
@@ -275,12 +273,6 @@ class McapDrive(Drive):
 
     @property
     def distortion_note(self) -> str | None:
-        """A note for the user if the scans contain motion distortion.
-
-        The value is None if the scans contain no motion distortion, and for
-        recordings of real LiDARs, which do not state whether their scans are
-        distorted.
-        """
         if not self.lidar_section.get("motion_distortion"):
             return None
         return (
@@ -370,11 +362,6 @@ class McapDrive(Drive):
 
     @property
     def kalibr(self) -> str | None:
-        """Noise of the IMU as text in Kalibr's file format; None without noise.
-
-        Raises:
-            InputError: the recording's attachment with the noise is no text.
-        """
         data = self._file.attachment(_KALIBR)
         try:
             return None if data is None else data.decode()
@@ -450,12 +437,10 @@ class McapDrive(Drive):
 
     @property
     def X_BS(self) -> np.ndarray:
-        """Pose of the LiDAR S on the vehicle B, (4, 4)."""
         return self._mounted[0]
 
     @cached_property
     def X_BI(self) -> np.ndarray | None:
-        """Pose of the IMU I on the vehicle B, (4, 4); None without an IMU."""
         if _IMU_TOPIC not in self._topics or self._base is None:
             return None
         frame = frame_name(self._topics.first(_IMU_TOPIC).header.frame_id)

@@ -1,4 +1,4 @@
+from .absence import Absence as Absence
 from .exporting import claim_folder as claim_folder
 from .exporting import export_drive as export_drive
 from .formats import export_formats as export_formats
-from .marked_drive import MarkedDrive as MarkedDrive

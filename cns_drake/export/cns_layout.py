@@ -7,18 +7,21 @@ from scipy.spatial.transform import Rotation
 import yaml
 
 from cns_drake.base import InputError, encode_pcd
-from cns_drake.drives import McapDrive
+from cns_drake.drives import Drive
 from cns_drake.export.layout import (
     Layout,
+    Trajectory,
     checked_name,
     imu_files,
-    odometry_columns,
+    lidar_trajectory,
     scenario_files,
     stamped_rows,
+    vehicle_notes,
+    vehicle_trajectory,
 )
 
 
-def _drive_folder(drive: McapDrive) -> PurePosixPath:
+def _drive_folder(drive: Drive) -> PurePosixPath:
     """Returns <Map>/<Sequence>, e.g. Metropolis/04 for metropolis_04."""
     scenario = drive.scenario or {}
     place = scenario.get("map") or scenario.get("world") or "world"
@@ -29,29 +32,35 @@ def _drive_folder(drive: McapDrive) -> PurePosixPath:
     )
 
 
-def _outer_files(drive: McapDrive) -> dict[str, str]:
-    height = drive.X_BS[2, 3]
+def _outer_files(drive: Drive) -> dict[str, str]:
+    X_BS = _trajectory(drive).X_BS
+    height = X_BS[2, 3]
     if height < 0.0:
         # Readers would take the mounting pose for its inverse.
         raise InputError(
             f"{drive.name}: the LiDAR is mounted at z = {height:g} m, below the"
             " vehicle, which this format does not have; use another one"
         )
-    files = {"transformation_lidar.yaml": _mount_yaml(drive.X_BS)}
+    files = {"transformation_lidar.yaml": _mount_yaml(X_BS)}
     if drive.X_BI is not None:
         files["transformation_imu.yaml"] = _mount_yaml(drive.X_BI)
     return files
 
 
-def _inner_files(drive: McapDrive) -> dict[str, str]:
-    odometry, imu = drive.odometry, drive.imu
-    columns = odometry_columns(drive)
-    files = {"gt.csv": stamped_rows(odometry["stamp_ns"], columns, ",")}
+def _inner_files(drive: Drive) -> dict[str, str]:
+    imu = drive.imu
+    poses = _trajectory(drive)
+    files = {"gt.csv": stamped_rows(poses.stamps_ns, poses.columns, ",")}
     if imu is not None:
         names = ("quat_xyzw", "angular_velocity", "specific_force")
         columns = [imu[name] for name in names]
         files["imu.csv"] = stamped_rows(imu["stamp_ns"], columns, ",")
     return files | imu_files(drive) | scenario_files(drive)
+
+
+def _trajectory(drive: Drive) -> Trajectory:
+    """Returns the poses of the vehicle; without them, those of the LiDAR."""
+    return vehicle_trajectory(drive) or lidar_trajectory(drive)
 
 
 def _mount_yaml(X_BC: np.ndarray) -> str:
@@ -75,7 +84,7 @@ LAYOUT = Layout(
         "<Map>/<Sequence>/gt.csv": (
             "t, x, y, z, qx, qy, qz, qw: pose of the vehicle's frame (on "
             "the ground, under the LiDAR; forward, left, up) in the world; "
-            "t in nanoseconds"
+            "t in nanoseconds; pose of the LiDAR for a drive without odometry"
         ),
         "<Map>/<Sequence>/imu.csv": (
             "t, qx, qy, qz, qw, wx, wy, wz, ax, ay, az: orientation of the "
@@ -101,4 +110,5 @@ LAYOUT = Layout(
         f"pcd/{stamp_ns}.pcd": encode_pcd(scan)
     },
     shared_outer_files=True,
+    notes=vehicle_notes,
 )

@@ -1,4 +1,4 @@
-"""Exports one recording into a folder of drives.
+"""Exports one drive into a folder of drives.
 
 The folder can contain several drives of one format. The file `export.yaml` in
 this folder lists the exported files, and shows that an export wrote the folder.
@@ -6,17 +6,19 @@ The subfolder of a drive is written under a name ending in `.part`, and gets its
 final name when it is complete.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
 import importlib
 import os
 from pathlib import Path
 import shutil
+from typing import TYPE_CHECKING
 
 from cns_drake.base import (
     InputError,
     check_folder_writable,
-    doing,
     make_folder,
     part_path,
     read_yaml,
@@ -26,15 +28,13 @@ from cns_drake.base import (
     value_errors,
     write_text,
 )
-from cns_drake.drives import (
-    McapDrive,
-    deskewed_notes,
-    deskewed_scan,
-    holds_mcap,
-)
+from cns_drake.drives import Drive, deskewed_notes, deskewed_scan
 from cns_drake.export.formats import ENDING, export_formats
-from cns_drake.export.layout import Layout
+from cns_drake.export.layout import Layout, structure_files
 from cns_drake.recording import to_yaml
+
+if TYPE_CHECKING:
+    from cns_drake.export.absence import Absence
 
 # File that shows that an export wrote a folder, and its field with the writer.
 _MARKER = "export.yaml"
@@ -52,33 +52,31 @@ def _formats_with(name: str) -> str:
 
 
 def export_drive(
-    recording: Path,
+    drive: Drive,
     format_name: str,
     output: Path,
     *,
-    lidar: str | None = None,
     absent_in: str | None = None,
     sequence: int | None = None,
     on_note: Callable[[str], None] = lambda note: None,
 ) -> Path:
-    """Exports a recording, and returns the folder of the drive.
+    """Exports a drive, and returns its folder.
 
     Args:
-        recording: path of the recording.
+        drive: the drive.
         format_name: name of the format, see `export_formats`.
         output: the folder of drives: a new or empty folder, or a folder to
             which this function has already written drives of the same format.
-        lidar: name of the LiDAR to export, if the recording has several LiDARs.
-        absent_in: another stage of the recording's map. Points on structures
-            that are absent in this other stage get SemanticKITTI's labels of
-            moving objects (see `cns_drake.export.marked_drive.MarkedDrive`).
-            None keeps the recorded labels.
+        absent_in: another stage of the drive's map. Points on structures that
+            are absent in this other stage get SemanticKITTI's labels of moving
+            objects (see `cns_drake.export.absence.Absence`). None keeps the
+            recorded labels.
         sequence: number of the drive in KITTI's layout; by default the digits
             at the end of the drive's name.
-        on_note: called with notes about how the recording was read and written.
+        on_note: called with notes about how the drive was read and written.
 
     Raises:
-        InputError: if the recording cannot be read; if the folder contains
+        InputError: if the drive cannot be read; if the folder contains
             anything but exports of this format, or already contains this drive;
             if the files cannot be written; or if `absent_in` is given and
             labels are not possible.
@@ -96,10 +94,14 @@ def export_drive(
                 f" {_formats_with('numbered')}"
             )
         layout = layout.numbered(f"{sequence:02d}")
-    if not holds_mcap(recording):
-        raise InputError(f"{recording}: no recording (.mcap) there")
-    doing(f"opening {recording}")
-    drive = _open_recording(recording, lidar, absent_in)
+    if not len(drive):
+        raise InputError(f"{drive.name}: has no scans")
+    absence = None
+    if absent_in is not None:
+        # Loading Drake takes a while, and only marks need it.
+        from cns_drake.export.absence import Absence
+
+        absence = Absence(drive, absent_in)
     folder = output / layout.drive_folder(drive)
     outer = {
         output / name: text for name, text in layout.outer_files(drive).items()
@@ -119,7 +121,7 @@ def export_drive(
         stack.callback(shutil.rmtree, part, ignore_errors=True)
         for note in _notes(drive, layout):
             on_note(note)
-        _write_drive(drive, layout, part)
+        _write_drive(drive, layout, part, absence)
         for path, text in outer.items():
             make_folder(path.parent)
             write_text(path, text)
@@ -144,17 +146,6 @@ def _remove_empty(folder: Path, output: Path) -> None:
             output.rmdir()
 
 
-def _open_recording(
-    recording: Path, lidar: str | None, absent_in: str | None
-) -> McapDrive:
-    if absent_in is None:
-        return McapDrive(recording, lidar)
-    # Loading Drake takes a while, and only marks need it.
-    from cns_drake.export.marked_drive import MarkedDrive
-
-    return MarkedDrive(recording, lidar, absent_in)
-
-
 def _check_shared_files(texts: Mapping[Path, str]) -> None:
     """Checks that existing files of all drives have the given texts.
 
@@ -171,22 +162,14 @@ def _check_shared_files(texts: Mapping[Path, str]) -> None:
             )
 
 
-def _notes(drive: McapDrive, layout: Layout) -> Iterator[str]:
+def _notes(drive: Drive, layout: Layout) -> Iterator[str]:
     """Yields notes about how a drive is read and written."""
+    yield from layout.notes(drive)
     if layout.scan_files is None:
         return
     yield from deskewed_notes(drive)
-    scan = drive.scan(0)
-    if (
-        layout.has_labels  # Only KITTI's has them.
-        and not drive.lidar_section
-        and "intensity" in (scan.dtype.names or ())
-        and scan["intensity"].max(initial=0.0) > 1.0
-    ):
-        yield (
-            f"{drive.name}: intensities above 1 are written as recorded; those"
-            " of KITTI end at 0.99"
-        )
+    if "intensity" not in (drive.scan(0).dtype.names or ()):
+        yield f"{drive.name}: points have no intensity; it is written as 0"
 
 
 def claim_folder(
@@ -234,15 +217,16 @@ def claim_folder(
 
 
 def _write_drive(
-    drive: McapDrive,
-    layout: Layout,
-    folder: Path,
+    drive: Drive, layout: Layout, folder: Path, absence: Absence | None
 ) -> None:
     with user_errors(folder):
         # An interrupted export may have left it behind.
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
-        for name, text in layout.inner_files(drive).items():
+        files = layout.inner_files(drive)
+        if layout.has_labels:
+            files |= structure_files((absence or drive).instances)
+        for name, text in files.items():
             (folder / name).write_text(text, encoding="utf-8")
         if layout.scan_files is None:
             return
@@ -251,6 +235,8 @@ def _write_drive(
             track(stamps_ns, "writing scans", len(stamps_ns), "scans")
         ):
             scan = deskewed_scan(drive, frame)
+            if absence is not None:
+                scan = absence.marked(scan, frame)
             with value_errors(f"{drive.name}: scan {frame}"):
                 made = layout.scan_files(drive, frame, stamp_ns, scan)
             for name, content in made.items():

@@ -1,18 +1,18 @@
 """The layout of KITTI odometry, with the labels of SemanticKITTI."""
 
+from collections.abc import Iterator
 from pathlib import PurePosixPath
 import re
 
 import numpy as np
 
 from cns_drake.base import encode_bin, poses
-from cns_drake.drives import McapDrive
+from cns_drake.drives import Drive
 from cns_drake.export.layout import (
     Layout,
     imu_files,
     scenario_files,
     seconds_text,
-    structure_files,
 )
 
 # Pose of the LiDAR S in KITTI's camera frame C: x right, y down, z ahead.
@@ -28,23 +28,27 @@ _X_CS = np.array(
 _PROJECTION = np.eye(4)
 
 
-def _drive_number(drive: McapDrive) -> str:
+def _drive_number(drive: Drive) -> str:
     """Returns the number of a drive: the digits at the end of its name, or 00.
 
     The second LiDAR of a recording adds 100, and the third 200, since tools for
     KITTI expect numbers.
     """
-    digits = re.findall(r"\d*$", drive.name)[0]
-    lidar = drive.lidar_names.index(drive.lidar_name)
-    return f"{100 * lidar + int(digits or 0):02d}"
+    digits = re.findall(r"\d*$", drive.session)[0]
+    return f"{100 * _lidar_number(drive) + int(digits or 0):02d}"
 
 
-def _inner_files(drive: McapDrive) -> dict[str, str]:
+def _lidar_number(drive: Drive) -> int:
+    """Returns the place of a drive's LiDAR among those of the recording."""
+    names = drive.lidar_names
+    return names.index(drive.lidar_name) if names else 0
+
+
+def _inner_files(drive: Drive) -> dict[str, str]:
     elapsed_ns = drive.stamps_ns - drive.stamps_ns[0]
     # LiDARs after the first one add their own name.
-    is_first = drive.lidar_name == drive.lidar_names[0]
     lidar = drive.lidar_name.strip("/").replace("/", "_")
-    name = drive.name if is_first else f"{drive.name}_{lidar}"
+    name = f"{drive.name}_{lidar}" if _lidar_number(drive) else drive.name
     calibration = {f"P{camera}": _PROJECTION for camera in range(4)}
     calibration["Tr"] = _X_CS
     return {
@@ -59,12 +63,11 @@ def _inner_files(drive: McapDrive) -> dict[str, str]:
         ),
         "first_pose.txt": _pose_rows(drive.X_WS[:1]),
         **imu_files(drive),
-        **structure_files(drive),
         **scenario_files(drive, name),
     }
 
 
-def _with_kitti_intensities(drive: McapDrive, scan: np.ndarray) -> np.ndarray:
+def _with_kitti_intensities(drive: Drive, scan: np.ndarray) -> np.ndarray:
     """Returns a scan with its intensities in KITTI's scale, if known.
 
     A calibrated intensity from 0 to 255 is divided by 256, rounded to
@@ -83,8 +86,21 @@ def _with_kitti_intensities(drive: McapDrive, scan: np.ndarray) -> np.ndarray:
     return scaled
 
 
+def _notes(drive: Drive) -> Iterator[str]:
+    scan = drive.scan(0)
+    if (
+        not drive.lidar_section
+        and "intensity" in (scan.dtype.names or ())
+        and scan["intensity"].max(initial=0.0) > 1.0
+    ):
+        yield (
+            f"{drive.name}: intensities above 1 are written as recorded; those"
+            " of KITTI end at 0.99"
+        )
+
+
 def _scan_files(
-    drive: McapDrive, frame: int, stamp_ns: int, scan: np.ndarray
+    drive: Drive, frame: int, stamp_ns: int, scan: np.ndarray
 ) -> dict[str, bytes]:
     scan = _with_kitti_intensities(drive, scan)
     files = {f"velodyne/{frame:06d}.bin": encode_bin(scan)}
@@ -93,7 +109,7 @@ def _scan_files(
     return files
 
 
-def _poses_text(drive: McapDrive) -> str:
+def _poses_text(drive: Drive) -> str:
     """Returns the poses X_C0C of all scans, one row of text each."""
     X_S0S = poses.inverse(drive.X_WS[0]) @ drive.X_WS
     return _pose_rows(_X_CS @ X_S0S @ poses.inverse(_X_CS))
@@ -161,7 +177,7 @@ def _layout(number: str | None = None) -> Layout:
             the third 200.
     """
 
-    def number_of(drive: McapDrive) -> str:
+    def number_of(drive: Drive) -> str:
         return number or _drive_number(drive)
 
     return Layout(
@@ -173,6 +189,7 @@ def _layout(number: str | None = None) -> Layout:
         },
         scan_files=_scan_files,
         has_labels=True,
+        notes=_notes,
         numbered=_layout,
     )
 

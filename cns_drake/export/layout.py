@@ -5,16 +5,18 @@ Frames: world W, vehicle B on the ground, LiDAR S, IMU I.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import json
 from pathlib import PurePosixPath
 import re
+from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from cns_drake.base import InputError, poses
-from cns_drake.drives import McapDrive
+from cns_drake.drives import Drive
 from cns_drake.recording import to_yaml
 
 # Text that may become the name of a folder; it cannot lead out of its parent.
@@ -45,24 +47,26 @@ class Layout:
             scans.
         shared_outer_files: whether the outer files belong to all drives
             together, and must therefore be the same for all drives.
-        has_labels: whether points have labels.
+        has_labels: whether points and structures have labels.
+        notes: function that yields notes about how a drive is written.
         numbered: function that returns the layout for a drive with a given
             number, as text; None for formats without numbers.
     """
 
     explained: Mapping[str, str]
-    drive_folder: Callable[[McapDrive], PurePosixPath]
-    inner_files: Callable[[McapDrive], dict[str, str]]
-    outer_files: Callable[[McapDrive], dict[str, str]] = lambda drive: {}
+    drive_folder: Callable[[Drive], PurePosixPath]
+    inner_files: Callable[[Drive], dict[str, str]]
+    outer_files: Callable[[Drive], dict[str, str]] = lambda drive: {}
     scan_files: (
-        Callable[[McapDrive, int, int, np.ndarray], dict[str, bytes]] | None
+        Callable[[Drive, int, int, np.ndarray], dict[str, bytes]] | None
     ) = None
     shared_outer_files: bool = False
     has_labels: bool = False
+    notes: Callable[[Drive], Iterable[str]] = lambda drive: ()
     numbered: Callable[[str], Layout] | None = None
 
 
-def checked_name(drive: McapDrive, text: str) -> str:
+def checked_name(drive: Drive, text: str) -> str:
     """Returns a name from a recording if it is safe as the name of a folder.
 
     Args:
@@ -79,7 +83,7 @@ def checked_name(drive: McapDrive, text: str) -> str:
     return text
 
 
-def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
+def scenario_files(drive: Drive, name: str | None = None) -> dict[str, str]:
     """Returns the file `scenario.yaml`, the scenario of a drive.
 
     The result maps the file name to its text. The result is empty if the
@@ -96,7 +100,7 @@ def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
     return {"scenario.yaml": to_yaml(scenario)}
 
 
-def imu_files(drive: McapDrive) -> dict[str, str]:
+def imu_files(drive: Drive) -> dict[str, str]:
     """Returns the file `imu.yaml`, the IMU's noise in Kalibr's format.
 
     The result maps the file name to its text. The result is empty if the
@@ -105,56 +109,89 @@ def imu_files(drive: McapDrive) -> dict[str, str]:
     return {} if drive.kalibr is None else {"imu.yaml": drive.kalibr}
 
 
-def structure_files(drive: McapDrive) -> dict[str, str]:
+def structure_files(table: Mapping[int, Mapping] | None) -> dict[str, str]:
     """Returns the file `structures.json`, the table of structures.
 
-    The result maps the file name to its text. The result is empty if the
-    recording contains no such table.
+    The result maps the file name to its text. The result is empty if there is
+    no such table.
     """
-    if drive.instances is None:
+    if table is None:
         return {}
-    table = list(drive.instances.values())
-    return {"structures.json": json.dumps(table, indent=1) + "\n"}
+    text = json.dumps(list(table.values()), indent=1)
+    return {"structures.json": text + "\n"}
 
 
-def odometry_columns(drive: McapDrive) -> list[np.ndarray]:
-    """Returns positions (M, 3) and orientations (M, 4) of a drive's odometry.
+class Trajectory(NamedTuple):
+    """Poses of a frame that carries the LiDAR.
 
-    The orientations are unit quaternions x, y, z, w of R_WB. Quaternions in the
-    recording may have any length.
-
-    Raises:
-        InputError: see `check_odometry`.
+    Attributes:
+        stamps_ns: (M,) [ns].
+        columns: positions (M, 3) [m] and unit quaternions (M, 4) x, y, z, w.
+        X_BS: (4, 4) pose of the LiDAR in this frame.
     """
-    check_odometry(drive)
-    quat_xyzw = drive.odometry["quat_xyzw"]
-    length = np.linalg.norm(quat_xyzw, axis=1, keepdims=True)
-    # A length that is one up to rounding is not changed.
-    is_wrong = np.abs(length - 1.0) > _ROUNDING
-    unit = np.where(is_wrong, quat_xyzw / length, quat_xyzw)
-    return [drive.odometry["position"], unit]
+
+    stamps_ns: np.ndarray
+    columns: list[np.ndarray]
+    X_BS: np.ndarray
 
 
-def check_odometry(drive: McapDrive) -> None:
-    """Checks the M odometry messages of a drive.
+def vehicle_trajectory(drive: Drive) -> Trajectory | None:
+    """Returns the poses of a drive's vehicle; None if it has none.
+
+    Quaternions in the recording may have any length.
 
     Raises:
         InputError: a quaternion has no direction, or a coordinate of a position
             is not finite, or not below `poses.FARTHEST`.
     """
-    quat_xyzw = drive.odometry["quat_xyzw"]
+    odometry, X_BS = drive.odometry, drive.X_BS
+    if odometry is None or len(odometry) == 0 or X_BS is None:
+        return None
+    columns = _odometry_columns(drive.name, odometry)
+    return Trajectory(odometry["stamp_ns"], columns, X_BS)
+
+
+def lidar_trajectory(drive: Drive) -> Trajectory:
+    """Returns the poses of a drive's LiDAR, as if it were the vehicle."""
+    X_WS = drive.X_WS
+    quat_WS = Rotation.from_matrix(X_WS[:, :3, :3]).as_quat(canonical=True)
+    return Trajectory(drive.stamps_ns, [X_WS[:, :3, 3], quat_WS], np.eye(4))
+
+
+def vehicle_notes(drive: Drive) -> Iterator[str]:
+    """Yields a note if a drive has no poses of a vehicle."""
+    if vehicle_trajectory(drive) is None:
+        yield (
+            f"{drive.name}: has no poses of the vehicle; those of the LiDAR are"
+            " written alone"
+        )
+
+
+def _odometry_columns(name: str, odometry: np.ndarray) -> list[np.ndarray]:
+    """Returns positions (M, 3) and unit quaternions (M, 4) of odometry."""
+    _check_odometry(name, odometry)
+    quat_xyzw = odometry["quat_xyzw"]
+    length = np.linalg.norm(quat_xyzw, axis=1, keepdims=True)
+    # A length that is one up to rounding is not changed.
+    is_wrong = np.abs(length - 1.0) > _ROUNDING
+    unit = np.where(is_wrong, quat_xyzw / length, quat_xyzw)
+    return [odometry["position"], unit]
+
+
+def _check_odometry(name: str, odometry: np.ndarray) -> None:
+    """Checks the M odometry messages of the drive with a name."""
+    quat_xyzw = odometry["quat_xyzw"]
     with np.errstate(over="ignore", invalid="ignore"):
         length = np.linalg.norm(quat_xyzw, axis=1)
-    position = drive.odometry["position"]
+    position = odometry["position"]
     bad = ~(np.isfinite(length) & (length > 0.0))
     # NaN is False here.
     bad |= ~(np.abs(position) < poses.FARTHEST).all(axis=1)
     if bad.any():
         row = int(bad.argmax())
         raise InputError(
-            f"{drive.name}: the odometry at"
-            f" {drive.odometry['stamp_ns'][row]} ns has the position"
-            f" {position[row]} and the quaternion {quat_xyzw[row]}"
+            f"{name}: the odometry at {odometry['stamp_ns'][row]} ns has the"
+            f" position {position[row]} and the quaternion {quat_xyzw[row]}"
         )
 
 

@@ -3,7 +3,7 @@
 from pathlib import PurePosixPath
 
 from cns_drake.base import encode_bin, poses
-from cns_drake.drives import ORIGIN, X_BS, McapDrive
+from cns_drake.drives import ORIGIN, X_BS, Drive
 from cns_drake.export.layout import (
     Layout,
     checked_name,
@@ -13,7 +13,7 @@ from cns_drake.export.layout import (
 )
 
 
-def _inner_files(drive: McapDrive) -> dict[str, str]:
+def _inner_files(drive: Drive) -> dict[str, str]:
     # The vehicle is where MulRan's mount of the LiDAR has it below this LiDAR.
     X_UB = drive.X_WS @ poses.inverse(X_BS)
     X_UB[:, :3, 3] += ORIGIN

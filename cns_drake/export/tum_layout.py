@@ -2,35 +2,32 @@
 
 from pathlib import PurePosixPath
 
-from scipy.spatial.transform import Rotation
-
-from cns_drake.drives import McapDrive
+from cns_drake.drives import Drive
 from cns_drake.export.layout import (
     Layout,
     checked_name,
     imu_files,
-    odometry_columns,
+    lidar_trajectory,
     seconds_text,
     stamped_rows,
+    vehicle_notes,
+    vehicle_trajectory,
 )
 
 
-def _inner_files(drive: McapDrive) -> dict[str, str]:
-    X_WB, X_WS = drive.odometry, drive.X_WS
-    quat_WS = Rotation.from_matrix(X_WS[:, :3, :3]).as_quat(canonical=True)
-    return {
-        "base_link.tum": stamped_rows(
-            map(seconds_text, X_WB["stamp_ns"].tolist()),
-            odometry_columns(drive),
-            " ",
-        ),
-        "lidar.tum": stamped_rows(
-            map(seconds_text, drive.stamps_ns.tolist()),
-            [X_WS[:, :3, 3], quat_WS],
-            " ",
-        ),
-        **imu_files(drive),
+def _inner_files(drive: Drive) -> dict[str, str]:
+    trajectories = {
+        "base_link.tum": vehicle_trajectory(drive),
+        "lidar.tum": lidar_trajectory(drive),
     }
+    files = {
+        name: stamped_rows(
+            map(seconds_text, one.stamps_ns.tolist()), one.columns, " "
+        )
+        for name, one in trajectories.items()
+        if one is not None
+    }
+    return files | imu_files(drive)
 
 
 LAYOUT = Layout(
@@ -39,7 +36,7 @@ LAYOUT = Layout(
             "timestamp tx ty tz qx qy qz qw: pose of the vehicle's frame "
             "(on the ground, under the LiDAR; forward, left, up) in the "
             "world, one row for each message of the odometry; seconds and "
-            "metres"
+            "metres; missing for a drive without odometry"
         ),
         "<drive>/lidar.tum": (
             "timestamp tx ty tz qx qy qz qw: pose of the LiDAR in the "
@@ -52,4 +49,5 @@ LAYOUT = Layout(
     },
     lambda drive: PurePosixPath(checked_name(drive, drive.name)),
     _inner_files,
+    notes=vehicle_notes,
 )

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from cns_drake.base import InputError, validated
 from cns_drake.drives import Drive, McapDrive, holds_mcap
@@ -21,6 +22,7 @@ from cns_drake.simulation import (
     load_stage,
     still_scene,
 )
+from evaluation.drives import find_data_sets
 from evaluation.study import DriveSource, RecordingSource
 
 # Recorded poses are those of the scenario up to this [m, or without a unit].
@@ -52,7 +54,7 @@ class LabelledDrive:
             return self.simulated.look(0)[0]
         world = load_stage(DrivePlan(self.scenario), with_vehicle=False)
         simulated = self.simulated
-        X_WS = simulated.X_WBs[0] @ simulated.X_BS
+        X_WS = simulated.X_WBs[0] @ RigidTransform(simulated.X_BS)
         return still_scene(world, X_WS, simulated.pattern)
 
 
@@ -69,14 +71,14 @@ def open_labelled(place: str | Path) -> LabelledDrive:
             recorded.
     """
     path = Path(place)
-    if not path.exists() or not holds_mcap(path):
+    if not path.exists() or not find_data_sets(path):
         return simulate_labelled(load_scenario(place))
     folder = path if path.is_dir() else path.parent
-    if not (folder / "scenario.yaml").is_file():
+    if not holds_mcap(path) or not (folder / "scenario.yaml").is_file():
         raise InputError(
-            f"{folder}: no scenario.yaml: the geometry of a recording by others"
-            " is not known (cns-drake export --format map-sessions makes its"
-            " maps)"
+            f"{path}: no recording of cns-drake with a scenario.yaml: the"
+            " geometry of a drive by others is not known (cns-drake export"
+            " --format map-sessions makes its maps)"
         )
     drive = McapDrive(path)
     _check_instances(drive, path)

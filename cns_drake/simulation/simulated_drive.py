@@ -69,7 +69,6 @@ class SimulatedDrive(Drive):
     Each access to a scan simulates the scan.
 
     Attributes:
-        X_BS: pose of the first LiDAR in base_link.
         structures: names of all structures in the world.
         trajectory: planned motion of base_link.
         period: time between two frames [s].
@@ -87,7 +86,7 @@ class SimulatedDrive(Drive):
         self.world_frame = MAP_FRAME
         self.trajectory = trajectory
         self.period = scenario.frame_period
-        self.X_BS = sensor_pose(next(iter(scenario.lidars.values())))
+        self._X_BS = sensor_pose(next(iter(scenario.lidars.values())))
         self._scenario = scenario
         self._num_frames = drive.num_frames
         self._instances = index_instances(drive.structures, self.name)
@@ -127,7 +126,11 @@ class SimulatedDrive(Drive):
             poses.rotation_from_quaternion(np.array(quat_xyzw)),
             np.array([X_WB.translation() for X_WB in self.X_WBs]),
         )
-        return X_WB @ self.X_BS.GetAsMatrix4()
+        return X_WB @ self.X_BS
+
+    @property
+    def X_BS(self) -> np.ndarray:
+        return self._X_BS.GetAsMatrix4()
 
     @cached_property
     def X_WBs(self) -> list[RigidTransform]:
@@ -169,7 +172,7 @@ class SimulatedDrive(Drive):
         `scan`.
         """
         scene = self._lidar.EvalScene(self._context_at(index))
-        return scene, self.X_WBs[index] @ self.X_BS
+        return scene, self.X_WBs[index] @ self._X_BS
 
     def _context_at(self, index: int) -> Context:
         """Returns the LiDAR's Context at the time of a scan."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cns_drake.base import InputError, shared_options, terminal
+from cns_drake.base import InputError, terminal
 
 if TYPE_CHECKING:
     from evaluation.verbs import Measured
@@ -30,40 +30,6 @@ MethodName = Annotated[
         "or a Python file with your own method.",
     ),
 ]
-# Options of commands that compare drives.
-_EACH = " Give it once for all drives, or once for each, in order."
-Lidars = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--lidar",
-        metavar="NAME",
-        help=shared_options.LIDAR + _EACH,
-    ),
-]
-Odometry = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="TOPIC",
-        help=f"Topic of the poses, if a recording has several.{_EACH}",
-    ),
-]
-Poses = Annotated[
-    list[Path] | None,
-    typer.Option(
-        metavar="FILE",
-        help="File with poses of the LiDAR that are used instead of those of "
-        "the recording, in the form of TUM (seconds, x y z, quaternion x y z "
-        f"w) or of KITTI (a 3 x 4 matrix for each scan).{_EACH}",
-    ),
-]
-Columns = Annotated[
-    list[int] | None,
-    typer.Option(
-        metavar="N",
-        min=3,  # x, y, z
-        help=shared_options.COLUMNS + _EACH,
-    ),
-]
 Tables = Annotated[
     Path | None,
     typer.Option(
@@ -75,22 +41,6 @@ Tables = Annotated[
 SensorHeight = Annotated[
     float, typer.Option(help="Height of the LiDAR above the ground [m].")
 ]
-
-
-def readings(
-    lidar: list[str] | None,
-    odometry: list[str] | None,
-    poses: list[Path] | None,
-    columns: list[int] | None,
-) -> dict[str, Any]:
-    """Returns the arguments of a verb from the options that were given."""
-    given = {
-        "lidar": lidar,
-        "odometry": odometry,
-        "poses": poses,
-        "columns": columns,
-    }
-    return {name: values for name, values in given.items() if values}
 
 
 def write_tables(found: Measured, output: Path) -> None:

@@ -16,6 +16,7 @@ from .sessions import read_session as read_session
 from .sessions import read_truth as read_truth
 from .sessions import write_labels as write_labels
 from .sessions import write_session as write_session
+from .sessions import write_sessions as write_sessions
 from .structures import StructureChange as StructureChange
 from .structures import class_names as class_names
 from .structures import (

@@ -15,7 +15,7 @@ one in the subfolder `A`, the newer one in `B`. A session consists of
 Scans and poses have the layout that ELite and LT-mapper read.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -26,6 +26,7 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import (
     InputError,
     completing,
+    draft_folder,
     encode_pcd,
     is_there,
     listed,
@@ -34,7 +35,7 @@ from cns_drake.base import (
     user_errors,
     xyz,
 )
-from cns_drake.drives import Drive
+from cns_drake.drives import Drive, check_same_world
 from evaluation.clouds import read_blocks, read_cloud, read_npy
 from evaluation.drives import read_poses, sample_frames
 from evaluation.map_update.labels import (
@@ -122,8 +123,6 @@ def write_session(
         ):
             scan = drive.scan(frame)
             builder.add(scan, X_WS[number])
-            if "intensity" not in (scan.dtype.names or ()):
-                scan = _without_intensity(scan)
             scan_path(folder, number).write_bytes(encode_pcd(scan))
         rows = X_WS[:, :3].reshape(-1, 12)
         (folder / "poses.txt").write_text(
@@ -133,6 +132,33 @@ def write_session(
         points = builder.points()
         _write_ply(folder / _MAP_FILE, points)
     return _session_of(folder, points, X_WS), frames
+
+
+def write_sessions(
+    older: Drive,
+    newer: Drive,
+    folder: Path,
+    spacing: float = SPACING,
+    on_note: Callable[[str], None] = lambda note: None,
+) -> None:
+    """Writes the maps of two drives, without labels, to a new folder.
+
+    Args:
+        older, newer: the drives.
+        folder: folder to create; it appears when it is complete.
+        spacing: distance driven between two scans [m].
+        on_note: called with notes about how the drives were read.
+
+    Raises:
+        InputError: the drives are in different worlds, a scan cannot be read,
+            or the folder cannot be written or is not empty.
+    """
+    check_same_world(older, newer)
+    with draft_folder(folder) as draft:
+        for side, drive in zip(SIDES, (older, newer), strict=True):
+            for note in drive.notes:
+                on_note(note)
+            write_session(drive, draft / side, spacing)
 
 
 def read_session(folder: Path) -> Session:
@@ -263,14 +289,6 @@ def _as_uint16(path: Path, points: np.ndarray, name: str) -> np.ndarray:
 def scan_path(folder: Path, number: int) -> Path:
     """Returns the path of a scan in the folder of a session."""
     return folder / _SCANS_FOLDER / f"{number:06d}.pcd"
-
-
-def _without_intensity(scan: np.ndarray) -> np.ndarray:
-    """Returns a scan that has no intensity as x, y, z and intensity 0, (N,)."""
-    plain = np.zeros(len(scan), [(n, "<f4") for n in (*"xyz", "intensity")])
-    for name in "xyz":
-        plain[name] = scan[name]
-    return plain
 
 
 def _write_ply(path: Path, points: np.ndarray) -> None:

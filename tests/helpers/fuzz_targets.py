@@ -225,7 +225,9 @@ def _read_drive(path: Path):
 def _export(format_name: str):
     def write(folder: Path) -> None:
         drive = bent_drive.write_drive(folder / "rec" / "town_07")
-        export_drive(drive, format_name, folder / format_name)
+        export_drive(
+            drives.open_drive(drive), format_name, folder / format_name
+        )
         shutil.rmtree(folder / "rec")
 
     return write

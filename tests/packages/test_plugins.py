@@ -100,10 +100,13 @@ def test_the_package_of_the_documents(tmp_path, environment):
     study = ("cns_drake", "study", "own.yaml", "recordings", *method)
     study += ("--output", "study", "--jobs", "2")
     ladder = ("cns_drake", "study", "ladder", "--show")
+    export = ("cns_drake", "export", pair[0], "--format", "kitti")
+    export += ("--output", "kitti")
 
     pip("install", "--no-deps", "--no-build-isolation", "./mine", "./broken")
-    done = [run(*words) for words in ((*pr, "--json"), compare, study, ladder)]
-    assert [one.returncode for one in done] == [0] * 4, done[2].stderr
+    verbs = ((*pr, "--json"), compare, study, ladder, export)
+    done = [run(*words) for words in verbs]
+    assert [one.returncode for one in done] == [0] * 5, done[2].stderr
     fault = "plug-in broken (broken): InputError: 3: no subclass of Method"
     assert all(fault in one.stderr.splitlines() for one in done)
     assert json.loads(done[0].stdout)["wrong_answers"] >= 0.0
@@ -112,6 +115,7 @@ def test_the_package_of_the_documents(tmp_path, environment):
     assert ",mean-heights,0,recorded," in table
     assert ",wrong_answers," in table
     assert "  deep_snow:" in done[3].stdout
+    assert done[4].stdout == "kitti/sequences/01\n"
 
     pip("uninstall", "--yes", "mine", "broken")
     # What was measured stays.

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -20,9 +20,6 @@ from cns_drake.base import (
 from cns_drake.command_line.suggestions import suggest_evaluation
 from cns_drake.export import export_formats
 
-if TYPE_CHECKING:
-    from cns_drake.drives import Drive
-
 GROUP = "Convert for other programs"
 
 
@@ -31,7 +28,6 @@ _SESSIONS = "map-sessions"
 _FORMATS = (*_CONVERTED, _SESSIONS)
 # Option -> the formats with which it has an effect.
 _ONLY_WITH: Mapping[str, tuple[str, ...]] = {
-    "columns": (_SESSIONS,),
     "spacing": (_SESSIONS,),
     "absent_in": _CONVERTED,
     "sequence": _CONVERTED,
@@ -52,8 +48,10 @@ def export(
     *,
     layout: Annotated[str, typer.Option("--format", metavar="FORMAT")],
     output: Annotated[Path, typer.Option()],
-    lidar: shared_options.LidarName = None,
-    columns: shared_options.Columns = None,
+    lidar: shared_options.Lidars = None,
+    odometry: shared_options.Odometry = None,
+    poses: shared_options.Poses = None,
+    columns: shared_options.ColumnsOfEach = None,
     absent_in: Annotated[str | None, typer.Option(metavar="STAGE")] = None,
     sequence: Annotated[
         int | None, typer.Option(metavar="NN", min=0, max=999)
@@ -61,15 +59,16 @@ def export(
     spacing: Annotated[float, typer.Option(min=0.01, metavar="METRES")] = 1.0,
     json: shared_options.Json = False,
 ) -> None:
-    """Convert recordings for other programs.
+    """Convert drives for other programs.
 
-    The format map-sessions contains two maps without labels, from recordings
-    whose world is unknown, such as real drives; for cns-eval map-update, add
-    ground truth of your own: A/truth.npy and B/truth.npy. All other formats
-    convert one recording.
+    The format map-sessions contains two maps without labels, from drives whose
+    world is unknown, such as real ones; for cns-eval map-update, add ground
+    truth of your own: A/truth.npy and B/truth.npy. All other formats convert
+    one drive.
 
     Args:
-        drives: Recording to convert; with --format map-sessions, two drives.
+        drives: Drive to convert, in any format that cns-eval reads; with
+            --format map-sessions, two drives.
         layout: Format to write: one of CONVERTED (tum has only the trajectory)
             or map-sessions.
         output: Folder to write: new, empty, or, except with map-sessions, with
@@ -96,20 +95,33 @@ def export(
     )
     if len(drives) != number:
         raise InputError(f"--format {layout}: give {wanted}, not {len(drives)}")
-    if layout == _SESSIONS:
-        _write_sessions(
-            _open_drives(drives, lidar, columns), output, spacing, json=json
+    with ended_by_interrupts("cns-drake"):
+        from cns_drake.export import export_drive
+        from evaluation.drives import Reading, find_data_sets
+        from evaluation.map_update import write_sessions
+
+    given = shared_options.readings(lidar, odometry, poses, columns)
+    opened = [
+        reading.open(Path(path))
+        for reading, path in zip(
+            Reading.each(number, **given), drives, strict=True
         )
+    ]
+    if layout == _SESSIONS:
+        write_sessions(opened[0], opened[1], output, spacing, note)
+        path = output
     else:
-        _export_recording(
-            drives[0],
+        path = export_drive(
+            opened[0],
             layout,
             output,
-            lidar=lidar,
             absent_in=absent_in,
             sequence=sequence,
-            json=json,
+            on_note=note,
         )
+    show({"output": str(path)}, str(path), json=json)
+    if layout != _SESSIONS and find_data_sets(path):
+        suggest_evaluation(Path(drives[0]), path, is_plain=not given)
 
 
 # The help lists the formats.
@@ -148,60 +160,3 @@ def _check_options(names: Iterable[str], layout: str) -> None:
                 f"--{name.replace('_', '-')}: not with --format {layout};"
                 f" only with {', '.join(formats)}"
             )
-
-
-def _export_recording(
-    recording: str,
-    layout: str,
-    output: Path,
-    *,
-    lidar: str | None,
-    absent_in: str | None,
-    sequence: int | None,
-    json: bool,
-) -> None:
-    """Converts a recording to the layout of a data set."""
-    with ended_by_interrupts("cns-drake"):
-        from cns_drake.export import export_drive
-        from evaluation.drives import find_data_sets
-
-    path = export_drive(
-        Path(recording),
-        layout,
-        output,
-        lidar=lidar,
-        absent_in=absent_in,
-        sequence=sequence,
-        on_note=note,
-    )
-    show({"output": str(path)}, str(path), json=json)
-    if find_data_sets(path):
-        suggest_evaluation(Path(recording), lidar, path)
-
-
-def _open_drives(
-    paths: Sequence[str], lidar: str | None, columns: int | None
-) -> list[Drive]:
-    with ended_by_interrupts("cns-drake"):
-        from evaluation.drives import open_drive
-
-    return [open_drive(Path(path), lidar, columns) for path in paths]
-
-
-def _write_sessions(
-    drives: Sequence[Drive], output: Path, spacing: float, *, json: bool
-) -> None:
-    """Writes maps of two drives without labels."""
-    with ended_by_interrupts("cns-drake"):
-        from cns_drake.base import draft_folder
-        from cns_drake.drives import check_same_world
-        from evaluation.map_update import SIDES, write_session
-
-    for drive in drives:
-        for text in drive.notes:
-            note(text)
-    check_same_world(*drives)
-    with draft_folder(output) as draft:
-        for side, drive in zip(SIDES, drives, strict=True):
-            write_session(drive, draft / side, spacing)
-    show({"output": str(output)}, str(output), json=json)

@@ -31,10 +31,10 @@ def localise(
         float | None, typer.Option(metavar="PART")
     ] = None,
     align: options.Align = "auto",
-    lidar: options.Lidars = None,
-    odometry: options.Odometry = None,
-    poses: options.Poses = None,
-    columns: options.Columns = None,
+    lidar: shared_options.Lidars = None,
+    odometry: shared_options.Odometry = None,
+    poses: shared_options.Poses = None,
+    columns: shared_options.ColumnsOfEach = None,
     jobs: shared_options.Jobs = None,
     output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     json: shared_options.Json = False,
@@ -96,7 +96,7 @@ def localise(
         track=track,
         odometry_drift=odometry_drift,
         align=align,
-        **options.readings(lidar, odometry, poses, columns),
+        **shared_options.readings(lidar, odometry, poses, columns),
         processes=choose_cluster(jobs, None).num_workers,
     )
     values: dict = {

@@ -39,10 +39,10 @@ def pr(
     parameter: shared_options.MethodSettings = None,
     sensor_height: options.SensorHeight = 1.6,
     align: options.Align = "auto",
-    lidar: options.Lidars = None,
-    odometry: options.Odometry = None,
-    poses: options.Poses = None,
-    columns: options.Columns = None,
+    lidar: shared_options.Lidars = None,
+    odometry: shared_options.Odometry = None,
+    poses: shared_options.Poses = None,
+    columns: shared_options.ColumnsOfEach = None,
     across_maps: Annotated[bool, typer.Option("--across-maps")] = False,
     truth: Annotated[
         str, typer.Option(metavar="radius|overlap:PART")
@@ -130,7 +130,7 @@ def pr(
             metrics=metric or (),
             align=align,
             across_maps=across_maps,
-            **options.readings(lidar, odometry, poses, columns),
+            **shared_options.readings(lidar, odometry, poses, columns),
             exact_overlaps=exact_overlaps,
             hide_sector=hide_sector,
             seed=seed,

@@ -22,10 +22,10 @@ def tcr(
     target: Annotated[Path, typer.Argument(metavar="B")],
     no_change: Annotated[Path | None, typer.Option(metavar="C")] = None,
     align: options.Align = "auto",
-    lidar: options.Lidars = None,
-    odometry: options.Odometry = None,
-    poses: options.Poses = None,
-    columns: options.Columns = None,
+    lidar: shared_options.Lidars = None,
+    odometry: shared_options.Odometry = None,
+    poses: shared_options.Poses = None,
+    columns: shared_options.ColumnsOfEach = None,
     output: options.Tables = None,
     json: shared_options.Json = False,
 ) -> None:
@@ -57,7 +57,7 @@ def tcr(
         target,
         no_change=no_change,
         align=align,
-        **options.readings(lidar, odometry, poses, columns),
+        **shared_options.readings(lidar, odometry, poses, columns),
     )
     report = found.report
     if output is not None:

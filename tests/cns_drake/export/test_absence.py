@@ -105,8 +105,10 @@ def read_labels(folder, scan):
 
 
 def test_absent_structures_have_labels_of_moving_ones(drive, tmp_path):
-    plain = export_drive(drive, "kitti", tmp_path / "plain")
-    marked = export_drive(drive, "kitti", tmp_path / "marked", absent_in="01")
+    plain = export_drive(open_drive(drive), "kitti", tmp_path / "plain")
+    marked = export_drive(
+        open_drive(drive), "kitti", tmp_path / "marked", absent_in="01"
+    )
     seen = set()
     for i in range(NUM_SCANS):
         before, instance = read_labels(plain, i)
@@ -126,7 +128,9 @@ def test_absent_structures_have_labels_of_moving_ones(drive, tmp_path):
 
 
 def test_the_table_of_structures_names_them(drive, tmp_path):
-    marked = export_drive(drive, "kitti", tmp_path / "out", absent_in="01")
+    marked = export_drive(
+        open_drive(drive), "kitti", tmp_path / "out", absent_in="01"
+    )
     table = json.loads((marked / "structures.json").read_text())
     assert {entry["instance"]: entry.get("absent_in") for entry in table} == {
         instance: None if absent is None else "01"
@@ -135,7 +139,9 @@ def test_the_table_of_structures_names_them(drive, tmp_path):
 
 
 def test_our_reader_takes_them(drive, tmp_path):
-    marked = export_drive(drive, "kitti", tmp_path / "out", absent_in="01")
+    marked = export_drive(
+        open_drive(drive), "kitti", tmp_path / "out", absent_in="01"
+    )
     read = open_drive(marked)
     labels, instances = read_labels(marked, 1)
     np.testing.assert_array_equal(read.scan(1)["label"], labels)
@@ -145,7 +151,9 @@ def test_our_reader_takes_them(drive, tmp_path):
 
 
 def test_its_own_stage_lacks_only_what_was_never_there(drive, tmp_path):
-    marked = export_drive(drive, "kitti", tmp_path / "out", absent_in="02")
+    marked = export_drive(
+        open_drive(drive), "kitti", tmp_path / "out", absent_in="02"
+    )
     for i in range(NUM_SCANS):
         labels, instances = read_labels(marked, i)
         assert set(instances[labels > 251]) == {11}
@@ -154,7 +162,9 @@ def test_its_own_stage_lacks_only_what_was_never_there(drive, tmp_path):
 @pytest.mark.parametrize("format_name", ["cns", "tum"])
 def test_formats_without_labels(drive, tmp_path, format_name):
     with pytest.raises(InputError, match=r"--absent-in: .* has no labels"):
-        export_drive(drive, format_name, tmp_path / "out", absent_in="01")
+        export_drive(
+            open_drive(drive), format_name, tmp_path / "out", absent_in="01"
+        )
     assert not (tmp_path / "out").exists()
 
 
@@ -188,7 +198,9 @@ def test_faults_are_one_line(town, tmp_path, changes, stage, fault):
         tmp_path / "rec/town_02", {"map": str(town), "stage": "02"}, **changes
     )
     with pytest.raises(InputError) as caught:
-        export_drive(drive, "kitti", tmp_path / "out", absent_in=stage)
+        export_drive(
+            open_drive(drive), "kitti", tmp_path / "out", absent_in=stage
+        )
     assert re.search(fault, str(caught.value))
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "out").exists()
@@ -209,7 +221,10 @@ def test_points_without_instances(town, tmp_path):
     )
     with pytest.raises(InputError, match="scan 0: no field label"):
         export_drive(
-            tmp_path / "rec/town_02", "kitti", tmp_path / "out", absent_in="01"
+            open_drive(tmp_path / "rec/town_02"),
+            "kitti",
+            tmp_path / "out",
+            absent_in="01",
         )
 
 

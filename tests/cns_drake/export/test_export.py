@@ -7,9 +7,10 @@ import shutil
 
 from helpers.bent_drive import NUM_SCANS, P_BS, QUAT_BS, write_drive
 from helpers.contradictions import read_messages, write_messages
-from helpers.drive_files import write_recording
+from helpers.drive_files import make_scan
 from helpers.internal.eval_program import run_program
 from helpers.internal.listening import Heard, listening
+from helpers.towns import TownDrive
 from mcap.reader import make_reader
 from mcap.writer import Writer
 import numpy as np
@@ -33,14 +34,17 @@ def drive(tmp_path_factory):
 @pytest.fixture(scope="module")
 def kitti(drive, tmp_path_factory):
     output = tmp_path_factory.mktemp("exports") / "kitti"
-    assert export_drive(drive, "kitti", output) == output / "sequences/07"
+    assert (
+        export_drive(open_drive(drive), "kitti", output)
+        == output / "sequences/07"
+    )
     return output
 
 
 @pytest.fixture(scope="module")
 def cns(drive, tmp_path_factory):
     output = tmp_path_factory.mktemp("exports") / "cns"
-    assert export_drive(drive, "cns", output) == output / "Town/07"
+    assert export_drive(open_drive(drive), "cns", output) == output / "Town/07"
     return output
 
 
@@ -56,6 +60,8 @@ def assert_same_drive(read, recorded, fields):
             np.testing.assert_array_equal(ours[name], original[name])
 
 
+POSES = np.tile(np.eye(4), (2, 1, 1))
+POSES[1, :3, 3] = 1.0, 2.0, 0.5
 XYZI = ("x", "y", "z", "intensity")
 
 
@@ -89,7 +95,7 @@ def test_kitti_has_its_poses_where_semantic_kitti_has_them(drive, kitti):
 
 def test_tum_by_plain_means(drive, tmp_path):
     """The vehicle drives as recorded, and the LiDAR stands fixed on it."""
-    folder = export_drive(drive, "tum", tmp_path / "tum")
+    folder = export_drive(open_drive(drive), "tum", tmp_path / "tum")
     assert folder == tmp_path / "tum/town_07"
     recorded = open_drive(drive)
     vehicle = np.loadtxt(folder / "base_link.tum")
@@ -184,20 +190,22 @@ def test_cns_reads_back(drive, cns):
 def test_cns_has_lidars_at_the_vehicle_and_none_below(tmp_path):
     """A mounting pose below the vehicle reads like the inverse of one above."""
     recording = write_drive(tmp_path / "town_01", p_BS=(0.2, 0.0, 0.0))
-    read = open_drive(export_drive(recording, "cns", tmp_path / "cns"))
+    read = open_drive(
+        export_drive(open_drive(recording), "cns", tmp_path / "cns")
+    )
     assert_same_drive(read, open_drive(recording), XYZI)
     recording = write_drive(tmp_path / "town_02", p_BS=(0.2, 0.0, -1e-3))
     with pytest.raises(InputError, match=r"town_02: .* z = -0\.001 m"):
-        export_drive(recording, "cns", tmp_path / "below")
+        export_drive(open_drive(recording), "cns", tmp_path / "below")
     assert not (tmp_path / "below").exists()
 
 
 def test_a_failed_export_leaves_earlier_drives(drive, tmp_path):
-    first = export_drive(drive, "kitti", tmp_path / "out")
-    bare = np.zeros(3, [(axis, "<f4") for axis in "xyz"])
-    recording = write_recording(tmp_path / "n_08", [bare] * 2, [np.eye(4)] * 2)
-    with pytest.raises(InputError, match="no field intensity"):
-        export_drive(recording, "kitti", tmp_path / "out")
+    first = export_drive(open_drive(drive), "kitti", tmp_path / "out")
+    broken = TownDrive("n_08", [make_scan(np.ones((3, 3)))] * 2, POSES)
+    broken.scan = lambda index: [][index]
+    with pytest.raises(IndexError):
+        export_drive(broken, "kitti", tmp_path / "out")
     assert [path.name for path in first.parent.iterdir()] == ["07"]
     assert (tmp_path / "out/export.yaml").is_file()
 
@@ -240,7 +248,7 @@ def test_pcd_by_open3d(drive, cns):
 
 def test_mulran_reads_back(drive, tmp_path):
     recorded = open_drive(drive)
-    folder = export_drive(drive, "mulran", tmp_path / "mulran")
+    folder = export_drive(open_drive(drive), "mulran", tmp_path / "mulran")
     read = open_drive(folder)
     assert read.world_frame == "mulran/utm-52n"
     np.testing.assert_allclose(read.X_WS, recorded.X_WS, rtol=0, atol=1e-8)
@@ -255,7 +263,7 @@ def test_mulran_reads_back(drive, tmp_path):
 def test_mulran_by_plain_means(drive, tmp_path):
     """By the mount of calib_base2ouster.txt, turned by almost half a turn."""
     recorded = open_drive(drive)
-    folder = export_drive(drive, "mulran", tmp_path / "mulran")
+    folder = export_drive(open_drive(drive), "mulran", tmp_path / "mulran")
     rows = np.loadtxt(folder / "global_pose.csv", delimiter=",", dtype=object)
     assert rows[:, 0].astype(int).tolist() == recorded.stamps_ns.tolist()
     X_UB = np.zeros((len(rows), 4, 4))
@@ -276,7 +284,7 @@ def test_mulran_by_plain_means(drive, tmp_path):
 
 
 def test_imu_of_a_simulated_drive(short_recording, tmp_path):
-    drive = export_drive(short_recording, "cns", tmp_path / "cns")
+    drive = export_drive(open_drive(short_recording), "cns", tmp_path / "cns")
     recorded = open_drive(short_recording)
     read = open_drive(drive)
     np.testing.assert_array_equal(read.imu, recorded.imu)
@@ -290,7 +298,7 @@ def test_imu_of_a_simulated_drive(short_recording, tmp_path):
 
 
 def test_same_recording_gives_same_bytes(drive, kitti, tmp_path):
-    export_drive(drive, "kitti", tmp_path / "again")
+    export_drive(open_drive(drive), "kitti", tmp_path / "again")
     files = [path for path in kitti.rglob("*") if path.is_file()]
     assert len(files) == 1 + 1 + 6 + 2 * NUM_SCANS
     for path in files:
@@ -319,21 +327,21 @@ def test_several_drives_share_a_folder(drive, tmp_path):
     other = write_drive(tmp_path / "recordings" / "town_08")
     output = tmp_path / "output"
     for recording in (drive, other):
-        export_drive(recording, "cns", output)
+        export_drive(open_drive(recording), "cns", output)
     assert sorted(p.name for p in (output / "Town").iterdir()) == ["07", "08"]
     moved = write_drive(tmp_path / "recordings" / "town_09", p_BS=(0, 0, 2))
     with pytest.raises(InputError, match=r"lidar\.yaml: differs.*mount"):
-        export_drive(moved, "cns", output)
+        export_drive(open_drive(moved), "cns", output)
     assert not (output / "Town/09").exists()
 
 
 def test_a_drive_is_not_replaced(drive, tmp_path):
-    drive_folder = export_drive(drive, "kitti", tmp_path / "output")
+    drive_folder = export_drive(open_drive(drive), "kitti", tmp_path / "output")
     (drive_folder / "times.txt").write_text("mine")
     with pytest.raises(
         InputError, match="sequences/07: this drive is there already"
     ):
-        export_drive(drive, "kitti", tmp_path / "output")
+        export_drive(open_drive(drive), "kitti", tmp_path / "output")
     assert (drive_folder / "times.txt").read_text() == "mine"
 
 
@@ -347,7 +355,9 @@ def test_foreign_folders_are_left_alone(drive, tmp_path, format_name):
     (tmp_path / "foreign").mkdir()
     (tmp_path / "foreign/export.yaml").write_text("format: [cns]")
     export_drive(
-        drive, "kitti" if format_name == "cns" else "cns", tmp_path / "other"
+        open_drive(drive),
+        "kitti" if format_name == "cns" else "cns",
+        tmp_path / "other",
     )
     before = sorted(tmp_path.rglob("*"))
     for folder, fault in (
@@ -358,7 +368,7 @@ def test_foreign_folders_are_left_alone(drive, tmp_path, format_name):
         ("other", "the folder holds"),
     ):
         with pytest.raises(InputError, match=fault):
-            export_drive(drive, format_name, tmp_path / folder)
+            export_drive(open_drive(drive), format_name, tmp_path / folder)
     assert sorted(tmp_path.rglob("*")) == before
 
 
@@ -374,14 +384,19 @@ def test_an_interrupted_export_has_no_final_name(drive, tmp_path, format_name):
                 raise StopError
 
     with pytest.raises(StopError), listening(Stopper()):
-        export_drive(drive, format_name, tmp_path / "out")
+        export_drive(open_drive(drive), format_name, tmp_path / "out")
     assert not (tmp_path / "out").exists()
     # A killed export leaves its part file, which no other export uses.
-    drive_folder = export_drive(drive, format_name, tmp_path / "out")
+    drive_folder = export_drive(
+        open_drive(drive), format_name, tmp_path / "out"
+    )
     part = drive_folder.with_name("07.part")
     drive_folder.rename(part)
     (part / "scrap").write_text("")
-    assert export_drive(drive, format_name, tmp_path / "out") == drive_folder
+    assert (
+        export_drive(open_drive(drive), format_name, tmp_path / "out")
+        == drive_folder
+    )
     assert not part.exists()
     assert not (drive_folder / "scrap").exists()
 
@@ -402,7 +417,7 @@ def test_a_full_disk_leaves_nothing_half(
 
     monkeypatch.setattr(type(tmp_path), "write_bytes", write_bytes)
     with pytest.raises(InputError, match=r"07\.part: No space left"):
-        export_drive(drive, format_name, tmp_path / "out")
+        export_drive(open_drive(drive), format_name, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -423,7 +438,9 @@ def test_a_report_finds_exports(tmp_path, format_name, depth):
                 "scenario.json": {"map": "town", "stage": f"s{number}"}
             },
         )
-        export_drive(recording, format_name, tmp_path / "in" / depth)
+        export_drive(
+            open_drive(recording), format_name, tmp_path / "in" / depth
+        )
     (tmp_path / "in" / "notes").mkdir()
     (city,) = drives_by_map(find_recordings(tmp_path / "in"))
     assert city.name == "town"
@@ -437,12 +454,11 @@ def test_one_of_several_lidars(drive, tmp_path):
     rear = write_drive(
         tmp_path / "recordings" / "town_01", lidar_topic="/rear/points"
     )
-    export_drive(rear, "kitti", tmp_path / "rear", lidar="rear")
+    export_drive(open_drive(rear, "rear"), "kitti", tmp_path / "rear")
     with pytest.raises(
         InputError, match=r"no topic /side/points .*/rear/points"
     ):
-        export_drive(rear, "kitti", tmp_path / "side", lidar="side")
-    assert not (tmp_path / "side").exists()
+        open_drive(rear, "side")
 
 
 def add_topic(path, old, new):
@@ -487,11 +503,12 @@ def test_two_lidars_share_a_kitti_folder(tmp_path):
     add_topic(recording / "town_07_0.mcap", "/lidar/points", "/rear/points")
     output = tmp_path / "kitti"
     for lidar, number in (("lidar", "07"), ("rear", "107")):
-        drive = export_drive(recording, "kitti", output, lidar=lidar)
+        opened = open_drive(recording, lidar)
+        drive = export_drive(opened, "kitti", output)
         assert drive == output / "sequences" / number
         assert (output / f"poses/{number}.txt").is_file()
         with pytest.raises(InputError, match="is there already"):
-            export_drive(recording, "kitti", output, lidar=lidar)
+            export_drive(opened, "kitti", output)
     names = [open_drive(drive).name for drive in sorted(drive.parent.iterdir())]
     assert names == ["town_07", "town_07_rear"]
 
@@ -503,7 +520,7 @@ def test_names_that_lead_elsewhere_are_refused(tmp_path):
             attachments={"scenario.json": {"map": place}},
         )
         with pytest.raises(InputError, match="cannot be the name of a folder"):
-            export_drive(drive, "cns", tmp_path / "out" / "deep")
+            export_drive(open_drive(drive), "cns", tmp_path / "out" / "deep")
         shutil.rmtree(tmp_path / "recordings")
     assert not (tmp_path / "out").exists()
 
@@ -521,7 +538,7 @@ def test_quaternions_are_of_unit_length(tmp_path, format_name):
                 quat = one.body.pose.pose.orientation
                 setattr(quat, name, 3.0 * getattr(quat, name))
     path.write_bytes(write_messages(messages, attachments))
-    folder = export_drive(path, format_name, tmp_path / "out")
+    folder = export_drive(open_drive(path), format_name, tmp_path / "out")
     if format_name == "cns":
         exported = open_drive(folder)
         np.testing.assert_allclose(exported.X_WS, whole, atol=1e-12)
@@ -532,18 +549,34 @@ def test_quaternions_are_of_unit_length(tmp_path, format_name):
         setattr(messages[-2].body.pose.pose.orientation, name, 0.0)
     path.write_bytes(write_messages(messages, attachments))
     with pytest.raises(InputError, match="quaternion"):
-        export_drive(path, format_name, tmp_path / "new")
+        export_drive(open_drive(path), format_name, tmp_path / "new")
     assert not list((tmp_path / "new").glob("*/*"))
 
 
-def test_folders_without_a_recording(kitti, tmp_path):
-    for path in (tmp_path, tmp_path / "missing", kitti / "sequences/07"):
-        with pytest.raises(InputError, match=f"{path}: no recording"):
-            export_drive(path, "cns", tmp_path / "out")
-    (tmp_path / "broken.mcap").write_text("no mcap")
-    with pytest.raises(InputError, match=r"broken\.mcap: not an MCAP file"):
-        export_drive(tmp_path / "broken.mcap", "cns", tmp_path / "out")
-    assert not (tmp_path / "out").exists()
+@pytest.mark.parametrize("format_name", ["cns", "kitti", "mulran"])
+def test_a_drive_of_any_format(tmp_path, format_name):
+    """Also of points alone, without a vehicle, a scenario, an intensity."""
+    scans = [np.full(3, k, [(axis, "<f4") for axis in "xyz"]) for k in (1, 2)]
+    drive, notes = TownDrive("hall_08", scans, POSES), []
+    folder = export_drive(
+        drive, format_name, tmp_path / "out", on_note=notes.append
+    )
+    read = open_drive(folder)
+    np.testing.assert_allclose(read.X_WS, drive.X_WS, atol=1e-8)
+    assert (read.scan(1)["x"] == 2.0).all()
+    assert (read.scan(1)["intensity"] == 0.0).all()
+    assert notes[-1] == "hall_08: points have no intensity; it is written as 0"
+    assert (format_name == "cns") == ("no poses of the vehicle" in notes[0])
+
+
+def test_the_trajectory_of_a_lidar_alone(tmp_path):
+    drive = TownDrive("hall_08", [np.zeros(0)] * 2, POSES)
+    folder = export_drive(drive, "tum", tmp_path / "out")
+    assert [file.name for file in folder.iterdir()] == ["lidar.tum"]
+    rows = np.loadtxt(folder / "lidar.tum")
+    np.testing.assert_array_equal(rows[:, 1:4], POSES[:, :3, 3])
+    with pytest.raises(InputError, match="empty: has no scans"):
+        export_drive(TownDrive("empty", [], POSES[:0]), "tum", tmp_path / "no")
 
 
 class TestReadingKittiExports:

@@ -101,7 +101,7 @@ def test_it_is_simulated_again_from_its_own_scenario(recording, tmp_path):
 @pytest.mark.parametrize("format_name", ["kitti", "cns"])
 def test_an_export_has_the_rings(recording, tmp_path, format_name):
     drive = open_drive(
-        export_drive(recording, format_name, tmp_path / format_name)
+        export_drive(open_drive(recording), format_name, tmp_path / format_name)
     )
     assert drive.lidar_field == (11, -20.0, 4.0)
     scan = drive.scan(0)

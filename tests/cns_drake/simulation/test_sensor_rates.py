@@ -220,7 +220,7 @@ def test_kalibrs_file_travels_with_the_recording(recording, tmp_path):
     assert yaml.safe_load((recording / "imu.yaml").read_text()) == expected
     assert yaml.safe_load(McapDrive(recording).kalibr) == expected
     for layout in ("cns", "kitti", "mulran", "tum"):
-        drive = export_drive(recording, layout, tmp_path / layout)
+        drive = export_drive(McapDrive(recording), layout, tmp_path / layout)
         assert yaml.safe_load((drive / "imu.yaml").read_text()) == expected
 
 

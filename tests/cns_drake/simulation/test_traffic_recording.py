@@ -149,7 +149,7 @@ def test_kitti_has_moving_labels_and_instances(recording, moving, tmp_path):
     assert {252, 254} < set(moving.values())
     assert max(moving.values()) > 255
     assert min(moving) > 300
-    folder = export_drive(recording, "kitti", tmp_path)
+    folder = export_drive(McapDrive(recording), "kitti", tmp_path)
     drive = McapDrive(recording)
     names = {i: one["class"] for i, one in drive.instances.items()}
     for instance, label in moving.items():

@@ -1178,9 +1178,10 @@ def _(folder):
     from helpers import bent_drive
 
     from cns_drake.export import export_drive
+    from evaluation import open_drive
 
     source = bent_drive.write_drive(folder / "rec" / "town_07")
-    export_drive(source, "cns", folder / "all")
+    export_drive(open_drive(source), "cns", folder / "all")
     (one,) = (file.parent for file in folder.rglob("scenario.yaml"))
     one.rename(folder / "drive")
     (folder / "drive" / "scenario.yaml").write_text(LAUGHS)
