@@ -44,6 +44,7 @@ from .simulation import FinishedSimulation as FinishedSimulation
 from .simulation import add_mcap_recorder as add_mcap_recorder
 from .simulation import make_station as make_station
 from .simulation import plan_scenario_traffic as plan_scenario_traffic
+from .simulation import scan as scan
 from .simulation import simulate as simulate
 from .traffic import add_traffic as add_traffic
 from .units import LIDAR_PRESETS as LIDAR_PRESETS

@@ -1,5 +1,7 @@
 """A single scan of any SDF world from any pose."""
 
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,9 +10,72 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
+from cns_drake.base import check_writable, doing
 from cns_drake.ray_casting import RayCastingScene
-from cns_drake.scene import World
-from cns_drake.sensors import BeamPattern, Lidar, connect_lidar
+from cns_drake.scene import World, load_world
+from cns_drake.sensors import (
+    BeamPattern,
+    Lidar,
+    LidarSection,
+    WeatherConfig,
+    connect_lidar,
+    make_lidar_model,
+)
+from cns_drake.simulation.scan_files import check_ending, save_scan
+
+
+def scan(
+    world: Path | str,
+    X_WS: RigidTransform,
+    lidar: LidarSection | None = None,
+    *,
+    weather: WeatherConfig | None = None,
+    seed: int = 0,
+    model_paths: Iterable[Path] = (),
+    output: Path | None = None,
+    on_note: Callable[[str], None] = lambda note: None,
+) -> np.ndarray:
+    """Takes one LiDAR scan of an SDF world, as `cns-drake scan`.
+
+    Args:
+        world: SDF file.
+        X_WS: pose of the LiDAR in the world.
+        lidar: the LiDAR; its mounting pose has no effect. By default the preset
+            `cns`, whose coordinates are not rounded.
+        weather: weather of calibrated returns; by default clear.
+        seed: seed of the random numbers.
+        model_paths: folders with the world's model:// files.
+        output: file for the scan, see `save_scan`; by default none is written.
+        on_note: called with notes about how the world was read.
+
+    Returns:
+        Structured array (N,) of `POINT_DTYPE`, in the LiDAR's frame S.
+
+    Raises:
+        InputError: the world cannot be read, or the file cannot be written.
+
+    Example:
+        from pydrake.math import RigidTransform
+
+        from cns_drake import scan
+
+        points = scan("hall.sdf", RigidTransform([0.0, 0.0, 1.6]))
+    """
+    if output is not None:
+        check_ending(output)
+        check_writable(output)
+    world = Path(world)
+    doing(f"reading {world.name}")
+    loaded = load_world(world, model_paths=list(model_paths))
+    for text in loaded.notes:
+        on_note(text)
+    lidar = lidar or LidarSection(resolution=0.0)
+    model = make_lidar_model(lidar, "lidar", seed, weather)
+    doing("casting rays")
+    points = scan_world(loaded, X_WS, **model._asdict())
+    if output is not None:
+        save_scan(points, output)
+    return points
 
 
 def scan_world(

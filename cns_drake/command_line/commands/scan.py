@@ -9,7 +9,6 @@ import typer
 
 from cns_drake.base import (
     InputError,
-    doing,
     ended_by_interrupts,
     note,
     shared_options,
@@ -64,18 +63,14 @@ def scan(
         import numpy as np
         from pydrake.math import RigidTransform, RollPitchYaw
 
-        from cns_drake.base import check_writable
         from cns_drake.scenarios import make_scenario
-        from cns_drake.scene import LARGEST_SIZE, load_world
-        from cns_drake.sensors import make_lidar_model
-        from cns_drake.simulation import check_ending, save_scan, scan_world
+        from cns_drake.scene import LARGEST_SIZE
+        from cns_drake.simulation import scan as take_scan
 
     if not np.isfinite(pose).all():
         raise InputError("--pose: not finite")
     if max(map(abs, pose)) > LARGEST_SIZE:
         raise InputError(f"--pose: {pose} is beyond {LARGEST_SIZE:g} m or rad")
-    check_ending(output)
-    check_writable(output)
     values = {
         "name": "scan",
         "world": str(world),
@@ -86,17 +81,16 @@ def scan(
     plain = make_scenario(values, world)
     scenario = changed(plain, changes)
     _check_fields_of_scan(scenario, plain)
-    X_WS = RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
-    doing(f"reading {world.name}")
-    loaded = load_world(world, model_paths=model_path or ())
-    for text in loaded.notes:
-        note(text)
-    model = make_lidar_model(
-        scenario.lidars["lidar"], "lidar", scenario.seed, scenario.weather
+    points = take_scan(
+        world,
+        RigidTransform(RollPitchYaw(*pose[3:]), pose[:3]),
+        scenario.lidars["lidar"],
+        weather=scenario.weather,
+        seed=scenario.seed,
+        model_paths=model_path or (),
+        output=output,
+        on_note=note,
     )
-    doing("casting rays")
-    points = scan_world(loaded, X_WS, **model._asdict())
-    save_scan(points, output)
     show(
         {"output": str(output), "points": len(points)},
         f"{output}: {len(points)} points",

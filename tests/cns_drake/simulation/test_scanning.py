@@ -9,12 +9,13 @@ from cns_drake.base import InputError
 from cns_drake.scene import load_world
 from cns_drake.sensors import make_beam_pattern
 from cns_drake.simulation import save_scan, scan_world
+from cns_drake.simulation import scan as take_scan
 
 X_WS = RigidTransform(RollPitchYaw(0.05, -0.1, 2.0), [3.0, -2.0, 1.7])
 
 
 @pytest.fixture
-def scan(tmp_path):
+def world(tmp_path):
     path = tmp_path / "world.sdf"
     path.write_text(
         world_text(
@@ -24,7 +25,22 @@ def scan(tmp_path):
             ]
         )
     )
-    return scan_world(load_world(path), X_WS, make_beam_pattern("cns", 0.05))
+    return path
+
+
+@pytest.fixture
+def scan(world):
+    return take_scan(world, X_WS)
+
+
+def test_the_usual_lidar_is_exact(world, scan, tmp_path):
+    pattern = make_beam_pattern("cns", 0.05)
+    exact = scan_world(load_world(world), X_WS, pattern)
+    np.testing.assert_array_equal(scan, exact)
+    take_scan(world, X_WS, output=tmp_path / "scan.npy")
+    np.testing.assert_array_equal(
+        np.load(tmp_path / "scan.npy"), expected(exact)
+    )
 
 
 def test_points_lie_on_the_world(scan):
