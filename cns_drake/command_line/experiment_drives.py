@@ -27,19 +27,14 @@ def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
         InputError: the experiment cannot be used, or a file is in the way.
     """
     from cns_drake.scenarios import check_written_scenarios, write_scenarios
-    from cns_drake.studies import (
-        ExperimentRun,
-        study_drives,
-    )
-    from evaluation.study import (
-        load_experiment,
-    )
+    from cns_drake.studies import study_drives
+    from evaluation.study import Study, load_experiment
 
     # Nothing is measured, and no program of the experiment runs.
     unused = {"tasks": {"place": {}}, "methods": {"solid": {}}, "charts": []}
     experiment = load_experiment(vary, list(unused.items()))
     check_written_scenarios(output / "scenarios")
-    run = ExperimentRun(experiment, output.absolute(), vary, cluster, note)
-    members = study_drives(run)
+    study = Study(experiment, output.absolute(), vary, cluster, note)
+    members = study_drives(study)
     write_scenarios(members, output / "scenarios")
     return members

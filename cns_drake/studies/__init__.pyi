@@ -2,9 +2,6 @@ from .drives.changed_drives import Losses as Losses
 from .drives.sampled_drives import DrawnRoute as DrawnRoute
 from .drives.sampled_drives import Fleet as Fleet
 from .drives.viewpoints import with_lidars_moved as with_lidars_moved
-from .maps.experiment_maps import (
-    ExperimentRun as ExperimentRun,
-)
 from .maps.redrawing import marked_yaml as marked_yaml
 from .maps.redrawing import redrawn_inputs as redrawn_inputs
 from .maps.turned_inputs import turned_content as turned_content

@@ -4,9 +4,6 @@ from .chosen_methods import choose_method as choose_method
 from .chosen_methods import choose_methods as choose_methods
 from .chosen_methods import expanded_names as expanded_names
 from .chosen_methods import method_settings as method_settings
-from .engine import Engine as Engine
-from .engine import made_tasks as made_tasks
-from .experiments import STAGES_FILE as STAGES_FILE
 from .experiments.cause_files import Cause as Cause
 from .experiments.cause_files import causes as causes
 from .experiments.cause_files import register_cause as register_cause
@@ -56,12 +53,6 @@ from .recordings.map_drives import (
     drives_by_map as drives_by_map,
 )
 from .recordings.recorded_pairs import (
-    RecordedCondition as RecordedCondition,
-)
-from .recordings.recorded_pairs import (
-    chosen_recordings as chosen_recordings,
-)
-from .recordings.recorded_pairs import (
     recorded_pairs as recorded_pairs,
 )
 from .recordings.recording_search import (
@@ -69,6 +60,7 @@ from .recordings.recording_search import (
 )
 from .sources import DriveSource as DriveSource
 from .sources import RecordingSource as RecordingSource
+from .study import Study as Study
 from .study_files import StudyFiles as StudyFiles
 from .tasks.change import ChangeTask as ChangeTask
 from .tasks.jobs import OPENING_COST as OPENING_COST

@@ -24,13 +24,13 @@ from evaluation.results import (
     nearest_images,
 )
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.engine import Engine
 from evaluation.study.feature_extraction import FeatureExtraction, Further
 from evaluation.study.features import described_key
 from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import DescribedSource
 from evaluation.study.recordings.map_drives import MapDrives
 from evaluation.study.sources import DriveSource, RecordingSource
+from evaluation.study.study import Study
 from evaluation.study.study_files import FeatureFiles
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.jobs import STARTING_COST, Jobs
@@ -43,7 +43,7 @@ _COST = 5.0
 
 @dataclass(frozen=True)
 class ShownCity:
-    """What the page shows of a city, once the jobs of the engine are done.
+    """What the page shows of a city, once the jobs of the study are done.
 
     Attributes:
         city: the recordings.
@@ -77,7 +77,7 @@ class ShownCity:
 
 
 def add_city(
-    engine: Engine,
+    study: Study,
     city: MapDrives,
     pairs: Sequence[Pair],
     distractors: Sequence[NamedDrive] = (),
@@ -85,36 +85,36 @@ def add_city(
     """Adds the pairs of a city to a study, and jobs that draw it for the page.
 
     Args:
-        engine: the engine of the study.
+        study: the study.
         city: the recordings.
         pairs: pairs of these recordings in all conditions; the first has the
             main protocol.
-        distractors: drives through other cities, see `Engine.add`.
+        distractors: drives through other cities, see `Study.add`.
 
     Returns:
         What the page shows; None if the study does not measure the change, and
         therefore makes no maps.
     """
-    with_map = ChangeTask.name in engine.tasks
-    planned = engine.add(
+    with_map = ChangeTask.name in study.tasks
+    planned = study.add(
         pairs, distractors, _ExtractionJobs if with_map else Jobs
     )
     if not (isinstance(planned, _ExtractionJobs) and pairs):
         return None
     shown = ShownCity(
         city,
-        _draw_drives(city, pairs, planned, engine.pictures),
-        tuple(_draw_changes(city, pairs, planned, engine.pictures)),
+        _draw_drives(city, pairs, planned, study.pictures),
+        tuple(_draw_changes(city, pairs, planned, study)),
         tuple(
-            one.parts[PlaceTask.name]
+            study.results[one][PlaceTask.name]
             for one in pairs
-            if PlaceTask.name in one.parts
+            if PlaceTask.name in study.results[one]
             and not one.is_composed
             and one.factors.get(STAGE, OWN) == OWN
             and one.protocol == pairs[0].protocol
         ),
     )
-    engine.jobs |= planned.jobs
+    study.jobs |= planned.jobs
     return shown
 
 
@@ -268,7 +268,7 @@ def _draw_changes(
     city: MapDrives,
     pairs: Sequence[Pair],
     planned: _ExtractionJobs,
-    jobs: dict[str, Job],
+    study: Study,
 ) -> list[ChangePicture]:
     """Adds jobs that draw changes between stages; returns the pictures."""
     found = []
@@ -278,7 +278,7 @@ def _draw_changes(
             for one in pairs
             if one.names == (earlier.name, later.name)
             and one.factors.get(STAGE, OWN) == OWN
-            for part in one.parts.get(ChangeTask.name, ())
+            for part in study.results[one].get(ChangeTask.name, ())
             if isinstance(part, Part)
         ]
         if not parts:
@@ -302,7 +302,7 @@ def _draw_changes(
             figures=picture.files,
         )
         name = f"draw {city.name} {stages[0]} > {stages[1]}"
-        jobs[name] = Job(name, step, (), _COST)
+        study.pictures[name] = Job(name, step, (), _COST)
         found.append(picture)
     return found
 

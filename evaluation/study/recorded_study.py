@@ -9,11 +9,11 @@ from collections.abc import (
     Mapping,
     Sequence,
 )
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from cns_drake.base import (
     Cluster,
@@ -21,7 +21,6 @@ from cns_drake.base import (
     Job,
     Reporter,
     Space,
-    read_yaml,
 )
 from evaluation.drives import MovedDrive, cloud_at
 from evaluation.paper import paper, paper_section
@@ -50,13 +49,10 @@ from evaluation.results import (
     lacks_baseline,
     page_section,
     routes_section,
-    write_page,
 )
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.engine import Engine, made_tasks
-from evaluation.study.experiments import (
-    STAGES_FILE,
-)
+from evaluation.study.experiments.experiment import Experiment
+from evaluation.study.experiments.experiment_files import load_experiment
 from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import PlaceComparison
 from evaluation.study.recorded_city import ShownCity, add_city
@@ -65,11 +61,9 @@ from evaluation.study.recordings.map_drives import (
     drives_by_map,
     nothing_to_compare,
 )
-from evaluation.study.recordings.recorded_pairs import (
-    RecordedCondition,
-    recorded_pairs,
-)
+from evaluation.study.recordings.recorded_pairs import recorded_pairs
 from evaluation.study.sources import DriveSource
+from evaluation.study.study import Study
 from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.place import (
@@ -135,29 +129,38 @@ def study_recordings(
         InputError: two recordings have the same map and stage, there is nothing
             to compare, a step failed, or a file cannot be written.
     """
-    StudyFiles(output).check()
-    experiment = read_yaml(STAGES_FILE)
-    engine = Engine(
-        STAGES_FILE.stem,
-        made_tasks({name: {} for name in experiment["tasks"]}, _TASKS, source),
-        {one.key: (one, one.columns) for one in methods},
-        output.absolute(),
-        on_note,
-    )
-    conditions = _conditions(protocols)
+    experiment = _experiment(protocols, methods)
+    study = Study(experiment, output.absolute(), source, cluster, on_note)
+    study.choose(_TASKS, methods)
+    main, *_ = protocols
+    with_itself = protocols[main].exclude_recent is not None
     cities = drives_by_map(recordings, on_note)
-    with_itself = conditions[0].protocol.exclude_recent is not None
+    # Only the main protocol has the control, which would double the cost of a
+    # further protocol.
+    conditions = [
+        (one, protocols[name])
+        for one in experiment.conditions
+        if (name := one.factors.get(PROTOCOL_BASE, main)) == main
+        or one.factors[STAGE] != LAST
+    ]
     shown: list[ShownCity] = []
     for city in cities:
         pairs = recorded_pairs(
             city,
             conditions,
             _SEED,
+            source,
             on_note,
             both_ways=True,
             with_itself=with_itself,
         )
-        if (one := add_city(engine, city, list(pairs))) is not None:
+        measured = [
+            replace(one, methods=_further_methods(name))
+            if (name := one.factors.get(PROTOCOL_BASE, main)) != main
+            else one
+            for one in pairs
+        ]
+        if (one := add_city(study, city, measured)) is not None:
             shown.append(one)
     alone = [] if with_itself else nothing_to_compare(cities)
     if not shown:
@@ -165,34 +168,30 @@ def study_recordings(
     for text in alone:
         on_note(text)
     if with_costs:
-        job = _cost_job(engine, shown[0], conditions[0].protocol)
-        engine.jobs[job.name] = job
-    engine.jobs = {**{job.name: job for job in further_jobs}, **engine.jobs}
-    results, queries = engine.run(cluster, space)
-    StudyFiles(output.absolute()).remove_other_changes(
+        job = _cost_job(study, shown[0], protocols[main])
+        study.jobs[job.name] = job
+    study.jobs = {**{job.name: job for job in further_jobs}, **study.jobs}
+    results, queries = study.measure(space)
+    StudyFiles(study.output).remove_other_changes(
         [path for city in shown for one in city.changes for path in one.files]
     )
     _note_missed_routes(results, on_note)
-    return write_page(
+    page = study.write_page(
         results,
         queries,
-        output,
-        title=STAGES_FILE.stem,
-        about=_ALONE if lacks_baseline(results) else experiment["about"],
-        charts=experiment["charts"],
-        experiment_text=_experiment_text(experiment, methods, protocols),
-        notes=[
+        [
             *(f"{name}: {one.to_text()}" for name, one in protocols.items()),
             *_without_control(protocols),
             *alone,
         ],
-        sections=[
+        [
             *recorded_sections(shown, results, queries, output, pages or {}),
             *([_costs_section(output)] if with_costs else []),
         ],
+        about=_ALONE if lacks_baseline(results) else None,
         printed=printed,
-        on_note=on_note,
     )
+    return output / page.name
 
 
 def recorded_sections(
@@ -240,36 +239,6 @@ def recorded_sections(
     ]
 
 
-def _conditions(
-    protocols: Mapping[str, RetrievalProtocol],
-) -> list[RecordedCondition]:
-    """Returns the conditions of the experiment, the baseline first.
-
-    Only the main protocol has the control, which would double the cost of a
-    further protocol.
-    """
-    main, *_ = protocols
-    found = []
-    for stage in (LAST, OWN):
-        for name, protocol in protocols.items():
-            if stage == LAST and name != main:
-                continue
-            factors = {STAGE: stage}
-            if len(protocols) > 1:
-                factors[PROTOCOL_BASE] = name
-            methods = None if name == main else _further_methods(name)
-            found.append(
-                RecordedCondition(
-                    factors,
-                    stage,
-                    factors | {STAGE: LAST},
-                    protocol,
-                    methods=methods,
-                )
-            )
-    return found
-
-
 def _further_methods(protocol: str) -> Collection[str] | None:
     """Returns the methods that a further protocol measures; None for all.
 
@@ -296,12 +265,11 @@ def _without_control(protocols: Iterable[str]) -> list[str]:
     ]
 
 
-def _experiment_text(
-    experiment: Mapping[str, Any],
-    methods: Iterable[MethodChoice],
+def _experiment(
     protocols: Mapping[str, RetrievalProtocol],
-) -> str:
-    """Returns the experiment as YAML, with its methods and protocols.
+    methods: Iterable[MethodChoice],
+) -> Experiment:
+    """Returns the experiment `stages` with its methods and protocols.
 
     All protocols have the same options.
     """
@@ -312,13 +280,18 @@ def _experiment_text(
         if value != PROTOCOLS[name].to_json()[option]
     }
     names: Any = [*protocols] if len(protocols) > 1 else next(iter(protocols))
-    values = {
-        **experiment,
-        "protocol": {"base": names, **options} if options else names,
-        "methods": [one.key for one in methods],
+    fields = {
+        "protocol": {"base": names, **options},
+        "methods": {
+            one.file.name if one.file else one.name: {
+                name: value if isinstance(value, str) else ",".join(value)
+                for name, value in one.settings
+            }
+            for one in methods
+        },
+        "quick": {},
     }
-    del values["quick"]
-    return yaml.safe_dump(values, sort_keys=False, allow_unicode=True, width=79)
+    return load_experiment("stages", list(fields.items()))
 
 
 def _note_missed_routes(
@@ -331,12 +304,12 @@ def _note_missed_routes(
 
 
 def _cost_job(
-    engine: Engine, shown: ShownCity, protocol: RetrievalProtocol
+    study: Study, shown: ShownCity, protocol: RetrievalProtocol
 ) -> Job:
     """Returns the job that measures costs on the first pair of a city."""
     pair = shown.city.recognition_pairs(with_itself=True)[0]
-    files = StudyFiles(engine.output)
-    methods = tuple(choice for choice, _ in engine.methods.values())
+    files = StudyFiles(study.output)
+    methods = tuple(choice for choice, _ in study.methods.values())
     places, queries = (files.features(one.name) for one in pair)
     stored = [
         (found.scans, *(found.described(one.key) for one in methods))
@@ -355,7 +328,7 @@ def _cost_job(
         (pair[1].source, queries.drive, compared),
         CostTask.version,
     )
-    return Job("costs of the methods", step, tuple(engine.jobs), _COSTS_COST)
+    return Job("costs of the methods", step, tuple(study.jobs), _COSTS_COST)
 
 
 def measure_method_costs(

@@ -28,12 +28,12 @@ from cns_drake.scene import load_world, read_perception_geometry
 from cns_drake.sensors import make_beam_pattern, make_pattern
 from cns_drake.simulation import save_scan, scan_world, simulate
 from cns_drake.studies import (
-    ExperimentRun,
     study_drives,
 )
 from evaluation import drives
 from evaluation.clouds import read_cloud
 from evaluation.study import (
+    Study,
     load_experiment,
 )
 from helpers import (
@@ -147,7 +147,7 @@ def _is_small(scenario: Scenario) -> bool:
 def _vary(folder: Path) -> None:
     experiment = load_experiment(folder / "vary.yaml")
     if len(experiment.conditions) * len(experiment.seeds) < 100:
-        run = ExperimentRun(experiment, folder / "out", "vary.yaml", Cluster(1))
+        run = Study(experiment, folder / "out", "vary.yaml", Cluster(1))
         write_scenarios(study_drives(run), folder / "out" / "scenarios")
 
 

@@ -1,12 +1,12 @@
 """The maps of an experiment, with the drives that are compared on each map."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Cluster, InputError, errors_at, natural_key
+from cns_drake.base import InputError, errors_at, natural_key
 from cns_drake.scenarios import (
     Scenario,
     load_scenario,
@@ -20,31 +20,12 @@ from cns_drake.studies.maps.made_maps import made_map_step
 from cns_drake.studies.maps.map_step import make_maps
 from evaluation.results import FROZEN_REDRAW
 from evaluation.study import (
-    Experiment,
     MadeMap,
     MapDrives,
+    Study,
     drives_by_map,
     find_recordings,
 )
-
-
-@dataclass(frozen=True)
-class ExperimentRun:
-    """An experiment, and where and by what it is run.
-
-    Attributes:
-        experiment: the experiment.
-        output: folder of the results.
-        source: file of the experiment, for errors.
-        cluster: runs the jobs.
-        on_note: is called with notes on what is left out.
-    """
-
-    experiment: Experiment
-    output: Path
-    source: str
-    cluster: Cluster
-    on_note: Callable[[str], None] = lambda text: None
 
 
 @dataclass(frozen=True)
@@ -71,11 +52,11 @@ class MapPairs:
         return names | {one.name for pair in self.pairs for one in pair}
 
 
-def pairs_by_map(run: ExperimentRun, maps: Sequence[str]) -> Iterator[MapPairs]:
+def pairs_by_map(study: Study, maps: Sequence[str]) -> Iterator[MapPairs]:
     """Yields the pairs of all maps; makes aged and imported maps.
 
     Args:
-        run: the experiment.
+        study: the experiment, and where it runs.
         maps: names or folders of maps that replace the experiment's maps.
 
     Raises:
@@ -84,28 +65,28 @@ def pairs_by_map(run: ExperimentRun, maps: Sequence[str]) -> Iterator[MapPairs]:
     """
     made = {
         one.name: one
-        for one in run.experiment.maps or ()
+        for one in study.experiment.maps or ()
         if isinstance(one, MadeMap)
     }
     wanted: Sequence[str | MadeMap] = [made.get(one, one) for one in maps]
     if not maps:
-        wanted = run.experiment.maps or recordable_maps()
-    place = "" if maps else f"{run.source}: maps"
+        wanted = study.experiment.maps or recordable_maps()
+    place = "" if maps else f"{study.source}: maps"
     known: set[str] = set()
     for one in wanted:
         # A wrong name is found before any map is made.
-        if run.experiment.frozen_redraws and (
+        if study.experiment.frozen_redraws and (
             isinstance(one, MadeMap) or one not in shipped_maps()
         ):
             raise InputError(
-                f"{run.source}: {FROZEN_REDRAW}:"
+                f"{study.source}: {FROZEN_REDRAW}:"
                 f" {getattr(one, 'name', one)}: no shipped map"
             )
         if isinstance(one, str) and not Path(one).is_dir():
             with errors_at(place) if place else nullcontext():
                 recordable_map(one)
     for one in wanted:
-        for some in _pairs_of(run, one, place):
+        for some in _pairs_of(study, one, place):
             names = {some.map_name, *some.drive_names}
             if some.factors:
                 names.remove(some.map_name)
@@ -119,25 +100,25 @@ def pairs_by_map(run: ExperimentRun, maps: Sequence[str]) -> Iterator[MapPairs]:
 
 
 def _pairs_of(
-    run: ExperimentRun, one: str | MadeMap, place: str
+    study: Study, one: str | MadeMap, place: str
 ) -> Iterator[MapPairs]:
     """Yields the pairs of a map; `place` is the field for errors, or ""."""
-    kind = run.experiment.drives
+    kind = study.experiment.drives
     if isinstance(one, MadeMap):
-        folder = run.output / "cities" / one.name
-        step = made_map_step(one, run.experiment, folder, shipped_maps())
-        make_maps([step], folder.parent, run.cluster)
+        folder = study.output / "cities" / one.name
+        step = made_map_step(one, study.experiment, folder, shipped_maps())
+        make_maps([step], folder.parent, study.cluster)
         yield MapPairs(one.name, {}, _drive_pairs(folder, kind))
         return
     path = shipped_maps().get(one, Path(one))
-    versions = run.experiment.frozen_redraws
+    versions = study.experiment.frozen_redraws
     if versions:
         cities = redraw_frozen(
             [one],
             versions,
-            run.output / "cities",
-            run.cluster,
-            run.source,
+            study.output / "cities",
+            study.cluster,
+            study.source,
         )
         for number, folder in zip(sorted(versions), cities, strict=True):
             yield MapPairs(
@@ -147,7 +128,7 @@ def _pairs_of(
     if path.is_dir() and not MapFolder(path).drives():
         with errors_at(place) if place else nullcontext():
             recorded = drives_by_map(
-                find_recordings(path, run.on_note), run.on_note
+                find_recordings(path, study.on_note), study.on_note
             )
         for city in recorded:
             yield MapPairs(city.name, {}, city=city)

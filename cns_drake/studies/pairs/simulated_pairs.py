@@ -8,7 +8,7 @@ from cns_drake.base import Job, fingerprint
 from cns_drake.scenarios import Scenario
 from cns_drake.simulation import SimulationSource
 from cns_drake.studies.drives.named_stages import MissingError
-from cns_drake.studies.maps.experiment_maps import ExperimentRun, MapPairs
+from cns_drake.studies.maps.experiment_maps import MapPairs
 from cns_drake.studies.maps.made_maps import MadeMaps
 from cns_drake.studies.pairs.comparisons import ComparedDrives, PairMaker
 from cns_drake.studies.pairs.map_upkeep import (
@@ -27,6 +27,7 @@ from evaluation.study import (
     NamedDrive,
     Pair,
     RecordingSource,
+    Study,
     StudyFiles,
     condition_protocol,
     job_name,
@@ -64,12 +65,12 @@ class SimulatedPairs:
     """Makes the pairs of simulated drives of an experiment.
 
     Attributes:
-        run: the experiment.
+        study: the experiment, and where it runs.
         upkeep: name -> job, for the jobs that update the maps of the pairs
             named so far.
     """
 
-    run: ExperimentRun
+    study: Study
     upkeep: dict[str, Job] = field(default_factory=dict)
 
     def changed(self, maps: Sequence[MapPairs]) -> list[list[ChangedPair]]:
@@ -83,19 +84,19 @@ class SimulatedPairs:
             InputError: a field of a condition cannot be used, or a city cannot
                 be made.
         """
-        made = MadeMaps(self.run.output / "cities")
+        made = MadeMaps(self.study.output / "cities")
         found = []
         for some in maps:
             before = made.num_requests
             built = self._built(some, made)
             found.append((some, *built, made.num_requests > before))
-        made.make(self.run.cluster)
+        made.make(self.study.cluster)
         pairs = []
         for some, changed, notes, lacks_cities in found:
             if lacks_cities:
                 changed, notes = self._built(some, made)
             for text in notes:
-                self.run.on_note(f"{some.map_name}: {text}")
+                self.study.on_note(f"{some.map_name}: {text}")
             pairs.append(changed)
         return pairs
 
@@ -108,7 +109,7 @@ class SimulatedPairs:
             some: the pairs of the map.
             made: the maps that conditions need.
         """
-        experiment, source = self.run.experiment, self.run.source
+        experiment, source = self.study.experiment, self.study.source
         noted: dict[str, None] = {}
         found = []
         for database, query in some.pairs:
@@ -158,7 +159,7 @@ class SimulatedPairs:
         )
         database, *beside = self._with_upkept_maps(drives, compared.maintain)
         way = None
-        if self.run.experiment.drives == "same-route":
+        if self.study.experiment.drives == "same-route":
             city = {
                 name: getattr(compared.database, name)
                 for name in ("map", "stage", "without", "transient")
@@ -202,7 +203,7 @@ class SimulatedPairs:
             return drives
         sources = tuple(one.source for one in drives)
         content = fingerprint({"drives": [one.name for one in drives]})[:8]
-        part = StudyFiles(self.run.output).part(
+        part = StudyFiles(self.study.output).part(
             "upkeep", drives[0].name, f"{content} {maintain}"
         )
         job = Job(
@@ -224,9 +225,9 @@ class SimulatedPairs:
 
     def named_drive(self, drive: Scenario) -> NamedDrive:
         """Returns a drive that is simulated, or read if it is recorded."""
-        if is_recorded(drive, self.run.output):
+        if is_recorded(drive, self.study.output):
             return NamedDrive(
-                drive.name, RecordingSource(self.run.output / drive.name)
+                drive.name, RecordingSource(self.study.output / drive.name)
             )
         return NamedDrive(drive.name, SimulationSource(drive))
 

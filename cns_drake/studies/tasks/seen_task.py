@@ -225,8 +225,8 @@ class SeenTask(Task):
         parts.append(found)
         return tuple(parts)
 
-    def found(self, pair: Pair) -> Any:
-        *sightings, years = [part.read() for part in pair.parts[self.name]]
+    def found(self, pair: Pair, results: Sequence[Result]) -> Any:
+        *sightings, years = [part.read() for part in results]
         drives = pair.database, *pair.beside
         dated = [
             (one.years or 0, sighting)

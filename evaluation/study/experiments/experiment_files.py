@@ -27,9 +27,6 @@ from evaluation.results import (
     chart_factors,
     check_factors,
 )
-from evaluation.study.experiments import (
-    STAGES_FILE,
-)
 from evaluation.study.experiments.cause_files import (
     with_cases,
 )
@@ -50,8 +47,7 @@ _FOLDER = Path(__file__).parent
 
 def shipped_experiments() -> dict[str, Path]:
     """Returns name -> file of the shipped experiments."""
-    files = [*_FOLDER.glob("*.yaml"), STAGES_FILE]
-    return {path.stem: path for path in sorted(files, key=lambda p: p.stem)}
+    return {path.stem: path for path in sorted(_FOLDER.glob("*.yaml"))}
 
 
 def experiment_text(name_or_file: str | Path) -> str:

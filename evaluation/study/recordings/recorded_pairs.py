@@ -1,14 +1,7 @@
 """Pairs of recordings, which a study compares as they were recorded."""
 
-from collections.abc import (
-    Callable,
-    Collection,
-    Iterable,
-    Iterator,
-    Mapping,
-    Sequence,
-)
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
 
 from cns_drake.base import (
     InputError,
@@ -17,8 +10,14 @@ from cns_drake.base import (
     natural_key,
     repeated,
 )
-from evaluation.recognition import KEEP_ALL, RetrievalProtocol
-from evaluation.results import OWN
+from evaluation.recognition import (
+    KEEP_ALL,
+    RetrievalProtocol,
+    checked_keep,
+)
+from evaluation.results import CAUSE, LAST, OWN, STAGE
+from evaluation.study.experiments.conditions import Condition
+from evaluation.study.experiments.nested_fields import SESSIONS, SIDES
 from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
 from evaluation.study.tasks.pair import Pair
 
@@ -27,35 +26,15 @@ from evaluation.study.tasks.pair import Pair
 _DATED_NS = 10**17
 
 
-class RecordedCondition(NamedTuple):
-    """A condition that recordings allow.
-
-    Attributes:
-        factors: name -> value of each factor of the condition.
-        stage: `own` if each recording is of its own stage; `last` for the
-            control, in which both recordings are of the stage of the query.
-        baseline: the factors of the condition with which this one is compared.
-        protocol: protocol of place recognition.
-        database: the recordings of the database, if there are several.
-        keep: which places of these recordings are kept, see
-            `evaluation.recognition.place_selection.kept_places`.
-        methods: names of the methods that are measured; None for all methods
-            of the study.
-    """
-
-    factors: Mapping[str, Any]
-    stage: str
-    baseline: Mapping[str, Any]
-    protocol: RetrievalProtocol
-    database: tuple[RecordingInfo, ...] = ()
-    keep: str | int = KEEP_ALL
-    methods: Collection[str] | None = None
+# Fields of a database of several recordings.
+_OF_RECORDINGS = (f"database.{SESSIONS}", "database.keep")
 
 
 def recorded_pairs(
     city: MapDrives,
-    conditions: Iterable[RecordedCondition],
+    conditions: Iterable[tuple[Condition, RetrievalProtocol]],
     seed: int,
+    source: str,
     on_note: Callable[[str], None],
     *,
     both_ways: bool = False,
@@ -63,53 +42,104 @@ def recorded_pairs(
 ) -> Iterator[Pair]:
     """Yields the pairs of a map's recordings in all conditions.
 
+    In the stage `own`, each recording is of its own stage; in the stage `last`,
+    the control, both are of the stage of the query.
+
     Args:
         city: the recordings.
-        conditions: the conditions.
+        conditions: the conditions, with their protocols.
         seed: seed of the experiment.
+        source: file of the experiment, for errors.
         on_note: is called with a note on each pair without a control.
         both_ways: whether the two recordings of a pair are compared both ways.
         with_itself: whether each recording is compared with itself, too.
+
+    Raises:
+        InputError: a condition varies what recordings do not allow, or names a
+            recording that is missing.
     """
     conditions = list(conditions)
+    for one, _ in conditions:
+        _check_recordable(city, one, source)
     pairs = city.recognition_pairs() if both_ways else city.change_pairs()
     if with_itself:
         pairs += [(one, one) for one in city.stages.values()]
-    composed = [one for one in conditions if one.database]
-    if composed:
-        conditions = [one for one in conditions if not one.database]
-        yield from _composed_pairs(city, composed, seed)
-    for pair in pairs if conditions else ():
+    plain = []
+    for one, protocol in conditions:
+        if SESSIONS in one.changes.get("database", {}):
+            yield _composed_pair(city, one, protocol, seed, source)
+        else:
+            plain.append((one, protocol, _stage(one)))
+    for pair in pairs if plain else ():
         control = city.unchanged_pair(*pair)
-        is_wanted = any(one.stage != OWN for one in conditions)
+        is_wanted = any(stage != OWN for *_, stage in plain)
         if control is None and is_wanted and pair[0] is not pair[1]:
             on_note(
                 f"{city.name}: no drive on the route of {pair[0].name} in"
                 f" the stage of {pair[1].name}"
             )
-        for condition in conditions:
-            recordings = pair if condition.stage == OWN else control
+        for condition, protocol, stage in plain:
+            recordings = pair if stage == OWN else control
             if recordings is None:
                 continue
             database, query = (one.named for one in recordings)
             # Queries are scored once for all radii.
-            asked = condition.protocol.to_json() | {"radius": None}
+            asked = protocol.to_json() | {"radius": None}
             yield Pair(
                 map_name=city.name,
                 names=(pair[0].name, pair[1].name),
                 factors=condition.factors,
                 seed=seed,
                 baseline=condition.baseline,
-                stated=condition.protocol,
+                stated=protocol,
                 key=f"{database.name} {query.name} {fingerprint(asked)[:8]}",
                 database=database,
                 query=query,
-                protocol=condition.protocol,
-                methods=condition.methods,
+                protocol=protocol,
             )
 
 
-def chosen_recordings(
+def _stage(condition: Condition) -> Any:
+    return condition.changes.get("both", {}).get("stage", OWN)
+
+
+def _check_recordable(
+    city: MapDrives, condition: Condition, source: str
+) -> None:
+    """Checks that a condition varies only the stage, as recordings require."""
+    sides = {n: condition.changes.get(n, {}) for n in SIDES}
+    given = [f"{side}.{name}" for side in sides for name in sides[side]]
+    if SESSIONS in sides["database"]:
+        given = [one for one in given if one not in _OF_RECORDINGS]
+        if sides["both"]:
+            raise InputError(
+                f"{source}: {STAGE}: databases of several"
+                " recordings have no control"
+            )
+    elif "keep" in sides["database"]:
+        raise InputError(
+            f"{source}: database.keep: of recordings, it selects places of"
+            f" database.{SESSIONS}; name them, too"
+        )
+    given += [CAUSE] if condition.causes else []
+    for name in given:
+        if name != STAGE:
+            name = next(
+                (n for n in condition.factors if n.startswith(name)),
+                name,
+            )
+            raise InputError(
+                f"{source}: {name}: the recordings of {city.name}"
+                " are as they are; simulated drives alone can vary it"
+            )
+    stage = _stage(condition)
+    if stage not in (OWN, LAST):
+        raise InputError(
+            f"{source}: {STAGE}: {stage!r}: recordings have {OWN} and {LAST}"
+        )
+
+
+def _chosen_recordings(
     city: MapDrives, names: Sequence[str], where: str
 ) -> tuple[RecordingInfo, ...]:
     """Returns the recordings of a database, from older to newer.
@@ -153,32 +183,43 @@ def chosen_recordings(
     )
 
 
-def _composed_pairs(
-    city: MapDrives, conditions: Iterable[RecordedCondition], seed: int
-) -> Iterator[Pair]:
-    """Yields the pairs of databases of several recordings and the query."""
-    query = city.last
-    for one in conditions:
-        named = [recording.named for recording in one.database]
-        digest = fingerprint(
-            {
-                **one.protocol.to_json(),
-                "radius": None,
-                "drives": [recording.name for recording in named],
-                "keep": one.keep,
-            }
-        )[:8]
-        yield Pair(
-            map_name=city.name,
-            names=(city.name, query.name),
-            factors=one.factors,
-            seed=seed,
-            baseline=one.baseline,
-            stated=one.protocol,
-            key=f"{named[0].name} {query.name} {digest}",
-            database=named[0],
-            query=query.named,
-            protocol=one.protocol,
-            beside=tuple(named[1:]),
-            keep=one.keep,
-        )
+def _composed_pair(
+    city: MapDrives,
+    condition: Condition,
+    protocol: RetrievalProtocol,
+    seed: int,
+    source: str,
+) -> Pair:
+    """Returns the pair of a database of several recordings and the query."""
+    fields, query = condition.changes["database"], city.last
+    names, where = fields[SESSIONS], f"{source}: database.{SESSIONS}"
+    keep = fields.get("keep", KEEP_ALL)
+    is_list = isinstance(names, list) and bool(names)
+    if not (is_list and all(isinstance(one, str) for one in names)):
+        raise InputError(f"{where}: not a list of names of recordings")
+    named = [one.named for one in _chosen_recordings(city, names, where)]
+    keep = checked_keep(
+        fields.get("keep", KEEP_ALL), f"{source}: database.keep"
+    )
+    digest = fingerprint(
+        {
+            **protocol.to_json(),
+            "radius": None,
+            "drives": [recording.name for recording in named],
+            "keep": keep,
+        }
+    )[:8]
+    return Pair(
+        map_name=city.name,
+        names=(city.name, query.name),
+        factors=condition.factors,
+        seed=seed,
+        baseline=condition.baseline,
+        stated=protocol,
+        key=f"{named[0].name} {query.name} {digest}",
+        database=named[0],
+        query=query.named,
+        protocol=protocol,
+        beside=tuple(named[1:]),
+        keep=keep,
+    )

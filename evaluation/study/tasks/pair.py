@@ -1,7 +1,7 @@
 """A pair of drives, as tasks measure it under a condition of an experiment."""
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
 from typing import Any, Protocol
 
@@ -54,7 +54,7 @@ class Result(Protocol):
         """
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pair:
     """Two drives that are measured under a condition of an experiment.
 
@@ -90,8 +90,6 @@ class Pair:
         way: drive along the query's route through the database's city, with
             which the task `change` compares the query drive; None for the
             database drive.
-        parts: task -> its results, as files or in memory, for the tasks that
-            measure the pair.
     """
 
     map_name: str
@@ -110,7 +108,6 @@ class Pair:
     may_repeat: bool = False
     methods: Collection[str] | None = None
     way: NamedDrive | None = None
-    parts: dict[str, tuple[Result, ...]] = field(default_factory=dict)
 
     def has_method(self, name: str) -> bool:
         """Returns whether a method of the study is measured, by its name."""

@@ -83,11 +83,11 @@ class PoseTask(Task):
         jobs.jobs[name] = Job(name, step, tuple(needs), cost, pair.title)
         return parts
 
-    def found(self, pair: Pair) -> Outcomes:
+    def found(self, pair: Pair, results: Sequence[Result]) -> Outcomes:
         radius = pair.protocol.radius
         return [
             one
-            for part in pair.parts[self.name]
+            for part in results
             for one in part.read()
             if one.radius == radius
         ]

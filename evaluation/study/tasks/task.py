@@ -1,7 +1,7 @@
 """The interface of a study's tasks."""
 
 import abc
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
@@ -95,9 +95,17 @@ class Task(abc.ABC):
             are none if the task does not apply to the pair.
         """
 
-    def found(self, pair: Pair) -> Any:
-        """Returns the task's result for a pair of drives that has one."""
-        (part,) = pair.parts[self.name]
+    def found(self, pair: Pair, results: Sequence[Result]) -> Any:
+        """Returns the task's result for a pair of drives.
+
+        Args:
+            pair: the pair.
+            results: what `measure` returned for the pair; its jobs are done.
+
+        Raises:
+            InputError: a file cannot be read.
+        """
+        (part,) = results
         return part.read()
 
     def numbers(self, found: Any, before: Any | None) -> Iterable[Number]:

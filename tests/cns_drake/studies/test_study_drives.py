@@ -10,10 +10,10 @@ from cns_drake.base import Cluster, InputError
 from cns_drake.scenarios import load_scenario
 from cns_drake.sensors import make_pattern
 from cns_drake.studies import (
-    ExperimentRun,
     study_drives,
 )
 from evaluation.study import (
+    Study,
     load_experiment,
 )
 
@@ -60,9 +60,7 @@ def drives(town, tmp_path):
 
     def find_all(experiment, source="mine.yaml", notes=None):
         more = {} if notes is None else {"on_note": notes.append}
-        run = ExperimentRun(
-            experiment, tmp_path / "out", source, Cluster(), **more
-        )
+        run = Study(experiment, tmp_path / "out", source, Cluster(), **more)
         return {one.name: one for one in study_drives(run, [str(town)])}
 
     find.all = find_all

@@ -3,36 +3,37 @@
 import pytest
 
 from cns_drake.base import InputError, choose_cluster
+from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.results import check_output
-from evaluation.study import study_recordings
+from evaluation.study import choose_methods, study_recordings
 
-MEASURE = {
-    "report": lambda output: study_recordings(
-        [], output, choose_cluster(1, None), [], {}, source="nowhere"
-    ),
-}
+PROTOCOLS = {"random-yaw": RANDOM_YAW_PROTOCOL}
+
+
+def measure(output):
+    cluster = choose_cluster(1, None)
+    methods = choose_methods(["solid"])
+    study_recordings([], output, cluster, methods, PROTOCOLS, source="nowhere")
 
 
 @pytest.mark.parametrize("name", ["results.csv", "queries.csv"])
-@pytest.mark.parametrize("study", MEASURE)
-def test_a_link_is_refused_at_once(tmp_path, study, name):
+def test_a_link_is_refused_at_once(tmp_path, name):
     elsewhere = tmp_path / "mine.csv"
     elsewhere.write_text("mine")
     output = tmp_path / "study"
     output.mkdir()
     (output / name).symlink_to(elsewhere)
     with pytest.raises(InputError, match=rf"{name}: a link; give the name"):
-        MEASURE[study](output)
+        measure(output)
     assert elsewhere.read_text() == "mine"
     assert sorted(path.name for path in output.iterdir()) == [name]
 
 
-@pytest.mark.parametrize("study", MEASURE)
-def test_a_dead_link_is_no_folder(tmp_path, study):
+def test_a_dead_link_is_no_folder(tmp_path):
     output = tmp_path / "study"
     output.symlink_to(tmp_path / "gone")
     with pytest.raises(InputError, match="study: not a folder"):
-        MEASURE[study](output)
+        measure(output)
 
 
 def test_outputs_need_not_exist(tmp_path):

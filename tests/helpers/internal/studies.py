@@ -16,8 +16,8 @@ from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.study import (
     choose_methods,
     chosen_methods,
-    engine,
     find_recordings,
+    study,
     study_recordings,
 )
 
@@ -50,13 +50,13 @@ def jobs_here(patch):
     Returns:
         A list that gets the names of the jobs of each study.
     """
-    from cns_drake.studies import recording, study
+    from cns_drake.studies import recording
     from cns_drake.studies.maps import map_step
 
     runs = []
     run_here(patch, map_step, recording)
     patch.setattr(
-        engine,
+        study,
         "run_jobs",
         lambda jobs, cluster, unit="": runs.append(do(jobs)),
     )
@@ -96,7 +96,7 @@ def report(recordings, output, methods=None, protocols=None, **more):
     """Measures a folder of recordings; returns the path of the page."""
     chosen = choose_methods() if methods is None else tuple(methods)
     with pytest.MonkeyPatch.context() as patch:
-        run_here(patch, engine)
+        run_here(patch, study)
         return study_recordings(
             find_recordings(recordings),
             output,
@@ -124,9 +124,9 @@ def planned(recordings, output, methods=None, protocols=None, **more):
 
     chosen = choose_methods() if methods is None else tuple(methods)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(engine, "run_jobs", stop)
-        patch.setattr(engine, "forecast", keep)
-        patch.setattr(engine, "make_output", lambda path, writes: None)
+        patch.setattr(study, "run_jobs", stop)
+        patch.setattr(study, "forecast", keep)
+        patch.setattr(study, "make_output", lambda path, writes: None)
         with pytest.raises(PlannedError):
             study_recordings(
                 recordings,

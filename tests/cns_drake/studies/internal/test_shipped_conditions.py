@@ -8,14 +8,14 @@ from cns_drake.base import Cluster
 from cns_drake.studies import (
     study,
 )
-from cns_drake.studies.maps.experiment_maps import ExperimentRun
 from evaluation.study import (
+    Study,
     load_experiment,
 )
 
 
 def why(name, maps=(), *changes, **options):
-    run = ExperimentRun(
+    run = Study(
         load_experiment(name, changes, **options),
         Path(),
         name,

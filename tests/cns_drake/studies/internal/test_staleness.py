@@ -14,7 +14,7 @@ from cns_drake.studies import reproduction
 from cns_drake.studies.recording import Record
 from evaluation.methods import make_method
 from evaluation.recognition import RANDOM_YAW_PROTOCOL
-from evaluation.study import ChangeTask, PlaceTask, engine
+from evaluation.study import ChangeTask, PlaceTask, study
 
 pytestmark = [
     pytest.mark.slow,
@@ -51,7 +51,7 @@ def reproduce(tmp_path, monkeypatch):
         assert len(names) == len(set(names))
         done.append(set(names))
 
-    monkeypatch.setattr(engine, "run_jobs", run_jobs)
+    monkeypatch.setattr(study, "run_jobs", run_jobs)
 
     def run(**options):
         done.clear()

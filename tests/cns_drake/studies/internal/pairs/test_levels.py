@@ -8,9 +8,6 @@ import pytest
 
 from cns_drake.base import Cluster, InputError, fingerprint
 from cns_drake.scenarios import make_scenario, worlds_folder
-from cns_drake.studies import (
-    ExperimentRun,
-)
 from cns_drake.studies.maps.experiment_maps import pairs_by_map
 from cns_drake.studies.pairs.comparisons import ComparedDrives
 from cns_drake.studies.pairs.simulated_pairs import SimulatedPairs
@@ -22,6 +19,7 @@ from cns_drake.studies.study import (
 )
 from evaluation.recognition import RECORDED_PROTOCOL
 from evaluation.study import (
+    Study,
     load_experiment,
 )
 
@@ -30,7 +28,7 @@ TABLE = "levels.csv"
 
 def run_of(output, *overrides):
     wanted = load_experiment("levels", ["methods=[solid]", *overrides])
-    return ExperimentRun(wanted, output, "levels", Cluster())
+    return Study(wanted, output, "levels", Cluster())
 
 
 @pytest.mark.slow
