@@ -1,12 +1,14 @@
 """The numbers and tables of the documents are those of their files."""
 
 import csv
+import datetime
 
 from helpers import documents
 import numpy as np
 import pytest
 
 from docs import declared, fill_numbers, survival
+from evaluation.study import load_experiment
 
 FILLED = [
     page
@@ -186,3 +188,34 @@ def test_no_published_interval_is_without_width(path):
                 other = name.replace("low", "high")
                 if other != name and row.get(other):
                     assert float(row[name]) < float(row[other]), row
+
+
+def test_outside_results_stand_beside_what_was_predicted():
+    path = documents.ROOT / "docs/notes/outside.csv"
+    with path.open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert rows
+    for row in rows:
+        assert list(row) == [
+            "declared",
+            "source",
+            "quantity",
+            "predicted_low",
+            "predicted_high",
+            "found",
+        ]
+        assert row["source"]
+        assert row["quantity"]
+        predicted = [row["predicted_low"], row["predicted_high"]]
+        if row["declared"]:
+            # What was not predicted has neither a date nor an interval.
+            date, experiment = row["declared"].split(" ")
+            assert datetime.date.fromisoformat(date)
+            assert load_experiment(documents.ROOT / experiment).conditions
+            low, high = map(float, predicted)
+            assert low <= high, row
+        else:
+            assert predicted == ["", ""]
+            assert row["found"]
+        if row["found"]:
+            float(row["found"])
