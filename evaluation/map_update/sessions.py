@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base import (
@@ -51,6 +52,8 @@ SPACING = 1.0
 # Names of the files in the folder of a session.
 _MAP_FILE = "map.ply"
 _SCANS_FOLDER = "Scans"
+# Greatest rounding of coordinates in a file of labels that is usual [m].
+_ROUNDED = 0.02
 # NumPy's name of a type -> PLY's name.
 _PLY_TYPES = {"f8": "double", "u2": "ushort"}
 
@@ -187,8 +190,9 @@ def read_labels(path: Path, session: Session, *, truth: bool) -> np.ndarray:
     """Reads labels of a session's points.
 
     Args:
-        path: an array `.npy` of integers, or a cloud `.ply` with a property
-            `prediction` for each point.
+        path: an array `.npy` of integers in the order of the map's points, or a
+            cloud `.ply` of the same points, in any order, with a property
+            `prediction`.
         session: the session to which the labels belong.
         truth: whether the labels are ground truth. Only ground-truth labels may
             have the value `Label.IGNORED`.
@@ -197,9 +201,10 @@ def read_labels(path: Path, session: Session, *, truth: bool) -> np.ndarray:
         (N,) uint8.
 
     Raises:
-        InputError: the file cannot be read, or has the wrong length or values.
+        InputError: the file cannot be read, or has other points, or the wrong
+            length or values.
     """
-    labels = _read_any_labels(path)
+    labels, points = _read_any_labels(path)
     count = len(session.points)
     if labels.ndim != 1 or labels.dtype.kind not in "iu":
         raise InputError(f"{path}: not one whole number for each point")
@@ -219,7 +224,45 @@ def read_labels(path: Path, session: Session, *, truth: bool) -> np.ndarray:
             f"{path}: point {place} has the label {labels[place]}; those of "
             f"{session.side} are {names}"
         )
+    if points is not None:
+        try:
+            labels = labels[_places(session.points, points)]
+        except ValueError as error:
+            raise InputError(
+                f"{path}: {error} of {session.folder / _MAP_FILE}"
+            ) from error
     return labels.astype(np.uint8)
+
+
+def _places(points: np.ndarray, labelled: np.ndarray) -> np.ndarray:
+    """Returns the index (N,) of each point among labelled points.
+
+    Args:
+        points: (N, 3) points [m].
+        labelled: structured array (N,) of the same points, which may be in
+            another order and rounded [m].
+
+    Raises:
+        ValueError: they are other points, or cannot be told apart.
+    """
+    others = xyz(labelled)
+    if not np.isfinite(others).all():
+        raise ValueError("a coordinate is not finite, so these are no points")
+    step = max(np.spacing(np.abs(labelled[i]).max(initial=0)) for i in "xyz")
+    near = max(_ROUNDED, float(step))
+    if (np.abs(points - others) <= near).all():
+        return np.arange(len(points))
+    distances, places = KDTree(others).query(points, workers=-1)
+    far = int(np.argmax(distances))
+    if distances[far] > near:
+        raise ValueError(
+            f"no point within {near:.2g} m of point {far}: not the points"
+        )
+    if len(np.unique(places)) < len(places):
+        raise ValueError(
+            "in another order, and too coarse to tell apart the points"
+        )
+    return places
 
 
 def write_labels(path: Path, labels: np.ndarray) -> None:
@@ -228,8 +271,8 @@ def write_labels(path: Path, labels: np.ndarray) -> None:
         np.save(stream, labels.astype(np.uint8))
 
 
-def _read_any_labels(path: Path) -> np.ndarray:
-    """Returns the array of labels in a file, of any shape and type.
+def _read_any_labels(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
+    """Returns labels of any shape and type, and their points, if known.
 
     Raises:
         InputError: the file cannot be read, or is a cloud without labels.
@@ -238,8 +281,8 @@ def _read_any_labels(path: Path) -> np.ndarray:
         points = np.concatenate(list(read_blocks(path)))
         if "prediction" not in (points.dtype.names or ()):
             raise InputError(f"{path}: no property `prediction`")
-        return points["prediction"]
-    return read_npy(path)
+        return points["prediction"], points
+    return read_npy(path), None
 
 
 def _session_of(folder: Path, points: np.ndarray, X_WS: np.ndarray) -> Session:

@@ -260,20 +260,38 @@ def test_bad_labels_are_refused(tmp_path, capsys):
 
 
 def test_labels_of_a_cloud_are_its_predictions(tmp_path):
-    """A cloud may contain the truth, too."""
+    """A cloud may contain the truth, too, and its points in any order."""
     pair, _ = clouds(tmp_path)
-    rows = "0 0 0 1 2\n" * 400
-    text = (
-        "ply\nformat ascii 1.0\nelement vertex 400\nproperty double x\n"
-        "property double y\nproperty double z\nproperty uchar {}\n"
-        "property uchar {}\nend_header\n"
-    )
+    points = pair.A.points
+    random = np.random.default_rng(3)
+    labels = random.integers(0, 3, len(points), dtype=np.uint8)
     path = tmp_path / "labels.ply"
-    path.write_text(text.format("truth", "prediction") + rows)
-    assert (read_labels(path, pair.A, truth=False) == Label.GONE).all()
-    path.write_text(text.format("truth", "change") + rows)
+
+    def read(points, labels, name="prediction", kind="float", of=pair.A):
+        text = (
+            f"ply\nformat ascii 1.0\nelement vertex {len(points)}\n"
+            f"property {kind} x\nproperty {kind} y\nproperty {kind} z\n"
+            f"property uchar truth\nproperty uchar {name}\nend_header\n"
+        )
+        rows = zip(points, labels, strict=True)
+        text += "".join("{} {} {} 1 {}\n".format(*p, k) for p, k in rows)
+        path.write_text(text)
+        return read_labels(path, of, truth=False)
+
+    for order in np.arange(len(points)), random.permutation(len(points)):
+        for kind in ("float", "double"):
+            found = read(points[order], labels[order], kind=kind)
+            np.testing.assert_array_equal(found, labels)
     with pytest.raises(InputError, match="no property `prediction`"):
-        read_labels(path, pair.A, truth=False)
+        read(points, labels, "change")
+    with pytest.raises(InputError, match=r"no point within 0\.02 m of point"):
+        read(points[::-1] + 0.3, labels)
+    with pytest.raises(InputError, match="too coarse to tell apart"):
+        read(
+            [(5, 0, 0), (0.012, 0, 0), (0.018, 0, 0)],
+            [0, 1, 2],
+            of=replace(pair.A, points=np.array([(0, 0, 0), (0.01, 0, 0), (5, 0, 0)])),
+        )
 
 
 def write_column(path, kind, value):
