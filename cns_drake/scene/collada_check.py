@@ -5,13 +5,16 @@ https://www.khronos.org/files/collada_spec_1_4.pdf
 """
 
 from collections import Counter
+from collections.abc import Iterator
 import math
 from pathlib import Path
 from typing import cast
+from xml.etree import ElementTree
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from cns_drake.base import Element, read_elements, to_number
+from cns_drake.base import Element, read_bytes, read_elements, to_number
 
 # Elements that show what their `url` names.
 _INSTANCES = (
@@ -55,6 +58,8 @@ _SHAPELESS = (
     "skeleton", "Name_array", "IDREF_array", "SIDREF_array", "bool_array",
     "int_array",
 )  # fmt: skip
+# Nodes that show each other form a circle beyond this depth.
+_DEEPEST = 100
 _CURE = "; export it with triangles and matrices, or as glTF"
 
 
@@ -66,7 +71,7 @@ def check_collada(path: Path) -> tuple[str, ...]:
         InputError: the file cannot be read, or is no XML.
     """
     root = read_elements(path)
-    _check_units(root)
+    _unit_and_axis(root)
     for matrix in root.iter("bind_shape_matrix"):
         numbers = [to_number(word) for word in (matrix.text or "").split()]
         if not np.array_equal(numbers, np.eye(4).ravel()):
@@ -84,24 +89,173 @@ def check_collada(path: Path) -> tuple[str, ...]:
     )
 
 
-def _check_units(root: Element) -> None:
-    """Checks that the whole file has the unit and the axis of its beginning.
+def plain_collada(path: Path) -> tuple[bytes, np.ndarray]:
+    """Returns a COLLADA file as Open3D can read it, in full precision.
+
+    Open3D reads numbers, and multiplies the places of nodes, in single
+    precision. Each shown mesh therefore gets a node of its own, and vertices
+    begin near the origin.
+
+    Args:
+        path: the file, which `check_collada` has checked.
+
+    Returns:
+        The file, and (3,) what was taken from the place of all meshes, along
+        the axes that Open3D gives them [m]. Files with skins or morphs, whose
+        meshes name others, and files that show nothing stay as they are.
+
+    Raises:
+        ValueError: an element has not the numbers that it needs.
+        InputError: the file cannot be read, or is no XML.
+    """
+    root = read_elements(path)
+    shown = list(_placed_meshes(root))
+    if not shown or next(root.iter("controller"), None) is not None:
+        return read_bytes(path), np.zeros(3)
+    starts = {
+        one.get("id"): _begin_at_origin(cast(Element, one))
+        for one in root.iter("geometry")
+    }
+    X_meshes = np.array([X for _, X in shown])
+    for X, (one, _) in zip(X_meshes, shown, strict=True):
+        X[:3, 3] += X[:3, :3] @ starts.get(one.get("url", "")[1:], np.zeros(3))
+    p_offset = X_meshes[0, :3, 3].copy()
+    X_meshes[:, :3, 3] -= p_offset
+    scene = _shown_scene(root)
+    assert scene is not None  # It shows a mesh.
+    scene[:] = []
+    for X, (one, _) in zip(X_meshes, shown, strict=True):
+        matrix = Element("matrix")
+        matrix.text = " ".join(map(repr, X.ravel().tolist()))
+        node = ElementTree.SubElement(scene, "node")
+        node.extend([matrix, one])
+    unit, axis = _unit_and_axis(root)
+    x, y, z = p_offset * unit
+    turned = {"Z_UP": (x, z, -y), "X_UP": (-y, x, z)}.get(axis, (x, y, z))
+    return ElementTree.tostring(root), np.array(turned)
+
+
+def _shown_scene(root: Element) -> Element | None:
+    """Returns the scene that a file shows, or None."""
+    for one in root.all("scene", "instance_visual_scene"):
+        for scene in root.all("library_visual_scenes", "visual_scene"):
+            if scene.get("id") == one.get("url", "")[1:]:
+                return scene
+    return None
+
+
+def _placed_meshes(root: Element) -> Iterator[tuple[Element, np.ndarray]]:
+    """Yields each `instance_geometry` that a file shows, and its place (4, 4).
+
+    Raises:
+        ValueError: a node shows itself, or has other numbers than it needs.
+    """
+    scene = _shown_scene(root)
+    waiting = [] if scene is None else [(scene, np.eye(4), 0)]
+    named = {one.get("id"): cast(Element, one) for one in root.iter("node")}
+    while waiting:
+        parent, X, depth = waiting.pop()
+        if depth > _DEEPEST:
+            raise ValueError("has a node of COLLADA that shows itself")
+        X = X @ _own_place(parent)
+        yield from ((one, X) for one in parent.all("instance_geometry"))
+        inner = [*parent.all("node")]
+        for one in parent.all("instance_node"):
+            if (found := named.get(one.get("url", "")[1:])) is not None:
+                inner.append(found)
+        waiting += [(one, X, depth + 1) for one in reversed(inner)]
+
+
+def _own_place(node: Element) -> np.ndarray:
+    """Returns the place (4, 4) of a node in its parent."""
+    X = np.eye(4)
+    for one in node.all("*"):
+        step = np.eye(4)
+        if one.tag == "matrix":
+            step = _numbers(one, 16).reshape(4, 4)
+        elif one.tag == "translate":
+            step[:3, 3] = _numbers(one, 3)
+        elif one.tag == "scale":
+            step[:3, :3] = np.diag(_numbers(one, 3))
+        elif one.tag == "rotate":
+            *axis, angle_deg = _numbers(one, 4)
+            length = np.linalg.norm(axis)
+            if length > 0.0:
+                vector = np.array(axis) / length * np.deg2rad(angle_deg)
+                step[:3, :3] = Rotation.from_rotvec(vector).as_matrix()
+        X = X @ step
+    return X
+
+
+def _begin_at_origin(geometry: Element) -> np.ndarray:
+    """Moves the vertices of a mesh to the origin.
+
+    Returns:
+        (3,) the place where they began; 0 if they are no plain x, y and z.
+    """
+    for mesh in geometry.all("mesh"):
+        names = [
+            one.get("source", "")[1:]
+            for one in mesh.all("vertices", "input")
+            if one.get("semantic") == "POSITION"
+        ]
+        for source in mesh.all("source"):
+            accessor = source.first("technique_common", "accessor")
+            array = source.first("float_array")
+            if (
+                [source.get("id")] != names
+                or accessor is None
+                or array is None
+                or accessor.get("stride") != "3"
+                or accessor.get("offset", "0") != "0"
+                or len([*accessor.all("param")]) != 3
+            ):
+                continue
+            words = (array.text or "").split()
+            values = np.array([to_number(word) for word in words])
+            if len(values) < 3 or len(values) % 3:
+                continue
+            points = values.reshape(-1, 3)
+            start = points[0].copy()
+            moved = (points - start).ravel().tolist()
+            array.text = " ".join(map(repr, moved))
+            return start
+    return np.zeros(3)
+
+
+def _numbers(element: Element, count: int) -> np.ndarray:
+    """Returns the numbers (N,) of an element.
+
+    Raises:
+        ValueError: it has not `count` numbers.
+    """
+    words = (element.text or "").split()
+    if len(words) != count:
+        raise ValueError(
+            f"has <{element.tag}> of COLLADA with {len(words)} numbers, not"
+            f" {count}"
+        )
+    return np.array([to_number(word) for word in words])
+
+
+def _unit_and_axis(root: Element) -> tuple[float, str]:
+    """Returns the unit [m] and the axis of a whole file.
 
     Raises:
         ValueError: a unit is no length, or a part of the file has a unit or an
             axis of its own.
     """
     own = root.first("asset")
-    kept = [(1.0, "Y_UP") if own is None else _unit_and_axis(own)]
+    kept = (1.0, "Y_UP") if own is None else _stated(own)
     for asset in root.iter("asset"):
-        kept.append(_unit_and_axis(cast(Element, asset), *kept[0]))
-    if len(set(kept)) > 1:
-        raise ValueError(
-            f"has parts of COLLADA with another unit or axis{_CURE}"
-        )
+        if _stated(cast(Element, asset), *kept) != kept:
+            raise ValueError(
+                f"has parts of COLLADA with another unit or axis{_CURE}"
+            )
+    return kept
 
 
-def _unit_and_axis(
+def _stated(
     asset: Element, unit: float = 1.0, axis: str = "Y_UP"
 ) -> tuple[float, str]:
     """Returns the unit [m] and the axis that an asset states, or defaults."""

@@ -8,7 +8,11 @@ from collections import Counter
 import json
 from pathlib import Path
 import struct
-from typing import Any
+from typing import Any, NamedTuple
+from urllib.parse import unquote_to_bytes
+
+import numpy as np
+from scipy.spatial.transform import Rotation
 
 from cns_drake.base import parse_json, read_bytes
 from cns_drake.scene.model_finder import resolve
@@ -35,6 +39,11 @@ _FLOAT = 5126
 _FIRST_TRIANGLES = 4
 # Greatest mode of a primitive.
 _LAST_TRIANGLES = 6
+# Members of a file that show no shape, or whose shapes are not read.
+_UNSEEN = (
+    "images", "textures", "samplers", "materials", "cameras", "animations",
+    "skins",
+)  # fmt: skip
 # Type of a chunk of JSON.
 _JSON = 0x4E4F534A
 
@@ -79,29 +88,6 @@ def check_gltf(content: bytes) -> tuple[str, ...]:
     return tuple(f"{number} {what}" for what, number in counts.items())
 
 
-def count_triangles(content: bytes) -> int:
-    """Returns how many triangles a glTF file shows, which was checked.
-
-    Open3D leaves out triangles whose vertices do not exist.
-    """
-    top = parse_json(_json_chunk(content))
-    try:
-        meshes = [_count_of_mesh(top, one) for one in top.get("meshes", [])]
-        nodes = top.get("nodes", [])
-        waiting = list(top["scenes"][top.get("scene", 0)].get("nodes", []))
-        total = 0
-        # A node has one parent, so no node is visited twice.
-        for _ in range(len(nodes)):
-            if not waiting:
-                break
-            node = nodes[waiting.pop()]
-            waiting += node.get("children", [])
-            total += meshes[node["mesh"]] if "mesh" in node else 0
-    except (AttributeError, LookupError, TypeError) as error:
-        raise ValueError(f"no valid glTF ({type(error).__name__})") from error
-    return total
-
-
 def _count_of_mesh(top: Any, mesh: Any) -> int:
     count = 0
     for one in mesh["primitives"]:
@@ -115,46 +101,129 @@ def _count_of_mesh(top: Any, mesh: Any) -> int:
     return count
 
 
-def with_own_buffers(path: Path, content: bytes) -> bytes | None:
-    """Returns a glTF file with its buffers, without looks; None if it has them.
+class PlainGltf(NamedTuple):
+    """A glTF file for Open3D: shapes alone, with all buffers inside.
 
-    Open3D does not find buffers whose names have percent escapes, fails on
-    missing textures, and takes every buffer of a binary file for its chunk,
-    even a `data:` URI, which Open3D itself writes. The result is text.
+    Attributes:
+        text: the file.
+        p_offset: (3,) what was taken from the place of all meshes, along the
+            axes of glTF [m].
+        num_triangles: how many triangles the file shows. Open3D leaves out
+            triangles whose vertices do not exist.
+    """
+
+    text: bytes
+    p_offset: np.ndarray
+    num_triangles: int
+
+
+def plain_gltf(content: bytes, folder: Path) -> PlainGltf:
+    """Returns a glTF file as Open3D can read it, in full precision.
+
+    Open3D multiplies the places of nodes in single precision, does not find
+    buffers whose names have percent escapes, takes a `data:` URI for base64 in
+    any case, fails on missing textures, and takes every buffer of a binary file
+    for its chunk.
 
     Args:
-        path: the file, whose folder has the buffers.
         content: the file, which `check_gltf` has checked.
+        folder: folder that has the buffers.
 
     Raises:
-        ValueError: a buffer does not exist.
+        ValueError: the file is not glTF, or a buffer does not exist.
         InputError: a buffer cannot be read.
     """
-    is_binary = content[:4] == b"glTF"
     top = parse_json(_json_chunk(content))
     buffers = top.get("buffers", [])
-    uris = _buffer_uris(top)
-    readable = () if is_binary else ("data:",)
-    if all(uri is None or uri.startswith(readable) for uri in uris):
-        return None
-    for one, uri in zip(buffers, uris, strict=True):
-        if uri is None:
-            data = _binary_chunk(content) if is_binary else b""
-        elif uri.startswith("data:"):
-            continue
-        else:
-            found = resolve(uri, path.parent)
-            if found is None or not found.is_file():
-                raise ValueError(f"its buffer {uri} does not exist")
-            data = read_bytes(found, LARGEST_FILE)
+    for one, uri in zip(buffers, _buffer_uris(top), strict=True):
+        # The chunk of a file may be longer.
+        data = _buffer(content, uri, folder)[: one["byteLength"]]
         text = base64.b64encode(data).decode()
         one["uri"] = f"data:application/octet-stream;base64,{text}"
-    for key in ("images", "textures", "samplers", "materials"):
+    for key in _UNSEEN:
         top.pop(key, None)
+    try:
+        placed = _placed_meshes(top)
+        count = sum(
+            _count_of_mesh(top, top["meshes"][mesh]) for mesh, _ in placed
+        )
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        raise ValueError(f"no valid glTF ({type(error).__name__})") from error
     for mesh in top.get("meshes", []):
         for primitive in mesh["primitives"]:
             primitive.pop("material", None)
-    return json.dumps(top).encode()
+    p_offset = placed[0][1][:3, 3].copy() if placed else np.zeros(3)
+    top["nodes"] = []
+    for mesh, X in placed:
+        X[:3, 3] -= p_offset
+        top["nodes"].append({"mesh": mesh, "matrix": X.T.ravel().tolist()})
+    top["scenes"] = [{"nodes": [*range(len(placed))]}]
+    top["scene"] = 0
+    return PlainGltf(json.dumps(top).encode(), p_offset, count)
+
+
+def _placed_meshes(top: Any) -> list[tuple[int, np.ndarray]]:
+    """Returns each mesh that a scene shows, and its place (4, 4).
+
+    Raises:
+        LookupError, TypeError, ValueError: the file is no valid glTF.
+    """
+    nodes = top.get("nodes", [])
+    roots = top["scenes"][top.get("scene", 0)].get("nodes", [])
+    waiting = [(one, np.eye(4)) for one in roots]
+    found = []
+    # A node has one parent, so no node is visited twice.
+    for _ in range(len(nodes)):
+        if not waiting:
+            break
+        index, X = waiting.pop()
+        node = nodes[index]
+        X = X @ _own_place(node)
+        waiting += [(one, X) for one in node.get("children", [])]
+        if "mesh" in node:
+            found.append((node["mesh"], X.copy()))
+    return found
+
+
+def _own_place(node: Any) -> np.ndarray:
+    """Returns the place (4, 4) of a node in its parent."""
+    if "matrix" in node:
+        return np.array(node["matrix"], dtype=float).reshape(4, 4).T
+    X = np.eye(4)
+    X[:3, 3] = node.get("translation", (0, 0, 0))
+    X[:3, :3] = Rotation.from_quat(
+        node.get("rotation", (0, 0, 0, 1))
+    ).as_matrix() * np.asarray(node.get("scale", (1, 1, 1)), dtype=float)
+    return X
+
+
+def _buffer(content: bytes, uri: str | None, folder: Path) -> bytes:
+    """Returns the bytes of a buffer of a file.
+
+    Args:
+        content: the file.
+        uri: address of the buffer; None for the chunk of a binary file.
+        folder: folder of the file.
+
+    Raises:
+        ValueError: the buffer does not exist.
+        InputError: the buffer cannot be read.
+    """
+    if uri is None:
+        return _binary_chunk(content) if content[:4] == b"glTF" else b""
+    if uri.startswith("data:"):
+        kind, _, data = uri.partition(",")
+        plain = unquote_to_bytes(data)
+        if not kind.lower().endswith(";base64"):
+            return plain
+        try:
+            return base64.b64decode(plain + b"=" * (-len(plain) % 4))
+        except ValueError as error:
+            raise ValueError("its buffer data: is no base64") from error
+    found = resolve(uri, folder)
+    if found is None or not found.is_file():
+        raise ValueError(f"its buffer {uri} does not exist")
+    return read_bytes(found, LARGEST_FILE)
 
 
 def _json_chunk(content: bytes) -> bytes:
@@ -173,10 +242,13 @@ def _buffer_uris(top: Any) -> list[str | None]:
     Raises:
         AttributeError, TypeError: the buffers are no valid glTF.
     """
-    uris = [one.get("uri") for one in top.get("buffers", [])]
-    for uri in uris:
+    buffers = top.get("buffers", [])
+    uris = [one.get("uri") for one in buffers]
+    for uri, one in zip(uris, buffers, strict=True):
         if not (uri is None or isinstance(uri, str)):
             raise TypeError(f"{uri!r} is no address")
+        if not isinstance(one["byteLength"], int):
+            raise TypeError("the length of a buffer is no number")
     return uris
 
 

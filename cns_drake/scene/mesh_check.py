@@ -5,22 +5,26 @@ without a warning. This module refuses such a file if surfaces would be missing,
 and files of all other formats.
 """
 
+import codecs
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 import re
 import struct
 
-from cns_drake.base import read_bytes
+import numpy as np
+
+from cns_drake.base import read_bytes, to_number
 from cns_drake.scene.collada_check import check_collada
 from cns_drake.scene.gltf_check import check_gltf
-from cns_drake.scene.obj_check import LARGEST_FILE, check_obj
+from cns_drake.scene.obj_check import LARGEST_FILE, check_obj, unmarked
 from cns_drake.scene.ply_check import check_ply
 
 # File name extensions of glTF.
 GLTF = (".gltf", ".glb")
 _STL_HEADER_BYTES = 84
 _STL_FACET_BYTES = 50
+_STL_VERTEX = re.compile(rb"^[ \t]*vertex\b(.*)", re.M | re.I)
 _STL_WORDS = re.compile(rb"^[ \t]*(vertex|endfacet|endsolid)\b", re.M | re.I)
 
 
@@ -37,14 +41,16 @@ def check_mesh_file(path: Path) -> tuple[str, ...]:
     """
     ending = path.suffix.lower()
     if ending in _CHECKS_OF_FILES:
-        return _CHECKS_OF_FILES[ending](path)
+        with unmarked(path) as file:
+            return _CHECKS_OF_FILES[ending](file)
     if ending not in _CHECKS:
         formats = " ".join([*_CHECKS, *_CHECKS_OF_FILES])
         raise ValueError(
             f"is no mesh of a format that is read ({formats}); Blender or"
             " trimesh writes these"
         )
-    return _CHECKS[ending](read_bytes(path, LARGEST_FILE))
+    content = read_bytes(path, LARGEST_FILE)
+    return _CHECKS[ending](content.removeprefix(codecs.BOM_UTF8))
 
 
 def _check_stl(content: bytes) -> tuple[()]:
@@ -59,11 +65,7 @@ def _check_stl(content: bytes) -> tuple[()]:
         ValueError: the text ends within a solid, or a facet has more than three
             corners.
     """
-    if len(content) >= _STL_HEADER_BYTES:
-        (number,) = struct.unpack_from("<I", content, _STL_HEADER_BYTES - 4)
-        if len(content) == _STL_HEADER_BYTES + _STL_FACET_BYTES * number:
-            return ()
-    if content[:5].lower() != b"solid":
+    if not _is_stl_text(content):
         return ()
     words = [word.lower() for word in _STL_WORDS.findall(content)]
     counts = Counter(words)
@@ -75,6 +77,34 @@ def _check_stl(content: bytes) -> tuple[()]:
             " of STL; all facets must be triangles"
         )
     return ()
+
+
+def stl_corners(content: bytes) -> np.ndarray | None:
+    """Returns the corners of a text file of STL in full precision.
+
+    Open3D would read them in single precision.
+
+    Returns:
+        (N, 3) float64 [m], three for each facet; None if the file is binary.
+
+    Raises:
+        ValueError: a corner is not three numbers.
+    """
+    if not _is_stl_text(content):
+        return None
+    rows = [row.split() for row in _STL_VERTEX.findall(content)]
+    if wrong := next((row for row in rows if len(row) != 3), None):
+        raise ValueError(f"has a vertex of STL with {len(wrong)} numbers")
+    words = (word.decode("ascii", "replace") for row in rows for word in row)
+    return np.array([to_number(word) for word in words]).reshape(-1, 3)
+
+
+def _is_stl_text(content: bytes) -> bool:
+    if len(content) >= _STL_HEADER_BYTES:
+        (number,) = struct.unpack_from("<I", content, _STL_HEADER_BYTES - 4)
+        if len(content) == _STL_HEADER_BYTES + _STL_FACET_BYTES * number:
+            return False
+    return content[:5].lower() == b"solid"
 
 
 # File name extension -> function that reads and checks a file.

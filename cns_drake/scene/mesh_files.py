@@ -13,18 +13,17 @@ from pydrake.geometry import (
 )
 
 from cns_drake.base import InputError, note, read_bytes
+from cns_drake.scene.collada_check import plain_collada
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.file_watch import once_a_file
 from cns_drake.scene.foreign_meshes import ForeignMeshes
-from cns_drake.scene.gltf_check import count_triangles, with_own_buffers
-from cns_drake.scene.mesh_check import GLTF, check_mesh_file
-from cns_drake.scene.obj_check import LARGEST_FILE, check_obj
+from cns_drake.scene.gltf_check import plain_gltf
+from cns_drake.scene.mesh_check import GLTF, check_mesh_file, stl_corners
+from cns_drake.scene.obj_check import LARGEST_FILE, check_obj, unmarked
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 
 # Formats whose y axis points up. Drake rotates them so that z does.
 _Y_UP = (*GLTF, ".dae")
-# Formats whose coordinates are read in double precision.
-_DOUBLE = (".obj", ".ply")
 # Greatest step of coordinates that no note mentions [m].
 _COARSE = 0.005
 # Greatest number of triangles in all copies of meshes at further scales, of
@@ -104,42 +103,74 @@ class MeshFiles:
             raise ValueError("no such mesh file")
         ending = path.suffix.lower()
         check_mesh_file(path)
-        if ending == ".obj":
-            p_GVset, triangles = _read_obj(path)
-        elif ending in GLTF:
-            p_GVset, triangles = self._read_gltf(path)
-        else:
-            p_GVset, triangles = self._foreign.read(path)
+        with unmarked(path) as file:
+            p_GVset, triangles, step = (
+                (*_read_obj(file), 0.0)
+                if ending == ".obj"
+                else self._read_foreign(file, path.parent)
+            )
         if len(triangles) == 0:
             raise ValueError("holds no triangles")
         # Drake only warns; a ray caster would read outside its memory.
         if not 0 <= triangles.min() <= triangles.max() < len(p_GVset):
             raise ValueError("a face has a vertex that is not there")
-        if ending not in _DOUBLE:
-            step = float(np.spacing(np.abs(p_GVset).max().astype(np.float32)))
-            if step > _COARSE:
-                note(
-                    f"{path}: coordinates of single precision are coarse here:"
-                    f" steps of {step:.2g} m; move the vertices to the origin,"
-                    " or convert the file to OBJ or PLY"
-                )
+        if step > _COARSE:
+            note(
+                f"{path}: coordinates of single precision are coarse here:"
+                f" steps of {step:.2g} m; export it again with vertices near"
+                " the origin, or as OBJ or PLY with doubles"
+            )
         if ending in _Y_UP:
             x, y, z = p_GVset.T
             p_GVset = np.stack([x, -z, y], axis=1)
         return TriangleSurface(p_GVset, triangles)
 
-    def _read_gltf(self, path: Path) -> tuple[np.ndarray, np.ndarray]:
-        content = read_bytes(path, LARGEST_FILE)
-        whole = with_own_buffers(path, content)
-        if whole is None:
-            found = self._foreign.read(path)
+    def _read_foreign(
+        self, path: Path, folder: Path
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Reads a mesh with Open3D.
+
+        Args:
+            path: the file.
+            folder: folder of the files that it names.
+
+        Returns:
+            Vertices (N, 3), float64 [m], triangles (M, 3), int32, and the step
+            between the coordinates that the file can have [m].
+        """
+        ending = path.suffix.lower()
+        p_offset, expected, text = np.zeros(3), 0, None
+        if ending in GLTF:
+            content = read_bytes(path, LARGEST_FILE)
+            text, p_offset, expected = plain_gltf(content, folder)
+            ending = ".gltf"
+        elif ending == ".dae":
+            text, p_offset = plain_collada(path)
+        elif ending == ".stl":
+            p_GVset = stl_corners(read_bytes(path, LARGEST_FILE))
+            if p_GVset is not None:
+                corners = np.arange(len(p_GVset), dtype=np.int32)
+                return p_GVset, corners.reshape(-1, 3), 0.0
+        if text is None:
+            p_GVset, triangles = self._foreign.read(path)
         else:
-            with tempfile.TemporaryDirectory() as folder:
-                copy = Path(folder) / "mesh.gltf"
-                copy.write_bytes(whole)
-                found = self._foreign.read(copy)
-        _check_count(len(found[1]), count_triangles(content))
-        return found
+            with tempfile.TemporaryDirectory() as place:
+                copy = Path(place) / f"mesh{ending}"
+                copy.write_bytes(text)
+                p_GVset, triangles = self._foreign.read(copy)
+        _check_count(len(triangles), expected)
+        return p_GVset + p_offset, triangles, _step(p_GVset)
+
+
+def _step(p_GVset: np.ndarray) -> float:
+    """Returns the step of coordinates (N, 3) in single precision [m].
+
+    The step is 0 if they are more precise.
+    """
+    single = p_GVset.astype(np.float32)
+    if not len(single) or (single != p_GVset).any():
+        return 0.0
+    return float(np.spacing(np.abs(single).max()))
 
 
 def _check_count(found: int, expected: int) -> None:
@@ -206,7 +237,11 @@ def _read_hull(shape: Convex) -> TriangleSurface:
     source = shape.source()
     if source.is_path():
         check_mesh_file(Path(source.path()))
-    hull = shape.GetConvexHull()
+        with unmarked(Path(source.path())) as file:
+            # Drake reads the file here.
+            hull = Convex(str(file), shape.scale3()).GetConvexHull()
+    else:
+        hull = shape.GetConvexHull()
     vertices = [hull.vertex(k) for k in range(hull.num_vertices())]
     triangles = []
     for k in range(hull.num_faces()):

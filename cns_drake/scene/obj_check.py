@@ -1,13 +1,17 @@
 """Finds faults in OBJ files that Drake would misread or on which it crashes."""
 
+import codecs
 from collections import Counter
+from collections.abc import Iterator
+import contextlib
 from pathlib import Path
 import re
+import tempfile
 from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import read_bytes
+from cns_drake.base import read_bytes, user_errors
 from cns_drake.scene.file_watch import once_a_file
 
 # Larger mesh files are refused [bytes].
@@ -48,7 +52,27 @@ _FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
 # them.
 _OTHER_INDICES = re.compile(rb"/[^\s]*")
 _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+
+@contextlib.contextmanager
+def unmarked(path: Path) -> Iterator[Path]:
+    """Gives a file, or for a while a copy without its byte order mark.
+
+    Neither Drake nor Open3D reads the line behind a mark.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    with user_errors(path), open(path, "rb") as stream:
+        is_marked = stream.read(len(codecs.BOM_UTF8)) == codecs.BOM_UTF8
+    if not is_marked:
+        yield path
+        return
+    content = read_bytes(path, LARGEST_FILE)
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / f"mesh{path.suffix.lower()}"
+        copy.write_bytes(content.removeprefix(codecs.BOM_UTF8))
+        yield copy
 
 
 class ObjFaces(NamedTuple):
@@ -75,7 +99,7 @@ def check_obj(path: Path) -> ObjFaces:
     """
     # Drake accepts carriage returns as line ends, too.
     content = read_bytes(path, LARGEST_FILE).replace(b"\r", b"\n")
-    if content.startswith(_BYTE_ORDER_MARK):
+    if content.startswith(codecs.BOM_UTF8):
         raise ValueError("begins with a byte order mark; save it without")
     counts = _count_ignored(content)
     if found := _NO_VERTEX.search(content):

@@ -20,17 +20,17 @@ L_TRIANGLES = np.array(
 )
 
 
-def obj_text():
+def obj_text(vertices=L_VERTICES):
     """The prism, without normals."""
-    lines = ["v {} {} {}".format(*p) for p in L_VERTICES]
+    lines = ["v {} {} {}".format(*p) for p in vertices]
     lines += ["f {} {} {}".format(*(t + 1)) for t in L_TRIANGLES]
     return "\n".join(lines) + "\n"
 
 
-def stl_text():
+def stl_text(vertices=L_VERTICES):
     """The prism."""
     lines = ["solid prism"]
-    for triangle in L_VERTICES[L_TRIANGLES]:
+    for triangle in vertices[L_TRIANGLES]:
         normal = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
         lines.append("facet normal {} {} {}".format(*normal))
         lines.append("outer loop")
@@ -39,21 +39,21 @@ def stl_text():
     return "\n".join([*lines, "endsolid prism"]) + "\n"
 
 
-def ply_text():
-    """The prism."""
-    rows = ["{} {} {}".format(*p) for p in L_VERTICES]
+def ply_text(vertices=L_VERTICES, kind="float"):
+    """The prism, with coordinates of a type."""
+    rows = ["{} {} {}".format(*p) for p in vertices]
     rows += ["3 {} {} {}".format(*t) for t in L_TRIANGLES]
     return (
         f"ply\nformat ascii 1.0\nelement vertex {len(L_VERTICES)}\n"
-        "property float x\nproperty float y\nproperty float z\n"
+        f"property {kind} x\nproperty {kind} y\nproperty {kind} z\n"
         f"element face {len(L_TRIANGLES)}\n"
         "property list uchar int vertex_indices\nend_header\n"
     ) + "".join(f"{row}\n" for row in rows)
 
 
-def collada_text():
-    """The prism, its z up."""
-    numbers = " ".join(map(str, L_VERTICES.ravel()))
+def collada_text(vertices=L_VERTICES, place=""):
+    """The prism, its z up, at a place: elements of its node."""
+    numbers = " ".join(map(str, vertices.ravel()))
     corners = " ".join(map(str, L_TRIANGLES.ravel()))
     return f"""<COLLADA version="1.4.1"
 xmlns="http://www.collada.org/2005/11/COLLADASchema">
@@ -67,7 +67,8 @@ xmlns="http://www.collada.org/2005/11/COLLADASchema">
 <triangles count="{len(L_TRIANGLES)}">
 <input semantic="VERTEX" source="#v" offset="0"/><p>{corners}</p></triangles>
 </mesh></geometry></library_geometries>
-<library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/>
+<library_visual_scenes><visual_scene id="s"><node>{place}
+<instance_geometry url="#g"/>
 </node></visual_scene></library_visual_scenes>
 <scene><instance_visual_scene url="#s"/></scene></COLLADA>
 """
