@@ -1,6 +1,7 @@
 """Counts of the faults that an import finds in a file."""
 
 from collections import Counter
+from collections.abc import Mapping
 from typing import NamedTuple
 
 # Longer texts are cut [characters].
@@ -32,6 +33,7 @@ class ImportFaults:
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
         self._examples: dict[str, str] = {}
+        self._names: dict[str, set[str]] = {}
         self._parts: dict[tuple[str, str], set[str]] = {}
 
     def add(self, kind: str, example: str, number: int = 1) -> None:
@@ -43,6 +45,7 @@ class ImportFaults:
         kind = _printable(kind)
         self._counts[kind] += number
         self._examples.setdefault(kind, _printable(example))
+        self._names.setdefault(kind, set()).add(example)
 
     def take_back(self, kind: str) -> None:
         """Removes one fault of a kind from the counts.
@@ -71,6 +74,23 @@ class ImportFaults:
             f"{element}: {_USES[use]}: {' '.join(sorted(names))}"
             for (element, use), names in sorted(self._parts.items())
         ]
+
+    def shares(self, volumes: Mapping[str, float]) -> dict[str, float]:
+        """Returns the share of the whole volume that has each kind of fault.
+
+        Args:
+            volumes: name of an object -> its volume [m^3].
+
+        Returns:
+            Kind -> share, from 0 to 1; only kinds of these objects.
+        """
+        whole = sum(volumes.values()) or 1.0
+        shares = {
+            kind: sum(volumes.get(name, 0.0) for name in names) / whole
+            for kind, names in self._names.items()
+            if kind in self._counts
+        }
+        return {kind: share for kind, share in shares.items() if share > 0.0}
 
     def rows(self) -> list[FaultCount]:
         """Returns the counts of all kinds of faults, most frequent first."""

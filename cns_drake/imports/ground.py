@@ -149,29 +149,21 @@ def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
     return np.array(feet).reshape(-1, 3)
 
 
-def ground_of(
-    objects: Sequence[ImportedObject], below_bridges: bool = False
-) -> Ground:
+def ground_of(objects: Sequence[ImportedObject]) -> Ground:
     """Returns the ground of a city: its terrain or, without one, a guess.
 
     The guess is a smooth ground through the lowest points of structures, and
-    through streets and other ground.
-
-    Args:
-        objects: objects of the city.
-        below_bridges: whether bridges and tunnels are ignored in the guess,
-            unless the city has no other structures.
+    through streets and other ground. Bridges and tunnels are ignored, unless
+    the city has no other structures.
     """
     surfaces = joined_triangles(one.triangles for one in objects)
     terrain = [one for one in objects if one.object_type == "TINRelief"]
     if terrain:
         feet = [one.triangles.reshape(-1, 3) for one in terrain]
     else:
-        standing = objects
-        if below_bridges:
-            spans = ("Bridge", "Tunnel")
-            firm = [o for o in objects if not o.object_type.startswith(spans)]
-            standing = firm or objects
+        spans = ("Bridge", "Tunnel")
+        firm = [o for o in objects if not o.object_type.startswith(spans)]
+        standing = firm or objects
         feet = [feet_of([o.triangles for o in standing if not o.is_ground])]
         feet += [
             one.triangles.reshape(-1, 3)[::_CORNER_STRIDE]

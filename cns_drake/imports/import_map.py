@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
+import re
 
 import numpy as np
 import shapely
@@ -97,13 +98,13 @@ def import_city(
     if options.grow is not None:
         staged, changes = grow(staged, options.grow, options.seed)
     doing("looking for streets")
-    ground = ground_of(staged.kept, options.dressed)
+    ground = ground_of(staged.kept)
     space = find_free_space(staged.kept, ground)
     side = options.drive_on or ("left" if city.keeps_left else "right")
     drives = own or _find_drives(city, space, side)
     if options.within is not None:
         staged = _cropped_city(staged, drives, options.within, city.faults)
-        ground = ground_of(staged.kept, options.dressed)
+        ground = ground_of(staged.kept)
     drives = with_ground_heights(drives, ground.height, city.faults)
     bare = staged.kept
     dressing = None
@@ -127,7 +128,7 @@ def import_city(
             city, options, list(staged.standing), changes, dressing
         )
         map_files.write_facts(draft, source, facts, city.faults)
-        report = _report_of(staged, drives, city.faults)
+        report = _report_of(staged, drives, city)
         map_files.write_report(draft, report)
         map_files.write_drives(
             draft,
@@ -207,8 +208,9 @@ def _find_drives(
 
 
 def _report_of(
-    staged: StagedCity, drives: Sequence[WaypointRoute], faults: ImportFaults
+    staged: StagedCity, drives: Sequence[WaypointRoute], city: ForeignCity
 ) -> ImportReport:
+    faults = city.faults
     return ImportReport(
         kinds=dict(Counter(one.object_type for one in staged.kept)),
         triangles=sum(one.num_own_triangles for one in staged.kept),
@@ -220,7 +222,35 @@ def _report_of(
         drives=tuple(drive.length for drive in drives),
         faults=faults.rows(),
         parts=faults.parts(),
+        shares=faults.shares(_volumes(city.objects)),
     )
+
+
+def _volumes(objects: Sequence[ImportedObject]) -> dict[str, float]:
+    """Returns the volume of each building above its lowest point [m^3].
+
+    The keys are the names by which faults are counted.
+    """
+    volumes: Counter[str] = Counter()
+    for one in objects:
+        if one.is_building:
+            a, b, c = np.moveaxis(one.triangles, 1, 0)
+            twice_area = np.cross(b - a, c - a)[:, 2]
+            height = (a + b + c)[:, 2] / 3.0 - one.triangles[:, :, 2].min()
+            volumes[_name_in_faults(one)] += (
+                abs(float(twice_area @ height)) / 2.0
+            )
+    return dict(volumes)
+
+
+def _name_in_faults(imported: ImportedObject) -> str:
+    """Returns the name of an object that counts of faults give as an example.
+
+    Parts of a multipolygon of OpenStreetMap have a number behind their id.
+    """
+    name = imported.structure.name
+    found = re.match(r"building_([nwr]-?\d+)(_\d+)?$", name)
+    return found[1] if found else name
 
 
 def _check_options(
@@ -305,7 +335,7 @@ def _cropped_city(
     for kept in city.kept:
         corners = kept.triangles.reshape(-1, 3)
         if not _are_near(corners[None], paths, distance)[0]:
-            name = kept.structure.name
+            name = _name_in_faults(kept)
             faults.add("structure far from the drives, left out", name)
             changed[kept] = None
         elif kept.object_type == "TINRelief":

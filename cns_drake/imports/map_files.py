@@ -199,7 +199,7 @@ def write_report(draft: Path, report: ImportReport) -> None:
     """Writes all counts of an import to `import.txt` in the map's folder."""
     lines = [f"{kind}: {number}" for kind, number in report.kinds.items()]
     lines += [
-        f"{fault.kind}: {fault.number}, such as {fault.example}"
+        f"{fault.kind}: {report.told(fault)}, such as {fault.example}"
         for fault in report.faults
     ]
     lines += report.parts

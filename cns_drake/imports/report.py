@@ -1,6 +1,7 @@
 """The report of an import: what was imported, and its faults."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from cns_drake.imports.faults import FaultCount
 
@@ -23,6 +24,8 @@ class ImportReport:
             frequent first.
         parts: lines on the parts of elements that are read, or that change no
             shape.
+        shares: kind of fault -> share of the volume of all buildings that the
+            buildings with this fault have, from 0 to 1.
     """
 
     kinds: dict[str, int]
@@ -33,3 +36,12 @@ class ImportReport:
     drives: tuple[float, ...]
     faults: list[FaultCount]
     parts: list[str]
+    shares: Mapping[str, float] = field(default_factory=dict)
+
+    def told(self, fault: FaultCount) -> str:
+        """Returns the number of a fault in words, with its share."""
+        share = self.shares.get(fault.kind)
+        if share is None:
+            return str(fault.number)
+        part = f"{100 * share:.2g} % of the volume of all buildings"
+        return f"{fault.number}, {part}"

@@ -31,6 +31,8 @@ _PROFILES: dict[str, list[tuple[float, float]]] = {
         (0.0, 1.0),
     ],
 }
+# Sides whose lengths differ by less are equally long [m].
+_SAME_LENGTH = 0.05
 # Inset of a mansard roof's flat top, as a share of the roof's height.
 _MANSARD_INSET = 0.5
 # Triangles (M, 3, 3) of a pitched roof [m]: its slopes, and its gables.
@@ -209,9 +211,17 @@ def _mansard(
 def _skillion(
     corners: np.ndarray, polygon: Polygon, roof_height: float
 ) -> _Roof:
-    """Returns a roof that rises from the longest side, and its gables."""
+    """Returns a roof that rises from the longest side, and its gables.
+
+    Of sides that are equally long, the southernmost is the lower one.
+    """
     sides = np.roll(corners, -1, axis=0) - corners
-    longest = int(np.linalg.norm(sides, axis=1).argmax())
+    lengths = np.linalg.norm(sides, axis=1)
+    middles = corners + sides / 2.0
+    longest = min(
+        np.flatnonzero(lengths > lengths.max() - _SAME_LENGTH).tolist(),
+        key=lambda k: (middles[k, 1], middles[k, 0]),
+    )
     inwards = np.array([-sides[longest, 1], sides[longest, 0]])
     away = (corners[:, :2] - corners[longest, :2]) @ inwards
     low, high = away.min(), away.max()

@@ -1,5 +1,6 @@
 """Small OpenStreetMap files, written here from the specification alone."""
 
+import cmath
 import math
 
 # Origin of the maps [deg].
@@ -8,13 +9,22 @@ LON = 13.0
 
 
 class OsmWriter:
-    """Writes nodes and ways, given in metres about 52 N, 13 E."""
+    """Writes nodes and ways, given in metres about 52 N, 13 E.
 
-    def __init__(self):
+    Args:
+        move: by what everything is moved [m].
+        turn_deg: by how much everything is turned first [deg].
+    """
+
+    def __init__(self, move=(0, 0), turn_deg=0.0):
         self.rows = []
         self._next = 1
+        self._move = complex(*move)
+        self._turn = cmath.rect(1.0, math.radians(turn_deg))
 
     def node(self, x, y, **tags):
+        place = complex(x, y) * self._turn + self._move
+        x, y = place.real, place.imag
         # The lengths of a degree, by the series for WGS 84.
         phi = math.radians(LAT)
         lat = 111132.954 - 559.822 * math.cos(2 * phi)

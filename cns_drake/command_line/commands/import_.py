@@ -192,7 +192,11 @@ def _report_rows(
     for letter, length in zip("ab", report.drives, strict=False):
         yield f"drive {letter}", f"{length:.0f} m"
     if report.faults:
-        parts = [f"{fault.kind} ({fault.number})" for fault in report.faults]
+        # What concerns most of the city comes first.
+        faults = sorted(
+            report.faults, key=lambda one: -report.shares.get(one.kind, 0.0)
+        )
+        parts = [f"{fault.kind} ({report.told(fault)})" for fault in faults]
         yield "left out or repaired", _shortened(parts)
     yield "written", f"{output}, with all counts in {REPORT_NAME}"
     if not report.drives:

@@ -1,11 +1,12 @@
-"""Bridges and tunnels of OpenStreetMap, and the parapets of bridges."""
+"""Bridges and tunnels of OpenStreetMap: decks and parapets."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import math
 import re
 
+import shapely
 from shapely import STRtree
 from shapely.geometry import LineString
 
@@ -20,6 +21,7 @@ from cns_drake.imports.openstreetmap.way_tags import (
     path_width,
     sidewalk_sides,
     street_width,
+    way_width,
 )
 from cns_drake.imports.streets import SIDEWALK_WIDTH
 from cns_drake.scene import LocalMetres
@@ -30,7 +32,10 @@ _PARAPET_THICKNESS = 0.25
 _PARAPET_HEIGHT = 1.0
 # Layer of a bridge whose tags name none.
 _USUAL_LAYER = 1.0
-_PARAPET = AreaLook("Parapet", "fence", (0.62, 0.60, 0.57), _PARAPET_HEIGHT)
+_CONCRETE = (0.62, 0.60, 0.57)
+# Height of a deck above the way below it, and thickness of the deck [m].
+_DECK_HEIGHT = 6.0
+_DECK_THICKNESS = 1.0
 
 
 @dataclass(frozen=True)
@@ -38,20 +43,21 @@ class Bridges:
     """Bridges and tunnels among the ways for cars, people and trains.
 
     Attributes:
-        over_streets: ids of the bridges that cross another way.
+        over_streets: id -> height of the deck [m], of the bridges that cross
+            another way.
         level: ids of all other bridges, which are assumed to be at the height
             of the surrounding ground.
         tunnels: ids of the tunnels.
     """
 
-    over_streets: AbstractSet[str] = frozenset()
+    over_streets: Mapping[str, float] = field(default_factory=dict)
     level: AbstractSet[str] = frozenset()
     tunnels: AbstractSet[str] = frozenset()
 
     @property
     def left_out(self) -> AbstractSet[str]:
-        """Ids of the bridges and tunnels that a dressed city does not have."""
-        return self.over_streets | self.tunnels
+        """Ids of the bridges and tunnels over or in which no street leads."""
+        return self.over_streets.keys() | self.tunnels
 
 
 def bridges_of(ways: Iterable[OsmWay], local: LocalMetres) -> Bridges:
@@ -71,9 +77,12 @@ def bridges_of(ways: Iterable[OsmWay], local: LocalMetres) -> Bridges:
     open_ways = [way for way in used if way.name not in tunnels]
     lines = [LineString(local(way.line)) for way in open_ways]
     tree = STRtree(lines)
-    over: set[str] = set()
+    over: dict[str, float] = {}
     level: set[str] = set()
-    for way, line in zip(open_ways, lines, strict=True):
+    # The lower one of two bridges that cross comes first.
+    for way, line in sorted(
+        zip(open_ways, lines, strict=True), key=lambda one: _height_rank(one[0])
+    ):
         if not has_tag(way.tags, "bridge"):
             continue
         crossed = [
@@ -83,7 +92,8 @@ def bridges_of(ways: Iterable[OsmWay], local: LocalMetres) -> Bridges:
             and _height_rank(open_ways[k]) < _height_rank(way)
         ]
         if crossed:
-            over.add(way.name)
+            highest = max(over.get(one.name, 0.0) for one in crossed)
+            over[way.name] = highest + _DECK_HEIGHT
         else:
             level.add(way.name)
     return Bridges(over, level, tunnels)
@@ -101,30 +111,57 @@ def _height_rank(way: OsmWay) -> tuple[float, str]:
     return float(layer[0]) if layer else _USUAL_LAYER, way.name
 
 
+def decks(
+    ways: Iterable[OsmWay], bridges: Bridges, local: LocalMetres
+) -> Iterator[ImportedObject]:
+    """Yields the decks of bridges over other ways, without their ramps."""
+    for name, tags, line, _ in ways:
+        if name not in bridges.over_streets:
+            continue
+        top = bridges.over_streets[name]
+        left, right = _reaches(tags)
+        course = LineString(local(line))
+        area = shapely.union_all(
+            [
+                course.buffer(left, single_sided=True),
+                course.buffer(-right, single_sided=True),
+            ]
+        )
+        look = AreaLook("Bridge", "other-structure", _CONCRETE, top)
+        source = (name, ImportFaults())
+        low = top - _DECK_THICKNESS
+        yield from raised_object(f"bridge_{name}", look, [area], source, low)
+
+
 def parapets(
     ways: Iterable[OsmWay], bridges: Bridges, local: LocalMetres
 ) -> Iterator[ImportedObject]:
-    """Yields parapets along both sides of road bridges.
+    """Yields parapets along both sides of bridges.
 
-    Only bridges at the height of the surrounding ground get parapets.
+    Bridges at the height of the surrounding ground have some if they carry a
+    street.
     """
     for name, tags, line, _ in ways:
-        width = street_width(tags)
-        if width is None or name not in bridges.level:
+        is_level = name in bridges.level and street_width(tags) is not None
+        if not is_level and name not in bridges.over_streets:
             continue
         course = LineString(local(line))
-        strips = []
-        for side, has_sidewalk in zip(
-            (1.0, -1.0), sidewalk_sides(tags), strict=True
-        ):
-            aside = (
-                width / 2.0
-                + _PARAPET_FROM_EDGE
-                + (SIDEWALK_WIDTH if has_sidewalk else 0.0)
+        strips = [
+            course.offset_curve(side * (reach + _PARAPET_FROM_EDGE)).buffer(
+                _PARAPET_THICKNESS / 2.0, cap_style="flat"
             )
-            edge = course.offset_curve(side * aside)
-            strips.append(
-                edge.buffer(_PARAPET_THICKNESS / 2.0, cap_style="flat")
-            )
+            for side, reach in zip((1.0, -1.0), _reaches(tags), strict=True)
+        ]
+        low = bridges.over_streets.get(name, 0.0)
+        top = low + _PARAPET_HEIGHT
+        kind = "Parapet" if is_level else "BridgeParapet"
+        look = AreaLook(kind, "fence", _CONCRETE, top)
         source = (name, ImportFaults())
-        yield from raised_object(f"parapet_{name}", _PARAPET, strips, source)
+        yield from raised_object(f"parapet_{name}", look, strips, source, low)
+
+
+def _reaches(tags: Mapping[str, str]) -> tuple[float, float]:
+    """Returns how far a way with its sidewalks reaches to both sides [m]."""
+    half = (way_width(tags) or 0.0) / 2.0
+    left, right = sidewalk_sides(tags)
+    return half + SIDEWALK_WIDTH * left, half + SIDEWALK_WIDTH * right

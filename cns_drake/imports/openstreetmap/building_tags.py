@@ -90,7 +90,7 @@ def heights(
             )
             work = TABLES["works"].get(tags.get("man_made", ""))
             if work is not None and "building" not in tags:
-                levels = work / STOREY_HEIGHT
+                levels = work[0] / STOREY_HEIGHT
         high = STOREY_HEIGHT * levels + (
             roof or STOREY_HEIGHT * (roof_levels or 0.0)
         )

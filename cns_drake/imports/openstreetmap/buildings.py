@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from shapely.geometry import Polygon
+import shapely.affinity
+from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.strtree import STRtree
 
@@ -29,9 +30,19 @@ from cns_drake.imports.openstreetmap.building_tags import (
     is_open_below,
     why_absent,
 )
-from cns_drake.imports.openstreetmap.features import OsmArea, Tags
+from cns_drake.imports.openstreetmap.element_kinds import is_building
+from cns_drake.imports.openstreetmap.features import (
+    OsmArea,
+    OsmFeatures,
+    Tags,
+)
 from cns_drake.imports.openstreetmap.passages import Passage, Passages
-from cns_drake.imports.openstreetmap.tags import has_tag
+from cns_drake.imports.openstreetmap.tags import (
+    TABLES,
+    has_tag,
+    length,
+    tag_value,
+)
 from cns_drake.imports.solids import extruded
 from cns_drake.scene import LocalMetres
 
@@ -48,6 +59,8 @@ _MOST_UNCOVERED = 0.1
 _SEAM = 0.01
 # Pieces of an outline are dropped if no circle of this radius fits in [m].
 _SLIVER_RADIUS = 0.25
+# Greatest diameter of a tower or tank [m].
+_WIDEST_WORK = 150.0
 # Least height of a passage [m].
 _LEAST_CLEAR = 2.0
 # Least height of the building above a passage [m].
@@ -102,6 +115,31 @@ def standing_buildings(
             yield area
         else:
             faults.add(f"{absent} building, left out", area.name)
+
+
+def works_at_points(features: OsmFeatures) -> Iterator[OsmArea]:
+    """Yields the towers, masts, chimneys and tanks that are nodes, as circles.
+
+    Those on buildings are left out.
+    """
+    outlines = STRtree(
+        [
+            polygon
+            for area in features.areas
+            if is_building(area.tags)
+            for polygon in area.polygons
+        ]
+    )
+    for name, tags, place in features.nodes:
+        work = TABLES["works"].get(tags.get("man_made", ""))
+        if work is None or len(outlines.query(Point(place), "within")):
+            continue
+        where = (name, features.faults)
+        diameter = tag_value(tags, "diameter", length, _WIDEST_WORK, where)
+        circle = Point(0.0, 0.0).buffer((diameter or work[1]) / 2, quad_segs=4)
+        degree = LocalMetres(*place).metres(np.ones(2))
+        circle = shapely.affinity.scale(circle, *(1.0 / degree), origin=(0, 0))
+        yield OsmArea(name, tags, [shapely.affinity.translate(circle, *place)])
 
 
 def make_buildings(

@@ -29,6 +29,7 @@ from cns_drake.imports.openstreetmap.area_looks import AreaLook, raised_object
 from cns_drake.imports.openstreetmap.bridges import (
     Bridges,
     bridges_of,
+    decks,
     parapets,
 )
 from cns_drake.imports.openstreetmap.building_tags import heights
@@ -37,6 +38,7 @@ from cns_drake.imports.openstreetmap.buildings import (
     is_gone,
     make_buildings,
     standing_buildings,
+    works_at_points,
 )
 from cns_drake.imports.openstreetmap.element_kinds import (
     is_building,
@@ -124,7 +126,8 @@ def import_openstreetmap(
     """Imports a city from an OpenStreetMap file.
 
     The origin of the map is the centre of its buildings. The ground is level.
-    Bridges and tunnels become streets on the ground, unless `dressed` is set.
+    Bridges over other ways become decks that no street leads to; all other
+    bridges are streets on the ground with parapets. Tunnels are left out.
 
     Args:
         path: the file.
@@ -132,9 +135,7 @@ def import_openstreetmap(
             tags.
         dressed: whether to read the file for a city with details. The city then
             has the sea, areas of ground by their material, and buildings that
-            were demolished at an unknown date. Tunnels, and bridges over other
-            ways, are left out; all other bridges are streets on the ground with
-            parapets.
+            were demolished at an unknown date.
 
     Raises:
         InputError: if the file cannot be read, has no building, or extends over
@@ -142,6 +143,7 @@ def import_openstreetmap(
     """
     features = reading.read_openstreetmap(path)
     faults = features.faults
+    features.areas += works_at_points(features)
     buildings = _used_buildings(features, dressed)
     if not buildings:
         raise InputError(f"{path}: {_no_buildings(faults)}")
@@ -154,7 +156,7 @@ def import_openstreetmap(
             f"{path}: {width / 1000:.0f} km across; cut out a piece of at most"
             f" {_WIDEST / 1000:.0f} km"
         )
-    bridges = bridges_of(features.ways, local) if dressed else Bridges()
+    bridges = bridges_of(features.ways, local)
     coasts = coasts_of(features.ways) if dressed else []
     outwards = np.array([[-1.0], [1.0]])
     sea_limits = local(np.array([low, high])) + _SEA_MARGIN * outwards
@@ -171,9 +173,10 @@ def import_openstreetmap(
             passages=passages,
         ),
         *streets.street_surfaces(features, local, bridges),
-        *_crossing_stripes(features, local),
+        *_crossing_stripes(features, local, bridges),
         *ground_areas(features, local, dressed),
         *sea(coasts, local, sea_limits, faults),
+        *decks(features.ways, bridges, local),
         *parapets(features.ways, bridges, local),
         *_barriers(features, local),
         *_trees(features, local),
@@ -426,13 +429,13 @@ def _trees(
 
 
 def _crossing_stripes(
-    features: OsmFeatures, local: LocalMetres
+    features: OsmFeatures, local: LocalMetres, bridges: Bridges
 ) -> Iterator[ImportedObject]:
     """Yields the stripes of zebra crossings, slightly above their street."""
     marked = {number for number, tags in features.crossings if is_marked(tags)}
-    for _, tags, line, nodes in features.ways:
+    for name, tags, line, nodes in features.ways:
         width = street_width(tags)
-        if width is None or is_tunnel(tags):
+        if width is None or is_tunnel(tags) or name in bridges.left_out:
             continue
         for k, number in enumerate(nodes):
             if number not in marked:

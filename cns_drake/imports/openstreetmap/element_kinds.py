@@ -29,7 +29,7 @@ def element_kind(tags: Tags) -> str:
 def is_building(tags: Tags) -> bool:
     """Returns whether tags describe a building or a part of a building.
 
-    Towers, chimneys, tanks and silos of `man_made` count, too. A former
+    Towers, masts, chimneys and tanks of `man_made` count, too. A former
     building counts as well, if its tags state the date of its demolition.
     """
     return (

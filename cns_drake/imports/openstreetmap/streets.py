@@ -25,6 +25,7 @@ from cns_drake.imports.streets import KERB_HEIGHT, SIDEWALK_WIDTH, Street
 from cns_drake.scene import LocalMetres
 
 _ROAD = AreaLook("Road", "road", None, 0.0)
+_NO_RAMPS = "bridge over a way, built without ramps and without drives on it"
 _WALK = AreaLook("Sidewalk", "sidewalk", None, KERB_HEIGHT)
 
 
@@ -33,8 +34,8 @@ def street_surfaces(
 ) -> Iterator[ImportedObject]:
     """Yields the carriageways, their sidewalks, and paths for people.
 
-    Sidewalks and paths end at carriageways. Tunnels, and bridges over streets
-    or railways, are left out and counted as faults.
+    Sidewalks and paths end at carriageways. Tunnels are left out, and counted
+    as faults, as are bridges over other ways, which `decks` makes.
     """
     faults = features.faults
     _count_left_out(bridges, faults)
@@ -68,8 +69,6 @@ def _street_areas(
             continue
         course = LineString(local(line))
         if width is not None:
-            if has_tag(tags, "bridge") and name not in bridges.level:
-                faults.add("bridge, laid on the ground", name)
             half = width / 2.0
             roads[name] = course.buffer(half, quad_segs=4)
             on_left, on_right = sidewalk_sides(tags)
@@ -86,7 +85,7 @@ def _street_areas(
 def _count_left_out(bridges: Bridges, faults: ImportFaults) -> None:
     """Counts the bridges over other ways, and the tunnels."""
     for kind, ids in (
-        ("bridge over a street or railway, left out", bridges.over_streets),
+        (_NO_RAMPS, bridges.over_streets),
         ("tunnel, left out", bridges.tunnels),
     ):
         for name in sorted(ids):

@@ -1,12 +1,21 @@
 """A city that is moved, turned or written in another order is the same."""
 
+import csv
 import re
 
 from helpers.small_cityjson import CityWriter
+from helpers.small_opendrive import cubic, straight, write_roads
+from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
+from shapely import MultiPoint
 
-from cns_drake.imports import ImportOptions, import_city, import_cityjson
+from cns_drake.imports import (
+    ImportOptions,
+    import_city,
+    import_cityjson,
+    import_openstreetmap,
+)
 
 # Boxes: place, size, height of the foot.
 BOXES = [
@@ -71,6 +80,88 @@ def test_a_city_that_is_moved_is_the_same(tmp_path, change):
     assert found.keys() == wanted.keys()
     for name, points in wanted.items():
         np.testing.assert_allclose(found[name], points, atol=0.021)
+
+
+def osm_corners(path, order=1, **change):
+    """Returns name -> corners of what a file shows, moved and turned back."""
+    osm = OsmWriter(**change)
+    street = {"highway": "residential", "sidewalk": "both"}
+    middle = [osm.node(x, 0) for x in (-150, -10, 120)]
+    osm.way_of(middle, **street)
+    osm.way_of([osm.node(-10, -90), middle[1], osm.node(-30, 110)], **street)
+    osm.way([(50, -60), (60, 70)], highway="primary", bridge="yes")
+    for k, shape in enumerate(["flat", "gabled", "hipped", "mansard"]):
+        tags = {"height": str(8 + k), "roof__shape": shape}
+        osm.box(-120 + 60 * k, 20, 14, 11 + k, building="yes", **tags)
+    osm.box(-80, -60, 40, 25, natural="water")
+    osm.way([(-40, -40), (-25, -40), (-25, -70)], barrier="hedge")
+    osm.node(90, -40, man_made="chimney", height="45", diameter="1")
+    osm.node(-60, -10, natural="tree", height="7")
+    osm.rows = osm.rows[::order]
+    city = import_openstreetmap(osm.write(path), None, dressed=True)
+    turn = np.radians(-change.get("turn_deg", 0.0))
+    R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    found = {one.structure.name: one.triangles for one in city.objects}
+    middle = found["road_w5"][:, :, :2].reshape(-1, 2) @ R.T
+    for name, triangles in found.items():
+        p = triangles.reshape(-1, 3).copy()
+        p[:, :2] = p[:, :2] @ R.T - (middle.min(axis=0) + np.ptp(middle, 0) / 2)
+        found[name] = p
+    return found
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"move": (10_000, 0)}, {"turn_deg": 37.0}, {"order": -1}],
+    ids=str,
+)
+def test_streets_and_houses_that_are_moved_are_the_same(tmp_path, change):
+    wanted = osm_corners(tmp_path / "a.osm")
+    found = osm_corners(tmp_path / "b.osm", **change)
+    assert found.keys() == wanted.keys()
+    for name, points in wanted.items():
+        hulls = [MultiPoint(p).convex_hull for p in (found[name], points)]
+        # Corners of round things are 0.2 m apart.
+        assert hulls[0].hausdorff_distance(hulls[1]) < 0.15, name
+        for one in (np.min, np.max):
+            assert abs(one(found[name][:, 2]) - one(points[:, 2])) < 0.01
+
+
+@pytest.mark.night
+@pytest.mark.slow
+def test_roads_that_are_moved_have_the_same_town(tmp_path):
+    def town(name, move, order):
+        x, y, z = move
+        up = cubic("elevation", 0, z, key="s")
+        roads = [
+            straight("a", x, y, x + 180, y, elevation=up),
+            straight("b", x, y + 90, x + 180, y + 90, elevation=up),
+        ]
+        path = write_roads(tmp_path / f"{name}.xodr", *roads[::order])
+        import_city(path, tmp_path / name, ImportOptions(seed=1))
+        with (tmp_path / name / "structures.csv").open(newline="") as stream:
+            rows = [
+                (*row[1:4], *map(float, row[4:7]))
+                for row in list(csv.reader(stream))[1:]
+            ]
+        # Ground is one mesh, in coordinates of the map.
+        things = [row for row in rows if any(row[3:])]
+        places = np.array([row[3:] for row in things]) - move
+        return [row[:3] for row in things], places
+
+    names, places = town("plain", (0, 0, 0), 1)
+    assert len(names) > 50
+    for name, move, order in (
+        ("high", (0, 0, 60), 1),
+        ("low", (0, 0, -300), 1),
+        ("far", (5_000, -5_000, 0), 1),
+        ("other", (0, 0, 0), -1),
+    ):
+        found, moved = town(name, move, order)
+        assert found == names
+        np.testing.assert_allclose(moved[:, :2], places[:, :2], atol=0.011)
+        # Only a town at z = 0 has lawns with a relief.
+        np.testing.assert_allclose(moved[:, 2], places[:, 2], atol=0.5)
 
 
 @pytest.mark.parametrize(

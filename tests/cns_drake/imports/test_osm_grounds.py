@@ -4,7 +4,7 @@ from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
 
-from cns_drake.imports import import_openstreetmap
+from cns_drake.imports import ImportOptions, import_city, import_openstreetmap
 
 
 def read(osm, folder, dressed=True):
@@ -157,33 +157,44 @@ def test_the_sea_lies_right_of_the_coast(tmp_path, is_eastward):
     assert not any("coastline" in kind for kind, _, _ in city.faults.rows())
 
 
-def test_bridges_are_level_or_left_out(tmp_path):
+NO_RAMPS = "bridge over a way, built without ramps and without drives on it"
+
+
+@pytest.mark.parametrize("dressed", [True, False])
+def test_bridges_over_ways_are_decks_and_others_level(tmp_path, dressed):
     osm = OsmWriter()
     osm.box(-60, 20, 10, 10, building="yes")
     below = [osm.node(0, -80), osm.node(0, 80)]
     osm.way_of(below, highway="residential", width="8")
     over = [osm.node(-40, 0), osm.node(40, 0)]
-    over = osm.way_of(over, highway="primary", width="10", bridge="yes")
+    tags = {"highway": "primary", "width": "10", "sidewalk": "left"}
+    over = osm.way_of(over, **tags, bridge="yes")
     level = [osm.node(60, -30), osm.node(60, 30)]
     level = osm.way_of(level, highway="primary", width="10", bridge="yes")
     under = [osm.node(-90, -50), osm.node(-60, -50)]
     under = osm.way_of(under, highway="primary", tunnel="yes", layer="-1")
-    city = read(osm, tmp_path)
-    names = set(kinds(city))
-    assert f"road_w{over}" not in names
+    city = read(osm, tmp_path, dressed)
+    found = {one.structure.name: one for one in city.objects}
+    assert f"road_w{over}" not in found
     assert f"w{over}" not in {street.name for street in city.streets}
-    assert {f"road_w{level}", f"parapet_w{level}"} <= names
     faults = {kind: number for kind, number, _ in city.faults.rows()}
-    assert faults["bridge over a street or railway, left out"] == 1
+    assert faults[NO_RAMPS] == 1
     assert faults["tunnel, left out"] == 1
     assert not any(kind.startswith("highway=") for kind in faults)
-    (wall,) = (o for o in city.objects if o.object_type == "Parapet")
-    x = wall.triangles[:, :, 0] - city.streets[-1].line[0, 0]
     # 0.2 m beside a carriageway of 10 m, 0.25 m thick.
+    wall = found[f"parapet_w{level}"].triangles
+    x = wall[:, :, 0] - city.streets[-1].line[0, 0]
     assert np.abs(x).min() == pytest.approx(5.075, abs=0.02)
-    assert wall.triangles[:, :, 2].max() == pytest.approx(1.0)
-    plain = read(osm, tmp_path, dressed=False)
-    assert f"road_w{over}" in kinds(plain)
+    assert wall[:, :, 2].max() == pytest.approx(1.0)
+    # A car passes below the deck, which is no ground, and stays on its street.
+    deck = found[f"bridge_w{over}"]
+    assert not deck.is_ground
+    low, high = deck.triangles.min(axis=(0, 1)), deck.triangles.max(axis=(0, 1))
+    np.testing.assert_allclose(high - low, (80, 12, 1), atol=0.05)
+    assert low[2] == 5.0
+    wall = found[f"parapet_w{over}"].triangles
+    assert (wall[:, :, 2].min(), wall[:, :, 2].max()) == (6.0, 7.0)
+    assert np.ptp(wall[:, :, 1]) == pytest.approx(12 + 2 * 0.325, abs=0.05)
 
 
 @pytest.mark.parametrize(
@@ -198,7 +209,7 @@ def test_bridges_are_level_or_left_out(tmp_path):
         (("1", "1"), None),
     ],
 )
-def test_the_upper_one_of_two_bridges_is_left_out(tmp_path, layers, upper):
+def test_the_upper_one_of_two_bridges_is_a_deck(tmp_path, layers, upper):
     osm = OsmWriter()
     osm.box(-60, 20, 10, 10, building="yes")
     names = []
@@ -214,6 +225,42 @@ def test_the_upper_one_of_two_bridges_is_left_out(tmp_path, layers, upper):
     (out,) = (n for n in names if f"road_w{n}" not in built)
     assert upper is None or out == names[upper]
     names.remove(out)
-    assert built == {f"road_w{names[0]}", f"parapet_w{names[0]}"}
-    row = ("bridge over a street or railway, left out", 1, f"w{out}")
-    assert row in city.faults.rows()
+    assert built == {
+        f"road_w{names[0]}", f"parapet_w{names[0]}",
+        f"bridge_w{out}", f"parapet_w{out}",
+    }  # fmt: skip
+    assert (NO_RAMPS, 1, f"w{out}") in city.faults.rows()
+
+
+def test_each_of_three_bridges_that_cross_lies_above_those_below(tmp_path):
+    osm = OsmWriter()
+    osm.box(-60, 20, 10, 10, building="yes")
+    osm.way([(-40, -40), (40, 40)], highway="primary")
+    names = [
+        osm.way(line, highway="footway", bridge="yes", layer=str(layer))
+        for line, layer in (
+            ([(-40, 0), (40, 0)], 3),
+            ([(0, -40), (0, 40)], 1),
+            ([(-40, 40), (40, -40)], 2),
+        )
+    ]
+    found = {
+        one.structure.name: one.triangles[:, :, 2].max()
+        for one in read(osm, tmp_path).objects
+    }
+    assert [found[f"bridge_w{name}"] for name in names] == [18.0, 6.0, 12.0]
+
+
+def test_a_drive_passes_below_a_bridge(tmp_path):
+    def drives(name, **more):
+        osm = OsmWriter()
+        osm.box(-60, 20, 10, 10, building="yes")
+        osm.way([(-200, 0), (200, 0)], highway="residential")
+        osm.way([(0, -60), (0, 60)], **more)
+        path = osm.write(tmp_path / f"{name}.osm")
+        options = ImportOptions(dressed=False)
+        return import_city(path, tmp_path / name, options).drives
+
+    plain = drives("plain", power="line")
+    assert plain[0] > 300.0
+    assert drives("below", highway="primary", bridge="yes") == plain

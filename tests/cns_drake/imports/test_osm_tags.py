@@ -4,6 +4,9 @@ from helpers.imported_osm import bounds, import_osm, volume
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
+import shapely
+
+from cns_drake.imports import ImportOptions, import_city
 
 L_SHAPE = [(0, 0), (30, 0), (30, 8), (8, 8), (8, 30), (0, 30)]
 SHORT_L = [(0, 0), (12, 0), (12, 10), (10, 10), (10, 12), (0, 12)]
@@ -259,6 +262,44 @@ def test_towers_and_tanks_are_built(tmp_path, tags, height):
     _, found = import_osm(city.write(tmp_path / "a.osm"))
     (one,) = (x for x in found.values() if x.object_type == "Building")
     assert np.ptp(one.triangles[..., 2]) == pytest.approx(height, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("tags", "size"),
+    [
+        ({"man_made": "chimney"}, (4, 4, 40)),
+        ({"man_made": "mast", "height": "31.5"}, (1, 1, 31.5)),
+        ({"man_made": "water_tower", "diameter": "12"}, (12, 12, 30)),
+    ],
+)
+def test_towers_at_nodes_are_built_unless_they_stand_on_houses(
+    tmp_path, tags, size
+):
+    city = OsmWriter()
+    city.box(20, 0, 30, 30, building="yes")
+    alone, on_roof = city.node(0, 0, **tags), city.node(35, 15, **tags)
+    read, found = import_osm(city.write(tmp_path / "a.osm"))
+    corners = found[f"building_n{alone}"].triangles.reshape(-1, 3)
+    assert np.ptp(corners, axis=0) == pytest.approx(size, abs=0.02)
+    assert f"building_n{on_roof}" not in found
+    kind = f"man_made={tags['man_made']}, left out"
+    assert (kind, 1, f"n{on_roof}") in read.faults.rows()
+
+
+def test_what_is_flattened_is_told_by_its_share_of_the_volume(tmp_path):
+    city = OsmWriter()
+    house = {"building": "yes", "height": "9", "roof__height": "2"}
+    city.box(40, 0, 10, 10, **house, roof__shape="gabled")
+    name = city.way(L_SHAPE, closed=True, **house, roof__shape="gabled")
+    path = city.write(tmp_path / "a.osm")
+    report = import_city(path, tmp_path / "map", ImportOptions(dressed=False))
+    flat = 9 * shapely.Polygon(L_SHAPE).area
+    (share,) = report.shares.values()
+    assert share == pytest.approx(flat / (flat + 100 * 8), rel=1e-3)
+    assert (
+        f"roof of shape gabled, made flat: 1, {100 * share:.2g} % of the volume"
+        f" of all buildings, such as w{name}\n"
+    ) in (tmp_path / "map" / "import.txt").read_text()
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from cns_drake.base import InputError
 from cns_drake.scenarios import ground_notes, load_scenario, plan_drive
@@ -59,28 +60,45 @@ def test_two_surfaces_along_the_whole_path_need_z(scenario):
     np.testing.assert_array_equal(heights(drive), 5.0)
 
 
-@pytest.mark.parametrize("up", [-300, -20, 0, 500])
-def test_a_world_that_is_moved_is_the_same(scenario, up):
+@pytest.mark.parametrize(
+    ("move", "turn_deg"),
+    [
+        *(((0, 0, up), 0) for up in (-300, -20, 0, 500)),
+        ((10_000, -10_000, 0), 0),
+        ((0, 0, 0), 37),
+    ],
+)
+def test_a_world_that_is_moved_is_the_same(scenario, move, turn_deg):
     """The street dips and rises, also below a deck and beside a hole."""
-    parts = [
-        BOX.format(f"s{k}", f"{8 * k} 0 {up - 0.5 + 0.2 * (k % 3)}", "8 9 1")
+    turn = Rotation.from_euler("z", turn_deg, degrees=True)
+
+    def box(name, place, size):
+        x, y, z = turn.apply(place) + move
+        pose = f"{x} {y} {z} 0 0 {np.radians(turn_deg)}"
+        return BOX.replace("{} 0 0 0", "{}").format(name, pose, size)
+
+    def way(step):
+        places = [(x, 0, 0) for x in range(0, 61, step)]
+        rows = (turn.apply(places) + move)[:, :2]
+        return "x,y\n" + "".join(f"{x},{y}\n" for x, y in rows)
+
+    world = "".join(
+        box(f"s{k}", (8 * k, 0, 0.2 * (k % 3) - 0.5), "8 9 1")
         for k in range(9)
         if k != 6
-    ]
-    parts.append(BOX.format("deck", f"28 0 {up + 8.5}", "20 20 1"))
-    world = "".join(parts)
-    drive = scenario(world, "x,y\n0,0\n60,0\n")
-    times = np.linspace(0.0, plan_drive(drive).duration, 60)
-    path = plan_drive(drive).poses(times)[1]
-    x, z = path[:, 0], path[:, 2] - up
+    ) + box("deck", (28, 0, 8.5), "20 20 1")
+    plan = plan_drive(scenario(world, way(60)))
+    times = np.linspace(0.0, plan.duration, 60)
+    path = turn.inv().apply(plan.poses(times)[1] - move)
+    x, z = path[:, 0], path[:, 2]
     inside = np.abs((x + 4) % 8 - 4) < 1.9
     inside &= (x < 42) | (x > 54)
     level = 0.2 * (np.rint(x / 8) % 3)
+    np.testing.assert_allclose(path[:, 1], 0.0, atol=1e-9)
     np.testing.assert_allclose(z[inside], level[inside], atol=0.05)
     # Waypoints may be dense or not.
-    dense = "".join(f"{x},0\n" for x in range(0, 61, 5))
-    other = plan_drive(scenario(world, f"x,y\n{dense}")).poses(times)[1]
-    np.testing.assert_allclose(other, path, atol=1e-6)
+    other = plan_drive(scenario(world, way(5))).poses(times)[1]
+    np.testing.assert_allclose(turn.inv().apply(other - move), path, atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -290,7 +290,9 @@ def test_labels_of_a_cloud_are_its_predictions(tmp_path):
         read(
             [(5, 0, 0), (0.012, 0, 0), (0.018, 0, 0)],
             [0, 1, 2],
-            of=replace(pair.A, points=np.array([(0, 0, 0), (0.01, 0, 0), (5, 0, 0)])),
+            of=replace(
+                pair.A, points=np.array([(0, 0, 0), (0.01, 0, 0), (5, 0, 0)])
+            ),
         )
 
 
