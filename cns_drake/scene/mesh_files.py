@@ -20,6 +20,7 @@ from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.gltf_check import plain_gltf
 from cns_drake.scene.mesh_check import GLTF, check_mesh_file, stl_corners
 from cns_drake.scene.obj_check import LARGEST_FILE, check_obj, unmarked
+from cns_drake.scene.ply_check import has_single_vertices
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 
 # Formats whose y axis points up. Drake rotates them so that z does.
@@ -159,18 +160,11 @@ class MeshFiles:
                 copy.write_bytes(text)
                 p_GVset, triangles = self._foreign.read(copy)
         _check_count(len(triangles), expected)
-        return p_GVset + p_offset, triangles, _step(p_GVset)
-
-
-def _step(p_GVset: np.ndarray) -> float:
-    """Returns the step of coordinates (N, 3) in single precision [m].
-
-    The step is 0 if they are more precise.
-    """
-    single = p_GVset.astype(np.float32)
-    if not len(single) or (single != p_GVset).any():
-        return 0.0
-    return float(np.spacing(np.abs(single).max()))
+        step = 0.0
+        if ending != ".ply" or has_single_vertices(path):
+            farthest = np.abs(p_GVset).max(initial=0.0)
+            step = float(np.spacing(np.float32(farthest)))
+        return p_GVset + p_offset, triangles, step
 
 
 def _check_count(found: int, expected: int) -> None:

@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 import contextlib
 from dataclasses import dataclass
+from pathlib import Path
 import struct
 
 import numpy as np
 
-from cns_drake.base import repeated
+from cns_drake.base import repeated, user_errors
 
 # Elements of PLY that are no shapes.
 _NO_SHAPES = ("vertex", "face", "camera", "material")
@@ -80,6 +81,19 @@ def check_ply(content: bytes) -> tuple[str, ...]:
         # Open3D would read its corners from beyond the list.
         raise ValueError(f"has a face of PLY with {least} corners")
     return notes
+
+
+def has_single_vertices(path: Path) -> bool:
+    """Returns whether the vertices of a PLY file are of single precision."""
+    with user_errors(path), open(path, "rb") as stream:
+        head = stream.read(_LONGEST_HEADER).partition(b"end_header")[0]
+    _, elements = _parse_header(head.decode("ascii", "replace"))
+    return any(
+        name in _AXES and _TYPES.get(types[0]) == "f4"
+        for one in elements
+        if one.name == "vertex"
+        for name, types in one.properties
+    )
 
 
 def _parse_header(head: str) -> tuple[str, list[_Element]]:

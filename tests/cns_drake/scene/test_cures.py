@@ -1,0 +1,163 @@
+"""What a message about a mesh tells you to do is enough to read the mesh."""
+
+import base64
+import json
+
+from helpers.mesh_texts import (
+    L_TRIANGLES,
+    L_VERTICES,
+    collada_text,
+    gltf_text,
+    obj_text,
+    ply_text,
+    stl_text,
+)
+from helpers.mesh_worlds import read_mesh
+import numpy as np
+import pytest
+
+from cns_drake.base import InputError
+
+FAR = (350_000.0, 4_020_000.0, 60.0)
+GLTF = gltf_text()[0]
+
+
+def gltf(**more):
+    return json.dumps({**json.loads(GLTF), **more})
+
+
+def shorts():
+    top = json.loads(GLTF)
+    top["accessors"][0] |= {"componentType": 5122, "normalized": True}
+    return json.dumps(top)
+
+
+def swapped():
+    return (
+        ply_text().replace("float x", "float u").replace("float y", "float x")
+    )
+
+
+# Message -> name of a file, its text, and the file that the message asks for.
+REFUSED = [
+    ("export it without", "a.gltf", gltf(extensionsRequired=["ACME"]), GLTF),
+    ("export it without", "a.gltf", shorts(), GLTF),
+    (
+        "write it in one line",
+        "a.obj",
+        obj_text().replace("f 3 2 1", "f 3 2 \\\n1"),
+        obj_text(),
+    ),
+    (
+        "export it with faces",
+        "a.obj",
+        obj_text() + "cstype bezier\n",
+        obj_text(),
+    ),
+    ("export it again", "a.ply", swapped(), ply_text()),
+    (
+        "export it again",
+        "a.ply",
+        ply_text().replace("vertex_indices", "corners"),
+        ply_text(),
+    ),
+    (
+        "export it once",
+        "a.ply",
+        ply_text().replace(
+            "end_header",
+            "element face 0\nproperty list uchar int x\nend_header",
+        ),
+        ply_text(),
+    ),
+    (
+        "export it with faces",
+        "a.ply",
+        ply_text().replace(
+            "end_header",
+            "element tristrips 1\nproperty list int int vertex_indices\n"
+            "end_header",
+        )
+        + "3 0 1 2\n",
+        ply_text(),
+    ),
+    (
+        "export it with valid triangles",
+        "a.gltf",
+        None,
+        GLTF,
+    ),
+    (
+        "export it with triangles and matrices",
+        "a.dae",
+        collada_text(place="<lookat>0 0 0 1 0 0 0 0 1</lookat>"),
+        collada_text(place="<matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</matrix>"),
+    ),
+    (
+        r"or as glTF",
+        "a.dae",
+        collada_text().replace("<mesh>", "<convex_mesh/><mesh>"),
+        (".gltf", GLTF),
+    ),
+    (r"Blender or trimesh writes these", "a.fbx", "x", (".stl", stl_text())),
+]
+
+
+def missing_vertices():
+    top = json.loads(GLTF)
+    primitive = top["meshes"][0]["primitives"][0]
+    count = top["accessors"][0]["count"]
+    numbers = np.arange(count, dtype="<u2")
+    numbers[-1] = count + 5
+    text = base64.b64encode(numbers.tobytes()).decode()
+    top["buffers"].append(
+        {
+            "byteLength": numbers.nbytes,
+            "uri": f"data:application/octet-stream;base64,{text}",
+        }
+    )
+    top["bufferViews"].append({"buffer": 1, "byteLength": numbers.nbytes})
+    top["accessors"].append(
+        {
+            "bufferView": 2,
+            "componentType": 5123,
+            "count": count,
+            "type": "SCALAR",
+        }
+    )
+    primitive["indices"] = 2
+    return json.dumps(top)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("said", "name", "bad", "good"), REFUSED)
+def test_what_a_message_asks_for_is_read(tmp_path, said, name, bad, good):
+    path = tmp_path / name
+    path.write_text(missing_vertices() if bad is None else bad)
+    with pytest.raises(InputError, match=said):
+        read_mesh(path)
+    if isinstance(good, tuple):
+        path = path.with_suffix(good[0])
+        good = good[1]
+    path.write_text(good)
+    assert len(read_mesh(path).triangles) == len(L_TRIANGLES)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("near.ply", ply_text()),
+        ("far.obj", obj_text(L_VERTICES + FAR)),
+        ("far.ply", ply_text(L_VERTICES + FAR, "double")),
+    ],
+)
+def test_coarse_coordinates_are_cured(tmp_path, capsys, name, text):
+    coarse = tmp_path / "coarse.ply"
+    coarse.write_text(ply_text((L_VERTICES + FAR).astype("f4")))
+    read_mesh(coarse)
+    said = "export it again with vertices near the origin, or as OBJ or PLY"
+    assert said in capsys.readouterr().err
+    (tmp_path / name).write_text(text)
+    read_mesh(tmp_path / name)
+    assert "coarse" not in capsys.readouterr().err
