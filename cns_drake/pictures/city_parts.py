@@ -2,13 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+import math
+from typing import NamedTuple
 
 import numpy as np
 
+from cns_drake.base import distances_along
 from cns_drake.scene import (
     CLASS_RGB,
+    MAX_INSTANCE,
+    StructureTable,
     TriangleSurface,
     World,
+    kind_in_name,
     merge_surfaces,
     read_perception_geometry,
 )
@@ -18,6 +24,12 @@ DEFAULT_RGB = (0.7, 0.7, 0.7)
 # A structure has the same height in two stages if it differs by at most this
 # [m].
 _HEIGHT_TOLERANCE = 0.5
+# Changes farther from a route than this are not shown as its places [m].
+_NEAR = 30.0
+# A change is shown from this far before the place that is nearest to it, and
+# the places of two changes are at least so far apart [m].
+_BEFORE = 35.0
+_APART = 60.0
 
 
 @dataclass(frozen=True)
@@ -123,6 +135,94 @@ def compare_parts(
         if name not in own:
             difference.missing.extend(parts)
     return difference
+
+
+def changed_above(
+    own: Mapping[str, Sequence[ColouredPart]],
+    other: Mapping[str, Sequence[ColouredPart]],
+    structures: StructureTable,
+) -> np.ndarray:
+    """Returns above which height a structure is absent in the other stage.
+
+    Args:
+        own, other: as for `compare_parts`.
+        structures: the structures of this stage.
+
+    Returns:
+        A height for each instance id [m]: minus infinity if the other stage
+        lacks the whole structure, infinity if it has all of it.
+    """
+    heights = np.full(MAX_INSTANCE + 1, math.inf)
+    table = structures.completed(own)
+    for name, parts in own.items():
+        height = _top(other[name]) if name in other else -math.inf
+        if _top(parts) > height + _HEIGHT_TOLERANCE:
+            heights[table[name].instance] = height + _HEIGHT_TOLERANCE
+    return heights
+
+
+class Change(NamedTuple):
+    """A structure that only one of two stages has, beside a route.
+
+    Attributes:
+        frame: frame of the drive a little before it is passed.
+        kind: its kind, such as `office`, or its class.
+        height: height of what only one stage has [m].
+        is_own: whether the stage of the drive has it.
+        place: its middle [m].
+    """
+
+    frame: int
+    kind: str
+    height: float
+    is_own: bool
+    place: tuple[float, float, float]
+
+
+def greatest_changes(
+    own: Mapping[str, Sequence[ColouredPart]],
+    other: Mapping[str, Sequence[ColouredPart]],
+    p_WBset: np.ndarray,
+    most: int,
+) -> list[Change]:
+    """Returns the changes that look greatest from a route, in order of time.
+
+    Args:
+        own, other: as for `compare_parts`.
+        p_WBset: (F, 3) places of the vehicle [m].
+        most: greatest number of changes.
+    """
+    travelled = distances_along(p_WBset)
+    found = []
+    for is_own, here, there in ((True, own, other), (False, other, own)):
+        for name, parts in here.items():
+            points = np.concatenate([part.surface.p_GVset for part in parts])
+            low, high = points.min(axis=0), points.max(axis=0)
+            if name in there:
+                low[2] = _top(there[name])
+            height = float(high[2] - low[2])
+            if height <= _HEIGHT_TOLERANCE:
+                continue
+            nearest = np.clip(p_WBset[:, :2], low[:2], high[:2])
+            away = np.linalg.norm(p_WBset[:, :2] - nearest, axis=1)
+            frame = int(away.argmin())
+            if away[frame] <= _NEAR:
+                kind = kind_in_name(name) or parts[0].semantic_class
+                size = height * float(np.linalg.norm((high - low)[:2]))
+                x, y, z = ((low + high) / 2.0).tolist()
+                change = Change(
+                    frame, kind.replace("_", " "), height, is_own, (x, y, z)
+                )
+                found.append((size, change))
+    places: list[float] = []
+    changes = []
+    for _, change in sorted(found, reverse=True):
+        passed = travelled[change.frame]
+        if all(abs(passed - one) > _APART for one in places):
+            places.append(passed)
+            start = int(np.searchsorted(travelled, passed - _BEFORE))
+            changes.append(change._replace(frame=start))
+    return sorted(changes[:most])
 
 
 def _top(parts: Sequence[ColouredPart]) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import replace
 from html import escape, unescape
@@ -20,7 +20,11 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base import InputError, read_text, write_text
 from cns_drake.pictures import meshcat_drawing as drawing
-from cns_drake.pictures.city_parts import compare_parts, read_parts
+from cns_drake.pictures.city_parts import (
+    ColouredPart,
+    compare_parts,
+    greatest_changes,
+)
 from cns_drake.pictures.drive_record import DriveRecord, ScanRecord
 from cns_drake.pictures.page_panel import (
     ShownStages,
@@ -30,19 +34,23 @@ from cns_drake.pictures.page_panel import (
 )
 from cns_drake.scene import PerceptionGeometry, World, read_perception_geometry
 
+Parts = Mapping[str, Sequence[ColouredPart]]
+
 # Greatest size of a page [bytes].
 _MOST_BYTES = 20_000_000
 # Traffic gets a pose only every so many frames, which keeps pages small. In the
 # tightest turns at 10 m/s, the error between these frames is 0.1 m.
 _TRAFFIC_INTERVAL = 5
-_ALONE = ShownStages()
+# Number of changes that can be jumped to.
+_MOST_CHANGES = 5
 
 
 def make_drive_page(
     drive: DriveRecord,
     world: World,
-    shown: ShownStages = _ALONE,
-    title: str = "cns-drake",
+    parts: tuple[Parts, Parts],
+    shown: ShownStages,
+    title: str,
 ) -> str:
     """Returns the HTML of a page with the city, the drive and its scans.
 
@@ -55,40 +63,48 @@ def make_drive_page(
       structures that are higher in one of them,
     - `/vehicle/<body>`, `/moving/<body>`: the moving bodies,
     - `/route`: a ribbon along the route,
-    - `/scans`: the LiDAR points of the latest scan, coloured by height.
+    - `/scans`: the LiDAR points of the last three seconds, coloured by height,
+      intensity, class or change.
 
     The page has every point of the scans that it has. If not all scans fit,
     they are evenly spaced, and the page says so. A scan is decoded when the
     play head comes near.
 
+    The page opens at the first of the greatest changes beside the route, and
+    has buttons that jump to these. A divider across the picture has the earlier
+    stage on its left, where what will be gone is outlined in violet, and the
+    later stage on its right, where what is new is outlined in red.
+
     The camera is behind and above the car. It rises where a building would hide
-    the car, and sees the car through whatever else is in between. A panel shows
-    the title, the stage, the sensors and the switches, which are also the
-    legend. With the switch "before | after", a divider across the picture has
-    the earlier stage on its left, where what is gone is violet, and the later
-    stage on its right, where what is new is red. Other panels show the images
-    of cameras. Below the time line are plots of the speed and the IMU. On a
-    phone, the panels are one sheet, which is folded when the page opens.
+    the car, and sees the car through whatever else is in between. Panels show
+    the title, the sensors, the switches, which are also the legend, the images
+    of cameras, and plots of the speed and the IMU. On a phone, the panels are
+    one sheet.
 
     Args:
         drive: what is shown of the drive.
         world: world of the stage.
+        parts: the structures of the stage, and those of the other stage, as
+            `read_parts` returns them.
         shown: the stage, and the other stage with which it is compared, if any.
         title: title of the page.
     """
     with _without_port_message():
         meshcat = geometry.Meshcat(MeshcatParams(host="127.0.0.1", port=0))
-    changes = _draw_city(meshcat, world, shown)
+    sides = _draw_city(meshcat, parts, shown)
     if len(drive.X_WBs) > 1:
         drawing.draw_route(meshcat, "/route", drive.X_WBs)
     _animate(meshcat, drive, world)
     p_WBset = np.array([X_WB.translation() for X_WB in drive.X_WBs])
+    changes = greatest_changes(*parts, p_WBset, _MOST_CHANGES)
     drawing.set_view(meshcat, p_WBset.min(axis=0), p_WBset.max(axis=0))
     start, scene, end = _static_parts(meshcat, title)
     module = f'<script type="module">{read_template("drive.js")}</script>'
 
     def panel(scans: ScanRecord) -> str:
-        return make_panel(title, replace(drive, scans=scans), changes, shown)
+        return make_panel(
+            title, replace(drive, scans=scans), sides, changes, shown
+        )
 
     rest = start, panel(drive.scans), scene, module, end
     free = _MOST_BYTES - sum(map(len, rest))
@@ -172,22 +188,20 @@ def moving_frames(world: World) -> tuple[FrameId, ...]:
 
 
 def _draw_city(
-    meshcat: geometry.Meshcat, world: World, shown: ShownStages
+    meshcat: geometry.Meshcat, parts: tuple[Parts, Parts], shown: ShownStages
 ) -> set[str]:
     """Draws static structures; returns which of `before`, `after` exist."""
-    own = read_parts(world)
-    other = own if shown.other is None else read_parts(shown.other)
-    difference = compare_parts(own, other)
+    difference = compare_parts(*parts)
     drawing.draw_parts(meshcat, "/city", difference.common)
     drawn = set()
-    for here, parts in (
+    for here, changed in (
         (True, difference.additional),
         (False, difference.missing),
     ):
-        if parts:
+        if changed:
             name = "before" if here != shown.is_earlier else "after"
             drawn.add(name)
-            drawing.draw_parts(meshcat, f"/{name}", parts)
+            drawing.draw_parts(meshcat, f"/{name}", changed)
             meshcat.SetProperty(f"/{name}", "visible", here)
     return drawn
 
@@ -221,6 +235,7 @@ def _animate(
             animation.SetTransform(frame, path, X_WFs[frame])
     # The script of the page places it.
     drawing.draw_marker(meshcat)
+    # The script of the page lets it wait until there are points.
     animation.set_autoplay(True)
     animation.set_loop_mode(geometry.MeshcatAnimation.LoopMode.kLoopOnce)
     animation.set_clamp_when_finished(True)

@@ -1,6 +1,6 @@
 """What is recorded of a drive for its web page."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import math
 from typing import NamedTuple
 import zlib
@@ -14,6 +14,8 @@ _MOST_KEPT = 26_000_000
 # Points are rounded to a grid of 2 cm, about the noise of a LiDAR.
 _GRID = 0.02
 _LEVEL = 4
+# Greatest level of an intensity.
+_TOP_LEVEL = 63
 
 
 class PackedScan(NamedTuple):
@@ -24,10 +26,12 @@ class PackedScan(NamedTuple):
         num_points: number N of points.
         origin: point of W from which the points are counted [m].
         grid: step of the coordinates [m].
-        data: deflated bytes, 6 N before. The points go along one ring after the
+        data: deflated bytes, 8 N before. The points go along one ring after the
             other. Each coordinate is the difference from the point before, as
             int16 modulo 2^16, with the sign in the lowest bit. First come the
-            low bytes of all x, then their high bytes, then y and z.
+            low bytes of all x, then their high bytes, then y and z. Last come
+            two bytes of each point, as differences modulo 256: the intensity,
+            and the kind.
     """
 
     frame: int
@@ -38,7 +42,11 @@ class PackedScan(NamedTuple):
 
 
 def pack_scan(
-    frame: int, p_WRset: np.ndarray, rings: np.ndarray, p_WB: np.ndarray
+    frame: int,
+    p_WRset: np.ndarray,
+    rings: np.ndarray,
+    p_WB: np.ndarray,
+    marks: np.ndarray,
 ) -> PackedScan:
     """Returns a scan as the page holds it.
 
@@ -47,9 +55,11 @@ def pack_scan(
         p_WRset: (N, 3) points in W [m].
         rings: (N,) ring of each point; points of a ring in their order of time.
         p_WB: (3,) where the vehicle is [m].
+        marks: (N, 2) uint8, the intensity and the kind of each point.
     """
     origin = np.round(p_WB).astype(int)
-    p_ORset = (p_WRset - origin)[np.argsort(rings, kind="stable")]
+    order = np.argsort(rings, kind="stable")
+    p_ORset = (p_WRset - origin)[order]
     grid = _GRID
     while np.abs(p_ORset).max(initial=0.0) > 32_000 * grid:
         grid *= 2.0
@@ -60,6 +70,9 @@ def pack_scan(
     )
     signless = ((steps << 1) ^ (steps >> 15)).astype("<u2")
     planes = signless.view(np.uint8).reshape(-1, 6).T.tobytes()
+    planes += np.diff(
+        marks[order], axis=0, prepend=np.zeros((1, 2), np.uint8)
+    ).T.tobytes()
     x, y, z = origin.tolist()
     return PackedScan(
         frame, len(p_WRset), (x, y, z), grid, zlib.compress(planes, _LEVEL)
@@ -74,15 +87,27 @@ class ScanRecord:
         num_frames: number of frames that the drive will have, if known.
         stride: one scan in so many frames is kept.
         scans: the scans.
+        intensities: the range of intensities that levels distinguish, that of
+            the first points but for the least and the greatest 2 %.
     """
 
     num_frames: int | None = None
     stride: int = 1
     scans: list[PackedScan] = field(default_factory=list)
+    intensities: tuple[float, float] | None = None
 
     def wants(self, frame: int) -> bool:
         """Returns whether the scan of a frame is one of the kept."""
         return frame % self.stride == 0
+
+    def intensity_levels(self, intensities: np.ndarray) -> np.ndarray:
+        """Returns levels (N,) uint8 of intensities (N,), 0 to 63."""
+        if self.intensities is None and len(intensities):
+            low, high = np.percentile(intensities, [2.0, 98.0]).tolist()
+            self.intensities = low, max(high, low + 1e-6)
+        low, high = self.intensities or (0.0, 1.0)
+        share = np.clip((intensities - low) / (high - low), 0.0, 1.0)
+        return np.round(_TOP_LEVEL * share).astype(np.uint8)
 
     def add(self, scan: PackedScan) -> None:
         """Adds a scan, and keeps fewer of them if they become too large."""
@@ -105,8 +130,8 @@ class ScanRecord:
             len(one.data) for one in self.scans[::step]
         ):
             step += 1
-        return ScanRecord(
-            self.num_frames, step * self.stride, self.scans[::step]
+        return replace(
+            self, stride=step * self.stride, scans=self.scans[::step]
         )
 
 

@@ -48,6 +48,10 @@ _SHADOW_HEIGHT = 120.0
 _SHADOW_PIXELS = 4096.0
 
 _WHITE = [1.0, 1.0, 1.0, 1.0]
+# High in the sky.
+_SKY_RGB = [0.30, 0.55, 0.92]
+_SUNLIGHT = 2.3
+_SKYLIGHT = 2.6
 
 
 def draw_parts(
@@ -135,21 +139,22 @@ def draw_route(
 
 def height_rgb(z: np.ndarray) -> np.ndarray:
     """Returns sRGB colours (N, 3) for points at heights (N,) [m]."""
+    lowest, highest = POINT_HEIGHTS
+    level = np.clip((z - lowest) / (highest - lowest), 0.0, 1.0)
+    return scale_rgb(np.round(level * (_NUM_COLORS - 1)) / (_NUM_COLORS - 1))
+
+
+def scale_rgb(level: np.ndarray) -> np.ndarray:
+    """Returns sRGB colours (N, 3) of points for levels (N,) from 0 to 1."""
     # Only pages need colour maps, and the import takes a moment.
     from matplotlib import colormaps
 
-    lowest, highest = POINT_HEIGHTS
-    level = np.clip((z - lowest) / (highest - lowest), 0.0, 1.0)
-    level = np.round(level * (_NUM_COLORS - 1)) / (_NUM_COLORS - 1)
-    # Without the dark half of the colour map, which looks much like asphalt and
-    # brick, and like a city at night.
-    return colormaps["viridis"](0.5 + 0.5 * level)[:, :3]
+    # A map without the greens, greys and browns of a city.
+    return colormaps["plasma"](0.05 + 0.9 * level)[:, :3]
 
 
 def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
-    """Lights a scene as at dusk; sets a view from the south and above.
-
-    The scene is dim, so that the points of a LiDAR stand out from it.
+    """Lights a scene as by day; sets a view from the south and above.
 
     Args:
         meshcat: Meshcat's server with the scene.
@@ -159,8 +164,9 @@ def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetProperty("/Axes", "visible", False)
     background = "/Background/<object>"
-    meshcat.SetProperty(background, "top_color", [0.03, 0.05, 0.08])
-    meshcat.SetProperty(background, "bottom_color", [0.12, 0.16, 0.21])
+    meshcat.SetProperty(background, "top_color", _SKY_RGB)
+    # The horizon is between the two.
+    meshcat.SetProperty(background, "bottom_color", _WHITE[:3])
     _set_lights(meshcat, lower, upper)
     center = (lower + upper) / 2.0
     reach = float(np.linalg.norm((upper - lower)[:2])) / 2.0
@@ -179,9 +185,9 @@ def _set_lights(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
     # These lamps are near the origin and would light one block only.
     for lamp in ("SpotLight", "PointLightNegativeX", "PointLightPositiveX"):
         meshcat.SetProperty(f"/Lights/{lamp}", "visible", False)
-    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.0)
+    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", _SKYLIGHT)
     sun = "/Lights/FillLight/<object>"
-    meshcat.SetProperty(sun, "intensity", 1.1)
+    meshcat.SetProperty(sun, "intensity", _SUNLIGHT)
     # The sun shines towards the origin, and casts shadows in a box along its
     # rays. The box must contain the whole view.
     low = np.array([*(lower[:2] - _SHADOW_MARGIN), lower[2] - 10.0])

@@ -14,6 +14,7 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
 
 from cns_drake.base import to_jpeg, write_text
+from cns_drake.pictures.city_parts import changed_above, read_parts
 from cns_drake.pictures.drive_page import (
     OtherPage,
     make_drive_page,
@@ -25,7 +26,7 @@ from cns_drake.pictures.drive_record import (
     ScanRecord,
     pack_scan,
 )
-from cns_drake.pictures.page_panel import ShownStages
+from cns_drake.pictures.page_panel import ShownStages, point_kinds
 from cns_drake.scene import World
 from cns_drake.units import MOST_RINGS
 
@@ -90,6 +91,10 @@ class MeshcatRecorder(LeafSystem):
         super().__init__()
         self._world = world
         self._shown = shown or ShownStages()
+        own = read_parts(world)
+        other = self._shown.other
+        self._parts = own, own if other is None else read_parts(other)
+        self._changed_above = changed_above(*self._parts, world.structures)
         self._X_BSs = dict(X_BSs)
         self._num_frames = num_frames
         self.drive = DriveRecord(
@@ -157,7 +162,9 @@ class MeshcatRecorder(LeafSystem):
         Raises:
             InputError: if the file cannot be written.
         """
-        page = make_drive_page(self.drive, self._world, self._shown, title)
+        page = make_drive_page(
+            self.drive, self._world, self._parts, self._shown, title
+        )
         if beside is not None:
             page = make_pair_page(beside, OtherPage(title, page))
         write_text(path, page)
@@ -210,19 +217,29 @@ class MeshcatRecorder(LeafSystem):
         self, context: Context, frame: int, X_WB: RigidTransform
     ) -> None:
         p_WRsets, rings = [np.empty((0, 3))], [np.empty(0, int)]
+        marks = [np.empty((0, 2), np.uint8)]
         for k, (name, port) in enumerate(self._scans.items()):
             scan = port.Eval(context)
             X_WS = X_WB @ self._X_BSs[name]
             p_SRset = np.column_stack([scan["x"], scan["y"], scan["z"]])
-            p_WRsets.append(
-                p_SRset @ X_WS.rotation().matrix().T + X_WS.translation()
-            )
+            p_WRset = p_SRset @ X_WS.rotation().matrix().T + X_WS.translation()
+            p_WRsets.append(p_WRset)
             rings.append(scan["ring"].astype(int) + k * MOST_RINGS)
+            is_changed = p_WRset[:, 2] > self._changed_above[scan["instance"]]
+            marks.append(
+                np.column_stack(
+                    [
+                        self.drive.scans.intensity_levels(scan["intensity"]),
+                        point_kinds(scan["label"], is_changed),
+                    ]
+                )
+            )
         self.drive.scans.add(
             pack_scan(
                 frame,
                 np.concatenate(p_WRsets),
                 np.concatenate(rings),
                 X_WB.translation(),
+                np.concatenate(marks),
             )
         )

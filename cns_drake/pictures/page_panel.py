@@ -13,13 +13,49 @@ import numpy as np
 
 from cns_drake.base import GONE_RGB, NEW_RGB, length_of
 from cns_drake.pictures import meshcat_drawing as drawing
+from cns_drake.pictures.city_parts import Change
 from cns_drake.pictures.drive_record import DriveRecord, ScanRecord
-from cns_drake.scene import World
+from cns_drake.scene import CLASS_IDS, MOVING_IDS, World
 
 Rgb = tuple[float, float, float]
 
+# Class -> colour of its points: SemanticKITTI's. They stand out from the city,
+# which has its own colours.
+_POINT_RGB = {
+    "unlabeled": (120, 120, 120),
+    "car": (100, 150, 245),
+    "bicycle": (100, 230, 245),
+    "bus": (100, 80, 250),
+    "motorcycle": (30, 60, 150),
+    "truck": (80, 30, 180),
+    "other-vehicle": (0, 0, 255),
+    "person": (255, 30, 30),
+    "bicyclist": (255, 40, 200),
+    "motorcyclist": (150, 30, 90),
+    "road": (255, 0, 255),
+    "parking": (255, 150, 255),
+    "sidewalk": (75, 0, 75),
+    "other-ground": (175, 0, 75),
+    "building": (255, 200, 0),
+    "fence": (255, 120, 50),
+    "other-structure": (255, 150, 0),
+    "vegetation": (0, 175, 0),
+    "trunk": (135, 60, 0),
+    "terrain": (150, 240, 80),
+    "pole": (255, 240, 150),
+    "traffic-sign": (255, 0, 0),
+    "other-object": (50, 255, 255),
+}
+_POINT_CLASSES = list(_POINT_RGB)
+# The kind of a point is the place of its class in this list and, if only the
+# drive's own stage has what it lies on, this bit.
+_CHANGED_BIT = 128
+# Points on what both stages have.
+_SAME_RGB = (150, 156, 164)
+
 # Side of the divider -> colour of what only this side has.
 _CHANGE_RGB = {"before": GONE_RGB, "after": NEW_RGB}
+_OTHER_SIDE = {"before": "after", "after": "before"}
 # Greatest number of samples in a plot; more would not be visible.
 _MAX_SAMPLES = 400
 # Size of a plot in units of its own, which the page stretches.
@@ -65,15 +101,37 @@ class ShownStages:
         return names[::-1] if self.is_earlier else names
 
 
+def point_kinds(labels: np.ndarray, is_changed: np.ndarray) -> np.ndarray:
+    """Returns what the page knows of each point, its kind.
+
+    Args:
+        labels: (N,) class ids of the points.
+        is_changed: (N,) whether only the stage of the drive has the structure.
+
+    Returns:
+        (N,) uint8 kinds.
+    """
+    table = np.zeros(max(CLASS_IDS.values()) + 2**10, np.uint8)
+    for name, number in (*CLASS_IDS.items(), *MOVING_IDS.items()):
+        if name in _POINT_RGB:
+            table[number] = _POINT_CLASSES.index(name)
+    return table[labels] + np.uint8(_CHANGED_BIT) * is_changed
+
+
 def make_panel(
-    title: str, drive: DriveRecord, changes: Set[str], shown: ShownStages
+    title: str,
+    drive: DriveRecord,
+    sides: Set[str],
+    changes: Sequence[Change],
+    shown: ShownStages,
 ) -> str:
     """Returns the HTML of the page's title, switches, legend and plots.
 
     Args:
         title: title of the page.
         drive: record of the drive.
-        changes: what the page shows of a change, `before` and `after`.
+        sides: what the page shows of a change, `before` and `after`.
+        changes: the greatest changes.
         shown: the stages of the city that the page shows.
     """
     # Only pages need templates, and the import takes a moment.
@@ -87,22 +145,42 @@ def make_panel(
     metres = round(length)
     way = f"{metres} m" if metres < 1000 else f"{length / 1000.0:.2f} km"
     lowest, highest = drawing.POINT_HEIGHTS
+    weakest, strongest = drive.scans.intensities or (0.0, 1.0)
+    own = "after" if shown.is_earlier else "before"
+    colours = {
+        name: _hex(np.array(rgb) / 255.0) for name, rgb in _CHANGE_RGB.items()
+    }
+    names = shown.sides()
+    told = {"before": f"gone after {names[0]}", "after": f"new in {names[1]}"}
     return fill_template(
         "panel.html",
         style=Markup(read_template("drive.css")),
         title=title,
         facts=f"{way} in {took}",
-        points=",".join(
-            map(_hex, drawing.height_rgb(np.linspace(lowest, highest, 9)))
-        ),
         heights=(f"{lowest:g}", f"{highest:g}"),
+        intensities=(f"{weakest:.2g}", f"{strongest:.2g}"),
+        scale=[_hex(rgb) for rgb in drawing.scale_rgb(np.linspace(0, 1, 9))],
+        classes=[
+            (name, _hex(np.array(rgb) / 255.0))
+            for name, rgb in _POINT_RGB.items()
+        ],
+        same=_hex(np.array(_SAME_RGB) / 255.0),
         route=_hex(drawing.ROUTE_RGB),
-        colours={
-            name: _hex(np.array(rgb) / 255.0)
-            for name, rgb in _CHANGE_RGB.items()
-        },
-        changes=changes,
-        sides=shown.sides(),
+        colours=colours,
+        own=own,
+        told=told,
+        drawn=sides,
+        sides=names,
+        places=[
+            (
+                f"{change.frame * drive.period:.2f}",
+                f"{change.kind.capitalize()}, {change.height:.0f} m high, "
+                + told[own if change.is_own else _OTHER_SIDE[own]],
+                ",".join(f"{x:.1f}" for x in change.place),
+                own if change.is_own else _OTHER_SIDE[own],
+            )
+            for change in changes
+        ],
         scans=_scans_text(drive.scans),
         sensors=drive.sensors,
         plots=motion_plots(drive),
@@ -141,9 +219,9 @@ def _scans_text(record: ScanRecord) -> str:
         return ""
     most = max(scan.num_points for scan in record.scans)
     part = (
-        "Every scan" if record.stride == 1 else f"One scan in {record.stride}"
+        "every scan" if record.stride == 1 else f"one scan in {record.stride}"
     )
-    return f"{part}, every point: up to {most:,} a scan"
+    return f"LiDAR: the last 3 s, {part}, up to {most:,} points a scan"
 
 
 def read_template(name: str) -> str:

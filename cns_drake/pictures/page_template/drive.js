@@ -1,8 +1,8 @@
 // Connects the panels with the scene. `viewer` is Meshcat's viewer; `commands`
 // is a promise of the scene's commands.
 
-// Folded from the start, so that the sheet does not hide the city on a phone.
-document.body.classList.toggle("folded", innerWidth <= 640);
+// Folded from the start, so that the panels do not hide the city.
+document.body.classList.add("folded");
 
 const byId = (id) => document.getElementById(id);
 const node = (...path) => viewer.scene_tree.find(path);
@@ -212,6 +212,7 @@ function follow() {
 }
 
 function setFollowing(on) {
+  byId("follow").textContent = on ? "Whole city" : "Back to the car";
   // Near the car, the marker and the route hide other things.
   show("vehicle", "marker")(!on);
   viewer.set_property(["route"], "opacity", on ? 0.35 : 1);
@@ -232,25 +233,25 @@ function setFollowing(on) {
 
 // Whatever is between the camera and the car has a hole, through which the car
 // is seen; only the ground has none.
-const hole = {car: {value: new MeshCat.THREE.Vector3()}, radius: {value: 0}};
+const hole = {
+  holeCar: {value: new MeshCat.THREE.Vector3()}, holeRadius: {value: 0}};
 const GROUND = ["road", "parking", "sidewalk", "other-ground", "terrain"];
+const HOLE = `
+  uniform vec3 holeCar;
+  uniform float holeRadius;
+  void main() {
+    if (vViewPosition.z < -holeCar.z - 3.0) {
+      float grain = fract(52.98 * fract(
+        dot(gl_FragCoord.xy, vec2(0.0671, 0.0058))));
+      vec2 off = -vViewPosition.xy / vViewPosition.z + holeCar.xy / holeCar.z;
+      if (length(off) < holeRadius * (0.8 + 0.2 * grain)) discard;
+    }`;
 
 function makeHole(material) {
   material.onBeforeCompile = (shader) => {
-    shader.uniforms.holeCar = hole.car;
-    shader.uniforms.holeRadius = hole.radius;
-    shader.fragmentShader = shader.fragmentShader
-      .replace("void main() {", `
-        uniform vec3 holeCar;
-        uniform float holeRadius;
-        void main() {
-          if (vViewPosition.z < -holeCar.z - 3.0) {
-            float grain = fract(52.98 * fract(
-              dot(gl_FragCoord.xy, vec2(0.0671, 0.0058))));
-            vec2 off = -vViewPosition.xy / vViewPosition.z +
-              holeCar.xy / holeCar.z;
-            if (length(off) < holeRadius * (0.8 + 0.2 * grain)) discard;
-          }`);
+    Object.assign(shader.uniforms, hole);
+    shader.fragmentShader =
+      shader.fragmentShader.replace("void main() {", HOLE);
   };
   material.needsUpdate = true;
 }
@@ -258,9 +259,65 @@ function makeHole(material) {
 function placeHole() {
   const {camera} = viewer;
   camera.updateMatrixWorld();
-  hole.car.value.copy(carPose().position)
+  const place = hole.holeCar.value.copy(carPose().position)
     .applyMatrix4(camera.matrixWorldInverse);
-  hole.radius.value = Math.max(7 / Math.max(-hole.car.value.z, 7), 0.035);
+  hole.holeRadius.value = Math.max(7 / Math.max(-place.z, 7), 0.035);
+}
+
+// What is far away fades into the horizon.
+const fog = new MeshCat.THREE.Fog(0xa6c6f0);
+viewer.scene.fog = fog;
+
+function placeFog() {
+  const away = viewer.camera.position.distanceTo(viewer.controls.target);
+  outlineScreen.value.set(innerWidth, innerHeight).divideScalar(OUTLINE);
+  fog.near = 150 + 2 * away;
+  fog.far = 6 * fog.near;
+}
+
+// What only one side has is outlined: copies of it of one colour, a little behind
+// it, and a little to all sides on the screen [px].
+const OUTLINE = 2;
+const outlineScreen = {value: new MeshCat.THREE.Vector2(1, 1)};
+const outlines = [];
+
+function outline(layer, colour) {
+  const meshes = [];
+  layer.traverse((one) => { if (one.isMesh) meshes.push(one); });
+  for (const [x, y] of [[1, 1], [1, -1], [-1, 1], [-1, -1]]) {
+    const material = new MeshCat.THREE.ShaderMaterial({
+      side: MeshCat.THREE.DoubleSide,
+      uniforms: {
+        ...hole,
+        colour: {value: new MeshCat.THREE.Color(colour)},
+        shift: {value: new MeshCat.THREE.Vector2(x, y)},
+        screen: outlineScreen,
+      },
+      vertexShader: `
+        uniform vec2 shift;
+        uniform vec2 screen;
+        varying vec3 vViewPosition;
+        void main() {
+          vec3 place = (modelViewMatrix * vec4(position, 1.0)).xyz;
+          vViewPosition = -place;
+          place *= 1.01 + 1.0 / length(place);
+          gl_Position = projectionMatrix * vec4(place, 1.0);
+          gl_Position.xy += 2.0 * shift / screen * gl_Position.w;
+        }`,
+      fragmentShader: `
+        uniform vec3 colour;
+        varying vec3 vViewPosition;
+        ${HOLE}
+          gl_FragColor = vec4(colour, 1.0);
+          #include <colorspace_fragment>
+        }`,
+    });
+    for (const mesh of meshes) {
+      const copy = new MeshCat.THREE.Mesh(mesh.geometry, material);
+      mesh.add(copy);
+      outlines.push(copy);
+    }
+  }
 }
 
 // The two sides of the divider: what only the earlier stage has, and what only
@@ -283,14 +340,7 @@ function setDivided(on) {
   divided = on;
   document.body.classList.toggle("changed", on);
   divider.hidden = !on;
-  for (const {layer, colour} of sides) {
-    layer.traverse(({material}) => {
-      if (!material) return;
-      material.color.set(on ? colour : "white");
-      material.emissive?.set(on ? colour : "black");
-      material.emissiveIntensity = 0.12;
-    });
-  }
+  for (const copy of outlines) copy.visible = on;
   showSides();
 }
 
@@ -314,15 +364,19 @@ function divide(renderer) {
     renderer.setScissorTest(true);
     for (const [k, x, width] of [[0, 0, edge], [1, edge, innerWidth - edge]]) {
       sides.forEach(({layer}, side) => { layer.visible = side === k; });
+      // The car drives through its own stage.
+      clouds.visible = sides[k].isOwn;
       renderer.setScissor(x, 0, width, innerHeight);
       draw(scene, camera);
     }
     renderer.setScissorTest(false);
     for (const {layer, isOwn} of sides) layer.visible = isOwn;
+    clouds.visible = true;
   };
 }
 
-// All points of a scan, from the page's own data. See `PackedScan` in Python.
+// All points of a scan, from the page's own data, and the intensity and the
+// kind of each. See `PackedScan` in Python.
 async function unpack({dataset, textContent}) {
   const packed = await fetch(
     "data:application/octet-binary;base64," + textContent);
@@ -330,7 +384,7 @@ async function unpack({dataset, textContent}) {
     new DecompressionStream("deflate"))).arrayBuffer());
   const origin = dataset.origin.split(",").map(Number);
   const grid = Number(dataset.grid);
-  const count = planes.length / 6;
+  const count = planes.length / 8;
   const points = new Float32Array(3 * count);
   for (let axis = 0; axis < 3; ++axis) {
     const low = 2 * axis * count;
@@ -343,65 +397,115 @@ async function unpack({dataset, textContent}) {
       points[3 * k + axis] = origin[axis] + grid * value;
     }
   }
-  return points;
+  const marks = planes.subarray(6 * count);
+  for (let k = 1; k < 2 * count; ++k) {
+    if (k !== count) marks[k] += marks[k - 1];
+  }
+  return {
+    points, intensities: marks.subarray(0, count), kinds: marks.subarray(count)};
 }
 
 const scans = [...document.querySelectorAll("script.scan")];
 const times = scans.map(({dataset}) => Number(dataset.time));
-// Index of a scan near the play head -> its geometry, null while it is decoded.
+// Index of a scan near the play head -> its cloud, null while it is decoded.
 const nearScans = new Map();
-const {colours: heightColours, lowest, highest} = byId("points").dataset;
-const heightScale = heightColours.split(",").map(
-  (one) => new MeshCat.THREE.Color(one));
-const cloud = new MeshCat.THREE.Points(
-  new MeshCat.THREE.BufferGeometry(),
-  new MeshCat.THREE.PointsMaterial(
-    {size: 2.5, sizeAttenuation: false, vertexColors: true}));
-cloud.frustumCulled = false;
-// Points are drawn a little nearer than the surfaces on which they lie.
-cloud.material.onBeforeCompile = (shader) => {
-  shader.vertexShader = shader.vertexShader.replace(
-    "#include <project_vertex>",
-    `#include <project_vertex>
-    gl_Position = projectionMatrix * vec4(0.99 * mvPosition.xyz, 1.0);`);
-};
-node("scans").object.add(cloud);
+const clouds = new MeshCat.THREE.Group();
+node("scans").object.add(clouds);
+const menu = byId("points");
+// Points are drawn a little nearer than the surfaces on which they lie. Those of
+// the latest scan are larger.
+const [earlierPoints, latestPoints] = [2, 3.2].map((size) => {
+  const material = new MeshCat.THREE.PointsMaterial(
+    {size, sizeAttenuation: false, vertexColors: true});
+  material.onBeforeCompile = (shader) => {
+    shader.vertexShader = shader.vertexShader.replace(
+      "#include <project_vertex>",
+      `#include <project_vertex>
+      gl_Position = projectionMatrix * vec4(0.99 * mvPosition.xyz, 1.0);`);
+  };
+  return material;
+});
+// How much of the past is shown [s], and in how many scans at most.
+const PAST = 3;
+let mostScans = 12;
 
-async function decode(index) {
-  nearScans.set(index, null);
-  const points = await unpack(scans[index]);
-  if (!nearScans.has(index)) return;
-  const colours = new Float32Array(points.length);
+// What gives a point its colour -> which of the colours: 0 is the first, 1 the
+// last.
+const {lowest, highest} = menu.dataset;
+const LEVELS = {
+  height: ({points}, k) => (points[3 * k + 2] - lowest) / (highest - lowest),
+  intensity: ({intensities}, k) => intensities[k] / 63,
+  class: ({kinds}, k, last) => (kinds[k] & 127) / last,
+  change: ({kinds}, k) => kinds[k] >> 7,
+};
+
+function colourCloud({userData, geometry}) {
+  const level = LEVELS[menu.value];
+  if (!level) return;
+  const scale = menu.selectedOptions[0].dataset.colours.split(",").map(
+    (one) => new MeshCat.THREE.Color(one));
+  const last = scale.length - 1;
+  const colours = new Float32Array(userData.points.length);
   const colour = new MeshCat.THREE.Color();
-  for (let k = 0; k < points.length; k += 3) {
-    const level = Math.min(Math.max(
-      (points[k + 2] - lowest) / (highest - lowest), 0), 1);
-    const at = level * (heightScale.length - 1);
-    const below = Math.min(Math.floor(at), heightScale.length - 2);
-    colour.lerpColors(heightScale[below], heightScale[below + 1], at - below)
-      .toArray(colours, k);
+  for (let k = 0; k < userData.kinds.length; ++k) {
+    const at = last * Math.min(Math.max(level(userData, k, last), 0), 1);
+    const below = Math.min(Math.floor(at), last - 1);
+    colour.lerpColors(scale[below], scale[below + 1], at - below)
+      .toArray(colours, 3 * k);
   }
-  const {BufferAttribute, BufferGeometry} = MeshCat.THREE;
-  nearScans.set(index, new BufferGeometry()
-    .setAttribute("position", new BufferAttribute(points, 3))
-    .setAttribute("color", new BufferAttribute(colours, 3)));
+  geometry.setAttribute("color", new MeshCat.THREE.BufferAttribute(colours, 3));
+}
+
+function setColours() {
+  show("scans")(Boolean(menu.value));
+  for (const key of document.querySelectorAll(".key")) {
+    key.hidden = key.dataset.of !== menu.value;
+  }
+  for (const cloud of nearScans.values()) if (cloud) colourCloud(cloud);
   viewer.set_dirty();
 }
 
-// Shows the latest scan; decodes the next ones, and forgets those far away.
-function showScan() {
-  if (!scans.length) return;
+async function decode(index) {
+  nearScans.set(index, null);
+  const scan = await unpack(scans[index]);
+  if (!nearScans.has(index)) return;
+  const {BufferAttribute, BufferGeometry, Points} = MeshCat.THREE;
+  const cloud = new Points(new BufferGeometry().setAttribute(
+    "position", new BufferAttribute(scan.points, 3)), earlierPoints);
+  cloud.frustumCulled = false;
+  cloud.userData = scan;
+  colourCloud(cloud);
+  clouds.add(cloud);
+  nearScans.set(index, cloud);
+  // The legend has the classes that were seen.
+  const classes = document.querySelectorAll('.key[data-of="class"] span');
+  for (const kind of new Set(scan.kinds)) classes[kind & 127].hidden = false;
+  viewer.set_dirty();
+}
+
+// Shows the scans of the last seconds; decodes the next ones, and forgets the
+// others.
+function showScans() {
+  if (!scans.length) return Promise.resolve();
   const now = animator.time + 1e-3;
-  const index = Math.max(times.findLastIndex((time) => time <= now), 0);
-  for (const k of [index, index + 1, index + 2]) {
-    if (k in scans && !nearScans.has(k)) decode(k);
-  }
-  for (const [k, geometry] of nearScans) {
-    if (Math.abs(k - index) <= 3) continue;
-    geometry?.dispose();
+  const latest = Math.max(times.findLastIndex((time) => time <= now), 0);
+  const first = times.findIndex((time) => time > now - PAST);
+  const step = Math.ceil((latest - first + 1) / mostScans);
+  const shown = (k) => k === latest || (k >= first && k < latest && k % step === 0);
+  const wanted = [...scans.keys()].filter(
+    (k) => shown(k) || (k > latest && k <= latest + 2));
+  for (const [k, cloud] of nearScans) {
+    if (cloud) {
+      cloud.visible = shown(k);
+      cloud.material = k === latest ? latestPoints : earlierPoints;
+    }
+    if (wanted.includes(k)) continue;
+    cloud?.removeFromParent();
+    cloud?.geometry.dispose();
     nearScans.delete(k);
   }
-  cloud.geometry = nearScans.get(index) ?? cloud.geometry;
+  return Promise.all(
+    wanted.filter((k) => !nearScans.has(k)).map((k) => decode(k)));
 }
 
 function connectSwitch(id, set) {
@@ -427,6 +531,61 @@ function fold(on) {
   byId("fold").textContent = on ? "More" : "Less";
   byId("fold").ariaExpanded = !on;
   centre();
+}
+
+// Buttons that go to the greatest changes, in order of time.
+const places = [...document.querySelectorAll("#places [data-time]")].map(
+  (button) => ({button, time: Number(button.dataset.time)}));
+
+// Goes to the car before a change, and looks from there at the side of the
+// divider that has it.
+function goTo({button, time}) {
+  if (!followed) setFollowing(true);
+  setTime(time);
+  const [x, y, z] = button.dataset.place.split(",").map(Number);
+  const {position} = followed = carPose();
+  const there = new MeshCat.THREE.Vector3(x, z, -y);
+  const way = there.clone().sub(position).setY(0);
+  const far = viewer.camera.aspect < 1 ? 1.5 : 1;
+  chosen = null;
+  look(
+    way.clone().setLength(-25 * far).add(position).setY(position.y + 14 * far),
+    way.clone().clampLength(0, 15).add(position)
+      .setY(position.y + Math.min(z - position.y, 15) / 3));
+  placeDivider(innerWidth * (button.dataset.side === "after" ? 0.35 : 0.65));
+}
+
+// Says which change the car passes.
+function showPlace() {
+  const now = places.findLast(({time}) => time <= animator.time + 1e-3
+    && animator.time < time + 8);
+  for (const one of places) one.button.ariaCurrent = one === now;
+  if (byId("place")) byId("place").value = now?.button.title ?? "";
+}
+
+// Motion begins when there are points. Where pictures take long, such as on a
+// slow phone, there are fewer points, and the car stands until it is told to go.
+async function begin() {
+  animator.pause();
+  if (places.length && parent === window) goTo(places[0]);
+  else setTime(0);
+  await showScans();
+  const picture = () => new Promise((drawn) => requestAnimationFrame(() => {
+    viewer.render();
+    drawn();
+  }));
+  await picture();
+  const start = performance.now();
+  await picture();
+  await picture();
+  byId("loading").remove();
+  if (performance.now() - start > 500) {
+    viewer.renderer.setPixelRatio(1);
+    mostScans = 6;
+  } else if (parent === window || leads) {
+    animator.play();
+  }
+  viewer.set_dirty();
 }
 
 function setTime(time) {
@@ -534,9 +693,11 @@ viewer.render_callback = () => {
   if (followed) follow();
   placeMarker();
   placeHole();
+  placeFog();
   tell();
   showTime();
-  showScan();
+  showScans();
+  showPlace();
   showImages();
 };
 
@@ -557,11 +718,13 @@ commands.then(() => {
       });
     }
   }
+  for (const side of sides) {
+    side.isOwn = side.layer.visible;
+    if (divider) outline(side.layer, side.colour);
+  }
   divide(viewer.renderer);
-  for (const side of sides) side.isOwn = side.layer.visible;
   track = carTrack();
   readRoofs();
-  byId("loading").remove();
   byId("time").max = animator.duration;
   byId("time").addEventListener("input", (event) => {
     setTime(Number(event.target.value));
@@ -571,9 +734,17 @@ commands.then(() => {
     else animator.play();
     showTime();
   });
-  connectSwitch("follow", setFollowing);
+  byId("follow").addEventListener("click", () => setFollowing(!followed));
+  menu.addEventListener("change", setColours);
+  for (const one of places) {
+    one.button.addEventListener("click", () => goTo(one));
+  }
+  byId("unfold")?.addEventListener("click", () => {
+    byId("plots").hidden = !byId("plots").hidden;
+    byId("unfold").ariaExpanded = !byId("plots").hidden;
+    centre();
+  });
   connectSwitch("change", setDivided);
-  connectSwitch("points", show("scans"));
   connectSwitch("route", show("route"));
   connectSwitch("moving", show("moving"));
   connectSwitch("city", setCity);
@@ -600,7 +771,8 @@ commands.then(() => {
     event.preventDefault();
     byId("play").click();
   });
-  fold(innerWidth <= 640 || parent !== window);
+  fold(true);
+  setColours();
   if (parent !== window) {
     for (const kind of ["pointerdown", "keydown", "wheel"]) {
       addEventListener(kind, () => {
@@ -616,4 +788,9 @@ commands.then(() => {
   look(camera.position.clone().sub(controls.target).multiplyScalar(farther)
     .add(controls.target), controls.target.clone());
   setFollowing(true);
+  if (divider) {
+    byId("change").checked = parent === window;
+    setDivided(parent === window);
+  }
+  return begin();
 });

@@ -106,13 +106,11 @@ def test_page_has_title_length_and_legend(page):
     assert "<h1>a &lt; b</h1>" in text
     # A quarter of a circle of 20 m, in 20 steps of half a second.
     assert "<p>31 m in 10 s</p>" in text
-    for line in ("LiDAR points, 0 to 25 m high", "Route"):
-        assert f">{line}</label>" in text
     for line in ("gone after stage 01", "new in stage &lt;02&gt;"):
-        assert f">{line}</dd>" in text
+        assert f"</i> {line}</span>" in text
     for line in (
         "lidar: cns, 32 rings",
-        "Every scan, every point: up to 500 a scan",
+        "LiDAR: the last 3 s, every scan, up to 500 points a scan",
     ):
         assert f"<p>{line}</p>" in text
     assert not re.search(r"\{\{\w+\}\}", text)
@@ -135,9 +133,8 @@ def test_page_of_another_city_is_refused(page, tmp_path):
 
 def test_without_another_stage_nothing_is_said_of_change(tmp_path):
     text = write_page(tmp_path / "page.html").read_text()
-    assert 'id="change"' not in text
-    assert 'class="change"' not in text
-    assert 'id="divider"' not in text
+    for name in ('id="change"', 'value="change"', 'id="divider"', "Changes<"):
+        assert name not in text
 
 
 @pytest.mark.slow
@@ -169,7 +166,7 @@ def test_page_of_a_shipped_drive_is_small(tmp_path):
     # Scans are left out evenly, so some room is left.
     assert 15e6 < path.stat().st_size <= 20e6
     assert re.search(
-        r">One scan in \d+, every point: up to 25,000 a ", path.read_text()
+        r"one scan in \d+, up to 25,000 points a scan<", path.read_text()
     )
 
 
@@ -194,7 +191,7 @@ def browser(tmp_path_factory):
     ],
 )
 def opened(browser, page, request):
-    """The page, standing still, with its sheet unfolded."""
+    """The page, standing still, with its panels unfolded."""
     browser.open(page.as_uri(), *request.param)
     # Nobody looks at the picture, which software draws pixel by pixel.
     browser.evaluate("viewer.renderer.setPixelRatio(0.1)")
@@ -202,10 +199,14 @@ def opened(browser, page, request):
     browser.evaluate("viewer.animator.pause()")
     browser.evaluate("document.getElementById('follow').click()")
     browser.evaluate("viewer.controls.saveState()")
-    is_folded = browser.evaluate('document.body.className === "folded"')
-    assert is_folded is (request.param == SCREENS["phone"])
-    if is_folded:
-        click(browser, "fold")
+    assert browser.evaluate('document.body.classList.contains("folded")')
+    assert browser.evaluate("document.getElementById('plots').hidden")
+    # It opens between both stages.
+    assert (
+        browser.evaluate("document.getElementById('divider').hidden") is False
+    )
+    for name in ("change", "fold", "unfold"):
+        browser.evaluate(f"document.getElementById('{name}').click()")
     return browser
 
 
@@ -229,6 +230,13 @@ def pair(browser, tmp_path):
         browser.wait_for(inside(k, '!document.getElementById("loading")'))
         browser.evaluate(inside(k, "viewer.animator.pause()"))
     return browser
+
+
+CLOUDS = "viewer.scene_tree.find(['scans']).object.children[0].children"
+
+
+def of_hex(colour):
+    return np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
 
 
 SANDBOX = 'sandbox="allow-scripts"'
@@ -268,10 +276,12 @@ def reader(opened):
 
 
 def click(browser, name):
-    """Clicks at the visible position of a button."""
+    """Clicks at the visible position of a button, which is scrolled there."""
     x, y = browser.evaluate(
         f"""(() => {{
-          const box = document.getElementById("{name}").getBoundingClientRect();
+          const button = document.getElementById("{name}");
+          button.scrollIntoView({{block: "nearest"}});
+          const box = button.getBoundingClientRect();
           return [box.x + box.width / 2, box.y + box.height / 2];
         }})()"""
     )
@@ -286,6 +296,17 @@ def go_to(browser, time):
           slider.value = {time};
           slider.dispatchEvent(new Event("input"));
           viewer.render();
+        }})()"""
+    )
+
+
+def choose(browser, value):
+    """Chooses what gives points their colour."""
+    browser.evaluate(
+        f"""(() => {{
+          const menu = document.getElementById("points");
+          menu.value = "{value}";
+          menu.dispatchEvent(new Event("change"));
         }})()"""
     )
 
@@ -393,14 +414,25 @@ class TestInChromium:
     pytestmark = slow_in_chromium
 
     def test_panels_fit_the_screen(self, reader):
+        """Unfolded, too; on a phone they are one sheet, which is scrolled."""
         assert not reader.evaluate(
             """[...document.querySelectorAll(".panel, .panel *")].filter(
               (one) => {
                 const box = one.getBoundingClientRect();
                 return box.left < 0 || box.right > innerWidth ||
-                  box.top < 0 || box.bottom > innerHeight;
+                  (innerWidth > 640 &&
+                    (box.top < 0 || box.bottom > innerHeight));
               }).map((one) => one.outerHTML)"""
         )
+        shares = reader.evaluate(
+            """["sheet", "bar"].map((id) => {
+              const {width, height} = document.getElementById(id)
+                .getBoundingClientRect();
+              return width * height / innerWidth / innerHeight;
+            })"""
+        )
+        is_phone = reader.evaluate("innerWidth") <= 640
+        assert shares[not is_phone] < 1 / 3
 
     def test_bar_comes_when_the_city_is_there(self, reader):
         is_seen = (
@@ -417,7 +449,7 @@ class TestInChromium:
         assert reader.evaluate(is_seen) is True
 
     def test_sides_of_the_divider_show_both_stages(self, reader):
-        legend = 'document.querySelector("dd.change").checkVisibility()'
+        legend = 'document.getElementById("outlines").checkVisibility()'
         shown = """(() => {
           const seen = [];
           const layer = (name) => viewer.scene_tree.find([name]).object;
@@ -429,9 +461,9 @@ class TestInChromium:
           viewer.render();
           return seen;
         })()"""
-        color = (
-            'viewer.scene_tree.find(["after", "unlabeled", "<object>"])'
-            ".object.material.color.getHexString()"
+        # The mesh has its own colours, and four copies behind it.
+        mesh = (
+            'viewer.scene_tree.find(["after", "unlabeled", "<object>"]).object'
         )
         after = reader.evaluate(
             'document.getElementById("divider").dataset.after'
@@ -440,8 +472,16 @@ class TestInChromium:
             sides = ["before", "after"] if is_on else ["before"]
             assert reader.evaluate(shown) == sides
             assert reader.evaluate(legend) is is_on
-            tint = after if is_on else "#ffffff"
-            assert "#" + reader.evaluate(color) == tint
+            colour = reader.evaluate(f"{mesh}.material.color.getHexString()")
+            assert colour == "ffffff"
+            assert (
+                reader.evaluate(
+                    f"{mesh}.children.filter(({{visible}}) => visible).map("
+                    "({material}) => '#' +"
+                    " material.uniforms.colour.value.getHexString())"
+                )
+                == [after] * 4 * is_on
+            )
             click(reader, "change")
         # Its handle is dragged.
         x, y, quarter = reader.evaluate(
@@ -456,22 +496,89 @@ class TestInChromium:
         assert reader.evaluate(place) == pytest.approx(25.0)
         click(reader, "change")
 
-    @pytest.mark.parametrize("frame", [0, 9, 10, 20])
-    def test_latest_scan_is_shown_with_every_point(self, reader, frame):
+    @pytest.mark.parametrize("frame", [0, 4, 20])
+    def test_scans_of_three_seconds_are_shown_with_every_point(
+        self, reader, frame
+    ):
         go_to(reader, frame * PERIOD)
-        points = (
-            'viewer.scene_tree.find(["scans"]).object.children[0]'
-            ".geometry.attributes.position"
-        )
-        first = points_of(frame)[0]
+        frames = range(max(frame - 5, 0), frame + 1)
         reader.wait_for(
-            f"(viewer.render(), Math.abs({points}?.array[0] - ({first[0]})) <"
-            " 0.02)"
+            f"(viewer.render(), {CLOUDS}.filter("
+            f"({{visible}}) => visible).length === {len(frames)})"
         )
-        array = reader.evaluate(f"[...{points}.array]")
-        np.testing.assert_allclose(
-            np.reshape(array, (-1, 3)), points_of(frame), atol=0.0101
+        seen = reader.evaluate(
+            f"{CLOUDS}.filter(({{visible}}) => visible).map(({{geometry}}) => "
+            "[...geometry.attributes.position.array])"
         )
+        seen = [np.reshape(one, (-1, 3)) for one in seen]
+        for k in frames:
+            cloud = min(seen, key=lambda one: abs(one - points_of(k)).max())
+            np.testing.assert_allclose(cloud, points_of(k), atol=0.0101)
+
+    def test_points_are_coloured_by_what_is_chosen(self, reader):
+        go_to(reader, 0.0)
+        reader.wait_for(f"(viewer.render(), {CLOUDS}.length > 0)")
+        scales = reader.evaluate(
+            "Object.fromEntries([...document.getElementById('points').options]"
+            ".map(({value, dataset}) => [value, dataset.colours]))"
+        )
+        rgb = {}
+        for mode in ("height", "intensity", "class", "change"):
+            choose(reader, mode)
+            colours = reader.evaluate(
+                f"[...{CLOUDS}.find(({{userData}}) => Math.abs("
+                f"userData.points[0] - ({points_of(0)[0, 0]})) < 0.02)"
+                ".geometry.attributes.color.array]"
+            )
+            linear = np.reshape(colours, (-1, 3))
+            rgb[mode] = np.where(
+                linear < 0.0031308,
+                12.92 * linear,
+                1.055 * linear ** (1 / 2.4) - 0.055,
+            )
+            shown = reader.evaluate(
+                "[...document.querySelectorAll('.key')].filter("
+                "(key) => key.checkVisibility()).map(({dataset}) => dataset.of)"
+            )
+            assert shown == [mode]
+        choose(reader, "height")
+        z = points_of(0)[:, 2]
+        level = np.clip(z / 25.0, 0, 1)
+        # Between the colours of the scale, by their light.
+        for k, end in ((0, level == 0.0), (-1, level == 1.0)):
+            colour = scales["height"].split(",")[k]
+            np.testing.assert_allclose(
+                rgb["height"][end], [of_hex(colour)] * end.sum(), atol=0.01
+            )
+        # All points have intensity 0, no class, and an unknown structure.
+        for mode in ("intensity", "class", "change"):
+            first = of_hex(scales[mode].split(",")[0])
+            np.testing.assert_allclose(rgb[mode], [first] * 500, atol=0.01)
+
+    def test_buttons_go_to_the_changes(self, reader):
+        """The tower at (15, 15) is the greatest; the kiosk is near it."""
+        button = "document.querySelector('#places [data-time]')"
+        told = reader.evaluate(f"{button}.title")
+        assert told == "Tower, 20 m high, new in stage <02>"
+        go_to(reader, 10.0)
+        shown = "document.getElementById('place').value"
+        assert reader.evaluate(shown) == ""
+        reader.evaluate(f"{button}.click()")
+        reader.evaluate("viewer.render()")
+        assert reader.evaluate("viewer.animator.time") == 0.0
+        assert reader.evaluate(shown) == told
+        assert reader.evaluate(f"{button}.ariaCurrent") == "true"
+        # The camera, the car and the tower are on a line.
+        x, y, _ = p_WC(reader)
+        assert x == pytest.approx(y)
+        assert x < 0.0
+        # The divider has the later stage on its right.
+        share = "parseFloat(document.getElementById('divider').style.left)"
+        assert reader.evaluate(share) == pytest.approx(35.0)
+        label = "document.getElementById('follow').textContent"
+        assert reader.evaluate(label) == "Whole city"
+        click(reader, "follow")
+        assert reader.evaluate(label) == "Back to the car"
 
     def test_camera_follows_the_car(self, reader):
         before = p_WC(reader)
@@ -575,16 +682,18 @@ class TestInChromium:
             )
 
         assert all(heights())
-        click(reader, "fold")
+        for name in ("fold", "unfold"):
+            expanded = f"document.getElementById('{name}').ariaExpanded"
+            assert reader.evaluate(expanded) == "true"
+            click(reader, name)
+            assert reader.evaluate(expanded) == "false"
         about, plots, course = heights()
         assert about == plots == 0
         assert course > 0
         top = "document.getElementById('bar').getBoundingClientRect().top"
-        assert reader.evaluate(f"{top} / innerHeight") > 0.8
-        expanded = "document.getElementById('fold').ariaExpanded"
-        assert reader.evaluate(expanded) == "false"
-        click(reader, "fold")
-        assert reader.evaluate(expanded) == "true"
+        assert reader.evaluate(f"{top} / innerHeight") > 0.75
+        for name in ("fold", "unfold"):
+            click(reader, name)
         assert all(heights())
 
     def test_keys_play_and_move_in_time(self, reader):
@@ -598,16 +707,15 @@ class TestInChromium:
         reader.evaluate("document.getElementById('time').focus()")
         reader.press("ArrowRight")
         assert 4.0 < reader.evaluate("viewer.animator.time") < 10.0
-        reader.evaluate("document.getElementById('points').focus()")
+        reader.evaluate("document.getElementById('route').focus()")
         for is_on in (False, True):
             reader.press(" ")
-            assert is_visible(reader, "scans") is is_on
+            assert is_visible(reader, "route") is is_on
         assert reader.evaluate("viewer.animator.playing") is False
 
     @pytest.mark.parametrize(
         ("name", "layers"),
         [
-            ("points", [["scans"]]),
             ("route", [["route"]]),
             ("city", [["city"], ["before"]]),
         ],

@@ -263,13 +263,18 @@ def test_motion_is_taken_down_at_every_frame(folder):
 
 
 def unpacked(scan):
-    """Returns the points of a packed scan (N, 3), as its docstring says."""
+    """Returns the points of a packed scan (N, 3), as its docstring says.
+
+    Also returns the intensities and kinds (N, 2).
+    """
     planes = np.frombuffer(zlib.decompress(scan.data), np.uint8)
-    low, high = planes.reshape(3, 2, -1).astype(int).swapaxes(0, 1)
+    planes = planes.reshape(8, -1).astype(int)
+    low, high = planes[:6].reshape(3, 2, -1).swapaxes(0, 1)
     signless = low + 256 * high
     steps = np.where(signless % 2, -(signless + 1) // 2, signless // 2)
     q = np.cumsum(steps, axis=1).astype(np.int16)
-    return np.array(scan.origin) + scan.grid * q.T
+    marks = np.cumsum(planes[6:], axis=1).astype(np.uint8)
+    return np.array(scan.origin) + scan.grid * q.T, marks.T
 
 
 def test_scans_have_every_point_where_it_was_measured(folder):
@@ -283,19 +288,56 @@ def test_scans_have_every_point_where_it_was_measured(folder):
             expected.append((X_WB_at(k * PERIOD) @ X_BS @ p_SR).T)
         assert scan.frame == k
         np.testing.assert_allclose(
-            unpacked(scan), np.concatenate(expected), atol=scan.grid / 1.99
+            unpacked(scan)[0], np.concatenate(expected), atol=scan.grid / 1.99
         )
     assert len(scans.scans) == 5
 
 
-def test_points_are_coloured_by_height():
+def test_points_tell_intensity_class_and_change(folder):
+    """Of stage 02, stage 01 lacks the second hall and the lamp."""
+    world = load_world(folder / "stage_02.sdf", vehicle=folder / "vehicle.sdf")
+    other = load_world(folder / "stage_03.sdf")
+    scan = np.zeros(6, POINT_DTYPE)
+    scan["z"] = [0.0, 3.0, 3.0, 3.0, 11.9, 12.9]
+    scan["instance"] = [1, 3, 4, 2, 2, 2]
+    scan["label"] = [72, 50, 80, 252, 50, 50]
+    scan["intensity"] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]
+
+    def kinds(world, other):
+        recorder = film(
+            world,
+            lambda time: RigidTransform(),
+            lambda time: np.zeros(6),
+            imu_at,
+            {"lidar": lambda time: scan},
+            1,
+            period=PERIOD,
+            X_BSs={"lidar": RigidTransform()},
+            shown=ShownStages(other),
+        )
+        (packed,) = recorder.drive.scans.scans
+        return unpacked(packed)[1]
+
+    intensities, marks = kinds(world, other).T
+    assert (np.diff(intensities.astype(int)) > 0).all()
+    assert (intensities[0], intensities[-1]) == (0, 63)
+    assert (marks >= 128).tolist() == [False, True, True, False, False, False]
+    terrain, building, pole, car, *halls = (marks & 127).tolist()
+    assert halls == [building, building]
+    assert len({terrain, building, pole, car}) == 4
+    # Above 6.5 m, the hall of stage 03 is what stage 01 lacks.
+    higher = load_world(folder / "stage_03.sdf", vehicle=folder / "vehicle.sdf")
+    scan["z"][3] = 6.4
+    marks = kinds(higher, load_world(folder / "stage_01.sdf"))[:, 1]
+    assert (marks[3:] >= 128).tolist() == [False, True, True]
+
+
+def test_points_are_the_brighter_the_higher():
     luminance = height_rgb(np.linspace(-1.0, 26.0, 10)) @ [
         0.2126,
         0.7152,
         0.0722,
     ]
-    # Bright on a dark scene, and the brighter the higher.
-    assert luminance[0] > 0.35
     assert (np.diff(luminance[1:-1]) > 0.0).all()
 
 
