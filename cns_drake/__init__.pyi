@@ -46,5 +46,7 @@ from .simulation import make_station as make_station
 from .simulation import plan_scenario_traffic as plan_scenario_traffic
 from .simulation import scan as scan
 from .simulation import simulate as simulate
+from .studies import causes as causes
+from .studies import register_cause as register_cause
 from .traffic import add_traffic as add_traffic
 from .units import LIDAR_PRESETS as LIDAR_PRESETS

@@ -7,6 +7,7 @@ is imported, with the functions with which this project registers its own.
 
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
+from contextvars import ContextVar
 import functools
 import importlib
 import pkgutil
@@ -19,6 +20,8 @@ from cns_drake.base.errors import one_line
 from cns_drake.base.terminal import note
 
 _Member = TypeVar("_Member")
+# Name of the plug-in whose module is imported.
+_LOADING: ContextVar[str] = ContextVar("_LOADING", default="")
 
 
 class Family(Mapping[str, _Member]):
@@ -40,6 +43,9 @@ class Family(Mapping[str, _Member]):
         self._kind = kind
         self._load_own = load_own
         self._members: dict[str, tuple[_Member, object]] = {}
+        self._own: list[str] = []
+        # Name -> plug-in that added the member.
+        self._plugins: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> _Member:
         if name not in self._members:
@@ -70,12 +76,27 @@ class Family(Mapping[str, _Member]):
         if known != source:
             raise ValueError(f"there is another {self._kind} {name!r}")
         self._members[name] = member, source
+        if plugin := _LOADING.get():
+            self._plugins[name] = plugin
+
+    def described(self, name: str) -> str:
+        """Returns a member with the plug-in that added it, for messages."""
+        told = f"{self._kind} {name!r}"
+        plugin = self._plugins.get(name)
+        return f"plug-in {plugin}: {told}" if plugin else told
 
     def load_own(self) -> None:
         """Loads the project's own members, unless this was done before."""
         load, self._load_own = self._load_own, None
         if load is not None:
+            others = set(self._members)
             load()
+            self._own = [name for name in self._members if name not in others]
+
+    def own(self) -> list[_Member]:
+        """Returns the project's own members."""
+        self.load_own()
+        return [self._members[name][0] for name in self._own]
 
     def _load(self) -> None:
         self.load_own()
@@ -126,6 +147,7 @@ def _load_plugins() -> dict[str, str]:
 
     places = {}
     for plugin in sorted(entry_points(group="cns_drake.plugins")):
+        loading = _LOADING.set(plugin.name)
         try:
             with contextlib.redirect_stdout(sys.stderr):
                 plugin.load()
@@ -139,4 +161,6 @@ def _load_plugins() -> dict[str, str]:
                 note(
                     one_line(f"plug-in {plugin.name} ({plugin.value}): {fault}")
                 )
+        finally:
+            _LOADING.reset(loading)
     return places

@@ -1,3 +1,5 @@
+from .cause_check import causes as causes
+from .cause_check import register_cause as register_cause
 from .drives.changed_drives import Losses as Losses
 from .drives.sampled_drives import DrawnRoute as DrawnRoute
 from .drives.sampled_drives import Fleet as Fleet

@@ -26,6 +26,7 @@ from cns_drake.scenarios import (
     worlds_folder,
 )
 from cns_drake.scene import MapFolder
+from cns_drake.studies.cause_check import check_causes
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
 from cns_drake.studies.maps.experiment_maps import (
     MapPairs,
@@ -58,6 +59,7 @@ from evaluation.study import (
     Study,
     Task,
     add_city,
+    causes,
     condition_protocol,
     load_experiment,
     recorded_pairs,
@@ -186,6 +188,8 @@ def plan_study(study: Study, maps: Sequence[str] = ()) -> list[ShownCity]:
     """
     experiment = study.experiment
     study.choose(TASKS)
+    known = causes()
+    check_causes(known[one] for one in experiment.cases if one in known)
     if experiment.frozen is not None:
         with errors_at(f"{study.source}: frozen"):
             frozen_drives(experiment.frozen)

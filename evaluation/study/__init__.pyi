@@ -7,6 +7,7 @@ from .chosen_methods import method_settings as method_settings
 from .experiments.cause_files import Cause as Cause
 from .experiments.cause_files import causes as causes
 from .experiments.cause_files import register_cause as register_cause
+from .experiments.cause_files import source_of_cause as source_of_cause
 from .experiments.conditions import Condition as Condition
 from .experiments.conditions import baseline_values as baseline_values
 from .experiments.conditions import levels_by_case as levels_by_case
@@ -22,6 +23,7 @@ from .experiments.method_variants import method_variants as method_variants
 from .experiments.nested_fields import FLEET as FLEET
 from .experiments.nested_fields import SESSIONS as SESSIONS
 from .experiments.nested_fields import SIDES as SIDES
+from .experiments.nested_fields import Case as Case
 from .experiments.nested_fields import Changes as Changes
 from .experiments.protocol_fields import (
     condition_protocol as condition_protocol,

@@ -7,7 +7,8 @@ Plug-ins register more. An experiment takes its cases from causes with the field
     causes: {together: levels}  # the case `all`, of all causes
 
 `ladder` and `levels` are names in the section `strengths` of a cause. A cause
-without this name is left out.
+without this name is left out. `only: [NAME, ...]` beside `each` keeps the cases
+of these causes.
 """
 
 from collections.abc import Mapping
@@ -111,8 +112,11 @@ def register_cause(cause: Path | str | Mapping[str, Any]) -> Cause:
 
     _CAUSES.load_own()
     found = _read(cause)
+    known = {name for one in _CAUSES.own() for name in one.strengths}
     for name, case in found.strengths.items():
         where = f"cause {found.name!r}: strengths.{name}"
+        if name not in known and (meant := did_you_mean(name, known)):
+            raise InputError(f"{where}: no experiment has it{meant}")
         cases = {found.name: case, ALL: [found.name]}
         values = {"name": "check", "about": "", "cases": cases}
         with value_errors(where):
@@ -120,6 +124,11 @@ def register_cause(cause: Path | str | Mapping[str, Any]) -> Cause:
             _ = validated(Experiment, values, where).conditions
     _CAUSES.add(found.name, found, found)
     return found
+
+
+def source_of_cause(cause: Cause) -> str:
+    """Returns the plug-in, if any, and the name of a cause, for messages."""
+    return _CAUSES.described(cause.name)
 
 
 def _load_own() -> None:
@@ -152,10 +161,17 @@ def with_cases(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
 
     Raises:
         InputError: `causes` has another form, or names no strengths.
+
+    Returns:
+        The fields; `causes` has `only` alone, if it was given.
     """
     if "causes" not in values:
         return dict(values)
     asked = values["causes"]
+    kept = {}
+    if isinstance(asked, dict) and "each" in asked and "only" in asked:
+        asked = dict(asked)
+        kept = {"causes": {"only": asked.pop("only")}}
     if not (isinstance(asked, dict) and len(asked) == 1):
         raise InputError(
             f"{path}: causes: not {{each: ...}} or {{together: ..}}"
@@ -183,7 +199,7 @@ def with_cases(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
             cases[ALL] = merged(cases[ALL], chosen[key].strengths[name])
     own = values.get("cases", {})
     # The cases stand where the causes stood.
-    return {
+    return kept | {
         ("cases" if key == "causes" else key): (
             merged(cases, own) if key == "causes" else value
         )

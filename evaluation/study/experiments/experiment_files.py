@@ -27,9 +27,8 @@ from evaluation.results import (
     chart_factors,
     check_factors,
 )
-from evaluation.study.experiments.cause_files import (
-    with_cases,
-)
+from evaluation.study.experiments.cause_files import ALL, with_cases
+from evaluation.study.experiments.conditions import levels_by_case
 from evaluation.study.experiments.experiment import (
     Experiment,
     in_long_form,
@@ -144,6 +143,7 @@ def _checked(
     for one in overrides:
         values = _overridden(values, one)
     values = in_long_form(dict(values))
+    only = values.pop("causes", None)
     for field, names in chosen.items():
         if names:
             given = values.get(field)
@@ -151,8 +151,11 @@ def _checked(
             values[field] = {name: given.get(name, {}) for name in names}
     experiment = validated(Experiment, values, path)
     with value_errors(path):
+        if only is not None:
+            experiment = _with_causes(experiment, only)
         known = _Measured.of(experiment)
-    if values != written:
+    written = {name: one for name, one in written.items() if name != "causes"}
+    if values != written or only is not None:
         # What an option has left out is still known.
         with contextlib.suppress(InputError, ValueError):
             known = known.joined(
@@ -160,6 +163,40 @@ def _checked(
             )
     _check_charts(experiment, known, path)
     return experiment
+
+
+def _with_causes(experiment: Experiment, asked: Any) -> Experiment:
+    """Returns an experiment with some of its causes.
+
+    Args:
+        experiment: the experiment; its case `all` combines others.
+        asked: the field `causes`: the key `only` with one name or several.
+
+    Raises:
+        ValueError: `causes` has another form, or names no case.
+    """
+    names = None
+    if isinstance(asked, dict) and list(asked) == ["only"]:
+        names = asked["only"]
+    names = [names] if isinstance(names, str) else names
+    if not isinstance(names, list) or not names:
+        raise ValueError("causes: choose some by causes.only=[NAME, ...]")
+    known = [name for name in experiment.cases if name != ALL]
+    for name in names:
+        if name not in known:
+            raise ValueError(
+                f"causes.only: no case {name!r}; known: {', '.join(known)}"
+                f"{did_you_mean(name, known)}"
+            )
+    cases = {name: experiment.cases[name] for name in known if name in names}
+    combined = experiment.cases.get(ALL, ())
+    together = tuple(name for name in combined if name in names)
+    if len(together) > 1:
+        cases[ALL] = together
+    found = experiment.replaced(cases=cases)
+    most = max(levels_by_case(found).values())
+    levels = {min(level, most) for level in found.levels or ()}
+    return found.replaced(levels=tuple(sorted(levels))) if levels else found
 
 
 class _Measured(NamedTuple):

@@ -37,6 +37,13 @@ def test_a_cause_is_a_mapping_or_a_file():
         register_cause(42)
 
 
+def test_sets_of_levels_are_known():
+    cause = {"name": "c", "title": "", "about": ""}
+    fields = {"query": {"transient": {"snow": [0.1]}}}
+    with pytest.raises(InputError, match=r"laddr: .*; did you mean ladder\?"):
+        register_cause({**cause, "strengths": {"laddr": fields}})
+
+
 def test_poses_are_finite():
     lost = TownDrive("lost", [None], np.full((1, 4, 4), np.nan))
     with pytest.raises(InputError, match="lost: X_WS: values that are not"):

@@ -40,6 +40,7 @@ def test_members_come_in_order_and_once():
     assert not loaded
     assert dict(family) == {"added": 2, "own": 1}
     assert loaded == [1]
+    assert family.own() == [1]
     family.add("own", 3, "here")
     assert (family.get("own"), family.get("none"), len(family)) == (3, None, 2)
     with pytest.raises(ValueError, match="there is another sort 'own'"):

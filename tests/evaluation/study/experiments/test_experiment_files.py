@@ -92,6 +92,35 @@ def test_faults_of_causes(tmp_path, causes, fault):
         load_experiment(path)
 
 
+@pytest.mark.parametrize("quick", [False, True])
+def test_some_of_the_causes(tmp_path, quick):
+    """The level of `--quick` is the greatest that they have."""
+    only = "causes.only=[snow, hidden]"
+    found = load_experiment("ladder", [only], quick=quick)
+    assert found.cases["all"] == ("snow", "hidden")
+    assert list(found.cases) == ["snow", "hidden", "all"]
+    single = load_experiment("ladder", ["causes.only=turn"], quick=quick)
+    assert list(single.cases) == ["turn"]
+    assert {one.factors["level"] for one in single.conditions} == {0, 1}
+    path = tmp_path / "mine.yaml"
+    path.write_text("about: one\ncauses: {each: ladder, only: turn}\n")
+    assert load_experiment(path).cases == single.cases
+
+
+@pytest.mark.parametrize(
+    ("override", "fault"),
+    [
+        ("causes.only=[snwo]", "causes.only: no case 'snwo'.*mean snow"),
+        ("causes.only=[]", "causes: choose some by causes.only"),
+        ("causes.each=levels", "causes: choose some by causes.only"),
+        ("causes=3", "causes: choose some by causes.only"),
+    ],
+)
+def test_causes_that_cannot_be_chosen(override, fault):
+    with pytest.raises(InputError, match=f"ladder.yaml: {fault}"):
+        load_experiment("ladder", [override])
+
+
 def test_own_cases_beside_those_of_causes(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text(
