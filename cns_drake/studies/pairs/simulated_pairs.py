@@ -214,11 +214,11 @@ class SimulatedPairs:
         )
         self.upkeep[job.name] = job
         return [
-            NamedDrive(
-                f"{one.name}_{maintain}_{content}",
-                UpkeptSource(sources, number, maintain, part),
-                (job.name,),
-                one.length,
+            replace(
+                one,
+                name=f"{one.name}_{maintain}_{content}",
+                source=UpkeptSource(sources, number, maintain, part),
+                needs=(job.name,),
             )
             for number, one in enumerate(drives)
         ]
