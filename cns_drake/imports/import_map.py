@@ -1,6 +1,6 @@
 """Makes a map folder, with stages and drives, from the file of a city."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 import math
@@ -231,7 +231,7 @@ def _volumes(objects: Sequence[ImportedObject]) -> dict[str, float]:
 
     The keys are the names by which faults are counted.
     """
-    volumes: Counter[str] = Counter()
+    volumes: defaultdict[str, float] = defaultdict(float)
     for one in objects:
         if one.is_building:
             a, b, c = np.moveaxis(one.triangles, 1, 0)

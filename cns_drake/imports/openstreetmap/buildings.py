@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-import shapely.affinity
 from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.strtree import STRtree
@@ -137,9 +136,10 @@ def works_at_points(features: OsmFeatures) -> Iterator[OsmArea]:
         where = (name, features.faults)
         diameter = tag_value(tags, "diameter", length, _WIDEST_WORK, where)
         circle = Point(0.0, 0.0).buffer((diameter or work[1]) / 2, quad_segs=4)
-        degree = LocalMetres(*place).metres(np.ones(2))
-        circle = shapely.affinity.scale(circle, *(1.0 / degree), origin=(0, 0))
-        yield OsmArea(name, tags, [shapely.affinity.translate(circle, *place)])
+        ring = np.array(circle.exterior.coords)
+        metres = LocalMetres(*place).metres(np.ones(2))
+        around = Polygon(np.array(place) + ring / metres)
+        yield OsmArea(name, tags, [around])
 
 
 def make_buildings(

@@ -164,16 +164,21 @@ def test_roads_that_are_moved_have_the_same_town(tmp_path):
         np.testing.assert_allclose(moved[:, 2], places[:, 2], atol=0.5)
 
 
-@pytest.mark.parametrize(
-    ("scale", "said"),
-    [(1e-3, "too small.* by 1000"), (1, None)],
-)
-def test_the_likely_factor_is_named(tmp_path, scale, said):
-    path = write(tmp_path / "a.city.json", scale=scale)
-    options = ImportOptions(dressed=False)
-    report = import_city(path, tmp_path / "map", options)
-    text = "\n".join(one.kind for one in report.faults)
-    if said is None:
-        assert "too " not in text
+@pytest.mark.parametrize("scale", [1, 1e-3, 0.01, 100, 1 / 0.0254])
+def test_the_factor_that_is_named_cures_the_city(tmp_path, scale):
+    def advice(name, scale):
+        path = write(tmp_path / f"{name}.city.json", scale=scale)
+        options = ImportOptions(dressed=False)
+        report = import_city(path, tmp_path / name, options)
+        found = re.search(
+            r"too (small|large): .*; multiply coordinates by (.+)\?",
+            "\n".join(one.kind for one in report.faults),
+        )
+        return found and float(found[2])
+
+    factor = advice("as_given", scale)
+    if scale == 1:
+        assert factor is None
     else:
-        assert re.search(said, text)
+        assert factor == pytest.approx(1 / scale)
+        assert advice("cured", scale * factor) is None
