@@ -6,6 +6,7 @@ import io
 import itertools
 from pathlib import Path
 import re
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from cns_drake.base import (
 )
 
 _NS_PER_US = 1000
+_NANOSECONDS = re.compile(r"\d{15,}")
 # Largest table [bytes]: NCLT has some of 80 MB.
 _TABLE_LIMIT_BYTES = 1 << 29
 
@@ -85,6 +87,52 @@ def read_numbers(
         InputError: if there is no such table, it is empty, a row has another
             form, or a header contradicts the order of the columns.
     """
+    before, header, lines = _parts(path)
+    with value_errors(path):
+        if names:
+            places, width = _places(
+                header or before, lines[0], separator, names
+            )
+            if places != list(range(width)):
+                lines = _pick_columns(lines, places, width, separator)
+        return parse_rows(lines, np.dtype(columns), separator)
+
+
+class TableForm(NamedTuple):
+    """The form of a table of text.
+
+    Attributes:
+        separator: text between columns; None for white space.
+        width: number of columns.
+        is_named: whether a header names most of the columns.
+    """
+
+    separator: str | None
+    width: int
+    is_named: bool
+
+
+def form_of(path: Path) -> TableForm:
+    """Returns the form of a table of text, by its first rows.
+
+    Raises:
+        InputError: see `read_numbers`.
+    """
+    before, header, lines = _parts(path)
+    separator = next((one for one in ",;" if one in lines[0]), None)
+    width = len(lines[0].split(separator))
+    words = _split_header(header or before, separator)
+    return TableForm(separator, width, len(words) == width)
+
+
+def _parts(path: Path) -> tuple[str, str, list[str]]:
+    """Returns the remark above a table, its header, and its rows.
+
+    Remark and header are "" if there is none.
+
+    Raises:
+        InputError: there is no such file, or no row in it.
+    """
     try:
         text = decode_text(read_bytes(path, _TABLE_LIMIT_BYTES))
     except UnicodeDecodeError as error:
@@ -99,14 +147,7 @@ def read_numbers(
         raise InputError(f"{path}: no row of numbers")
     remarks = itertools.takewhile(lambda line: line is not lines[0], every)
     *_, before = ("", *remarks)
-    with value_errors(path):
-        if names:
-            places, width = _places(
-                header or before, lines[0], separator, names
-            )
-            if places != list(range(width)):
-                lines = _pick_columns(lines, places, width, separator)
-        return parse_rows(lines, np.dtype(columns), separator)
+    return before, header, lines
 
 
 def _places(
@@ -169,10 +210,17 @@ def parse_stamps_ns(texts: np.ndarray) -> np.ndarray:
 def parse_seconds(texts: np.ndarray) -> np.ndarray:
     """Returns times [ns], (N,) int64, of strings that hold seconds.
 
+    Whole numbers of 15 digits or more are nanoseconds, as in EuRoC's tables.
+
     Raises:
         ValueError: if a string is no number.
     """
-    return np.array([_seconds_to_ns(text) for text in map(str, texts)])
+    return np.array(
+        [
+            _to_ns(text, 1 if _NANOSECONDS.fullmatch(text) else NS_PER_S)
+            for text in map(str, texts)
+        ]
+    )
 
 
 def parse_microseconds(texts: np.ndarray) -> np.ndarray:
@@ -217,7 +265,7 @@ def check_finite(path: Path, values: np.ndarray) -> None:
 
 
 def _begins_with_number(line: str) -> bool:
-    words = line.replace(",", " ").split()
+    words = re.sub("[,;]", " ", line).split()
     return bool(words) and is_number(words[0])
 
 
@@ -261,7 +309,8 @@ def _pick_columns(
     """
     picked = []
     for row, line in enumerate(lines, start=1):
-        words = line.split(separator)
+        # The last word would keep the end of the line.
+        words = line.strip().split(separator)
         if len(words) != width:
             fault = f"{len(words)} columns instead of {width}"
             raise ValueError(

@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError, poses, value_errors
+from cns_drake.base import InputError, note, poses, value_errors
 from cns_drake.drives import StampedPoses
 from evaluation.drives.text_tables import (
     check_finite,
     check_increasing,
+    form_of,
     parse_microseconds,
     parse_seconds,
     read_numbers,
@@ -73,26 +74,36 @@ def read_trajectory(path: Path, stamps_ns: np.ndarray) -> StampedPoses:
     """Returns the poses of a file in the form of TUM or of KITTI.
 
     Args:
-        path: rows of seconds, x y z [m] and quaternion x y z w (TUM); or of
-            3 x 4 matrices, one for each scan (KITTI).
+        path: rows of a time [s, or whole ns], x y z [m] and quaternion x y z w
+            (TUM), or of columns that a header names, such as EuRoC's; or of 3 x
+            4 matrices, one for each scan (KITTI). Commas may separate columns.
+            Rows with NaN are left out, and noted.
         stamps_ns: (N,) stamps of the scans [ns].
 
     Raises:
         InputError: the file has neither form, or another number of matrices.
     """
-    numbers = read_numbers(path, float)
-    columns = numbers.shape[1]
-    if columns == len(_COLUMNS):
-        rows = read_numbers(path, [("stamp", "U40"), ("values", "f8", 7)])
+    separator, columns, is_named = form_of(path)
+    if is_named or columns == len(_COLUMNS):
+        rows = read_numbers(
+            path, [("stamp", "U40"), ("values", "f8", 7)], separator, _COLUMNS
+        )
+        known = rows[~np.isnan(rows["values"]).any(axis=1)]
+        if not len(known):
+            raise InputError(f"{path}: no row without NaN")
+        if len(known) < len(rows):
+            number = len(rows) - len(known)
+            note(f"{path}: {number} rows with NaN are left out")
         with value_errors(f"{path}: time"):
-            own_ns = parse_seconds(rows["stamp"])
-        check_finite(path, rows["values"])
-        return _turned_poses(path, own_ns, rows["values"])
+            own_ns = parse_seconds(known["stamp"])
+        check_finite(path, known["values"])
+        return _turned_poses(path, own_ns, known["values"])
     if columns != 12:
         raise InputError(
             f"{path}: rows of {columns} numbers; TUM has 8 (seconds x y z qx qy"
-            " qz qw), KITTI 12"
+            " qz qw), KITTI 12; name the columns in a first line"
         )
+    numbers = read_numbers(path, float, separator)
     X_WS = pose_matrices(path, numbers)
     if len(X_WS) != len(stamps_ns):
         raise InputError(

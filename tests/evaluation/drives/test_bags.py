@@ -245,9 +245,57 @@ def test_poses_from_a_file(tmp_path):
         assert file in drive.files
         seen = poses.transform(drive.X_WS[3], xyz(drive.scan(3)))
         np.testing.assert_allclose(seen, p_WP, atol=1e-4)
-    kitti.write_text("1 2 3\n")
-    with pytest.raises(InputError, match="rows of 3 numbers; TUM has 8"):
-        _ = open_drive(path, poses=kitti).X_WS
+
+
+@pytest.mark.parametrize(
+    ("header", "columns", "sign", "is_ns"),
+    [
+        ("#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [],"
+         " q_RS_x [], q_RS_y [], q_RS_z []", [0, 1, 2, 3, 7, 4, 5, 6], ", ",
+         True),
+        ("num,t,x,y,z,qx,qy,qz,qw", [8, 0, 1, 2, 3, 4, 5, 6, 7], ",", False),
+        ("time;qw;qx;qy;qz;x;y;z", [0, 7, 4, 5, 6, 1, 2, 3], ";", False),
+        ("", range(8), "  ", False),
+        ("", range(8), ",", False),
+    ],
+)  # fmt: skip
+def test_tables_of_poses_in_other_forms(
+    tmp_path, capsys, header, columns, sign, is_ns
+):
+    """EuRoC's and MCD's, with a row of NaN as SLAM programs write."""
+    path = write(tmp_path, [*clouds("/points", "os_lidar")])
+    lines = [header] if header else []
+    for k, stamp in enumerate(STAMPS):
+        found = pose(X_WB(stamp) @ X_BS)
+        words = [str(stamp) if is_ns else f"{stamp / 1e9:.9f}"]
+        words += map(str, [*found["position"], *found["orientation"], k])
+        lines.append(sign.join(words[column] for column in columns))
+    before = str(STAMPS[0] - 10**8) if is_ns else f"{STAMPS[0] / 1e9 - 0.1:.9f}"
+    lost = ["nan"] * 9
+    lost[0] = before
+    lines.insert(len(lines) - 12, sign.join(lost[c] for c in columns))
+    file = tmp_path / "poses.csv"
+    file.write_text("\n".join([*lines, ""]))
+    drive = open_drive(path, poses=file)
+    X_WS = np.array([X_WB(stamp) @ X_BS for stamp in STAMPS])
+    np.testing.assert_allclose(drive.X_WS, X_WS, atol=1e-5)
+    assert "1 rows with NaN are left out" in capsys.readouterr().err
+
+
+def test_a_table_of_poses_of_no_form_names_its_cure(tmp_path):
+    path = write(tmp_path, [*clouds("/points", "os_lidar")])
+    rows = []
+    for k, stamp in enumerate(STAMPS):
+        found = pose(X_WB(stamp) @ X_BS)
+        place = [*found["position"], *found["orientation"]]
+        rows.append(f"{k} {stamp / 1e9:.9f} {' '.join(map(str, place))}\n")
+    file = tmp_path / "poses.txt"
+    file.write_text("".join(rows))
+    said = "rows of 9 numbers; TUM has 8 .*; name the columns in a first line"
+    with pytest.raises(InputError, match=said):
+        _ = open_drive(path, poses=file).X_WS
+    file.write_text("number time x y z qx qy qz qw\n" + "".join(rows))
+    assert len(open_drive(path, poses=file).X_WS) == len(STAMPS)
 
 
 @pytest.mark.parametrize("seed", range(5))
