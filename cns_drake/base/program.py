@@ -263,7 +263,7 @@ def _failure_of(error: BaseException) -> tuple[str | None, int] | None:
     is_loop = str(error).startswith("Symlink loop")
     if isinstance(error, RuntimeError) and is_loop:
         return f"error: {error}", 2
-    if isinstance(error, SystemExit):
+    if isinstance(error, SystemExit) and not plugin_fault(error):
         # Drake's C++ raises SystemExit when one of its own checks fails.
         message = (
             f"error: {error.code}" if isinstance(error.code, str) else None

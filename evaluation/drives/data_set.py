@@ -6,8 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import InputError
+from cns_drake.base import InputError, value_errors
 from cns_drake.drives import Drive
+
+# Greatest error of a rotation by rounding.
+_ROUNDED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -63,14 +66,16 @@ def check_interface(drive: Drive) -> None:
     """Checks that a drive has values of the types and shapes of `Drive`.
 
     Raises:
-        InputError: a value is missing, or is of another type or shape.
+        InputError: a value is missing, or is of another type or shape; or a
+            pose is not rigid.
     """
     if not isinstance(drive, Drive):
         raise InputError(f"{drive!r} is no Drive")
     for name in ("name", "world_frame"):
         if not isinstance(getattr(drive, name, None), str):
             raise InputError(f"{name}: no text")
-    number = len(drive)
+    with value_errors("len"):
+        number = len(drive)
     for name, shape, kinds in (
         ("stamps_ns", (number,), "iu"),
         ("X_WS", (number, 4, 4), "f"),
@@ -83,10 +88,37 @@ def check_interface(drive: Drive) -> None:
         ):
             kind = "integers" if kinds == "iu" else "floating-point numbers"
             raise InputError(f"{name}: no array of {kind} of shape {shape}")
-        if not np.isfinite(value).all():
-            raise InputError(f"{name}: values that are not finite")
+    if bad := _pose_fault(drive.X_WS):
+        raise InputError(f"{drive.name}: X_WS: {bad}")
     if number:
         scan = drive.scan(0)
         names = getattr(getattr(scan, "dtype", None), "names", None) or ()
         if np.ndim(scan) != 1 or not {"x", "y", "z"} <= set(names):
             raise InputError("scan 0: no array of points with x, y and z")
+
+
+def _pose_fault(X_WS: np.ndarray) -> str:
+    """Returns the first pose (4, 4) of many that is not rigid; "" if all are.
+
+    Rotations may differ from orthogonal ones as much as in files of poses.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        R = X_WS[:, :3, :3]
+        lengths = np.linalg.norm(R, axis=1)
+        is_scaled = np.abs(lengths - 1.0).max(axis=1) > _ROUNDED
+        error = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2))
+        faults = {
+            "not finite": ~np.isfinite(X_WS).all(axis=(1, 2)),
+            "the last row is not 0, 0, 0, 1": np.any(
+                np.abs(X_WS[:, 3] - [0.0, 0.0, 0.0, 1.0]) > _ROUNDED, axis=1
+            ),
+            "the axes have other lengths than 1": is_scaled,
+            "the axes are not orthogonal": error > _ROUNDED,
+            "a mirror, not a rotation": np.linalg.det(R) < 0.0,
+        }
+    bad = np.any(list(faults.values()), axis=0)
+    if not bad.any():
+        return ""
+    index = int(bad.argmax())
+    fault = next(text for text, some in faults.items() if some[index])
+    return f"pose {index}: {fault}"

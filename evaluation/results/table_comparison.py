@@ -403,13 +403,28 @@ def compare_tables(
         compared = _compared_rankings(own, metric)
     else:
         shipped = shipped_table(selection)
-        if not paths and not shipped.rows:
-            raise InputError(
-                f"the shipped tables have no {metric} like that; give a table"
-            )
+        if not shipped.rows:
+            lacking = _what_shipped_lack(metric, task)
+            if not paths:
+                raise InputError(lacking)
+            notes.append(lacking)
         compared = _compared_values(own, shipped, metric, paths)
     notes += compared.notes
     return replace(compared, task=task, notes=notes)
+
+
+def _what_shipped_lack(metric: str, task: str) -> str:
+    """Returns what to do if no shipped value of a metric fits."""
+    if any(one.where(metric=metric).rows for one in shipped_tables()):
+        return (
+            f"the shipped tables have no {metric} of the task {task or 'place'}"
+            " with these options"
+        )
+    return (
+        f"the shipped tables have no values of {metric}; measure each method"
+        " (cns-eval pr DATABASE QUERY --method NAME --output DIR, or cns-drake"
+        " study), and give the tables"
+    )
 
 
 def rows_beside_shipped(results: Results, metric: str) -> tuple[list[Row], str]:
@@ -731,11 +746,12 @@ def _common_conditions(
         return with_shipped, _notes_on_left_out(own, others, with_shipped)
     if common:
         notes = _notes_on_left_out(own, own, common)
-        why = _why_nothing_is_common(own[0], shipped)
-        return common, [
-            *notes,
-            f"the shipped tables have none of these conditions ({why})",
-        ]
+        if shipped.rows:
+            why = _why_nothing_is_common(own[0], shipped)
+            notes.append(
+                f"the shipped tables have none of these conditions ({why})"
+            )
+        return common, notes
     names = ", ".join(map(str, paths))
     why = _why_nothing_is_common(own[0], own[1])
     raise InputError(f"{names}: no condition in common ({why})")
@@ -801,9 +817,6 @@ def _without_controls(
 
 def _why_nothing_is_common(table: MetricTable, other: MetricTable) -> str:
     """Returns as text why two tables have no condition in common."""
-    if not other.rows:
-        tasks = {str(row["task"]) for row in table.rows.values()}
-        return f"task: {', '.join(sorted(tasks))}: not in {other.name}"
     rows = [list(compared.rows.values()) for compared in (table, other)]
     factors = {
         name: None

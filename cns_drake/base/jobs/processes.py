@@ -308,6 +308,10 @@ def _run_job(job: bytes, reporter: Reporter) -> tuple[str, str]:
         if errors.shows_traceback():
             reporter.note(traceback.format_exc())
         return "fault", str(error)
+    except SystemExit as error:
+        if fault := plugin_fault(error):
+            return "fault", fault
+        raise
     except Exception as error:
         if isinstance(error, ImportError):
             lacking = system_libraries.missing_library(error)

@@ -3,7 +3,7 @@
 import dataclasses
 import re
 
-from helpers.towns import TownDrive
+from helpers.towns import TownDrive, route
 import numpy as np
 import pytest
 
@@ -14,6 +14,8 @@ from evaluation import (
     register_cause,
     register_data_set,
 )
+
+SCAN = np.zeros(3, [(axis, "<f4") for axis in "xyz"])
 
 
 @pytest.mark.parametrize(
@@ -44,7 +46,22 @@ def test_sets_of_levels_are_known():
         register_cause({**cause, "strengths": {"laddr": fields}})
 
 
-def test_poses_are_finite():
-    lost = TownDrive("lost", [None], np.full((1, 4, 4), np.nan))
-    with pytest.raises(InputError, match="lost: X_WS: values that are not"):
-        data_set_checks[0](lost)
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (np.diag([np.nan, 1, 1, 1]), "not finite"),
+        (np.diag([1.1, 1.1, 1.1, 1]), "the axes have other lengths than 1"),
+        (np.diag([1, -1, 1, 1]), "a mirror, not a rotation"),
+        (np.diag([1, 1, 1, 2]), "the last row is not 0, 0, 0, 1"),
+        (
+            [[1, 0.6, 0, 0], [0, 0.8, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+            "the axes are not orthogonal",
+        ),
+    ],
+)
+def test_poses_are_rigid(change, fault):
+    X_WS = route(3)
+    data_set_checks[0](TownDrive("good", [SCAN] * 3, X_WS))
+    X_WS[1] = X_WS[1] @ change
+    with pytest.raises(InputError, match=f"^bad: .*X_WS: pose 1: {fault}$"):
+        data_set_checks[0](TownDrive("bad", [SCAN] * 3, X_WS))

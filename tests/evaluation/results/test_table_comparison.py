@@ -116,8 +116,8 @@ def test_a_task_that_is_not_shipped_is_named(tmp_path):
     rows = [replace(row, task="plac") for row in shipped(metric="auc")]
     path = tmp_path / "misspelt.csv"
     Results.of(rows).write_csv(path)
-    end = "these conditions (task: plac: not in shipped)"
-    assert any(note.endswith(end) for note in compare_tables([path]).notes)
+    lacking = "shipped tables have no auc of the task plac with these options"
+    assert any(lacking in note for note in compare_tables([path]).notes)
 
 
 @pytest.mark.parametrize(
@@ -178,6 +178,16 @@ def test_what_lacks_conditions_is_left_out_and_named(tmp_path):
         " one, but fresh, stages in shipped)",
         "y: left out, with 1 of 2 conditions",
     ]
+
+
+def test_a_metric_that_no_shipped_table_has(tmp_path):
+    rows = [replace(row, metric="mine") for row in shipped(metric="auc")]
+    own = tmp_path / "own.csv"
+    Results.of(rows[:1]).write_csv(own)
+    lacking = "the shipped tables have no values of mine; measure each method"
+    assert lacking in compare_tables([own], "mine").notes[-1]
+    with pytest.raises(InputError, match=lacking):
+        compare_tables([], "mine")
 
 
 def test_differences_of_answers(tmp_path):

@@ -1,10 +1,11 @@
 """Families, and the plug-ins that add members to them."""
 
+import contextlib
 import sys
 
 import pytest
 
-from cns_drake.base import Family, families
+from cns_drake.base import Family, families, program
 from cns_drake.base.families import plugin_fault
 
 
@@ -47,19 +48,30 @@ def test_members_come_in_order_and_once():
         family.add("own", 4, "there")
 
 
-def test_broken_plugins_are_a_line_each(install, capfd):
+def test_broken_plugins_are_a_line_each(install, capfd, monkeypatch):
     """The others are there, in the order of their names."""
     install("broken", "print('hello')\n1 / 0")
     install("ended", "raise SystemExit(3)")
     install("nowhere", "", "no_such_module")
-    install("right_one", "def fail():\n    return {}['key']")
+    install("right_one", "def fail():\n    raise SystemExit(4)")
     assert list(Family("sort")) == []
-    with pytest.raises(KeyError) as raised:
+    with pytest.raises(SystemExit) as raised:
         sys.modules["right_one"].fail()
     fault = plugin_fault(raised.value)
     assert fault.startswith("plug-in right_one_plugin: ")
-    assert fault.endswith("right_one.py: line 2: KeyError: 'key'")
+    assert fault.endswith("right_one.py: line 2: SystemExit: 4")
+
     assert plugin_fault(ValueError()) is None
+
+    monkeypatch.setattr(sys, "argv", ["town"])
+    monkeypatch.setattr(program.interrupts, "ignore_interrupts", lambda: None)
+    monkeypatch.setattr(
+        program.interrupts, "interrupt_on_termination", lambda: lambda: False
+    )
+    app = program.plain_app()
+    app.command()(sys.modules["right_one"].fail)
+    with pytest.raises(SystemExit, match="2"):
+        program.run(app, "town", contextlib.nullcontext())
     out, err = capfd.readouterr()
     assert out == ""
     assert err.splitlines() == [
@@ -68,4 +80,5 @@ def test_broken_plugins_are_a_line_each(install, capfd):
         "plug-in ended_plugin (ended): SystemExit: 3",
         "plug-in nowhere_plugin (no_such_module): ModuleNotFoundError: No"
         " module named 'no_such_module'",
+        f"town: error: {fault}",
     ]
