@@ -110,9 +110,9 @@ def _draw_methods(
     both: tuple[object, object],
     verified: bool,
 ) -> None:
-    """Draws a row for each method: the means, and a tick for each pair.
+    """Draws a row for each method, and in it a line for each pair of drives.
 
-    The share at the right is that of the means, as in the page's table.
+    The share at the right is the mean of what the pairs keep, as everywhere.
     """
     side = axes.get_yaxis_transform()
     for y, (name, (colour, _, marker)) in enumerate(chart.styles.items()):
@@ -122,20 +122,23 @@ def _draw_methods(
         is_whole = ~np.isnan(of_pairs).any(axis=1)
         if is_whole.any():
             of_pairs = of_pairs[is_whole]
-        # Above the row: before; below: after.
-        for value, at, shift in zip(both, of_pairs.T, (-0.3, 0.3), strict=True):
-            mark, shown = "|", at.tolist()
-            if len(of_pairs) == 1:
-                mark, shown = "-", _interval(chart, name, verified, value)
-            rows = np.full(len(shown), y + shift)
-            axes.plot(shown, rows, mark, color=colour, ms=7, alpha=0.8, lw=1.2)
-        before, after = of_pairs.mean(axis=0)
-        axes.plot([before, after], [y, y], color=colour, lw=3.5, alpha=0.5)
-        axes.plot(before, y, marker, color=colour, mfc="white", ms=8)
-        axes.plot(after, y, marker, color=colour, ms=8)
-        share = float(kept_share(after, before))
-        if not math.isnan(share):
-            text = _PERCENT.format(100.0 * share)
+        number = len(of_pairs)
+        shifts = np.linspace(-0.3, 0.3, number) if number > 1 else [0.0]
+        size = 8 if number == 1 else max(3, 7 - number // 3)
+        if number == 1:  # Above the line: before; below: after.
+            for value, shift in zip(both, (-0.3, 0.3), strict=True):
+                limits = _interval(chart, name, verified, value)
+                rows = np.full(len(limits), y + shift)
+                axes.plot(limits, rows, color=colour, alpha=0.8, lw=1.2)
+        for at, shift in zip(of_pairs, shifts, strict=True):
+            axes.plot(at, [y + shift] * 2, color=colour, lw=size / 2, alpha=0.5)
+            for end, fill in zip(at, ("white", colour), strict=True):
+                axes.plot(
+                    end, y + shift, marker, color=colour, mfc=fill, ms=size
+                )
+        shares = kept_share(of_pairs[:, 1], of_pairs[:, 0])
+        if not np.isnan(shares).all():
+            text = _PERCENT.format(100.0 * np.nanmean(shares))
             axes.text(
                 1.02, y, text, transform=side, va="center", fontweight="bold"
             )
@@ -166,9 +169,10 @@ def _axis_text(chart: Chart, before: object, after: object, number: int) -> str:
     text = f"{in_words(chart.metric)} {first} (hollow) and {last} (filled)"
     if number > 1:
         text += (
-            f": means of {number} pairs; ticks are pairs, before above and"
-            " after below the line"
+            f", a line for each of {number} pairs of drives; right: the mean of"
+            " the shares that are left"
         )
+        return text
     elif any(
         _interval(chart, name, verified, after)
         for name in chart.styles

@@ -285,16 +285,16 @@ def test_a_dumbbell_joins_both_ends():
     chart = {"kind": "dumbbell", "over": "both.stage", "metric": "auc"}
     drawn = draw_chart(chart, Results.of(rows))
     (axes,) = drawn.figure.axes
-    bars = [line for line in axes.get_lines() if line.get_linewidth() > 3.0]
+    bars = [line for line in axes.get_lines() if len(line.get_xdata()) == 2]
     found = [list(bar.get_xdata()) for bar in bars]
-    assert found == [[0.5, 0.1], [0.8, 0.6]]
+    assert found == 2 * [[0.5, 0.1]] + 2 * [[0.8, 0.6]]
     labels = [label.get_text() for label in axes.get_yticklabels()]
     assert labels == ["SOLiD", "RING++"]
     assert [shown(text.get_text()) for text in axes.texts] == ["20 %", "75 %"]
     assert drawn.title == "AUC by stage"
     assert " ".join(drawn.figure.get_supxlabel().split()).startswith(
-        "AUC without the change (hollow) and with the change (filled):"
-        " means of 2 pairs"
+        "AUC without the change (hollow) and with the change (filled),"
+        " a line for each of 2 pairs of drives"
     )
 
 
@@ -337,27 +337,31 @@ def test_a_dumbbell_over_a_setting_has_a_row_for_each_value():
     assert sorted(v for v in drawn_at if not math.isnan(v)) == [0.5, 0.75]
 
 
-def test_marks_label_and_table_are_of_the_same_means():
-    """Not of medians, and no mean of the shares of pairs."""
+def test_label_of_a_dumbbell_is_the_mean_of_what_its_pairs_keep():
+    """Neither of medians, nor the ratio of means; as in any table of shares."""
     both = {
         "ring++": ((0.9, 0.9), (0.1, 0.09), (0.1, 0.09)),
         "solid": ((0.9, 0.1), (0.1, 0.1), (0.1, 0.1)),
     }
     rows = [
-        row(value, {"both.stage": stage}, name, town=town)
+        replace(row(value, {"both.stage": stage}, name, town=town), metric=m)
         for name, pairs in both.items()
         for town, ends in zip("xyz", pairs, strict=True)
         for stage, value in zip(("last", "own"), ends, strict=True)
+        for m, value in (("auc", value), ("relative_auc", value / ends[0]))
     ]
     chart = {"kind": "dumbbell", "over": "both.stage", "metric": "auc"}
     (axes,) = draw_chart(chart, Results.of(rows)).figure.axes
-    bars = [line for line in axes.get_lines() if line.get_linewidth() > 3.0]
-    ends = [[f"{end:.2f}" for end in bar.get_xdata()] for bar in bars]
-    assert ends == [["0.37", "0.10"], ["0.37", "0.36"]]
+    bars = [line for line in axes.get_lines() if len(line.get_xdata()) == 2]
+    ends = [tuple(bar.get_xdata()) for bar in bars]
+    assert ends == [*both["solid"], *both["ring++"]]
     labels = [shown(text.get_text()) for text in axes.texts]
-    assert labels == ["27 %", "98 %"]
-    table = [line.split() for line in summary_lines(Results.of(rows))]
-    assert table[2:4] == [["SOLiD", *ends[0]], ["RING++", *ends[1]]]
+    assert labels == ["70 %", "93 %"]
+    shares = Results.of(rows).where(
+        {"both.stage": "own"}, metric="relative_auc"
+    )
+    table = [line.split() for line in summary_lines(shares)]
+    assert table[2:4] == [["SOLiD", "0.70"], ["RING++", "0.93"]]
 
 
 @pytest.mark.parametrize("number", [5, 8])
