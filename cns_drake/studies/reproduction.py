@@ -33,11 +33,13 @@ from cns_drake.studies.recording import (
     usual_frames,
 )
 from evaluation.recognition import RetrievalProtocol
+from evaluation.results import PrintStyle
 from evaluation.study import (
     MakePart,
     Part,
     RecordingInfo,
     choose_methods,
+    scenario_digest,
     study_recordings,
 )
 
@@ -60,6 +62,7 @@ def reproduce_maps(
     methods: Sequence[str] = (),
     settings: Sequence[str] = (),
     with_costs: bool = False,
+    printed: PrintStyle | None = None,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
     """Records the drives of maps, and measures the experiment `stages` on them.
@@ -86,6 +89,7 @@ def reproduce_maps(
             methods.
         settings: settings of methods, each `METHOD.NAME=VALUE`.
         with_costs: whether times are measured.
+        printed: style of the charts for print; None for the default.
         on_note: is called with each note for the user, such as on how long the
             jobs take on this machine, and how much space they need.
 
@@ -118,6 +122,7 @@ def reproduce_maps(
         protocols,
         source=", ".join(folder.name for folder in folders),
         with_costs=with_costs,
+        printed=printed,
         further_jobs=[*jobs, *pictures],
         space=_expected_space(
             usual_frames(every),
@@ -192,12 +197,14 @@ def recording_info(
             name of the scenario will make it.
     """
     assert scenario.stage is not None  # It has a map.
+    fields = describe_scenario(scenario)
     return RecordingInfo(
         name=scenario.name,
         path=output.absolute() / scenario.name,
         map_name=scenario.folder.name,
         stage=scenario.stage,
-        way=driven_way(describe_scenario(scenario)),
+        way=driven_way(fields),
+        scenario=scenario_digest(fields),
         needs=(scenario.name,) if is_waiting else (),
     )
 

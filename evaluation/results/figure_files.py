@@ -16,6 +16,8 @@ from cns_drake.base import save_figure as write_figure
 
 # The formats of pictures, the one for the page last.
 PIXELS = ("png", "webp")
+# The formats of charts for print.
+PRINTED = ("pdf", "png", "svg")
 # Resolution of pictures for print [dots per inch].
 _DPI = 200
 # Resolution of pictures for the page [dots per inch].

@@ -36,7 +36,9 @@ _GROUPS = {
         re.compile(rb"\A[^\n]*\bmethod,[^\n]*\bmetric,value\b"),
     ),
     "page": _Group(
-        re.compile(r"index\.html|summaries\.csv|(chart_\d+|beside)\.(pdf|png)"),
+        re.compile(
+            r"index\.html|summaries\.csv|(chart_\d+|beside)\.(pdf|png|svg)"
+        ),
         "index.html",
         re.compile(rb"Made by cns-drake "),
     ),

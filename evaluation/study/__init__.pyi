@@ -54,6 +54,9 @@ from .recordings.map_drives import (
 from .recordings.map_drives import (
     drives_by_map as drives_by_map,
 )
+from .recordings.map_drives import (
+    scenario_digest as scenario_digest,
+)
 from .recordings.recorded_pairs import (
     recorded_pairs as recorded_pairs,
 )

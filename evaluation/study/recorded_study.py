@@ -60,6 +60,7 @@ from evaluation.study.recordings.map_drives import (
     RecordingInfo,
     drives_by_map,
     nothing_to_compare,
+    unlike_shipped,
 )
 from evaluation.study.recordings.recorded_pairs import recorded_pairs
 from evaluation.study.sources import DriveSource
@@ -176,6 +177,10 @@ def study_recordings(
         [path for city in shown for one in city.changes for path in one.files]
     )
     _note_missed_routes(results, on_note)
+    own = [one.name for one in methods if one.file is not None]
+    if own and (changed := unlike_shipped(recordings)):
+        alone.append(f"Shipped results are not shown: {changed}.")
+        own = []
     page = study.write_page(
         results,
         queries,
@@ -189,6 +194,7 @@ def study_recordings(
             *([_costs_section(output)] if with_costs else []),
         ],
         about=_ALONE if lacks_baseline(results) else None,
+        own_methods=own,
         printed=printed,
     )
     return output / page.name

@@ -33,6 +33,9 @@ def reproduce(
     method: shared_options.Methods = None,
     parameter: shared_options.MethodSettings = None,
     costs: shared_options.Costs = True,
+    width: shared_options.Width = None,
+    font: shared_options.Font = None,
+    title: shared_options.Title = True,
     protocols: dict[str, RetrievalProtocol],
 ) -> None:
     """Simulate the drives of maps, and measure what they changed.
@@ -56,7 +59,9 @@ def reproduce(
         from cns_drake.base import choose_cluster
         from cns_drake.studies import reproduce_maps
         from evaluation.command_line import show_results
+        from evaluation.results import PrintStyle
 
+    printed = PrintStyle.checked(width, font, title)
     cluster = choose_cluster(jobs, scheduler)
     if pages and not recordings:
         raise InputError(
@@ -73,6 +78,7 @@ def reproduce(
             methods=method or (),
             settings=parameter or (),
             with_costs=costs,
+            printed=printed,
             on_note=note,
         )
     show_results(report)

@@ -21,7 +21,7 @@ from evaluation.results.charts.lines import draw_lines
 from evaluation.results.charts.matrix import draw_matrix
 from evaluation.results.charts.scatter import draw_scatter
 from evaluation.results.charts.words import in_words
-from evaluation.results.figure_files import figure_svg, save_figure
+from evaluation.results.figure_files import PRINTED, figure_svg, save_figure
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import RESERVED, SETTINGS
 from evaluation.results.method_names import in_table_order, title
@@ -57,7 +57,7 @@ class DrawnChart:
     legend: Mapping[str, MethodStyle]
     settings: Mapping[str, Any]
 
-    def save(self, stem: Path, kinds: Sequence[str] = ("pdf", "png")) -> None:
+    def save(self, stem: Path, kinds: Sequence[str] = PRINTED) -> None:
         """Writes the drawing, see `save_figure`."""
         save_figure(self.figure, stem, kinds, self.settings)
 

@@ -19,7 +19,7 @@ from evaluation.results.charts.chart import (
     rows_of_methods,
     start_at_zero,
 )
-from evaluation.results.figure_files import figure_svg, save_figure
+from evaluation.results.figure_files import PRINTED, figure_svg, save_figure
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import LAST, STAGE
 from evaluation.results.method_names import in_table_order, title
@@ -46,7 +46,7 @@ def beside_section(
 ) -> tuple[list[PageSection], str]:
     """Returns the user's methods beside the shipped ones, and writes a figure.
 
-    The figure, `beside.pdf` and `beside.png`, is as wide as a column of paper,
+    The figure, `beside.pdf` and others, is as wide as a column of paper,
     unless its style has another width.
 
     Args:
@@ -89,7 +89,7 @@ def beside_section(
     save_figure(
         _draw(*shown, column.layout_width, column),
         folder / "beside",
-        ("pdf", "png"),
+        PRINTED,
         column.settings,
     )
     number = len(of_method[ranked[0].method])

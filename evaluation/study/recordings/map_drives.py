@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+import csv
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 
-from cns_drake.base import InputError, natural_key
+from cns_drake.base import InputError, fingerprint, natural_key, read_text
 from cns_drake.drives import Drive, LidarField
 from evaluation.alignment import in_one_world
 from evaluation.study.sources import DriveSource, Placement, RecordingSource
@@ -17,6 +18,31 @@ _GUESSED = (
     " Map and stage were guessed from the drive's name; a scenario.yaml in its"
     " folder states them."
 )
+
+
+# Drive -> digest of its scenario, of all shipped drives.
+_SHIPPED = Path(__file__).with_name("shipped_drives.csv")
+
+
+def scenario_digest(scenario: Mapping) -> str:
+    """Returns a digest of what a scenario's fields say of a drive.
+
+    Titles do not count, and neither does the number of frames: the answers of
+    another one have another number of queries.
+    """
+    return fingerprint(
+        {k: v for k, v in scenario.items() if k not in ("title", "frames")}
+    )
+
+
+def unlike_shipped(recordings: Iterable[RecordingInfo]) -> str:
+    """Returns which recording is not the shipped drive of its name, or ""."""
+    rows = csv.DictReader(read_text(_SHIPPED, 100_000).splitlines())
+    known = {row["drive"]: row["scenario"] for row in rows}
+    for one in recordings:
+        if known.get(one.name, one.scenario) != one.scenario:
+            return f"{one.name} has other settings than the shipped drive"
+    return ""
 
 
 @dataclass(frozen=True)
@@ -37,6 +63,8 @@ class RecordingInfo:
         lidar_field: number of rings and field of view of the LiDAR; None if
             unknown.
         is_guessed: whether map and stage come from the name of the drive.
+        scenario: digest of the drive's scenario, see `scenario_digest`; empty
+            if unknown.
         length, num_scans: see `NamedDrive`.
         world_frame: name of the world frame of its poses; None if the recording
             does not exist yet.
@@ -51,6 +79,7 @@ class RecordingInfo:
     made_by: DriveSource | None = None
     lidar_field: LidarField | None = None
     is_guessed: bool = False
+    scenario: str = ""
     length: float = USUAL_LENGTH
     num_scans: float = math.inf
     world_frame: str | None = None

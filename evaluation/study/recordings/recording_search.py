@@ -10,7 +10,10 @@ import re
 from cns_drake.base import InputError, listed, natural_key, one_line
 from cns_drake.drives import SCENARIO, driven_way
 from evaluation.drives import find_data_sets, open_drive, travelled
-from evaluation.study.recordings.map_drives import RecordingInfo
+from evaluation.study.recordings.map_drives import (
+    RecordingInfo,
+    scenario_digest,
+)
 from evaluation.study.sources import RecordingSource
 
 # Names of drives that state map and stage. The first form ends in a date, as in
@@ -193,6 +196,7 @@ def _recording_info(
         made_by=source,
         lidar_field=drive.lidar_field,
         is_guessed=is_guessed,
+        scenario=scenario_digest(scenario),
         length=float(travelled(drive.X_WS[:, :3, 3])[-1]),
         num_scans=len(drive),
         world_frame=drive.world_frame,

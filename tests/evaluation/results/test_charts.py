@@ -736,7 +736,8 @@ def test_a_page_stands_alone(tmp_path):
     assert len(lines) == 3 * 3 * 2
     assert ["2", "solid", "30", "0.22"] in lines
     names = sorted(one.name for one in path.parent.iterdir())
-    assert names == ["chart_1.pdf", "chart_1.png", "index.html"]
+    charts = [f"chart_1.{kind}" for kind in ("pdf", "png", "svg")]
+    assert names == [*charts, "index.html"]
 
 
 @pytest.mark.parametrize(

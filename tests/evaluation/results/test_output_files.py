@@ -18,7 +18,7 @@ OWN = {
     "A.npy": "a",
     "B.npy": "a",
 }
-OTHERS = ["notes.txt", "chart_1.svg", "my_chart_1.png", "C.npy", "track.pdf"]
+OTHERS = ["notes.txt", "chart_1.eps", "my_chart_1.png", "C.npy", "track.pdf"]
 GROUPS = ["page", "localise", "map-update"]
 
 

@@ -265,7 +265,11 @@ def test_tables_and_pictures_are_all_that_is_written(report):
         "index.html",
         "results.csv",
         "queries.csv",
-        *(f"chart_{k}.{kind}" for k in (1, 3) for kind in ("pdf", "png")),
+        *(
+            f"chart_{k}.{kind}"
+            for k in (1, 3)
+            for kind in ("pdf", "png", "svg")
+        ),
     }
     assert {path.name for path in (report / "figures").iterdir()} == {
         f"change_metropolis_01_04.{kind}" for kind in ("png", "webp")
