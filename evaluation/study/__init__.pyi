@@ -10,7 +10,13 @@ from .experiments.cause_files import register_cause as register_cause
 from .experiments.cause_files import source_of_cause as source_of_cause
 from .experiments.conditions import Condition as Condition
 from .experiments.conditions import baseline_values as baseline_values
+from .experiments.conditions import (
+    condition_protocol as condition_protocol,
+)
 from .experiments.conditions import levels_by_case as levels_by_case
+from .experiments.conditions import (
+    protocol_from_fields as protocol_from_fields,
+)
 from .experiments.experiment import Experiment as Experiment
 from .experiments.experiment import MadeMap as MadeMap
 from .experiments.experiment import named_programs as named_programs
@@ -19,19 +25,13 @@ from .experiments.experiment_files import load_experiment as load_experiment
 from .experiments.experiment_files import (
     shipped_experiments as shipped_experiments,
 )
+from .experiments.factors import FLEET as FLEET
+from .experiments.factors import SESSIONS as SESSIONS
+from .experiments.factors import SIDES as SIDES
+from .experiments.factors import Case as Case
+from .experiments.factors import Changes as Changes
 from .experiments.method_variants import method_variants as method_variants
-from .experiments.nested_fields import FLEET as FLEET
-from .experiments.nested_fields import SESSIONS as SESSIONS
-from .experiments.nested_fields import SIDES as SIDES
-from .experiments.nested_fields import Case as Case
-from .experiments.nested_fields import Changes as Changes
-from .experiments.protocol_fields import (
-    condition_protocol as condition_protocol,
-)
-from .experiments.protocol_fields import (
-    protocol_from_fields as protocol_from_fields,
-)
-from .feature_extraction import (
+from .features import (
     extract_features as extract_features,
 )
 from .parts import LongList as LongList

@@ -31,8 +31,7 @@ from evaluation.recognition import (
     query_ms,
 )
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.feature_extraction import describe_recording
-from evaluation.study.features import KeptScans
+from evaluation.study.features import KeptScans, describe_recording
 from evaluation.study.parts import LongList, Part
 
 # A function that opens a drive, such as a `DriveSource`; or the parts of its

@@ -24,8 +24,7 @@ from evaluation.results import (
     nearest_images,
 )
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.feature_extraction import FeatureExtraction, Further
-from evaluation.study.features import described_key
+from evaluation.study.features import FeatureExtraction, Further, described_key
 from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import DescribedSource
 from evaluation.study.recordings.map_drives import MapDrives

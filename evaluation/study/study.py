@@ -43,12 +43,12 @@ from evaluation.study.chosen_methods import (
 from evaluation.study.experiments.conditions import (
     Condition,
     baseline_values,
+    condition_protocol,
     levels_by_case,
 )
 from evaluation.study.experiments.experiment import Experiment
+from evaluation.study.experiments.factors import FLEET, SESSIONS
 from evaluation.study.experiments.method_variants import method_variants
-from evaluation.study.experiments.nested_fields import FLEET, SESSIONS
-from evaluation.study.experiments.protocol_fields import condition_protocol
 from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.jobs import Jobs

@@ -27,7 +27,7 @@ from cns_drake.base import (
     validated,
     value_errors,
 )
-from evaluation.study.experiments.nested_fields import (
+from evaluation.study.experiments.factors import (
     SIDES,
     Case,
 )

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import itertools
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_type_hints
 
-from cns_drake.base import merged, nested
+from pydantic import ConfigDict, create_model
+
+from cns_drake.base import InputError, merged, nested, validated
+from evaluation.recognition import (
+    PROTOCOLS,
+    ProtocolFieldError,
+    RetrievalProtocol,
+)
 from evaluation.results import (
     CAUSE,
     FROZEN_REDRAW,
@@ -17,22 +24,18 @@ from evaluation.results import (
     SETTINGS,
 )
 from evaluation.study.experiments.factors import (
-    FactorValues,
-    leaves,
-    split_values,
-    table_value,
-)
-from evaluation.study.experiments.nested_fields import (
     SIDES,
     Case,
     Changes,
+    FactorValues,
+    leaves,
     set_field,
+    split_values,
+    table_value,
 )
 
 if TYPE_CHECKING:
-    from evaluation.study.experiments.experiment import (
-        Experiment,
-    )
+    from evaluation.study.experiments.experiment import Experiment
 
 # Places in the file of an experiment where a list of values is a factor.
 _FACTORED = (*SIDES, "protocol")
@@ -348,3 +351,56 @@ def _at_level(case: Case, level: int) -> Case:
             value = value[min(level, len(value)) - 1]
         set_field(fields, path, value)
     return fields
+
+
+# The fields of a protocol that a study can vary. Both settings of geometric
+# verification are measured in any case; matches are by distance, and drives
+# differ.
+_ProtocolFields = create_model(  # type: ignore[call-overload]  # Fields are computed.
+    "_ProtocolFields",
+    __config__=ConfigDict(extra="forbid", strict=True, allow_inf_nan=False),
+    **{
+        name: (kind, None)
+        for name, kind in get_type_hints(
+            RetrievalProtocol, localns={"PlaceScan": Literal["middle", "first"]}
+        ).items()
+        if name not in ("verified", "overlap", "exclude_recent")
+    },
+)
+
+
+def protocol_from_fields(
+    fields: Changes, source: object, place: str = "protocol"
+) -> RetrievalProtocol:
+    """Returns the protocol that some fields of an experiment describe.
+
+    Args:
+        fields: field -> value. The field `base` names a protocol; by default
+            `random-yaw`. Fields that are not given have the values of this
+            protocol.
+        source: file of the experiment, for error messages.
+        place: name of the section with these fields, for error messages.
+
+    Raises:
+        InputError: a field is unknown or out of range.
+    """
+    values = dict(fields)
+    base = values.pop("base", "random-yaw")
+    if not isinstance(base, str) or base not in PROTOCOLS:
+        raise InputError(
+            f"{source}: {place}.base: {base!r} is none of"
+            f" {', '.join(PROTOCOLS)}"
+        )
+    validated(_ProtocolFields, values, f"{source}: {place}")
+    try:
+        return replace(PROTOCOLS[base], **values)
+    except ProtocolFieldError as error:
+        where = f"{source}: {place}.{error.field}"
+        raise InputError(f"{where}: {error.fault}") from None
+
+
+def condition_protocol(
+    condition: Condition, source: object
+) -> RetrievalProtocol:
+    """Returns the protocol of a condition, as by `protocol_from_fields`."""
+    return protocol_from_fields(condition.changes.get("protocol", {}), source)

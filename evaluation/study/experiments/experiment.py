@@ -28,18 +28,14 @@ from evaluation.study.experiments.conditions import (
     conditions,
 )
 from evaluation.study.experiments.factors import (
+    SIDES,
+    Case,
     check_once,
+    expand_spread,
 )
 from evaluation.study.experiments.method_variants import (
     MethodVariant,
     method_variants,
-)
-from evaluation.study.experiments.nested_fields import (
-    SIDES,
-    Case,
-)
-from evaluation.study.experiments.spread_values import (
-    expand_spread,
 )
 
 if TYPE_CHECKING:

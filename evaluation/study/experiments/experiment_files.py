@@ -34,7 +34,7 @@ from evaluation.study.experiments.experiment import (
     in_long_form,
     named_programs,
 )
-from evaluation.study.experiments.nested_fields import (
+from evaluation.study.experiments.factors import (
     Changes,
 )
 from evaluation.study.tasks.place import (

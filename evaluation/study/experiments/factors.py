@@ -1,18 +1,86 @@
-"""Factors: the fields of an experiment that have a list of values."""
+"""Fields of experiments: paths, factors with lists of values, and sides."""
 
 from collections.abc import Iterable, Iterator, Mapping
 import json
+import math
 from typing import Any
 
-from cns_drake.base import repeated
-from evaluation.study.experiments.nested_fields import (
-    SESSIONS,
-    Changes,
-)
-from evaluation.study.experiments.spread_values import (
-    expand_spread,
-    is_spread,
-)
+from cns_drake.base import merged, repeated
+
+# Name of a field -> its value, which can be a mapping of further fields.
+Changes = Mapping[str, Any]
+# Sections of an experiment with fields of both drives, or of one of them.
+SIDES = ("both", "database", "query")
+# Field of the database with its drives, each with fields of its own.
+SESSIONS = "sessions"
+# Field of the database with drives that are sampled at random.
+FLEET = "fleet"
+# The section of each drive -> the fields that a case sets there.
+Case = dict[str, dict[str, Any]]
+
+
+def set_field(fields: dict[str, Any], path: str, value: Any) -> None:
+    """Sets the field at a path, in place: like `merged`, without a copy."""
+    *above, name = path.split(".")
+    for part in above:
+        inner = fields.get(part)
+        if not isinstance(inner, dict):
+            inner = fields[part] = {}
+        fields = inner
+    fields[name] = merged(fields.get(name), value)
+
+
+_SPREAD = {"from", "to", "count"}
+_MOST_SPREAD = 10_000
+
+
+def is_spread(value: object) -> bool:
+    """Returns whether a value is {from, to, count}, a short form of a list."""
+    return isinstance(value, Mapping) and set(value) == _SPREAD
+
+
+def expand_spread(value: Any, *, whole: bool = False) -> Any:
+    """Turns {from, to, count} into a list of evenly spaced numbers.
+
+    Other values are returned unchanged. The numbers are rounded to four decimal
+    places. The numbers have the type int if all numbers are whole and both ends
+    are written as whole numbers.
+
+    Args:
+        value: any value of a field.
+        whole: whether the numbers must be whole.
+
+    Raises:
+        ValueError: an end is no finite number, there are fewer than 2 or more
+            than 10,000 numbers, or a number is not whole although `whole` is
+            true.
+    """
+    if not is_spread(value):
+        if whole and isinstance(value, Mapping) and _SPREAD & set(value):
+            raise ValueError("a list needs from, to and count, nothing else")
+        return value
+    first, last, count = (value[name] for name in ("from", "to", "count"))
+    are_numbers = all(
+        isinstance(one, int | float)
+        and not isinstance(one, bool)
+        and math.isfinite(one)
+        for one in (first, last)
+    )
+    if not (are_numbers and type(count) is int and 2 <= count <= _MOST_SPREAD):
+        raise ValueError(
+            f"from and to are numbers, count from 2 to {_MOST_SPREAD}"
+        )
+    if isinstance(first, int) and isinstance(last, int):
+        step, rest = divmod(last - first, count - 1)
+        if not rest:
+            return [first + k * step for k in range(count)]
+    if whole:
+        raise ValueError(
+            f"{count} numbers from {first} to {last} are not all whole"
+        )
+    width = (last - first) / (count - 1)
+    return [round(first + k * width, 4) for k in range(count)]
+
 
 # Fields with a list as a single value -> types of what the list contains.
 _LISTS: Mapping[str, tuple[type, ...]] = {

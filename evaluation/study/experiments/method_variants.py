@@ -6,11 +6,9 @@ import math
 from typing import Any, NamedTuple
 
 from evaluation.study.experiments.factors import (
+    Changes,
     split_values,
     table_value,
-)
-from evaluation.study.experiments.nested_fields import (
-    Changes,
 )
 
 # A study of more variants would not end.

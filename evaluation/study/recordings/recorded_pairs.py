@@ -17,7 +17,7 @@ from evaluation.recognition import (
 )
 from evaluation.results import CAUSE, LAST, OWN, STAGE
 from evaluation.study.experiments.conditions import Condition
-from evaluation.study.experiments.nested_fields import SESSIONS, SIDES
+from evaluation.study.experiments.factors import SESSIONS, SIDES
 from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
 from evaluation.study.tasks.pair import Pair
 

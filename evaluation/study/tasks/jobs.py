@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from cns_drake.base import Job, fingerprint
 from evaluation.recognition import RetrievalProtocol, Role
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.feature_extraction import FeatureExtraction, map_source
+from evaluation.study.features import FeatureExtraction, map_source
 from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import DescribedSource
 from evaluation.study.study_files import StudyFiles

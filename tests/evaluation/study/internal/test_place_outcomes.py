@@ -17,7 +17,7 @@ from evaluation.study import (
     parts,
     place_measurements,
 )
-from evaluation.study.feature_extraction import FeatureExtraction
+from evaluation.study.features import FeatureExtraction
 from evaluation.study.place_measurements import (
     PlaceComparison,
     ScansOf,

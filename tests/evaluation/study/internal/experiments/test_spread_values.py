@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evaluation.study.experiments.spread_values import (
+from evaluation.study.experiments.factors import (
     expand_spread,
 )
 
