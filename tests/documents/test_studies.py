@@ -30,7 +30,7 @@ def first_codes(title):
 
 
 def test_shipped_experiments_are_listed_with_their_questions():
-    rows = documents.table(PAGE, "## Shipped experiments")
+    rows = documents.table(PAGE, "| experiment | question | findings |")
     said = {codes(row[0])[0]: row[1] for row in rows}
     assert said == {n: load_experiment(n).about for n in shipped_experiments()}
 
