@@ -42,6 +42,13 @@ _REAL_SHARE = 0.05
 # Work that is older than this share of all work hardly counts in the pace of
 # jobs, which follows the load of the machine.
 _MEMORY = 0.25
+# The pace of a kind is that of all jobs, as if jobs of this kind had done this
+# share of all work at that pace.
+_BORROWED = 0.02
+# Time for which the first jobs load the program, and no later job does [s]. The
+# rest is at least a share of what they take.
+_LOADING = 4.0
+_LEAST_WORK = 0.85
 
 
 @dataclass
@@ -51,6 +58,7 @@ class _Job:
     Attributes:
         cost: expected time [s].
         since: when the job was started [s]; None if the job does not run.
+        is_first: whether no job had ended before it was started.
         first: share that an earlier run had done; None until the job says how
             far it is.
         taken: time that the job took [s]; None until it has ended.
@@ -58,6 +66,7 @@ class _Job:
 
     cost: float
     since: float | None = None
+    is_first: bool = False
     first: float | None = None
     taken: float | None = None
 
@@ -71,9 +80,9 @@ class TimeLeft:
     """Estimates the time left for jobs from the jobs that have ended.
 
     The time that these jobs took, divided by their expected time, is the pace
-    of the jobs of the same kind that are left. Jobs that ended lately count
-    most. The pace of a kind of which no job has ended is that of all jobs,
-    because machines differ in how fast they do one kind of work.
+    of the jobs that are left. Jobs of the same kind, and jobs that ended
+    lately, count most, because machines differ in how fast they do one kind of
+    work.
 
     The methods take the present time `now` [s], always of the same clock.
     """
@@ -86,13 +95,16 @@ class TimeLeft:
         """
         self._jobs = {name: _Job(cost) for name, cost in costs.items()}
         self._most_running = 1
+        self._has_ended = False
         self._total = sum(costs.values())
         # Jobs that give a pace, in the order in which they ended.
         self._measured: list[tuple[str, float, float]] = []
 
     def start(self, name: str, now: float) -> None:
         """Records that a job starts, or is started again."""
-        self._jobs[name] = _Job(self._jobs[name].cost, since=now)
+        self._jobs[name] = _Job(
+            self._jobs[name].cost, since=now, is_first=not self._has_ended
+        )
         running = sum(one.since is not None for one in self._jobs.values())
         self._most_running = max(self._most_running, running)
 
@@ -106,8 +118,12 @@ class TimeLeft:
         job = self._jobs[name]
         job.taken = 0.0 if job.since is None else now - job.since
         job.since = None
+        self._has_ended = True
         if job.taken >= _REAL_SHARE * job.cost:
-            self._measured.append((_kind(name), job.expected, job.taken))
+            taken = job.taken
+            if job.is_first:
+                taken = max(taken - _LOADING, _LEAST_WORK * taken)
+            self._measured.append((_kind(name), job.expected, taken))
 
     def share(self) -> float:
         """Returns the share of all work that has ended, 0 to 1."""
@@ -156,15 +172,16 @@ class TimeLeft:
         self, measured: list[tuple[str, float, float]], kind: str
     ) -> float:
         """Returns the time that a job takes, divided by its expected time."""
-        expected = taken = age = 0.0
-        is_known = any(one == kind for one, _, _ in measured)
+        own, every, age = [0.0, 0.0], [0.0, 0.0], 0.0
         for one, cost, seconds in reversed(measured):
-            if one == kind or not is_known:
-                weight = math.exp(-age / (_MEMORY * self._total))
-                expected += weight * cost
-                taken += weight * seconds
+            weight = math.exp(-age / (_MEMORY * self._total))
+            for sums in (own, every) if one == kind else (every,):
+                sums[0] += weight * cost
+                sums[1] += weight * seconds
             age += cost
-        return taken / expected
+        borrowed = _BORROWED * self._total
+        pace = every[1] / every[0]
+        return (own[1] + borrowed * pace) / (own[0] + borrowed)
 
 
 def _kind(name: str) -> str:

@@ -10,6 +10,9 @@ from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Task, check_positive
 
+# Expected time to compare two maps [s].
+_COST = 0.5
+
 
 class ChangeTask(Task):
     """Measures the change (TCR_sym) between two drives or their cities.
@@ -38,7 +41,7 @@ class ChangeTask(Task):
         # The change does not depend on the protocol.
         part = jobs.files.part("change", way.name, pair.query.name)
         found = jobs.add(
-            part, measure_change, maps, needs, 2.0, self.version, pair.title
+            part, measure_change, maps, needs, _COST, self.version, pair.title
         )
         return (found,)
 

@@ -15,11 +15,11 @@ from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 # Expected time to start a job [s].
 STARTING_COST = 0.2
 # Expected time to start a job and to open a drive [s].
-OPENING_COST = 8.0
+OPENING_COST = 12.0
 # Expected time to read a scan [s].
 SCAN_COST = 0.011
-# Expected time to map a drive with each of its scans [s].
-_MAP_COST = 60.0
+# Expected time to map an open drive with each of its scans [s].
+_MAP_COST = 50.0
 # Expected time of other work [s].
 _OTHER_COST = 20.0
 
@@ -148,7 +148,8 @@ class Jobs:
         name = drive.name if spacing is None else f"{drive.name} {spacing:g}"
         part = self.files.part("mapped", name)
         needs.append(job_name(part))
-        cost = _MAP_COST * drive.share if spacing is None else _OTHER_COST
+        cost = OPENING_COST
+        cost += _MAP_COST * drive.share if spacing is None else 8.0
         arguments = (drive.source, spacing)
         title = f"{drive.title or drive.name}, map"
         return self.add(
