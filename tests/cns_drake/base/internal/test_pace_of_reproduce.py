@@ -73,4 +73,4 @@ def test_the_time_left_of_a_real_run(
     for share, ratio in ratios:
         # While only drives are measured, methods may be slower, and what the
         # first jobs take is not known to be all work.
-        assert (0.62 if share < 0.15 else 2 / 3) <= ratio <= 3 / 2, share
+        assert (0.6 if share < 0.2 else 2 / 3) <= ratio <= 3 / 2, share
