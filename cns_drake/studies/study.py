@@ -34,11 +34,8 @@ from cns_drake.studies.maps.experiment_maps import (
 )
 from cns_drake.studies.maps.made_maps import ONLY_STAGE
 from cns_drake.studies.maps.redrawing import redraw_cities
-from cns_drake.studies.pairs.comparisons import ComparedDrives
-from cns_drake.studies.pairs.simulated_pairs import (
-    ChangedPair,
-    SimulatedPairs,
-)
+from cns_drake.studies.pairs.comparisons import ChangedPair
+from cns_drake.studies.pairs.simulated_pairs import SimulatedPairs
 from cns_drake.studies.tasks.map_task import DrivenMapTask
 from cns_drake.studies.tasks.seen_task import SeenTask
 from evaluation.drives import sample_frames
@@ -240,7 +237,7 @@ def study_drives(study: Study, maps: Sequence[str] = ()) -> list[Scenario]:
     drives: dict[str, Scenario] = {}
     for changed in SimulatedPairs(study).changed(found):
         for one in changed:
-            for drive in one.compared.drives:
+            for drive in one.drives:
                 if drives.setdefault(drive.name, drive) != drive:
                     raise InputError(
                         f"{study.source}: two drives are named {drive.name}"
@@ -297,7 +294,7 @@ def _check_drives_are_frozen(
         for one in pairs:
             factors = {**some.factors, **one.condition.factors}
             place = some.map_name, factors.get(LEVEL, 0)
-            drawn = drives_fingerprint(one.compared, worlds)
+            drawn = drives_fingerprint(one, worlds)
             prints.setdefault(place, []).append(drawn)
     check_frozen(table, prints)
 
@@ -329,13 +326,11 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
     }
 
 
-def drives_fingerprint(
-    compared: ComparedDrives, worlds: dict[tuple, str]
-) -> str:
+def drives_fingerprint(pair: ChangedPair, worlds: dict[tuple, str]) -> str:
     """Returns a hash of all drives and of the cities along these drives.
 
     Args:
-        compared: the drives.
+        pair: the drives.
         worlds: cache: world file, folders of models and traffic -> digest of
             these files. This function adds the digests of these drives.
 
@@ -344,14 +339,14 @@ def drives_fingerprint(
     """
     keys = [
         (drive.world_file, drive.model_paths, drive.traffic)
-        for drive in compared.drives
+        for drive in pair.drives
     ]
-    for drive, key in zip(compared.drives, keys, strict=True):
+    for drive, key in zip(pair.drives, keys, strict=True):
         if key not in worlds:
             worlds[key] = combined_digest(digest_inputs(drive))
     return fingerprint(
         {
-            "drives": compared.fingerprint(),
+            "drives": pair.fingerprint(),
             "worlds": [worlds[key] for key in keys],
         }
     )

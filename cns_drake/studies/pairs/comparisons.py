@@ -68,57 +68,62 @@ class DatedDrive(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ComparedDrives:
-    """The drives of the database and the query drive of one condition.
+class ChangedPair:
+    """The drives of a database and a query drive, as a condition changes them.
 
     Attributes:
-        database: the drive of the database; the oldest drive if there are
-            several.
-        query: the drive of the queries.
+        condition: the condition.
+        seed: seed of the condition's random choices.
+        names: names of the database drive and of the query drive before the
+            change.
+        unchanged: the query drive before the change.
+        dated: the drives of the database, from older to newer, and the query.
         protocol: protocol of the queries.
         distractors: number of places of other cities that are added to the
             database, to make recognition harder.
         asked: field -> value, for the fields of the protocol with which the
             condition gives the queries a random yaw, a tilt or an occluded
             sector.
-        beside: further drives of the database, from older to newer.
         keep: which places of the database are kept, see
             `evaluation.recognition.place_selection.kept_places`.
         maintain: what updates the maps of older drives by newer drives, see
             `evaluation.map_update.upkeep`.
-        dated: what else is known of each of `drives`.
     """
 
-    database: Scenario
-    query: Scenario
+    condition: Condition
+    seed: int
+    names: tuple[str, str]
+    unchanged: Scenario
+    dated: tuple[DatedDrive, ...]
     protocol: RetrievalProtocol
     distractors: int = 0
     asked: Changes = field(default_factory=dict)
-    beside: tuple[Scenario, ...] = ()
     keep: str | int = KEEP_ALL
     maintain: str = NOT_MAINTAINED
-    dated: tuple[DatedDrive, ...] = ()
 
     @property
     def drives(self) -> tuple[Scenario, ...]:
         """The drives of the database, from older to newer, and the query."""
-        return self.database, *self.beside, self.query
+        return tuple(one.drive for one in self.dated)
 
     def fingerprint(self) -> str:
         """Returns a hash of the drives of the database and the query drive.
 
         Drives that differ only in their names have different hashes.
         """
+        database, *beside, query = (
+            one.model_dump(mode="json") for one in self.drives
+        )
         several = {
-            "beside": [one.model_dump(mode="json") for one in self.beside],
+            "beside": beside,
             "keep": self.keep,
             "maintain": self.maintain,
         }
-        is_one = not self.beside and self.keep == KEEP_ALL
+        is_one = not beside and self.keep == KEEP_ALL
         return fingerprint(
             {
-                "database": self.database.model_dump(mode="json"),
-                "query": self.query.model_dump(mode="json"),
+                "database": database,
+                "query": query,
                 "distractors": self.distractors,
                 **({} if is_one else several),
                 **self.asked,
@@ -177,7 +182,7 @@ class PairMaker:
             for side, drive in plain.items()
         }
 
-    def build(self, condition: Condition, seed: int) -> ComparedDrives:
+    def build(self, condition: Condition, seed: int) -> ChangedPair:
         """Returns the database drive and the query drive under a condition.
 
         Args:
@@ -195,7 +200,7 @@ class PairMaker:
                 _as_written(str(error), self.source, condition)
             ) from error
 
-    def _build(self, condition: Condition, seed: int) -> ComparedDrives:
+    def _build(self, condition: Condition, seed: int) -> ChangedPair:
         fields = self._fields(condition)
         both = fields.get("both", {})
         database = merged(both, fields.get("database", {}))
@@ -232,25 +237,23 @@ class PairMaker:
             len(drives),
             f"{where}.maintain",
         )
-        oldest, *beside = drives
-        return ComparedDrives(
-            oldest.drive,
+        asked_drive = DatedDrive(
+            years,
+            _drive_length(query),
             query_drive,
+            self._names["query"].title(query_drive),
+        )
+        return ChangedPair(
+            condition,
+            seed,
+            (self.database.name.removesuffix("_database"), self.query.name),
+            self.query,
+            (*drives, asked_drive),
             protocol,
             database.get("distractors", 0),
             asked,
-            tuple(one.drive for one in beside),
             keep,
             maintainer,
-            (
-                *drives,
-                DatedDrive(
-                    years,
-                    _drive_length(query),
-                    query_drive,
-                    self._names["query"].title(query_drive),
-                ),
-            ),
         )
 
     def _fields(self, condition: Condition) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 from cns_drake.base import Job, fingerprint
 from cns_drake.scenarios import Scenario
@@ -10,7 +9,7 @@ from cns_drake.simulation import SimulationSource
 from cns_drake.studies.drives.named_stages import MissingError
 from cns_drake.studies.maps.experiment_maps import MapPairs
 from cns_drake.studies.maps.made_maps import MadeMaps
-from cns_drake.studies.pairs.comparisons import ComparedDrives, PairMaker
+from cns_drake.studies.pairs.comparisons import ChangedPair, PairMaker
 from cns_drake.studies.pairs.map_upkeep import (
     UPKEEP_VERSION,
     UpkeptSource,
@@ -18,11 +17,9 @@ from cns_drake.studies.pairs.map_upkeep import (
 )
 from cns_drake.studies.recording import is_recorded
 from evaluation.map_update import NOT_MAINTAINED
-from evaluation.recognition import RetrievalProtocol
 from evaluation.results import CAUSE
 from evaluation.study import (
     OPENING_COST,
-    Condition,
     MakePart,
     NamedDrive,
     Pair,
@@ -37,27 +34,6 @@ from evaluation.study import (
 _USUAL_SPEED = 10.0
 # Expected time to update a map by a usual drive, once it is open [s].
 _UPKEEP_COST = 60.0
-
-
-class ChangedPair(NamedTuple):
-    """A pair of drives as a condition changes it.
-
-    Attributes:
-        names: names of the database drive and the query drive before the
-            change.
-        query: the query drive before the change.
-        compared: the changed drives.
-        condition: the condition.
-        stated: the protocol of the condition.
-        seed: seed of the condition's random choices.
-    """
-
-    names: tuple[str, str]
-    query: Scenario
-    compared: ComparedDrives
-    condition: Condition
-    stated: RetrievalProtocol
-    seed: int
 
 
 @dataclass
@@ -122,58 +98,52 @@ class SimulatedPairs:
                 made.redrawn,
                 noted.setdefault,
             )
-            names = _base_name(database), query.name
             known: set[str] = set()
             for condition in experiment.conditions:
                 for seed in experiment.seeds:
                     try:
-                        compared = pair.build(condition, seed)
+                        changed = pair.build(condition, seed)
                     except MissingError as error:
                         label = condition.factors.get(CAUSE, "a condition")
                         noted.setdefault(f"{label} left out: {error}")
                         break
                     # A condition without random numbers is measured once.
-                    key = f"{condition.factors} {compared.fingerprint()}"
+                    key = f"{condition.factors} {changed.fingerprint()}"
                     if key not in known:
                         known.add(key)
-                        stated = condition_protocol(condition, source)
-                        found.append(
-                            ChangedPair(
-                                names, query, compared, condition, stated, seed
-                            )
-                        )
+                        found.append(changed)
         return found, noted
 
     def named(self, some: MapPairs, one: ChangedPair) -> Pair:
         """Returns a pair of a map as it is measured."""
-        compared, query = one.compared, one.query
         *drives, asked = (
             replace(
-                self.named_drive(one.drive),
-                length=_driven_length(one.drive, one.length),
-                title=one.title,
+                self.named_drive(dated.drive),
+                length=_driven_length(dated.drive, dated.length),
+                title=dated.title,
                 # Without a later year, the city of the query has not aged.
-                years=one.years if compared.dated[-1].years else None,
+                years=dated.years if one.dated[-1].years else None,
             )
-            for one in compared.dated
+            for dated in one.dated
         )
-        database, *beside = self._with_upkept_maps(drives, compared.maintain)
-        way = None
+        database, *beside = self._with_upkept_maps(drives, one.maintain)
+        first, *_, last = one.drives
+        query, way = one.unchanged, None
         if self.study.experiment.drives == "same-route":
             city = {
-                name: getattr(compared.database, name)
+                name: getattr(first, name)
                 for name in ("map", "stage", "without", "transient")
             }
-            drive = compared.query.replaced(**city, name=query.name)
-            if drive.replaced(name=asked.name) == compared.query:
-                drive = compared.query
+            drive = last.replaced(**city, name=query.name)
+            if drive.replaced(name=asked.name) == last:
+                drive = last
             elif drive != query:
                 content = fingerprint(drive.model_dump(mode="json"))[:8]
                 drive = drive.replaced(name=f"{query.name}_way_{content}")
             way = replace(self.named_drive(drive), length=asked.length)
         asked_how = {
-            "compared": compared.fingerprint(),
-            **compared.protocol.to_json(),
+            "compared": one.fingerprint(),
+            **one.protocol.to_json(),
             "radius": None,  # Queries are scored once for all radii.
         }
         digest = fingerprint(asked_how)[:8]
@@ -183,15 +153,15 @@ class SimulatedPairs:
             factors={**some.factors, **one.condition.factors},
             seed=one.seed,
             baseline={**some.factors, **one.condition.baseline},
-            stated=one.stated,
+            stated=condition_protocol(one.condition, self.study.source),
             key=f"{database.name} {asked.name} {digest}",
             database=database,
             query=asked,
-            protocol=compared.protocol,
-            distractors=compared.distractors,
+            protocol=one.protocol,
+            distractors=one.distractors,
             beside=tuple(beside),
-            keep=compared.keep,
-            may_repeat=bool(compared.asked or compared.distractors),
+            keep=one.keep,
+            may_repeat=bool(one.asked or one.distractors),
             way=way,
         )
 
@@ -237,7 +207,3 @@ def _driven_length(drive: Scenario, length: float) -> float:
     if drive.frames is None:
         return length
     return min(length, _USUAL_SPEED * drive.frames * drive.frame_period)
-
-
-def _base_name(database: Scenario) -> str:
-    return database.name.removesuffix("_database")

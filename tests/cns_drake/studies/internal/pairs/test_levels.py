@@ -9,7 +9,7 @@ import pytest
 from cns_drake.base import Cluster, InputError, fingerprint
 from cns_drake.scenarios import make_scenario, worlds_folder
 from cns_drake.studies.maps.experiment_maps import pairs_by_map
-from cns_drake.studies.pairs.comparisons import ComparedDrives
+from cns_drake.studies.pairs.comparisons import ChangedPair, DatedDrive
 from cns_drake.studies.pairs.simulated_pairs import SimulatedPairs
 from cns_drake.studies.study import (
     check_frozen,
@@ -19,6 +19,7 @@ from cns_drake.studies.study import (
 )
 from evaluation.recognition import RECORDED_PROTOCOL
 from evaluation.study import (
+    Condition,
     Study,
     load_experiment,
 )
@@ -51,7 +52,7 @@ def test_the_levels_are_as_they_were_frozen(tmp_path):
     ):
         for one in pairs:
             key = some.map_name, one.condition.factors["level"]
-            drawn = drives_fingerprint(one.compared, worlds)
+            drawn = drives_fingerprint(one, worlds)
             found.setdefault(key, []).append(drawn)
     assert frozen == {
         key: fingerprint({"drives": prints}) for key, prints in found.items()
@@ -79,10 +80,22 @@ def test_other_drives_are_not_the_frozen_ones(tmp_path, change):
     plan_study(run_of(tmp_path, change, "maps=[suburbia]", "frozen=null"))
 
 
+def pair_of(*drives):
+    """The drives of a database, and the query."""
+    return ChangedPair(
+        Condition({}, {}),
+        1,
+        ("a", "b"),
+        drives[-1],
+        tuple(DatedDrive(0, 1.0, one, one.name) for one in drives),
+        RECORDED_PROTOCOL,
+    )
+
+
 def test_a_rebuilt_city_is_not_the_frozen_one(tmp_path):
     values = scenario_values(write_small_map(tmp_path / "small"))
     drive = make_scenario(values, "test")
-    compared = ComparedDrives(drive, drive, RECORDED_PROTOCOL)
+    compared = pair_of(drive, drive)
     before = drives_fingerprint(compared, {})
     assert drives_fingerprint(compared, {}) == before
     known = compared.fingerprint()
@@ -93,7 +106,7 @@ def test_a_rebuilt_city_is_not_the_frozen_one(tmp_path):
     assert compared.fingerprint() == known
     # Neither does the city of another session hide behind the first one's.
     former = drive.replaced(stage="01" if drive.stage != "01" else "04")
-    several = ComparedDrives(drive, drive, RECORDED_PROTOCOL, beside=(former,))
+    several = pair_of(drive, former, drive)
     assert several.fingerprint() != known
     before = drives_fingerprint(several, {})
     world = former.world_file
@@ -106,7 +119,7 @@ def test_other_traffic_of_a_map_is_not_the_frozen_one(tmp_path):
     """Also where the database, of the same world, has none."""
     folder = write_small_map(tmp_path / "small")
     drive = make_scenario(scenario_values(folder), "test")
-    compared = ComparedDrives(drive, drive.with_traffic(3), RECORDED_PROTOCOL)
+    compared = pair_of(drive, drive.with_traffic(3))
     found = set()
     for vehicles in (20, 30):
         write_rounds(drive.folder.traffic, vehicles)
