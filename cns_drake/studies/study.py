@@ -35,7 +35,11 @@ from cns_drake.studies.maps.experiment_maps import (
 from cns_drake.studies.maps.made_maps import ONLY_STAGE
 from cns_drake.studies.maps.redrawing import redraw_cities
 from cns_drake.studies.pairs.comparisons import ChangedPair
-from cns_drake.studies.pairs.simulated_pairs import SimulatedPairs
+from cns_drake.studies.pairs.simulated_pairs import (
+    changed_pairs,
+    simulated_drive,
+    simulated_pair,
+)
 from cns_drake.studies.tasks.map_task import DrivenMapTask
 from cns_drake.studies.tasks.seen_task import SeenTask
 from evaluation.drives import sample_frames
@@ -192,18 +196,17 @@ def plan_study(study: Study, maps: Sequence[str] = ()) -> list[ShownCity]:
             frozen_drives(experiment.frozen)
     found = list(pairs_by_map(study, maps))
     doing("looking at all conditions")
-    simulated = SimulatedPairs(study)
-    changed = simulated.changed(found)
+    changed = changed_pairs(study, found)
     cities: list[ShownCity] = []
     for some, simulations in zip(found, changed, strict=True):
         if some.city is None:
-            pairs = [simulated.named(some, one) for one in simulations]
+            pairs = [simulated_pair(study, some, one) for one in simulations]
         else:
             pairs = list(_recorded_pairs(study, some.city))
         if not pairs:
             study.on_note(f"{some.map_name}: no two drives to compare")
         others = [
-            simulated.named_drive(one)
+            simulated_drive(study, one)
             for one in _distractors(study, some, pairs)
         ]
         if some.city is None:
@@ -212,7 +215,6 @@ def plan_study(study: Study, maps: Sequence[str] = ()) -> list[ShownCity]:
             cities.append(shown)
     if not study.jobs:
         raise InputError(f"{study.source}: no condition that can be measured")
-    study.jobs = {**simulated.upkeep, **study.jobs}
     if experiment.frozen is not None:
         _check_drives_are_frozen(experiment.frozen, found, changed)
     return cities
@@ -235,7 +237,7 @@ def study_drives(study: Study, maps: Sequence[str] = ()) -> list[Scenario]:
                 f"{study.source}: {some.map_name}: its drives are recorded"
             )
     drives: dict[str, Scenario] = {}
-    for changed in SimulatedPairs(study).changed(found):
+    for changed in changed_pairs(study, found):
         for one in changed:
             for drive in one.drives:
                 if drives.setdefault(drive.name, drive) != drive:

@@ -1,7 +1,7 @@
 """Pairs of simulated drives, changed as the conditions of an experiment say."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from cns_drake.base import Job, fingerprint
 from cns_drake.scenarios import Scenario
@@ -36,170 +36,166 @@ _USUAL_SPEED = 10.0
 _UPKEEP_COST = 60.0
 
 
-@dataclass
-class SimulatedPairs:
-    """Makes the pairs of simulated drives of an experiment.
+def changed_pairs(
+    study: Study, maps: Sequence[MapPairs]
+) -> list[list[ChangedPair]]:
+    """Returns the pairs of each map, changed as its conditions say.
 
-    Attributes:
-        study: the experiment, and where it runs.
-        upkeep: name -> job, for the jobs that update the maps of the pairs
-            named so far.
+    All pairs are built before a city is made, because faults come before
+    slow work. Only the pairs of a map whose drives need new cities are
+    then built anew.
+
+    Raises:
+        InputError: a field of a condition cannot be used, or a city cannot
+            be made.
     """
+    made = MadeMaps(study.output / "cities")
+    found = []
+    for some in maps:
+        before = made.num_requests
+        built = _built(study, some, made)
+        found.append((some, *built, made.num_requests > before))
+    made.make(study.cluster)
+    pairs = []
+    for some, changed, notes, lacks_cities in found:
+        if lacks_cities:
+            changed, notes = _built(study, some, made)
+        for text in notes:
+            study.on_note(f"{some.map_name}: {text}")
+        pairs.append(changed)
+    return pairs
 
-    study: Study
-    upkeep: dict[str, Job] = field(default_factory=dict)
 
-    def changed(self, maps: Sequence[MapPairs]) -> list[list[ChangedPair]]:
-        """Returns the pairs of each map, changed as its conditions say.
+def _built(
+    study: Study, some: MapPairs, made: MadeMaps
+) -> tuple[list[ChangedPair], Iterable[str]]:
+    """Returns a map's pairs in each possible condition, and notes.
 
-        All pairs are built before a city is made, because faults come before
-        slow work. Only the pairs of a map whose drives need new cities are
-        then built anew.
-
-        Raises:
-            InputError: a field of a condition cannot be used, or a city cannot
-                be made.
-        """
-        made = MadeMaps(self.study.output / "cities")
-        found = []
-        for some in maps:
-            before = made.num_requests
-            built = self._built(some, made)
-            found.append((some, *built, made.num_requests > before))
-        made.make(self.study.cluster)
-        pairs = []
-        for some, changed, notes, lacks_cities in found:
-            if lacks_cities:
-                changed, notes = self._built(some, made)
-            for text in notes:
-                self.study.on_note(f"{some.map_name}: {text}")
-            pairs.append(changed)
-        return pairs
-
-    def _built(
-        self, some: MapPairs, made: MadeMaps
-    ) -> tuple[list[ChangedPair], Iterable[str]]:
-        """Returns a map's pairs in each possible condition, and notes.
-
-        Args:
-            some: the pairs of the map.
-            made: the maps that conditions need.
-        """
-        experiment, source = self.study.experiment, self.study.source
-        noted: dict[str, None] = {}
-        found = []
-        for database, query in some.pairs:
-            pair = PairMaker(
-                database,
-                query,
-                experiment.drives == "same-route",
-                source,
-                made.aged,
-                made.redrawn,
-                noted.setdefault,
-            )
-            known: set[str] = set()
-            for condition in experiment.conditions:
-                for seed in experiment.seeds:
-                    try:
-                        changed = pair.build(condition, seed)
-                    except MissingError as error:
-                        label = condition.factors.get(CAUSE, "a condition")
-                        noted.setdefault(f"{label} left out: {error}")
-                        break
-                    # A condition without random numbers is measured once.
-                    key = f"{condition.factors} {changed.fingerprint()}"
-                    if key not in known:
-                        known.add(key)
-                        found.append(changed)
-        return found, noted
-
-    def named(self, some: MapPairs, one: ChangedPair) -> Pair:
-        """Returns a pair of a map as it is measured."""
-        *drives, asked = (
-            replace(
-                self.named_drive(dated.drive),
-                length=_driven_length(dated.drive, dated.length),
-                title=dated.title,
-                # Without a later year, the city of the query has not aged.
-                years=dated.years if one.dated[-1].years else None,
-            )
-            for dated in one.dated
+    Args:
+        some: the pairs of the map.
+        made: the maps that conditions need.
+    """
+    experiment, source = study.experiment, study.source
+    noted: dict[str, None] = {}
+    found = []
+    for database, query in some.pairs:
+        pair = PairMaker(
+            database,
+            query,
+            experiment.drives == "same-route",
+            source,
+            made.aged,
+            made.redrawn,
+            noted.setdefault,
         )
-        database, *beside = self._with_upkept_maps(drives, one.maintain)
-        first, *_, last = one.drives
-        query, way = one.unchanged, None
-        if self.study.experiment.drives == "same-route":
-            city = {
-                name: getattr(first, name)
-                for name in ("map", "stage", "without", "transient")
-            }
-            drive = last.replaced(**city, name=query.name)
-            if drive.replaced(name=asked.name) == last:
-                drive = last
-            elif drive != query:
-                content = fingerprint(drive.model_dump(mode="json"))[:8]
-                drive = drive.replaced(name=f"{query.name}_way_{content}")
-            way = replace(self.named_drive(drive), length=asked.length)
-        asked_how = {
-            "compared": one.fingerprint(),
-            **one.protocol.to_json(),
-            "radius": None,  # Queries are scored once for all radii.
+        known: set[str] = set()
+        for condition in experiment.conditions:
+            for seed in experiment.seeds:
+                try:
+                    changed = pair.build(condition, seed)
+                except MissingError as error:
+                    label = condition.factors.get(CAUSE, "a condition")
+                    noted.setdefault(f"{label} left out: {error}")
+                    break
+                # A condition without random numbers is measured once.
+                key = f"{condition.factors} {changed.fingerprint()}"
+                if key not in known:
+                    known.add(key)
+                    found.append(changed)
+    return found, noted
+
+
+def simulated_pair(study: Study, some: MapPairs, one: ChangedPair) -> Pair:
+    """Returns a pair of a map as it is measured.
+
+    If later drives update the maps of older ones, the job is added to `study`.
+    """
+    *drives, asked = (
+        replace(
+            simulated_drive(study, dated.drive),
+            length=_driven_length(dated.drive, dated.length),
+            title=dated.title,
+            # Without a later year, the city of the query has not aged.
+            years=dated.years if one.dated[-1].years else None,
+        )
+        for dated in one.dated
+    )
+    database, *beside = with_upkept_maps(study, drives, one.maintain)
+    first, *_, last = one.drives
+    query, way = one.unchanged, None
+    if study.experiment.drives == "same-route":
+        city = {
+            name: getattr(first, name)
+            for name in ("map", "stage", "without", "transient")
         }
-        digest = fingerprint(asked_how)[:8]
-        return Pair(
-            map_name=some.map_name,
-            names=one.names,
-            factors={**some.factors, **one.condition.factors},
-            seed=one.seed,
-            baseline={**some.factors, **one.condition.baseline},
-            stated=condition_protocol(one.condition, self.study.source),
-            key=f"{database.name} {asked.name} {digest}",
-            database=database,
-            query=asked,
-            protocol=one.protocol,
-            distractors=one.distractors,
-            beside=tuple(beside),
-            keep=one.keep,
-            may_repeat=bool(one.asked or one.distractors),
-            way=way,
-        )
+        drive = last.replaced(**city, name=query.name)
+        if drive.replaced(name=asked.name) == last:
+            drive = last
+        elif drive != query:
+            content = fingerprint(drive.model_dump(mode="json"))[:8]
+            drive = drive.replaced(name=f"{query.name}_way_{content}")
+        way = replace(simulated_drive(study, drive), length=asked.length)
+    asked_how = {
+        "compared": one.fingerprint(),
+        **one.protocol.to_json(),
+        "radius": None,  # Queries are scored once for all radii.
+    }
+    digest = fingerprint(asked_how)[:8]
+    return Pair(
+        map_name=some.map_name,
+        names=one.names,
+        factors={**some.factors, **one.condition.factors},
+        seed=one.seed,
+        baseline={**some.factors, **one.condition.baseline},
+        stated=condition_protocol(one.condition, study.source),
+        key=f"{database.name} {asked.name} {digest}",
+        database=database,
+        query=asked,
+        protocol=one.protocol,
+        distractors=one.distractors,
+        beside=tuple(beside),
+        keep=one.keep,
+        may_repeat=bool(one.asked or one.distractors),
+        way=way,
+    )
 
-    def _with_upkept_maps(
-        self, drives: Sequence[NamedDrive], maintain: str
-    ) -> Sequence[NamedDrive]:
-        """Returns drives in maps that later drives update; adds the job."""
-        if maintain == NOT_MAINTAINED:
-            return drives
-        sources = tuple(one.source for one in drives)
-        content = fingerprint({"drives": [one.name for one in drives]})[:8]
-        part = StudyFiles(self.study.output).part(
-            "upkeep", drives[0].name, f"{content} {maintain}"
-        )
-        job = Job(
-            job_name(part),
-            MakePart(part, update_maps, (sources, maintain), UPKEEP_VERSION),
-            tuple(need for one in drives for need in one.needs),
-            sum(OPENING_COST + _UPKEEP_COST * one.share for one in drives),
-        )
-        self.upkeep[job.name] = job
-        return [
-            replace(
-                one,
-                name=f"{one.name}_{maintain}_{content}",
-                source=UpkeptSource(sources, number, maintain, part),
-                needs=(job.name,),
-            )
-            for number, one in enumerate(drives)
-        ]
 
-    def named_drive(self, drive: Scenario) -> NamedDrive:
-        """Returns a drive that is simulated, or read if it is recorded."""
-        if is_recorded(drive, self.study.output):
-            return NamedDrive(
-                drive.name, RecordingSource(self.study.output / drive.name)
-            )
-        return NamedDrive(drive.name, SimulationSource(drive))
+def with_upkept_maps(
+    study: Study, drives: Sequence[NamedDrive], maintain: str
+) -> Sequence[NamedDrive]:
+    """Returns drives in maps that later drives update; adds the job."""
+    if maintain == NOT_MAINTAINED:
+        return drives
+    sources = tuple(one.source for one in drives)
+    content = fingerprint({"drives": [one.name for one in drives]})[:8]
+    part = StudyFiles(study.output).part(
+        "upkeep", drives[0].name, f"{content} {maintain}"
+    )
+    job = Job(
+        job_name(part),
+        MakePart(part, update_maps, (sources, maintain), UPKEEP_VERSION),
+        tuple(need for one in drives for need in one.needs),
+        sum(OPENING_COST + _UPKEEP_COST * one.share for one in drives),
+    )
+    study.jobs[job.name] = job
+    return [
+        replace(
+            one,
+            name=f"{one.name}_{maintain}_{content}",
+            source=UpkeptSource(sources, number, maintain, part),
+            needs=(job.name,),
+        )
+        for number, one in enumerate(drives)
+    ]
+
+
+def simulated_drive(study: Study, drive: Scenario) -> NamedDrive:
+    """Returns a drive that is simulated, or read if it is recorded."""
+    if is_recorded(drive, study.output):
+        return NamedDrive(
+            drive.name, RecordingSource(study.output / drive.name)
+        )
+    return NamedDrive(drive.name, SimulationSource(drive))
 
 
 def _driven_length(drive: Scenario, length: float) -> float:

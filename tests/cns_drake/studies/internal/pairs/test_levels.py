@@ -10,7 +10,7 @@ from cns_drake.base import Cluster, InputError, fingerprint
 from cns_drake.scenarios import make_scenario, worlds_folder
 from cns_drake.studies.maps.experiment_maps import pairs_by_map
 from cns_drake.studies.pairs.comparisons import ChangedPair, DatedDrive
-from cns_drake.studies.pairs.simulated_pairs import SimulatedPairs
+from cns_drake.studies.pairs.simulated_pairs import changed_pairs
 from cns_drake.studies.study import (
     check_frozen,
     drives_fingerprint,
@@ -47,9 +47,7 @@ def test_the_levels_are_as_they_were_frozen(tmp_path):
     plan_study(run)
     maps = list(pairs_by_map(run, ()))
     worlds = {}
-    for some, pairs in zip(
-        maps, SimulatedPairs(run).changed(maps), strict=True
-    ):
+    for some, pairs in zip(maps, changed_pairs(run, maps), strict=True):
         for one in pairs:
             key = some.map_name, one.condition.factors["level"]
             drawn = drives_fingerprint(one, worlds)

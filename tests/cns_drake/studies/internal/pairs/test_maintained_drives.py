@@ -1,7 +1,7 @@
 """Drives in maps that later drives update."""
 
 from cns_drake.base import Cluster
-from cns_drake.studies.pairs.simulated_pairs import SimulatedPairs
+from cns_drake.studies.pairs.simulated_pairs import with_upkept_maps
 from evaluation.study import Experiment, NamedDrive, RecordingSource, Study
 
 
@@ -12,7 +12,7 @@ def test_their_maps_differ_and_nothing_else(tmp_path):
         NamedDrive(f"d{k}", RecordingSource(tmp_path), years=k, length=9.0 + k)
         for k in (0, 5)
     ]
-    kept = SimulatedPairs(study)._with_upkept_maps(drives, "distance")
+    kept = with_upkept_maps(study, drives, "distance")
     assert len({one.name for one in (*drives, *kept)}) == 4
     for old, new in zip(drives, kept, strict=True):
         assert (new.years, new.length) == (old.years, old.length)
