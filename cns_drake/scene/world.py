@@ -217,8 +217,10 @@ def _parse_error(path: Path, *texts: str) -> InputError:
     names = "|".join(re.escape(str(p)) for p in (path.absolute(), path))
     faults = [" ".join(text.split()) for text in texts[:2]]
     faults = [re.sub(r"^SDFormat Error .*?Msg: ", "", f) for f in faults]
-    # What is read of a world is a text with other lines than its file.
+    # What is read of a world is a text with other lines and another name than
+    # its file.
     faults = [re.sub(r"^<[^<>]*-string>\S* \w+: ", "", f) for f in faults]
+    faults = [f.replace("in world with name[frames]", "there") for f in faults]
     faults = [
         re.sub(
             rf"/*(?:{names}):(?:(\d+):)? (?:error|ERROR): (?:ERROR: )?",

@@ -411,13 +411,17 @@ def _check_answer(address: str) -> None:
         async with rpc(address, connection_args=keys) as scheduler:
             await scheduler.identity()
 
-    fault = f"--scheduler: {address}: no answer; is the scheduler running?"
+    is_usual = os.environ.get(_ADDRESS_VARIABLE) == address
+    given = _ADDRESS_VARIABLE if is_usual else "--scheduler"
+    fault = f"{given}: {address}: no answer"
     try:
         # This thread may have an event loop of its own.
         asked = asyncio.wait_for(ask(), _ANSWER_TIMEOUT)
         ThreadPoolExecutor(1).submit(asyncio.run, asked).result()
     except asyncio.TimeoutError:
-        raise InputError(f"{fault} in {_ANSWER_TIMEOUT:g} s") from None
+        raise InputError(
+            f"{fault} in {_ANSWER_TIMEOUT:g} s; is the scheduler running?"
+        ) from None
     # Dask raises any of these for an address that it cannot use, such as TLS
     # without a certificate.
     except (ImportError, OSError, TypeError, ValueError) as error:

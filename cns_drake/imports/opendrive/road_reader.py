@@ -88,11 +88,25 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
     x, y = _origin_of(path, roads)
     reference = top.first("header", "geoReference")
     system = "" if reference is None else reference.text or ""
+    with value_errors(path):
+        east, north, up = _offset_of(top)
     return road_model.RoadMap(
         tuple(_moved(road, x, y) for road in roads),
         " ".join(system.split()),
-        (x, y, 0.0),
+        (x + east, y + north, up),
     )
+
+
+def _offset_of(top: Element) -> tuple[float, float, float]:
+    """Returns the place of the file's origin in its reference system [m].
+
+    An offset that turns the file, too, is counted, and not read.
+    """
+    found = top.first("header", "offset")
+    if found is None or found.number("hdg", 0.0) != 0.0:
+        return 0.0, 0.0, 0.0
+    x, y, z = (found.number(axis, 0.0) for axis in "xyz")
+    return x, y, z
 
 
 def _origin_of(

@@ -69,7 +69,7 @@ def write_town(
         },
         town.faults,
         "# Where the roads of this map come from; all else is random."
-        "\n# A place of the map plus the origin is one of the source [m].\n",
+        "\n# A place of the map plus the origin is one of the system [m].\n",
     )
     _write_drives(draft, town)
     overview.draw_overview(

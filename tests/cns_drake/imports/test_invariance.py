@@ -9,6 +9,7 @@ from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
 from shapely import MultiPoint
+import yaml
 
 from cns_drake.imports import (
     ImportOptions,
@@ -137,8 +138,12 @@ def test_roads_that_are_moved_have_the_same_town(tmp_path):
             straight("a", x, y, x + 180, y, elevation=up),
             straight("b", x, y + 90, x + 180, y + 90, elevation=up),
         ]
-        path = write_roads(tmp_path / f"{name}.xodr", *roads[::order])
+        header = '<offset x="297133.5" y="5623440.5" z="12" hdg="0"/>'
+        path = tmp_path / f"{name}.xodr"
+        write_roads(path, *roads[::order], header=header)
         import_city(path, tmp_path / name, ImportOptions(seed=1))
+        facts = yaml.safe_load((tmp_path / name / "import.yaml").read_text())
+        assert facts["origin"] == [297133.5, 5623440.5, 12.0]
         with (tmp_path / name / "structures.csv").open(newline="") as stream:
             rows = [
                 (*row[1:4], *map(float, row[4:7]))

@@ -219,7 +219,7 @@ def test_what_is_not_read_is_counted(tmp_path):
         '<junction id="7"><connection id="0" incomingRoad="fine"'
         ' connectingRoad="0"/></junction>',
         '<junction id="6" type="virtual"/>',
-        header='<offset x="9" y="8" z="0" hdg="0"/>',
+        header='<offset x="9" y="8" z="0" hdg="0.1"/>',
     )
     report = import_city(path, tmp_path / "town", ImportOptions())
     counts = {kind: (number, first) for kind, number, first in report.faults}
@@ -254,7 +254,7 @@ def test_what_is_not_read_is_counted(tmp_path):
             "junction 7",
         ),
         "type of junction, not read": (1, "6"),
-        "offset of header, not read": (1, "the file"),
+        "hdg of offset, not read": (1, "the file"),
         "gap of over 0.1 m in the course of a road": (2, "broken"),
         "road whose course or lanes begin after its start": (1, "late"),
     }

@@ -85,6 +85,11 @@ def test_files_that_are_no_world(tmp_path, text):
     ("old", "new", "fault"),
     [
         ("<pose>1", '<pose relative_to="nowhere">1', "cannot be parsed: [^<]"),
+        (
+            "<link",
+            '<pose relative_to="nowhere">1 0 0 0 0 0</pose><link',
+            "does not match a model or frame name there",
+        ),
         ("<pose>1", "<pose>", "must have 6 values"),
         ("body", "b\udca5dy", "not UTF-8"),
     ],

@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from cns_drake.base import Cluster, InputError
+from cns_drake.base import Cluster, InputError, choose_cluster
 from cns_drake.base.jobs import running
 
 pytestmark = pytest.mark.slow
@@ -26,5 +26,11 @@ def test_a_scheduler_that_does_not_answer(monkeypatch, address):
                 InputError, match=f"^--scheduler: {address}: no answer"
             ),
             Cluster(scheduler=address).connect(print),
+        ):
+            pass
+        monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", address)
+        with (
+            pytest.raises(InputError, match="^DASK_SCHEDULER_ADDRESS: "),
+            choose_cluster(None, None).connect(print),
         ):
             pass
