@@ -76,9 +76,11 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
         raise InputError(f"{drive.name}: one scan is not enough for a motion")
     near = drive.stamps_ns[max(0, index - _REACH) : index + _REACH + 2]
     step_s = np.diff(near).mean() * 1e-9
-    if points["t"].dtype.kind not in "iu" or (
-        scan_s > 0.0 and not 1.0 / _MOST_RATIO < scan_s / step_s < _MOST_RATIO
-    ):
+    if (kind := points["t"].dtype).kind not in "iu":
+        raise InputError(
+            f"{drive.name}: scan {index}: t: {kind.name}, not whole nanoseconds"
+        )
+    if scan_s > 0.0 and not (1.0 / _MOST_RATIO < scan_s / step_s < _MOST_RATIO):
         raise InputError(
             f"{drive.name}: scan {index}: t: from {t_ns[0]:g} to {t_ns[-1]:g};"
             f" no nanoseconds of a scan, where scans are {step_s:.3g} s apart"
