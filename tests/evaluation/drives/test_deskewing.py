@@ -75,7 +75,9 @@ def test_times_that_are_not(tmp_path, name, kind, values):
     drive = open_drive(record(tmp_path, name, kind, values))
     scan = drive.scan(2)
     np.testing.assert_array_equal(scan[name], values.astype(kind))
-    with pytest.raises(InputError, match=r"^s: scan 2: (no field t|t: from|t: float32, not)"):
+    with pytest.raises(
+        InputError, match=r"^s: scan 2: (no field t|t: from|t: float)"
+    ):
         deskew(drive, 2)
 
 

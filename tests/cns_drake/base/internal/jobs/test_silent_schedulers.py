@@ -30,7 +30,7 @@ def test_a_scheduler_that_does_not_answer(monkeypatch, address):
             pass
         monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", address)
         with (
-            pytest.raises(InputError, match="^DASK_SCHEDULER_ADDRESS: "),
+            pytest.raises(InputError, match=r"^DASK_SCHEDULER_ADDRESS: "),
             choose_cluster(None, None).connect(print),
         ):
             pass
