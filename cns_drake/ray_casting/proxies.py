@@ -159,7 +159,10 @@ def _widen(surface: TriangleSurface) -> tuple[np.ndarray, np.ndarray]:
             parts[-1][slender] = first
             parts.append(second.astype(np.float32))
             rows.append(begin + slender)
-    return np.concatenate(parts).reshape(-1, 3), np.concatenate(rows)
+    triangles = np.concatenate(rows)
+    # The first of two shapes is hit where both are equally far.
+    order = np.argsort(triangles, kind="stable")
+    return np.concatenate(parts)[order].reshape(-1, 3), triangles[order]
 
 
 def _rectangles(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

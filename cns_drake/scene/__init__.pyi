@@ -41,6 +41,7 @@ from .perception_geometry import read_geometry as read_geometry
 from .perception_geometry import (
     read_perception_geometry as read_perception_geometry,
 )
+from .sdf_worlds import InSight as InSight
 from .semantics import CLASS_IDS as CLASS_IDS
 from .semantics import CLASS_RGB as CLASS_RGB
 from .semantics import GROUND_CLASSES as GROUND_CLASSES

@@ -38,7 +38,7 @@ _STATEMENT = re.compile(
 )
 # If a face refers to a missing vertex, Drake's reader reads outside its memory
 # and may end the process.
-_VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
+_VERTEX = re.compile(rb"^[ \t]*v[ \t]([^\n#]*)", re.MULTILINE)
 # Drake's reader takes what it cannot read in a vertex for 0.
 _NUMBER = rb"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _NO_VERTEX = re.compile(
@@ -81,10 +81,13 @@ class ObjFaces(NamedTuple):
     Attributes:
         notes: what is not read, such as lines; one note for each kind.
         num_triangles: number of triangles into which the faces can be divided.
+        box: least and greatest coordinates of the vertices, in that order; None
+            if there are no vertices, or if they have more than coordinates.
     """
 
     notes: tuple[str, ...]
     num_triangles: int
+    box: np.ndarray | None
 
 
 @once_a_file
@@ -108,7 +111,8 @@ def check_obj(path: Path) -> ObjFaces:
             f"line {number}: a vertex that is not three numbers, alone or with"
             " a weight of 1 or a colour"
         )
-    num_vertices = len(_VERTEX.findall(content))
+    vertices = _VERTEX.findall(content)
+    num_vertices = len(vertices)
     rows = _FACE.findall(content)
     faces = b" \n".join(rows)
     if b"/" in faces:
@@ -121,7 +125,19 @@ def check_obj(path: Path) -> ObjFaces:
     return ObjFaces(
         tuple(f"{count} {what}" for what, count in sorted(counts.items())),
         sum(max(number - 2, 0) for number in corners),
+        _box_of(vertices),
     )
+
+
+def _box_of(vertices: list[bytes]) -> np.ndarray | None:
+    """Returns the box of the vertices that lines describe; see `ObjFaces`."""
+    numbers = np.fromstring(b" ".join(vertices), sep=" ")
+    if len(numbers) != 3 * len(vertices) or not vertices:
+        return None
+    corners = numbers.reshape(-1, 3)
+    box = np.array([corners.min(axis=0), corners.max(axis=0)])
+    box.setflags(write=False)
+    return box
 
 
 def _count_ignored(content: bytes) -> Counter[str]:

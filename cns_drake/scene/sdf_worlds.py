@@ -7,11 +7,13 @@ in such a world moves.
 """
 
 from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 import contextlib
 import copy
 from dataclasses import dataclass
 import math
 from pathlib import Path
+from typing import NamedTuple, TypeAlias
 from urllib.parse import unquote
 from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
 
@@ -43,6 +45,12 @@ from cns_drake.scene.model_finder import (
     model_file,
     note_of_missing,
 )
+from cns_drake.scene.obj_check import check_obj
+from cns_drake.scene.surfaces import LARGEST_SIZE
+
+# Boxes (N, 2, 3) in the world [m], each its least and greatest coordinates ->
+# (N,) bool, whether anything in a box can be seen.
+InSight: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
 # Elements that are left out -> how a note calls them.
 _SKIPPED = {
@@ -111,6 +119,9 @@ _DEEPEST = 20
 # Greatest number of elements in all included models together. A few files that
 # include each other can stand for any number.
 _MOST_INCLUDED = 250_000
+# Greatest number of visuals on a body: Drake compares the name of each with the
+# names of all others on it.
+_MOST_ON_BODY = 250
 # Thickness of the box for a plane of finite size, below its surface [m].
 _PLANE_THICKNESS = 1e-4
 # Size of the box for an infinite plane. Larger shapes would show the single
@@ -120,18 +131,37 @@ _ENDLESS = 5000.0
 _EVERY_FLAG = 0xFFFFFFFF
 
 
+class UnseenMesh(NamedTuple):
+    """A mesh of a world that is not read, because it is out of sight.
+
+    Attributes:
+        name: scoped name of the visual.
+        path: the file.
+        notes: notes about content of the file that is not read.
+    """
+
+    name: str
+    path: str
+    notes: tuple[str, ...]
+
+
 def read_sdf_world(
-    plant: MultibodyPlant, path: Path, finder: ModelFinder
-) -> tuple[str, ...]:
+    plant: MultibodyPlant,
+    path: Path,
+    finder: ModelFinder,
+    in_sight: InSight | None = None,
+) -> tuple[tuple[str, ...], list[UnseenMesh]]:
     """Adds the visuals of a world or model to a plant, all of them static.
 
     Args:
         plant: plant that is registered with a SceneGraph, and not finalized.
         path: the SDF file.
         finder: finds included models and meshes.
+        in_sight: tells what is in sight; None if all is.
 
     Returns:
-        Notes for the user on what is left out.
+        Notes for the user on what is left out, and the meshes out of sight,
+        which are not added.
 
     Raises:
         InputError: the file has no world and no model, a model that was found
@@ -148,8 +178,9 @@ def read_sdf_world(
     reader = _Reader(path, finder)
     reader.skip("further worlds of the file", len(worlds) - 1)
     reader.add_world(root, world)
+    unseen = [] if in_sight is None else reader.leave_out_unseen(in_sight)
     reader.register(plant)
-    return reader.notes()
+    return reader.notes(), unseen
 
 
 @dataclass(frozen=True)
@@ -169,6 +200,12 @@ class _Visual:
     X_FG: RigidTransform
     shape: Shape
     properties: tuple[IllustrationProperties | PerceptionProperties, ...]
+
+    def is_perceived(self) -> bool:
+        """Returns whether sensors see it."""
+        return any(
+            isinstance(one, PerceptionProperties) for one in self.properties
+        )
 
 
 class _Names:
@@ -244,6 +281,59 @@ class _Reader:
         folder = self._path.absolute().parent
         self._add_children(world, self._frames, folder, 0)
 
+    def leave_out_unseen(self, in_sight: InSight) -> list[UnseenMesh]:
+        """Leaves out meshes that are out of sight, and returns them.
+
+        The origin of rays is in the middle of the places of all geometry (see
+        `ray_casting`), so what is beyond the others' places stays. So do meshes
+        of which the world has copies, and what other poses move.
+        """
+        paths = {
+            id(visual): str(visual.shape.source().path())
+            for visuals in self._visuals.values()
+            for visual in visuals
+            if isinstance(visual.shape, Mesh)
+        }
+        copies = Counter(paths.values())
+        unseen = []
+        for scope, visuals in self._unmoved():
+            far: dict[int, UnseenMesh] = {}
+            boxes = []
+            for visual in visuals:
+                path = paths.get(id(visual), "")
+                if copies[path] == 1 and not visual.frame:
+                    found = _box_of_mesh(path, visual)
+                    if found is not None:
+                        name = f"{scope}::{visual.name}"
+                        far[id(visual)] = UnseenMesh(name, path, found[1])
+                        boxes.append(found[0])
+            if not far:
+                continue
+            for key, is_near in zip(
+                [*far], in_sight(np.array(boxes)).tolist(), strict=True
+            ):
+                if is_near:
+                    del far[key]
+            low, high = _places_of(v for v in visuals if id(v) not in far)
+            for visual in visuals:
+                p = visual.X_FG.translation()
+                if not ((low <= p) & (p <= high)).all():
+                    far.pop(id(visual), None)
+            unseen += [far[id(v)] for v in visuals if id(v) in far]
+            visuals[:] = [v for v in visuals if id(v) not in far]
+        return unseen
+
+    def _unmoved(self) -> Iterator[tuple[str, list[_Visual]]]:
+        """Yields the visuals of links with the axes and origin of the world.
+
+        Each comes with the name of its model.
+        """
+        for model in self._frames.iterfind("model"):
+            if model.find("pose") is None and not model.get("placement_frame"):
+                for link in model.iterfind("link"):
+                    if link.find("pose") is None:
+                        yield model.get("name", ""), self._visuals[link]
+
     def register(self, plant: MultibodyPlant) -> None:
         """Adds the frames and visuals that were read to a plant."""
         made = Element("sdf", version="1.9")
@@ -262,7 +352,13 @@ class _Reader:
                 continue
             instance = plant.GetModelInstanceByName(name)
             body = plant.GetBodyByName(link.get("name", ""), instance)
-            for visual in visuals:
+            link_frame = body.body_frame()
+            for number, visual in enumerate(visuals):
+                if number and number % _MOST_ON_BODY == 0:
+                    # No link has this name: SDF reserves the colons.
+                    further = f"{body.name()}::{number}"
+                    body = plant.AddRigidBody(further, instance)
+                    plant.WeldFrames(link_frame, body.body_frame())
                 X_LG = visual.X_FG
                 if visual.frame:
                     frame = plant.GetFrameByName(visual.frame, instance)
@@ -649,6 +745,44 @@ class _Reader:
         elif pose.get("relative_to"):
             # A pose without numbers is the frame itself.
             SubElement(target, "pose", relative_to=kept["relative_to"])
+
+
+def _box_of_mesh(
+    path: str, visual: _Visual
+) -> tuple[np.ndarray, tuple[str, ...]] | None:
+    """Returns the box (2, 3) of a mesh G in F, and notes about its file.
+
+    The result is None if the mesh is to be read anyway.
+    """
+    if not (visual.is_perceived() and path.lower().endswith(".obj")):
+        return None
+    try:
+        faces = check_obj(Path(path))
+    except (InputError, ValueError):
+        return None  # Whoever reads it tells the fault.
+    if faces.box is None or faces.num_triangles == 0:
+        return None
+    assert isinstance(visual.shape, Mesh)
+    scaled = faces.box * visual.shape.scale3()
+    if not np.abs(scaled).max() <= LARGEST_SIZE:
+        return None
+    X_FG = visual.X_FG.GetAsMatrix34()
+    # The rotated box is largest where each coordinate is.
+    sides = X_FG[:, :3, None] * scaled.T
+    low, high = sides.min(axis=2).sum(axis=1), sides.max(axis=2).sum(axis=1)
+    return np.array([low, high]) + X_FG[:, 3], faces.notes
+
+
+def _places_of(visuals: Iterable[_Visual]) -> np.ndarray:
+    """Returns the box (2, 3) of the places of what rays can meet."""
+    places = [
+        visual.X_FG.translation()
+        for visual in visuals
+        if visual.is_perceived() and not isinstance(visual.shape, HalfSpace)
+    ]
+    if not places:
+        return np.array([np.full(3, np.inf), np.full(3, -np.inf)])
+    return np.array([np.min(places, axis=0), np.max(places, axis=0)])
 
 
 def _override_model(model: Element, include: Element) -> None:

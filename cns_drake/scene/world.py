@@ -1,6 +1,6 @@
 """Loads an SDF world, and a vehicle in it, into a SceneGraph."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 import contextlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,7 +33,7 @@ from cns_drake.scene.mesh_check import check_mesh_file
 from cns_drake.scene.model_check import check_model
 from cns_drake.scene.model_finder import ModelFinder
 from cns_drake.scene.perception_geometry import anchored_frames, check_shape
-from cns_drake.scene.sdf_worlds import read_sdf_world
+from cns_drake.scene.sdf_worlds import InSight, UnseenMesh, read_sdf_world
 from cns_drake.scene.structure_names import structure_name
 from cns_drake.scene.structure_table import StructureTable, load_structure_table
 from cns_drake.scene.urdf_worlds import read_urdf_world
@@ -77,6 +77,7 @@ def load_world(
     vehicle: Path | str | None = None,
     without: Collection[str] = (),
     model_paths: Collection[Path | str] = (),
+    in_sight: InSight | None = None,
 ) -> World:
     """Reads a world and, if given, a vehicle.
 
@@ -93,6 +94,11 @@ def load_world(
         without: names of structures to leave out.
         model_paths: folders in which `model://` and `package://` are searched,
             before the folders in GZ_SIM_RESOURCE_PATH and SDF_PATH.
+        in_sight: function that tells which of N boxes (N, 2, 3) in the world
+            [m] are in sight, each given by its least and greatest coordinates.
+            Meshes out of sight are not loaded; `structures` has theirs, and
+            rays that end in sight are the same. None to load all. Not together
+            with `without`.
 
     Raises:
         InputError: a file is missing or cannot be parsed, a structure to leave
@@ -110,9 +116,12 @@ def load_world(
     # plant with many models makes Build() slow.
     plant = MultibodyPlant(time_step=0.0)
     source = plant.RegisterAsSourceForSceneGraph(scene_graph)
-    notes = _read_world(plant, sdf, [Path(one) for one in model_paths])
+    notes, unseen = _read_world(
+        plant, sdf, [Path(one) for one in model_paths], in_sight
+    )
     _leave_out(scene_graph, source, sdf, without)
     found = _visible_structures(scene_graph)
+    found |= {structure_name(mesh.name) for mesh in unseen}
     if not found:
         left_out = "; ".join(note.removeprefix(f"{sdf}: ") for note in notes)
         raise InputError(
@@ -120,7 +129,7 @@ def load_world(
             f"LiDAR can see{left_out and f' ({left_out})'}"
         )
     _check_shapes(scene_graph, sdf)
-    notes += _mesh_notes(scene_graph)
+    notes += _mesh_notes(scene_graph, unseen)
     vehicle_model = None
     if vehicle is not None:
         vehicle_model = _parse_models(plant, Path(vehicle))[0]
@@ -146,22 +155,26 @@ def structures_in(world: World) -> set[str]:
 
 
 def _read_world(
-    plant: MultibodyPlant, path: Path, model_paths: Collection[Path]
-) -> tuple[str, ...]:
-    """Adds the models of a world to a plant; returns notes on what is left out.
+    plant: MultibodyPlant,
+    path: Path,
+    model_paths: Collection[Path],
+    in_sight: InSight | None,
+) -> tuple[tuple[str, ...], list[UnseenMesh]]:
+    """Adds the models of a world to a plant.
+
+    Returns:
+        Notes on what is left out, and the meshes that are out of sight.
 
     Raises:
         InputError: the file is missing, cannot be parsed, or has no models.
     """
     _check_text(path)
     doing(f"parsing {path.name}")
-    read = _READERS.get(path.suffix.lower(), read_sdf_world)
+    finder = ModelFinder(path, model_paths)
     with _drake_errors(path):
-        return read(plant, path, ModelFinder(path, model_paths))
-
-
-# File name ending -> reader; all others are read as SDF.
-_READERS = {".urdf": read_urdf_world}
+        if path.suffix.lower() == ".urdf":
+            return read_urdf_world(plant, path, finder), []
+        return read_sdf_world(plant, path, finder, in_sight)
 
 
 def _parse_models(
@@ -287,8 +300,12 @@ def _check_shapes(scene_graph: SceneGraph, sdf: Path) -> None:
             )
 
 
-def _mesh_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
-    """Returns notes about content of the visible meshes that is not read.
+def _mesh_notes(
+    scene_graph: SceneGraph, unseen: Iterable[UnseenMesh]
+) -> tuple[str, ...]:
+    """Returns notes about content of the meshes that is not read.
+
+    The meshes are the visible ones, and those out of sight.
 
     Raises:
         InputError: the shapes of a mesh would be misread.
@@ -297,10 +314,15 @@ def _mesh_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
     ids = inspector.GetAllGeometryIds(Role.kPerception)
     shapes = [inspector.GetShape(geometry_id) for geometry_id in ids]
     sources = [one.source() for one in shapes if isinstance(one, Mesh | Convex)]
+    paths = {str(one.path()) for one in sources if one.is_path()}
+    known = {mesh.path: mesh.notes for mesh in unseen}
     notes = []
-    for path in sorted({str(one.path()) for one in sources if one.is_path()}):
+    for path in sorted(paths | known.keys()):
         with value_errors(path):
-            notes += [f"{path}: {one}" for one in check_mesh_file(Path(path))]
+            found = known.get(path)
+            if found is None:
+                found = check_mesh_file(Path(path))
+            notes += [f"{path}: {one}" for one in found]
     return tuple(notes)
 
 

@@ -25,7 +25,7 @@ from cns_drake.recording import (
     recording_topics,
 )
 from cns_drake.scenarios import DrivePlan, Scenario, count_frames
-from cns_drake.scene import World
+from cns_drake.scene import InSight, World
 from cns_drake.sensors import sensor_pose
 from cns_drake.simulation.scenario_traffic import (
     plan_traffic_of_drive,
@@ -183,8 +183,13 @@ class LoadedDrive:
         return {name: sensor_pose(lidar) for name, lidar in lidars.items()}
 
 
-def load_drive(plan: DrivePlan) -> LoadedDrive:
+def load_drive(plan: DrivePlan, in_sight: InSight | None = None) -> LoadedDrive:
     """Plans the traffic of a drive, and loads its stage.
+
+    Args:
+        plan: the plan of the drive.
+        in_sight: tells what of the stage is in sight, see `load_world`; None to
+            load the whole stage.
 
     Raises:
         InputError: the scenario cannot be run.
@@ -193,7 +198,7 @@ def load_drive(plan: DrivePlan) -> LoadedDrive:
     doing("planning the drive")
     trajectory = plan.trajectory
     frames = count_frames(scenario, trajectory)  # An error comes at once.
-    world = load_stage(plan)
+    world = load_stage(plan, in_sight=in_sight)
     traffic = None
     if not scenario.traffic.is_off:
         doing("reading the traffic")

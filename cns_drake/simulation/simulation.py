@@ -42,7 +42,7 @@ from cns_drake.scenarios import (
     digest_inputs,
     recording_fingerprint,
 )
-from cns_drake.scene import FileWatch
+from cns_drake.scene import FileWatch, InSight
 from cns_drake.sensors import (
     KALIBR_FILE,
     SpinningPattern,
@@ -56,7 +56,7 @@ from cns_drake.simulation.loaded_drive import (
     LoadedDrive,
     load_drive,
 )
-from cns_drake.simulation.stage_loading import load_stage
+from cns_drake.simulation.stage_loading import load_stage, sight_along
 from cns_drake.simulation.station import make_station
 
 # Reports how many frames of how many are done.
@@ -158,14 +158,15 @@ def simulate(
         doing("reading the files of the drive")
         watch = FileWatch()
         inputs = digest_inputs(scenario, watch)
-        drive = load_drive(plan)
+        in_sight = sight_along(plan, with_page=page_file is not None)
+        drive = load_drive(plan, in_sight)
         changed = watch.changed()
         if changed is not None:
             raise InputError(f"{changed}: changed while it was being read")
         for text in drive.world.notes:
             on_note(text)
         strike()
-        page = None if page_file is None else _make_page(drive)
+        page = None if page_file is None else _make_page(drive, in_sight)
         with _make_bag(drive, inputs, folder, overwrite=overwrite) as bag:
 
             def report_frames(done: int) -> None:
@@ -278,7 +279,7 @@ def _fingerprint(drive: LoadedDrive, inputs: dict[str, str]) -> str:
     )
 
 
-def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
+def _make_page(drive: LoadedDrive, in_sight: InSight | None) -> MeshcatRecorder:
     scenario = drive.scenario
     other, other_name, is_earlier = other_stage(scenario)
     stage = scenario.stage
@@ -289,7 +290,9 @@ def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
         period=scenario.frame_period,
         num_frames=drive.num_frames,
         shown=ShownStages(
-            None if other is None else load_stage(DrivePlan(other)),
+            None
+            if other is None
+            else load_stage(DrivePlan(other), in_sight=in_sight),
             other_name,
             is_earlier,
             stage,

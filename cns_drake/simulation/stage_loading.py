@@ -8,16 +8,66 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base import doing
-from cns_drake.scenarios import DrivePlan, ground_notes, vehicle_file
-from cns_drake.scene import World, load_world
+from cns_drake.scenarios import (
+    DrivePlan,
+    count_frames,
+    ground_notes,
+    vehicle_file,
+)
+from cns_drake.scene import InSight, World, load_world
+from cns_drake.sensors import make_lidar_model
 from cns_drake.transient import change_world
 
 # Distance from the car's middle line to its sides, with a margin [m].
 _HALF_WIDTH = 1.3
+# How far the LiDARs are from the middle of the car at most, with a margin [m].
+_FAR_MOUNT = 20.0
+# A page shows what is this near to the drive: the whole of a shipped city [m].
+_SURROUNDINGS = 750.0
+
+
+def sight_along(plan: DrivePlan, *, with_page: bool) -> InSight | None:
+    """Returns what tells what can be seen from a drive, or on its page.
+
+    The result is None if more than the beams of the LiDARs asks for the world.
+
+    Args:
+        plan: the plan of the drive.
+        with_page: whether the surroundings are shown on a page.
+
+    Raises:
+        InputError: the scenario cannot be run.
+    """
+    scenario = plan.scenario
+    if not (
+        scenario.traffic.is_off
+        and scenario.transient.is_off
+        and not (scenario.cameras or scenario.further_sensors)
+        and not scenario.without
+    ):
+        return None
+    reach = _SURROUNDINGS if with_page else 0.0
+    for name, config in scenario.lidars.items():
+        model = make_lidar_model(config, name, scenario.seed, scenario.weather)
+        measured = model.returns or model.measurement
+        reach = max(reach, measured.reach(model.pattern.max_range))
+    frames = count_frames(scenario, plan.trajectory)
+    times = np.arange(frames + 1) * scenario.frame_period
+    path = shapely.LineString(plan.trajectory.poses(times)[1][:, :2])
+
+    def in_sight(boxes: np.ndarray) -> np.ndarray:
+        flat = shapely.box(*boxes[:, 0, :2].T, *boxes[:, 1, :2].T)
+        return shapely.dwithin(flat, path, reach + _FAR_MOUNT)
+
+    return in_sight
 
 
 def load_stage(
-    plan: DrivePlan, *, with_vehicle: bool = True, without: Sequence[str] = ()
+    plan: DrivePlan,
+    *,
+    with_vehicle: bool = True,
+    without: Sequence[str] = (),
+    in_sight: InSight | None = None,
 ) -> World:
     """Loads the world of a drive's stage, with its temporary changes.
 
@@ -26,6 +76,7 @@ def load_stage(
             are made near its path.
         with_vehicle: whether the world contains the vehicle.
         without: names of further structures that are left out.
+        in_sight: see `cns_drake.scene.world.load_world`.
 
     Raises:
         InputError: the scenario's files cannot be used.
@@ -37,6 +88,7 @@ def load_stage(
         vehicle=vehicle_file() if with_vehicle else None,
         without=(*scenario.without, *without),
         model_paths=scenario.model_paths,
+        in_sight=in_sight,
     )
     if scenario.world is not None:
         notes = ground_notes(scenario, plan.trajectory)

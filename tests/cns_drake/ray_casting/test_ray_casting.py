@@ -336,3 +336,23 @@ def test_a_ray_that_hardly_leaves_a_plane(axis, tiny):
     hits = scene.cast_rays(p, d, 100.0)
     expected = box(p, d, (9.0, 9.0, 9.0))
     np.testing.assert_allclose(hits.ranges, expected, rtol=1e-5)
+
+
+def test_the_first_of_two_shapes_in_one_place_is_hit():
+    """However slender, and whichever way its corners run."""
+    corners = np.array([[0, 0, 0], [600, 0, 0], [500, 4, 0]], float)
+    runs = ((0, 1, 2), (1, 0, 2), (2, 1, 0))
+    shapes = [
+        geometry(TriangleSurface(corners, np.array([run]))) for run in runs
+    ]
+    p = np.mgrid[10:590:8, 0:4, 2:3].reshape(3, -1).T.astype(float)
+    p = p[p[:, 1] * 500 < p[:, 0] * 4 - 40]
+    p = p[p[:, 1] * 100 < 4 * (600 - p[:, 0]) - 40]
+    down = np.tile([0.0, 0.0, -1.0], (len(p), 1))
+    for order in ([0, 1, 2], [1, 0, 2], [2, 1, 0]):
+        scene = RayCastingScene(
+            [shapes[k] for k in order], {WORLD}, identity, p_WS=np.zeros(3)
+        )
+        hits = scene.cast_rays(p, down, 10.0)
+        assert (hits.ranges == 2.0).all()
+        assert (hits.geometry == 0).all()

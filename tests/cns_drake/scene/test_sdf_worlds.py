@@ -1,9 +1,11 @@
 """SDF worlds, also those that people write for Gazebo."""
 
-from helpers.mesh_texts import obj_text
+from collections import Counter
+
+from helpers.mesh_texts import L_VERTICES, obj_text
 import numpy as np
 from pydrake.geometry import Role, SceneGraph
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 import pytest
@@ -674,3 +676,69 @@ def test_models_inside_of_models_stand_still(tmp_path):
     }
     assert len(frames) == 2
     assert frames <= set(world.anchored_frames())
+
+
+def test_visuals_are_spread_over_bodies(tmp_path):
+    """No body has many: Drake compares the names of each with all others."""
+    boxes = "".join(
+        f"<visual name='s{k}/part'><pose>{k} 0 0 0 0 0</pose>{BOX}</visual>"
+        for k in range(700)
+    )
+    link = f"<pose>1 2 3 0 0 0.5</pose><link name='city'>{boxes}</link>"
+    world = load_world(write(tmp_path, f"<model name='m'>{link}</model>"))
+    found = world.scene_graph.model_inspector()
+    ids = found.GetAllGeometryIds(Role.kPerception)
+    names = [found.GetName(one) for one in ids]
+    assert names == [f"m::s{k}/part" for k in range(700)]
+    frames = Counter(found.GetFrameId(one) for one in ids)
+    assert max(frames.values()) <= 250
+    assert frames.keys() <= world.anchored_frames()
+    context = world.plant.CreateDefaultContext()
+    for frame in frames:
+        body = world.plant.GetBodyFromFrameId(frame)
+        X_WB = body.EvalPoseInWorld(context)
+        assert X_WB.IsNearlyEqualTo(
+            RigidTransform(RollPitchYaw(0, 0, 0.5), [1, 2, 3]), 1e-12
+        )
+
+
+def test_meshes_out_of_sight_are_not_loaded(tmp_path):
+    """What is in sight is the same, and so are the table and the notes."""
+    folder = write(tmp_path).parent
+    visuals = ""
+    for k in range(6):
+        name = f"house_{k}.obj"
+        (folder / name).write_text(f"{obj_text()}l 1 2\n")
+        mesh = f"<mesh><uri>{name}</uri><scale>2 2 2</scale></mesh>"
+        visuals += (
+            f"<visual name='house_{k}/wall'><pose>{100 * k} 0 0 0 0 1</pose>"
+            f"<geometry>{mesh}</geometry></visual>"
+        )
+    # The origin of rays is in the middle of all places.
+    for k, x in enumerate((-50, 450)):
+        visuals += (
+            f"<visual name='post_{k}/a'><pose>{x} 0 0 0 0 0</pose>{BOX}"
+            "</visual>"
+        )
+    path = write(
+        tmp_path, f"<model name='m'><link name='a'>{visuals}</link></model>"
+    )
+    asked = []
+
+    def in_sight(boxes):
+        asked.extend(boxes.tolist())
+        return boxes[:, 0, 0] < 150.0
+
+    whole, part = load_world(path), load_world(path, in_sight=in_sight)
+    assert len(asked) == 6
+    low, high = np.array(asked)[3]
+    turned = RigidTransform(RollPitchYaw(0, 0, 1), [300, 0, 0])
+    corners = turned @ (2.0 * L_VERTICES).T
+    assert (low <= corners.min(axis=1) + 1e-9).all()
+    assert (high >= corners.max(axis=1) - 1e-9).all()
+    near = ["house_0", "house_1", "house_5", "post_0", "post_1"]
+    geometries = read_perception_geometry(part.scene_graph.model_inspector())
+    assert [one.structure for one in geometries] == near
+    assert list(part.structures) == list(whole.structures)
+    assert part.notes == whole.notes
+    assert len(part.notes) == 6

@@ -1,13 +1,16 @@
 """Stages of scenarios with added and removed structures."""
 
 import json
+from pathlib import Path
 import re
 import shutil
 
+from helpers.small_map import world_text
 from helpers.tiny_drive import tiny_scenario
 from helpers.transient_town import write_transient_town
 from mcap.reader import make_reader
 import numpy as np
+from pydrake.geometry import Role
 import pytest
 
 from cns_drake.base import InputError
@@ -19,7 +22,12 @@ from cns_drake.scenarios import (
     digest_inputs,
     make_scenario,
 )
-from cns_drake.simulation import SimulatedDrive, load_drive, simulate
+from cns_drake.simulation import (
+    SimulatedDrive,
+    load_drive,
+    sight_along,
+    simulate,
+)
 from evaluation import open_drive
 from evaluation.change import temporal_change
 
@@ -150,6 +158,41 @@ def test_what_came_is_absent_in_another_stage(tmp_path):
     assert 0 < came.sum() < len(scan)
     assert (scan["label"][came] == 252).all()
     assert (scan["label"][~came] < 252).all()
+
+
+@pytest.mark.slow
+def test_a_recording_shows_what_the_whole_world_shows(tmp_path):
+    """Also where streets overlap that are in one plane, and slender."""
+    lidars = {"lidar": {"preset": "vlp-16", "columns": 256}}
+    scenario = tiny_scenario(tmp_path, frames=2, lidars=lidars)
+    visuals = []
+    rng = np.random.default_rng(5)
+    for k, x in enumerate(rng.uniform(-200.0, 700.0, 150)):
+        end, y = x + rng.uniform(20.0, 150.0), rng.uniform(-40.0, 40.0)
+        (tmp_path / f"{k}.obj").write_text(
+            f"v {x} {y} 0\nv {end} {-y} 0\nv {end} {3 - y} 0\n"
+            f"v {x} {y} 6\nf 1 2 3\nf 2 3 4\n"
+        )
+        visuals.append(
+            f"<visual name='street_{k}/surface'><geometry><mesh><uri>{k}.obj"
+            "</uri></mesh></geometry></visual>"
+        )
+    Path(scenario.world).write_text(world_text(visuals))
+    Path(scenario.waypoints).write_text("x,y,z\n-10,5,0\n40,5,0\n40,60,0\n")
+    recording = McapDrive(
+        recorded(simulate(scenario, tmp_path / "out").folder.parent), None
+    )
+    whole = SimulatedDrive(scenario)
+    loaded = load_drive(
+        DrivePlan(scenario), sight_along(DrivePlan(scenario), with_page=False)
+    )
+    inspector = loaded.world.scene_graph.model_inspector()
+    assert len(inspector.GetAllGeometryIds(Role.kPerception)) < 150
+    assert recording.instances == whole.instances
+    for index in range(2):
+        scan = recording.scan(index)
+        assert len(np.unique(scan["instance"])) > 10
+        assert np.array_equal(scan, whole.scan(index))
 
 
 @pytest.mark.parametrize(
