@@ -195,7 +195,8 @@ def ground_structures(
     covered = joined_triangles(
         one.triangles for one in objects if one.is_ground
     )
-    lowered = ground.below(surface_samples(covered, ground.cell / 2.0))
+    samples = surface_samples(covered, ground.cell / 2.0)
+    lowered = ground.below(points for points, _ in samples)
     model = Model(
         (Part("surface", MeshShape(name)),),
         {name: lowered.to_mesh()},

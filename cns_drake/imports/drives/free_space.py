@@ -109,13 +109,8 @@ def find_free_space(
         shape,
     )
     in_water = _area_of([o for o in objects if _is_water(o)], window, shape)
-    blocked = np.zeros(shape, dtype=bool)
-    walls = []
-    for imported in objects:
-        if not (imported.is_ground or _is_water(imported)):
-            cells, triangles = _blocked_by(imported, ground, window)
-            blocked[cells] = True
-            walls.append(triangles)
+    obstacles = [o for o in objects if not (o.is_ground or _is_water(o))]
+    blocked, walls = _blocked_by(obstacles, ground, window, shape)
     free = ~(blocked | (in_water & ~on_road))
     least = _FROM_WALL
     paved = ndimage.binary_closing(on_road, iterations=1) & ~blocked
@@ -127,7 +122,7 @@ def find_free_space(
         least = _FROM_EDGE
     elif blocked.any():
         free &= _between_buildings(blocked)
-    outlines = joined_triangles(walls)[:, [0, 1, 2, 0], :2]
+    outlines = walls[:, [0, 1, 2, 0], :2]
     return FreeSpace(
         low,
         _clearance(free),
@@ -148,7 +143,7 @@ def _area_of(
     covered = np.zeros(shape, dtype=bool)
     # In one call: thousands of small groups would take far longer.
     surfaces = joined_triangles(imported.triangles for imported in objects)
-    for row, column in _covered_cells(surfaces, window):
+    for row, column, _ in _covered_cells(surfaces, window):
         covered[row, column] = True
     return covered
 
@@ -159,51 +154,119 @@ def _is_water(imported: ImportedObject) -> bool:
 
 def _covered_cells(
     triangles: np.ndarray, window: _Window, ground: Ground | None = None
-) -> Iterator[np.ndarray]:
-    """Yields row and column (2, N) of cells that triangles (M, 3, 3) cover.
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yields cells that triangles (M, 3, 3) cover.
 
-    With a ground, only places that a car on this ground could hit count.
+    Each time these are rows, columns, and indices of triangles, (N,) each. With
+    a ground, only places that a car on this ground could hit count.
     """
     low, _ = window
-    for points in surface_samples(triangles, _SAMPLE_SPACING, window):
+    for points, number in surface_samples(triangles, _SAMPLE_SPACING, window):
         if ground is not None:
             above = points[:, 2] - ground.height(points[:, :2])
-            points = points[above < _HEADROOM]
-        yield ((points[:, :2] - low) / CELL).astype(int).T[::-1]
+            is_low = above < _HEADROOM
+            points, number = points[is_low], number[is_low]
+        # The columns one by one: NumPy is slow for rows of two.
+        row, column = (
+            ((points[:, axis] - low[axis]) / CELL).astype(int)
+            for axis in (1, 0)
+        )
+        yield row, column, number
 
 
 def _blocked_by(
-    imported: ImportedObject, ground: Ground, window: _Window
-) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """Returns the cells that a structure blocks, and the triangles that block.
+    objects: Sequence[ImportedObject],
+    ground: Ground,
+    window: _Window,
+    shape: tuple[int, int],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the cells that structures block, and the triangles that block.
 
-    The cells, given by row and column (N,) each, include the inside of a
-    building. The triangles are (M, 3, 3) [m]. `window` contains the limits of
-    the grid.
+    The cells, (R, C) bool, include the insides of buildings. The triangles are
+    (M, 3, 3) [m]. `window` contains the limits of the grid, and `shape` is
+    (R, C).
     """
-    corners = imported.triangles.reshape(-1, 3)
+    triangles = joined_triangles(one.triangles for one in objects)
+    owner = np.repeat(
+        np.arange(len(objects)), [len(one.triangles) for one in objects]
+    )
+    corners = triangles.reshape(-1, 3)
     above = corners[:, 2] - ground.height(corners[:, :2])
     lowest = above.reshape(-1, 3).min(axis=1)
     highest = above.reshape(-1, 3).max(axis=1)
-    is_low = (lowest < _HEADROOM) & (above.max() >= _KERB)
-    cells = [np.zeros((2, 0), dtype=int)]
-    cells += _covered_cells(imported.triangles[is_low], window, ground)
-    row, column = np.concatenate(cells, axis=1)
-    if imported.structure.semantic_class == "building" and len(row):
-        row, column = _with_enclosed(row, column)
-    return (row, column), imported.triangles[is_low & (highest > _KERB)]
+    tallest = np.full(len(objects), -np.inf)
+    np.maximum.at(tallest, owner, highest)
+    is_low = (lowest < _HEADROOM) & (tallest[owner] >= _KERB)
+    walls = triangles[is_low & (highest > _KERB)]
+    triangles, owner = triangles[is_low], owner[is_low]
+    is_building = np.array(
+        [o.structure.semantic_class == "building" for o in objects], bool
+    )[owner]
+    blocked = _filled(
+        triangles[is_building], owner[is_building], ground, window, shape
+    )
+    others = triangles[~is_building]
+    for row, column, _ in _covered_cells(others, window, ground):
+        blocked[row, column] = True
+    return blocked, walls
 
 
-def _with_enclosed(
-    row: np.ndarray, column: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns cells (N,), at least one, together with those they enclose."""
-    first = np.array([row.min(), column.min()])
-    shape = np.array([row.max(), column.max()]) - first + 1
-    walls = np.zeros(shape, dtype=bool)
-    walls[row - first[0], column - first[1]] = True
-    row, column = np.nonzero(ndimage.binary_fill_holes(walls))
-    return row + first[0], column + first[1]
+def _filled(
+    triangles: np.ndarray,
+    owner: np.ndarray,
+    ground: Ground,
+    window: _Window,
+    shape: tuple[int, int],
+) -> np.ndarray:
+    """Returns the cells (R, C) bool of buildings, with those they enclose.
+
+    Each building gets a place of its own on a sheet, so that one call fills
+    all, and none is filled by the walls of several.
+
+    Args:
+        triangles: (M, 3, 3) the triangles of all buildings [m].
+        owner: (M,) the building of each triangle, in ascending order.
+        ground, window, shape: see `_blocked_by`.
+    """
+    blocked = np.zeros(shape, dtype=bool)
+    if not len(triangles):
+        return blocked
+    _, firsts, building = np.unique(
+        owner, return_index=True, return_inverse=True
+    )
+    # Rows and columns that each can have, with an empty one on each side.
+    places = (triangles[:, :, 1::-1] - window[0][::-1]) / CELL
+    limits = np.array(shape) - 1
+    first = np.minimum.reduceat(places.min(axis=1), firsts)
+    first = np.clip(np.floor(first), 0, limits).astype(int)
+    last = np.maximum.reduceat(places.max(axis=1), firsts)
+    last = np.clip(np.floor(last), 0, limits).astype(int)
+    sizes = last - first + 3
+    # Shelves of similar height.
+    order = np.argsort(-sizes[:, 0], kind="stable")
+    ends = np.cumsum(sizes[order, 1])
+    width = max(int(np.sqrt(np.prod(sizes, axis=1).sum())), 1)
+    shelf, left = np.divmod(ends - sizes[order, 1], width)
+    _, begins = np.unique(shelf, return_index=True)
+    tops = np.cumsum([0, *sizes[order, 0][begins]])
+    rank = np.searchsorted(shelf[begins], shelf)
+    corner = np.empty_like(first)
+    corner[order] = np.column_stack([tops[rank], left])
+    sheet = np.zeros((tops[-1], width + sizes[:, 1].max()), dtype=bool)
+    shift = corner + 1 - first
+    for row, column, number in _covered_cells(triangles, window, ground):
+        down, right = shift[building[number]].T
+        sheet[row + down, column + right] = True
+    # What is connected with the sheet's corner is outside.
+    parts, _ = ndimage.label(~sheet)
+    inside = parts != parts[0, 0]
+    for (top, left), (low, start), (high, end) in zip(
+        (corner + 1).tolist(), first.tolist(), (last + 1).tolist(), strict=True
+    ):
+        blocked[low:high, start:end] |= inside[
+            top : top + high - low, left : left + end - start
+        ]
+    return blocked
 
 
 def _clearance(free: np.ndarray) -> np.ndarray:
