@@ -25,5 +25,4 @@ from .simulation import (
 )
 from .simulation import simulate as simulate
 from .stage_loading import load_stage as load_stage
-from .stage_loading import sight_along as sight_along
 from .station import make_station as make_station
