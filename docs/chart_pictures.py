@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -21,8 +21,8 @@ from cns_drake.sensors import ImuErrors, ImuNoise
 from docs.fill_numbers import csv_rows
 from docs.picture_parts import (
     DPI,
-    FONT,
     ROOT,
+    STYLE,
     WIDTH,
     add_heading,
     make_plain,
@@ -31,8 +31,10 @@ from evaluation.methods import shipped_methods
 from evaluation.results import (
     INK,
     PALE,
+    PrintStyle,
     Results,
     Row,
+    draw_chart,
     in_table_order,
     method_style,
     rank_methods,
@@ -196,7 +198,7 @@ def years(path: Path) -> None:
         axes.set_xticks(x)
         make_plain(axes, "both")
     for axes in grid[:, 1]:
-        _name_lines(figure, axes, 0.095, FONT["font.size"])
+        _name_lines(figure, axes, 0.095, STYLE["font.size"])
     grid[0, 0].text(5.0, 7.0, "dashed: 90 %, a tenth lost", fontsize=11)
     for axes in grid[1]:
         axes.set_xlabel("age of the map [years]")
@@ -244,7 +246,7 @@ def visible_change(path: Path) -> None:
         axes.set_xlabel(words)
         axes.tick_params(labelbottom=True)
         make_plain(axes, "both")
-        _name_lines(figure, axes, 0.11, FONT["font.size"])
+        _name_lines(figure, axes, 0.11, STYLE["font.size"])
     panels[0].set_title("at the right: rank correlation of 1 - AUC", loc="left")
     figure.supylabel("AUC in 58 versions of Riverside", fontsize=13)
     add_heading(figure, "AUC over two measures of change")
@@ -329,7 +331,7 @@ def sessions(path: Path) -> None:
     axes.set_ylabel("R@1")
     axes.set_ylim(0.0, 1.02)
     make_plain(axes, "both")
-    _name_lines(figure, axes, 0.16, FONT["font.size"])
+    _name_lines(figure, axes, 0.16, STYLE["font.size"])
     add_heading(figure, "R@1 of a map of January 2012")
     figure.savefig(path, dpi=DPI)
 
@@ -423,8 +425,7 @@ def upkeep(
     add_heading(figure, finding)
     methods = [name for name in METHOD_STYLES if name in shown]
     handles = [
-        Line2D([], [], color=METHOD_STYLES[name][0], marker="o", ms=5, lw=3,
-               alpha=0.8)
+        Line2D([], [], color=METHOD_STYLES[name][0], marker="o", ms=5, ls="")
         for name in methods
     ]  # fmt: skip
     handles.append(Line2D([], [], color=INK, marker="|", ms=8, ls=""))
@@ -441,85 +442,25 @@ def ladder(path: Path) -> None:
     """Draws the ladder of Suburbia, what costs most on top."""
     results = Results.read(ROOT / "docs/notes/ladder_suburbia.csv")
     rows = results.where(metric="relative_auc", verified=False).rows
-    found: dict[str, dict[str, float]] = {}
+    shares: dict[object, list[float]] = {}
     for row in rows:
-        cause = str(row["cause"])
-        if cause != "none":
-            found.setdefault(cause, {})[row.method] = 100.0 * row.value
-    level = {str(row["cause"]): row["level"] for row in rows}
-    found = dict(
-        sorted(found.items(), key=lambda one: np.mean(list(one[1].values())))
-    )
-    # Methods from the most to the least robust.
-    methods = sorted(
-        found["all"],
-        key=lambda name: -np.mean([some[name] for some in found.values()]),
-    )
-    shares = np.array([[some[n] for n in methods] for some in found.values()])
-    texts = {cause: _cause_text(cause, level[cause]) for cause in found}
-    figure = Figure(figsize=(WIDTH, 9.4), layout="constrained")
-    axes = figure.subplots()
-    axes.imshow(
-        100.0 - np.clip(shares, 0.0, 100.0), cmap="Oranges", vmin=0.0,
-        vmax=130.0, aspect="auto",
-    )  # fmt: skip
-    for (y, x), share in np.ndenumerate(shares):
-        axes.text(x, y, f"{share:.0f}", ha="center", va="center")
-    axes.set_yticks(range(len(found)), texts.values())
-    axes.set_xticks(
-        range(len(methods)),
-        [title(n).replace(" ", "\n").replace("t++", "t\n++") for n in methods],
-        fontsize=10,
-    )
-    axes.xaxis.tick_top()
-    axes.tick_params(length=0)
-    axes.spines[:].set_visible(False)
-    axes.set_xticks(np.arange(0.5, len(methods) - 1), minor=True)
-    axes.set_yticks(np.arange(0.5, len(found) - 1), minor=True)
-    axes.grid(which="minor", color="white", lw=2)
-    axes.tick_params(which="minor", length=0)
-    axes.set_xlabel("retained AUC [%] in Suburbia", fontsize=11)
-    add_heading(figure, "What each cause leaves")
-    figure.savefig(path, dpi=DPI)
-
-
-def _cause_text(cause: str, level: object) -> str:
-    """Returns the title of a cause, and its strength at a level."""
-    if cause == "all":
-        return "All at once"
-    sheet = yaml.safe_load(
-        (ROOT / f"evaluation/study/experiments/causes/{cause}.yaml").read_text()
-    )
-    value: Any = sheet["strengths"]["ladder"]
-    while isinstance(value, dict):
-        value = list(value.values())[-1]
-    if not isinstance(value, list):
-        return sheet["title"]
-    strongest = value[int(str(level)) - 1]
-    if not isinstance(strongest, str | float | int) or strongest is True:
-        return sheet["title"]
-    strength = _STRENGTHS.get(cause, "{}").format(strongest)
-    return f"{sheet['title']}: {strength}".replace("%", " %")
-
-
-# Cause -> how its strength is written, if not as in its file.
-_STRENGTHS = {
-    "construction": "first stage",
-    "driver": "other way",
-    "furniture": "{:.0%} new",
-    "hidden": "{:g}°",
-    "lateral": "{:g} m",
-    "leaves": "{:.0%} left",
-    "parked_cars": "{:.0%}",
-    "raised": "{:g} m",
-    "ride": "class {}",
-    "scaffolds": "{:.0%}",
-    "size": "{}",
-    "snow": "{:g} m",
-    "tilt": "{:g}°",
-    "weather": "{:g} m",
-    "works": "{:.0%}",
-}
+        shares.setdefault(row["cause"], []).append(row.value)
+    folder = ROOT / "evaluation/study/experiments/causes"
+    titles = {
+        file.stem: yaml.safe_load(file.read_text())["title"]
+        for file in folder.glob("*.yaml")
+    }
+    named = [
+        replace(row, factors={**row.factors, "cause": name})
+        for row in sorted(rows, key=lambda row: np.mean(shares[row["cause"]]))
+        if (name := titles.get(str(row["cause"]), "All at once"))
+        and row["cause"] != "none"
+    ]
+    draw_chart(
+        {"kind": "matrix", "over": "cause", "metric": "relative_auc"},
+        Results.of(named),
+        printed=PrintStyle(WIDTH, title=False),
+    ).save(path.with_suffix(""), [path.suffix[1:]])
 
 
 def noise(path: Path) -> None:

@@ -4,7 +4,8 @@ python docs/draw.py            lists those that are older than their data
 python docs/draw.py NAME ...   draws these, and notes what they show
 
 For each picture, `docs/pictures.yaml` has a function of `chart_pictures` or
-`scene_pictures`, or a command; and the files that the picture shows. Commands
+`scene_pictures`, or a command; and the files that the picture shows, those
+of a page's code, too. Commands
 run in the root of the repository; what they made before is taken as it is.
 """
 
@@ -23,7 +24,7 @@ sys.path.insert(0, str(ROOT))
 
 from cns_drake.base import figure_style  # noqa: E402
 from docs import chart_pictures, scene_pictures  # noqa: E402
-from docs.picture_parts import FONT  # noqa: E402
+from docs.picture_parts import STYLE  # noqa: E402
 
 PICTURES = ROOT / "docs/pictures"
 REGISTRY = ROOT / "docs/pictures.yaml"
@@ -78,7 +79,7 @@ def main(names: Sequence[str]) -> None:
         if command and not (ROOT / entry.get("file", " ")).exists():
             subprocess.run(command, shell=True, check=True, cwd=ROOT)
         if draw:
-            with figure_style(FONT):
+            with figure_style(STYLE):
                 function_of(draw)(PICTURES / name, **entry)
         head, mark, rest = REGISTRY.read_text().partition(f"\n{name}:")
         rest = rest.replace(f"digest: {made}", f"digest: {digest(data)}", 1)

@@ -10,26 +10,26 @@ from matplotlib.figure import Figure
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from evaluation.results import INK
+from evaluation.results import FIGURE_STYLE, INK
 
 ROOT = Path(__file__).resolve().parents[1]
 # Charts are this wide [inches], and shown 830, 700 or 390 pixels wide.
 WIDTH = 7.0
-FONT = {"font.size": 13, "axes.titlesize": "medium", "svg.hashsalt": "cns"}
+# The style of all charts, in letters for pages.
+STYLE = {**FIGURE_STYLE, "font.size": 13}
 DPI = 160
 # Size of a camera's view [pixels].
 TILE = (704, 396)
 
 
 def add_heading(figure: Figure, finding: str) -> None:
-    figure.suptitle(finding, fontsize=17, fontweight="bold", x=0.01, ha="left")
+    figure.suptitle(finding)
 
 
 def make_plain(axes: Axes, grid: str = "x") -> None:
-    axes.grid(axis=grid, color="#dddddd")
-    axes.set_axisbelow(True)
+    axes.grid(axis=grid)
     axes.tick_params(length=0)
-    axes.spines[["top", "right", "left"]].set_visible(False)
+    axes.spines["left"].set_visible(False)
 
 
 def set_dark_view(axes: Axes, middle: np.ndarray, span: float) -> None:

@@ -54,6 +54,7 @@ from .sections.routes import (
     make_page_drive as make_page_drive,
 )
 from .sections.routes import routes_section as routes_section
+from .styles import FIGURE_STYLE as FIGURE_STYLE
 from .styles import INK as INK
 from .styles import PALE as PALE
 from .styles import method_style as method_style

@@ -542,16 +542,14 @@ const places = [...document.querySelectorAll("#places [data-time]")].map(
 function goTo({button, time}) {
   if (!followed) setFollowing(true);
   setTime(time);
-  const [x, y, z] = button.dataset.place.split(",").map(Number);
+  const [x, y] = button.dataset.place.split(",").map(Number);
   const {position} = followed = carPose();
-  const there = new MeshCat.THREE.Vector3(x, z, -y);
-  const way = there.clone().sub(position).setY(0);
+  const way = new MeshCat.THREE.Vector3(x, 0, -y).sub(position).setY(0);
   const far = viewer.camera.aspect < 1 ? 1.5 : 1;
   chosen = null;
   look(
     way.clone().setLength(-25 * far).add(position).setY(position.y + 14 * far),
-    way.clone().clampLength(0, 15).add(position)
-      .setY(position.y + Math.min(z - position.y, 15) / 3));
+    way.clone().clampLength(0, 5).add(position));
   placeDivider(innerWidth * (button.dataset.side === "after" ? 0.35 : 0.65));
 }
 
