@@ -64,11 +64,7 @@ from cns_drake.sensors import (
     OdometrySection,
     WeatherConfig,
 )
-from cns_drake.studies import (
-    DrawnRoute,
-    Fleet,
-    Losses,
-)
+from cns_drake.studies import DrawnRoute, Fleet, Losses
 from cns_drake.units import (
     LIDAR_PRESETS,
     Head,
@@ -89,11 +85,7 @@ from evaluation.methods import (
 )
 from evaluation.recognition import METRICS, Metric
 from evaluation.results import in_table_order
-from evaluation.study import (
-    Experiment,
-    MadeMap,
-    causes,
-)
+from evaluation.study import Experiment, MadeMap, causes
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 Sections = dict[str, type[BaseModel]]

@@ -28,13 +28,8 @@ import itertools
 import numpy as np
 
 from cns_drake.base import num_cores, track
-from cns_drake.ground_truth.exact_overlap import (
-    Sight,
-    sights_of,
-)
-from cns_drake.ground_truth.labelled import (
-    LabelledDrive,
-)
+from cns_drake.ground_truth.exact_overlap import Sight, sights_of
+from cns_drake.ground_truth.labelled import LabelledDrive
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.simulation import SimulatedDrive
 from evaluation.drives import sample_frames

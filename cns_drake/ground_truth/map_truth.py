@@ -19,12 +19,8 @@ from cns_drake.base import (
     write_text,
 )
 from cns_drake.drives import check_same_world
-from cns_drake.ground_truth.exact_labels import (
-    label_points,
-)
-from cns_drake.ground_truth.labelled import (
-    LabelledDrive,
-)
+from cns_drake.ground_truth.exact_labels import label_points
+from cns_drake.ground_truth.labelled import LabelledDrive
 from evaluation.map_update import (
     SIDES,
     SPACING,

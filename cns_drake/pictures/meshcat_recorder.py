@@ -21,11 +21,7 @@ from cns_drake.pictures.drive_page import (
     make_pair_page,
     moving_frames,
 )
-from cns_drake.pictures.drive_record import (
-    DriveRecord,
-    ScanRecord,
-    pack_scan,
-)
+from cns_drake.pictures.drive_record import DriveRecord, ScanRecord, pack_scan
 from cns_drake.pictures.page_panel import ShownStages, point_kinds
 from cns_drake.scene import World
 from cns_drake.units import MOST_RINGS

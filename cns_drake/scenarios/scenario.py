@@ -17,11 +17,7 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base import (
-    Name,
-    Section,
-    validated,
-)
+from cns_drake.base import Name, Section, validated
 from cns_drake.drives import check_sensor_name
 from cns_drake.motion import RoadProfile, RoughnessClass
 from cns_drake.roads import Route, Speeds

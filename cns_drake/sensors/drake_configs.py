@@ -35,11 +35,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
 from pydrake.systems.primitives import ZeroOrderHold
 
-from cns_drake.base import (
-    Section,
-    describe_validation_error,
-    one_line,
-)
+from cns_drake.base import Section, describe_validation_error, one_line
 from cns_drake.scene import find_bus
 from cns_drake.sensors import odometry
 from cns_drake.sensors.imu.config import ImuDescription, ImuSection

@@ -4,14 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 from pathlib import Path
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    ClassVar,
-    Literal,
-    NamedTuple,
-)
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import (
     BeforeValidator,
@@ -22,19 +15,11 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base import (
-    InputError,
-    Section,
-    validated,
-)
+from cns_drake.base import InputError, Section, validated
 from cns_drake.drives import LayoutName
 from cns_drake.sensors.lidar.measurement import Echoes, MeasurementModel
 from cns_drake.sensors.lidar.patterns import SpinningPattern
-from cns_drake.sensors.sensor_config import (
-    Mount,
-    Triple,
-    field_off_by_default,
-)
+from cns_drake.sensors.sensor_config import Mount, Triple, field_off_by_default
 from cns_drake.sensors.sheet_patterns import (
     UnitPattern,
     aimed,

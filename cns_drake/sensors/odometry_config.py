@@ -1,8 +1,6 @@
 """The description of odometry, which is read without Drake."""
 
-from cns_drake.base import (
-    Section,
-)
+from cns_drake.base import Section
 
 
 class OdometrySection(Section):

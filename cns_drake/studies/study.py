@@ -28,10 +28,7 @@ from cns_drake.scenarios import (
 from cns_drake.scene import MapFolder
 from cns_drake.studies.cause_check import check_causes
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
-from cns_drake.studies.maps.experiment_maps import (
-    MapPairs,
-    pairs_by_map,
-)
+from cns_drake.studies.maps.experiment_maps import MapPairs, pairs_by_map
 from cns_drake.studies.maps.made_maps import ONLY_STAGE
 from cns_drake.studies.maps.redrawing import redraw_cities
 from cns_drake.studies.pairs.comparisons import ChangedPair
@@ -43,10 +40,7 @@ from cns_drake.studies.pairs.simulated_pairs import (
 from cns_drake.studies.tasks.map_task import DrivenMapTask
 from cns_drake.studies.tasks.seen_task import SeenTask
 from evaluation.drives import sample_frames
-from evaluation.results import (
-    LEVEL,
-    PrintStyle,
-)
+from evaluation.results import LEVEL, PrintStyle
 from evaluation.study import (
     ChangeTask,
     CostTask,

@@ -7,10 +7,7 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base import InputError, track
-from cns_drake.training.batches import (
-    BatchSampler,
-    TrainingScans,
-)
+from cns_drake.training.batches import BatchSampler, TrainingScans
 from cns_drake.training.network import (
     Parameters,
     features,

@@ -30,9 +30,7 @@ from cns_drake.base import (
     user_errors,
 )
 from cns_drake.export import claim_folder
-from cns_drake.ground_truth import (
-    exact_overlaps,
-)
+from cns_drake.ground_truth import exact_overlaps
 from cns_drake.scenarios import Scenario
 from cns_drake.scene import CLASS_IDS, GROUND_CLASSES
 from cns_drake.simulation import SimulationSource

@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import (
-    Callable,
-    Collection,
-    Iterable,
-    Mapping,
-    Sequence,
-)
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cns_drake.base import (
-    Cluster,
-    InputError,
-    Job,
-    Reporter,
-    Space,
-)
+from cns_drake.base import Cluster, InputError, Job, Reporter, Space
 from evaluation.drives import MovedDrive, cloud_at
 from evaluation.paper import paper, paper_section
 from evaluation.recognition import (

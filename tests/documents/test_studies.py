@@ -7,15 +7,9 @@ from helpers import documents
 import pytest
 import yaml
 
-from cns_drake.studies import (
-    TASKS,
-)
+from cns_drake.studies import TASKS
 from evaluation.results import Results, Row
-from evaluation.study import (
-    Experiment,
-    load_experiment,
-    shipped_experiments,
-)
+from evaluation.study import Experiment, load_experiment, shipped_experiments
 
 PAGE = documents.read("docs/studies.md")
 

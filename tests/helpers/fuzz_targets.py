@@ -27,15 +27,10 @@ from cns_drake.scenarios import (
 from cns_drake.scene import load_world, read_perception_geometry
 from cns_drake.sensors import make_beam_pattern, make_pattern
 from cns_drake.simulation import save_scan, scan_world, simulate
-from cns_drake.studies import (
-    study_drives,
-)
+from cns_drake.studies import study_drives
 from evaluation import drives
 from evaluation.clouds import read_cloud
-from evaluation.study import (
-    Study,
-    load_experiment,
-)
+from evaluation.study import Study, load_experiment
 from helpers import (
     bent_drive,
     contradictions,

@@ -7,12 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import (
-    ended_by_interrupts,
-    note,
-    shared_options,
-    show,
-)
+from cns_drake.base import ended_by_interrupts, note, shared_options, show
 from cns_drake.command_line import options
 from cns_drake.command_line.experiment_drives import varied_drives
 
@@ -64,11 +59,7 @@ def pairs(
     with ended_by_interrupts("cns-drake"):
         from cns_drake.base import choose_cluster
         from cns_drake.scenarios import load_scenario
-        from cns_drake.training import (
-            ExportOptions,
-            claim_pairs,
-            export_pairs,
-        )
+        from cns_drake.training import ExportOptions, claim_pairs, export_pairs
 
     cluster = choose_cluster(jobs, scheduler)
     if vary is not None:  # Its scenarios are written to the same folder.

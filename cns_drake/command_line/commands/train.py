@@ -84,10 +84,7 @@ def train(
     with ended_by_interrupts("cns-drake"):
         from cns_drake.base import choose_cluster
         from cns_drake.sensors import make_lidar_config
-        from cns_drake.training import (
-            TrainingPlan,
-            make_weights,
-        )
+        from cns_drake.training import TrainingPlan, make_weights
 
     cluster = choose_cluster(jobs, scheduler)
     # A preset by its name, a data sheet by its content.

@@ -96,9 +96,7 @@ def _write_overlaps(
     """Writes the overlaps between a database and a query drive."""
     with ended_by_interrupts("cns-drake"):
         from cns_drake.scenarios import load_scenario
-        from cns_drake.training import (
-            write_overlap_table,
-        )
+        from cns_drake.training import write_overlap_table
 
     drives = [load_scenario(word) for word in words]
     table = write_overlap_table(drives[0], drives[1], output, protocol)
@@ -120,10 +118,7 @@ def _write_maps(
     """
     with ended_by_interrupts("cns-drake"):
         from cns_drake.base import check_new_folder
-        from cns_drake.ground_truth import (
-            open_labelled,
-            write_truth,
-        )
+        from cns_drake.ground_truth import open_labelled, write_truth
         from evaluation.map_update import Label
 
     check_new_folder(output)

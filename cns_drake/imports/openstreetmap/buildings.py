@@ -30,11 +30,7 @@ from cns_drake.imports.openstreetmap.building_tags import (
     why_absent,
 )
 from cns_drake.imports.openstreetmap.element_kinds import is_building
-from cns_drake.imports.openstreetmap.features import (
-    OsmArea,
-    OsmFeatures,
-    Tags,
-)
+from cns_drake.imports.openstreetmap.features import OsmArea, OsmFeatures, Tags
 from cns_drake.imports.openstreetmap.passages import Passage, Passages
 from cns_drake.imports.openstreetmap.tags import (
     TABLES,

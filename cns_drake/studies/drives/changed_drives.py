@@ -25,9 +25,7 @@ from cns_drake.scenarios import (
     plan_drive,
 )
 from cns_drake.scene import load_world, structures_in
-from cns_drake.sensors import (
-    WeatherConfig,
-)
+from cns_drake.sensors import WeatherConfig
 from cns_drake.simulation import recorded_traffic
 from cns_drake.studies.drives.named_stages import find_stage
 from cns_drake.studies.drives.sampled_drives import DrawnRoute
@@ -39,9 +37,7 @@ from cns_drake.studies.drives.viewpoints import (
 )
 from cns_drake.units import check_preset, is_sheet_file
 from evaluation.results import LAST, OWN
-from evaluation.study import (
-    Changes,
-)
+from evaluation.study import Changes
 
 # Fields of a drive that do not change the drive itself.
 _UNUSED_FIELDS = (*QUERY_FIELDS, "distractors", "years", "rates")

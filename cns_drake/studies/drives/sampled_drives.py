@@ -6,9 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from cns_drake.ageing import LAST_YEAR
-from cns_drake.base import (
-    Section,
-)
+from cns_drake.base import Section
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS
 
 _RouteLength = Annotated[float, Field(gt=0.0, le=100_000.0)]

@@ -7,11 +7,7 @@ from typing import Any
 from cns_drake.ageing import LAST_YEAR
 from cns_drake.base import InputError
 from evaluation.map_update import MAINTAINERS, NOT_MAINTAINED
-from evaluation.study import (
-    FLEET,
-    SESSIONS,
-    Changes,
-)
+from evaluation.study import FLEET, SESSIONS, Changes
 
 # Fields that only the query can have: they change its scans.
 QUERY_FIELDS = ("turn_queries", "tilt_queries", "hide_sector")

@@ -26,10 +26,7 @@ from cns_drake.scenarios import Scenario, digest_file
 from cns_drake.scene import MapFolder
 from cns_drake.studies.maps.map_step import MakeMap, make_maps
 from cns_drake.studies.maps.redrawing import RedrawCity
-from evaluation.study import (
-    Experiment,
-    MadeMap,
-)
+from evaluation.study import Experiment, MadeMap
 
 _FACTOR = "factor"
 # Seeds of redraws are below this number.

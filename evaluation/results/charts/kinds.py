@@ -25,11 +25,7 @@ from evaluation.results.figure_files import PRINTED, figure_svg, save_figure
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import RESERVED, SETTINGS
 from evaluation.results.method_names import in_table_order, title
-from evaluation.results.styles import (
-    FIGURE_STYLE,
-    MethodStyle,
-    method_styles,
-)
+from evaluation.results.styles import FIGURE_STYLE, MethodStyle, method_styles
 from evaluation.results.table import Answers, QueryRows, Results, Row
 
 _Measured = TypeVar("_Measured", Row, Answers)

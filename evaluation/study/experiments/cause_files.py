@@ -27,10 +27,7 @@ from cns_drake.base import (
     validated,
     value_errors,
 )
-from evaluation.study.experiments.factors import (
-    SIDES,
-    Case,
-)
+from evaluation.study.experiments.factors import SIDES, Case
 
 _FOLDER = Path(__file__).parent / "causes"
 # The case that combines causes.
@@ -106,9 +103,7 @@ def register_cause(cause: Path | str | Mapping[str, Any]) -> Cause:
         )
     """
     # It needs more modules than most commands.
-    from evaluation.study.experiments.experiment import (
-        Experiment,
-    )
+    from evaluation.study.experiments.experiment import Experiment
 
     _CAUSES.load_own()
     found = _read(cause)

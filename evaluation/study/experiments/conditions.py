@@ -16,13 +16,7 @@ from evaluation.recognition import (
     ProtocolFieldError,
     RetrievalProtocol,
 )
-from evaluation.results import (
-    CAUSE,
-    FROZEN_REDRAW,
-    LEVEL,
-    NO_CAUSE,
-    SETTINGS,
-)
+from evaluation.results import CAUSE, FROZEN_REDRAW, LEVEL, NO_CAUSE, SETTINGS
 from evaluation.study.experiments.factors import (
     SIDES,
     Case,

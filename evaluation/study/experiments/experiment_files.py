@@ -21,12 +21,7 @@ from cns_drake.base import (
     validated,
     value_errors,
 )
-from evaluation.results import (
-    SETTINGS,
-    as_factor,
-    chart_factors,
-    check_factors,
-)
+from evaluation.results import SETTINGS, as_factor, chart_factors, check_factors
 from evaluation.study.experiments.cause_files import ALL, with_cases
 from evaluation.study.experiments.conditions import levels_by_case
 from evaluation.study.experiments.experiment import (
@@ -34,12 +29,8 @@ from evaluation.study.experiments.experiment import (
     in_long_form,
     named_programs,
 )
-from evaluation.study.experiments.factors import (
-    Changes,
-)
-from evaluation.study.tasks.place import (
-    CostTask,
-)
+from evaluation.study.experiments.factors import Changes
+from evaluation.study.tasks.place import CostTask
 
 _FOLDER = Path(__file__).parent
 

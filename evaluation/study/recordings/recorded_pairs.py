@@ -10,11 +10,7 @@ from cns_drake.base import (
     natural_key,
     repeated,
 )
-from evaluation.recognition import (
-    KEEP_ALL,
-    RetrievalProtocol,
-    checked_keep,
-)
+from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
 from evaluation.results import CAUSE, LAST, OWN, STAGE
 from evaluation.study.experiments.conditions import Condition
 from evaluation.study.experiments.factors import SESSIONS, SIDES

@@ -20,11 +20,7 @@ from evaluation.study.place_measurements import (
     measure_places,
     shown_overlaps,
 )
-from evaluation.study.tasks.jobs import (
-    STARTING_COST,
-    Jobs,
-    num_described,
-)
+from evaluation.study.tasks.jobs import STARTING_COST, Jobs, num_described
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Answered, Task
 

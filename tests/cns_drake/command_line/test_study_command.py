@@ -6,10 +6,7 @@ import pytest
 
 from cns_drake.__main__ import main
 from evaluation.methods import shipped_methods
-from evaluation.study import (
-    load_experiment,
-    shipped_experiments,
-)
+from evaluation.study import load_experiment, shipped_experiments
 
 
 def run(capsys, *words):

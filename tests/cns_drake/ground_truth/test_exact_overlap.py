@@ -10,9 +10,7 @@ import pytest
 
 from cns_drake.__main__ import main
 from cns_drake.base import InputError
-from evaluation.recognition import (
-    read_overlaps,
-)
+from evaluation.recognition import read_overlaps
 
 
 @pytest.mark.slow

@@ -11,9 +11,7 @@ import yaml
 
 from cns_drake.__main__ import main
 from cns_drake.base import InputError
-from cns_drake.ground_truth import (
-    open_labelled,
-)
+from cns_drake.ground_truth import open_labelled
 from evaluation.map_update import Label, read_pair
 
 

@@ -2,14 +2,8 @@
 
 import pytest
 
-from cns_drake.base import (
-    InputError,
-    Section,
-    validated,
-)
-from cns_drake.sensors import (
-    field_off_by_default,
-)
+from cns_drake.base import InputError, Section, validated
+from cns_drake.sensors import field_off_by_default
 
 
 class Weather(Section):

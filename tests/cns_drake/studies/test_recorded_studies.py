@@ -9,18 +9,13 @@ import numpy as np
 import pytest
 
 from cns_drake.base import Cluster, InputError
-from cns_drake.studies import (
-    run_study,
-)
+from cns_drake.studies import run_study
 from evaluation.change import read_map
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition import RANDOM_YAW_PROTOCOL, RetrievalProtocol
 from evaluation.results import Results
-from evaluation.study import (
-    Experiment,
-    MethodChoice,
-)
+from evaluation.study import Experiment, MethodChoice
 
 
 @pytest.fixture(scope="module")

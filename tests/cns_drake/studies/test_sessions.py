@@ -4,14 +4,9 @@ from helpers.small_map import write_town
 import pytest
 
 from cns_drake.base import Cluster
-from cns_drake.studies import (
-    run_study,
-)
+from cns_drake.studies import run_study
 from evaluation.results import Results
-from evaluation.study import (
-    Experiment,
-    load_experiment,
-)
+from evaluation.study import Experiment, load_experiment
 
 
 @pytest.fixture(scope="module")

@@ -13,17 +13,13 @@ import pytest
 from cns_drake.base import Cluster, InputError
 from cns_drake.scenarios import load_scenario
 from cns_drake.simulation import SimulationSource
-from cns_drake.studies import (
-    run_study,
-)
+from cns_drake.studies import run_study
 from evaluation.change import DriveMap
 from evaluation.maps import CELL_SIZE, VoxelAccumulator
 from evaluation.methods import make_method
 from evaluation.recognition import RetrievalProtocol
 from evaluation.results import QueryRows, Results
-from evaluation.study import (
-    Experiment,
-)
+from evaluation.study import Experiment
 
 TABLES = ("results.csv", "queries.csv")
 

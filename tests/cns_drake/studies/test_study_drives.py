@@ -9,13 +9,8 @@ import yaml
 from cns_drake.base import Cluster, InputError
 from cns_drake.scenarios import load_scenario
 from cns_drake.sensors import make_pattern
-from cns_drake.studies import (
-    study_drives,
-)
-from evaluation.study import (
-    Study,
-    load_experiment,
-)
+from cns_drake.studies import study_drives
+from evaluation.study import Study, load_experiment
 
 # What a cause of the ladder may change, apart from the drive's name.
 CHANGED = {

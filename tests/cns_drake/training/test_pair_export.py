@@ -4,10 +4,7 @@ from helpers.tiny_drive import tiny_scenario
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.training import (
-    ExportOptions,
-    export_pairs,
-)
+from cns_drake.training import ExportOptions, export_pairs
 
 
 def test_two_drives_of_one_name_are_refused(tmp_path):

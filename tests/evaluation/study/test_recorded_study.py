@@ -21,11 +21,7 @@ from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition import PROTOCOLS, RetrievalProtocol
 from evaluation.results import QueryRows, Results
-from evaluation.study import (
-    choose_methods,
-    drives_by_map,
-    find_recordings,
-)
+from evaluation.study import choose_methods, drives_by_map, find_recordings
 
 pytestmark = pytest.mark.slow
 

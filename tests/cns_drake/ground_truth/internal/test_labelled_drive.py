@@ -5,15 +5,9 @@ from helpers.tiny_drive import tiny_scenario
 import numpy as np
 import pytest
 
-from cns_drake.ground_truth import (
-    write_truth,
-)
-from cns_drake.ground_truth.exact_labels import (
-    NEAR,
-)
-from cns_drake.ground_truth.labelled import (
-    LabelledDrive,
-)
+from cns_drake.ground_truth import write_truth
+from cns_drake.ground_truth.exact_labels import NEAR
+from cns_drake.ground_truth.labelled import LabelledDrive
 from cns_drake.sensors import BeamCoverage
 from cns_drake.simulation import SimulatedDrive
 from evaluation.map_update import Label, read_pair, read_truth

@@ -5,13 +5,9 @@ from helpers.tiny_drive import tiny_scenario
 import numpy as np
 import pytest
 
-from cns_drake.ground_truth.exact_overlap import (
-    exact_overlaps,
-)
+from cns_drake.ground_truth.exact_overlap import exact_overlaps
 from cns_drake.simulation import SimulationSource
-from evaluation.recognition import (
-    RetrievalProtocol,
-)
+from evaluation.recognition import RetrievalProtocol
 
 PROTOCOL = RetrievalProtocol(query_spacing=5.0, place_spacing=5.0)
 # The first pose is (-10, 5), heading along x: the front of the wall is 10 m to

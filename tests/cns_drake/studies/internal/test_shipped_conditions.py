@@ -5,13 +5,8 @@ from pathlib import Path
 import pytest
 
 from cns_drake.base import Cluster
-from cns_drake.studies import (
-    study,
-)
-from evaluation.study import (
-    Study,
-    load_experiment,
-)
+from cns_drake.studies import study
+from evaluation.study import Study, load_experiment
 
 
 def why(name, maps=(), *changes, **options):

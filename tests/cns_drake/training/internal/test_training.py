@@ -9,31 +9,12 @@ from cns_drake.base import InputError
 from cns_drake.roads import draw_route, load_road_network
 from cns_drake.scenarios import load_scenario
 from cns_drake.studies.maps.redrawing import marked_yaml
-from cns_drake.training import (
-    TrainingPlan,
-    batches,
-    descent,
-)
-from cns_drake.training.batches import (
-    BatchSampler,
-    TrainingScans,
-)
-from cns_drake.training.descent import (
-    train,
-)
-from cns_drake.training.network import (
-    features,
-    scores,
-    start_parameters,
-)
-from cns_drake.training.sampled_city import (
-    SampledCity,
-    draw_streets,
-)
-from cns_drake.training.weights import (
-    MAPS,
-    write_weights,
-)
+from cns_drake.training import TrainingPlan, batches, descent
+from cns_drake.training.batches import BatchSampler, TrainingScans
+from cns_drake.training.descent import train
+from cns_drake.training.network import features, scores, start_parameters
+from cns_drake.training.sampled_city import SampledCity, draw_streets
+from cns_drake.training.weights import MAPS, write_weights
 from evaluation.methods import SECTORS
 from evaluation.methods.learned import (
     CHANNELS,

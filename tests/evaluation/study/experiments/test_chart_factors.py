@@ -3,10 +3,7 @@
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.study import (
-    load_experiment,
-    shipped_experiments,
-)
+from evaluation.study import load_experiment, shipped_experiments
 
 TEXT = """
 database: {years: [0, 10]}

@@ -1,8 +1,6 @@
 """Fields of experiments."""
 
-from evaluation.study import (
-    named_programs,
-)
+from evaluation.study import named_programs
 
 
 def test_lists_of_whole_numbers_can_be_spread(read):

@@ -5,11 +5,7 @@ import yaml
 
 from cns_drake.base import InputError
 from evaluation.methods import shipped_methods
-from evaluation.study import (
-    Experiment,
-    load_experiment,
-    shipped_experiments,
-)
+from evaluation.study import Experiment, load_experiment, shipped_experiments
 
 
 def test_a_file_of_few_words_is_enough(read):

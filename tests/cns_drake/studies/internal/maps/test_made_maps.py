@@ -16,10 +16,7 @@ from cns_drake.scene import MapFolder
 from cns_drake.studies.maps import map_step
 from cns_drake.studies.maps.made_maps import AgeCity, made_map_step
 from cns_drake.studies.maps.map_step import MakeMap
-from evaluation.study import (
-    Experiment,
-    MadeMap,
-)
+from evaluation.study import Experiment, MadeMap
 
 DRIVE = """
 map: .

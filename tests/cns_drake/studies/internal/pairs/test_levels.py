@@ -18,11 +18,7 @@ from cns_drake.studies.study import (
     plan_study,
 )
 from evaluation.recognition import RECORDED_PROTOCOL
-from evaluation.study import (
-    Condition,
-    Study,
-    load_experiment,
-)
+from evaluation.study import Condition, Study, load_experiment
 
 TABLE = "levels.csv"
 

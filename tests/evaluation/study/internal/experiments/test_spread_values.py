@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from evaluation.study.experiments.factors import (
-    expand_spread,
-)
+from evaluation.study.experiments.factors import expand_spread
 
 
 @pytest.mark.parametrize(
