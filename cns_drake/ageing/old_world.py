@@ -17,10 +17,10 @@ from cns_drake.base import (
     InputError,
     check_regular,
     is_there,
-    number_within,
     read_elements,
     read_records,
     read_rows,
+    to_number,
     whole_number,
 )
 from cns_drake.city import (
@@ -113,7 +113,7 @@ class OldWorld:
                 if name != YEAR_COLUMN or row.get(name):
                     whole_number(row[name], f"{where}: {name}")
             for name in real:
-                number_within(row[name], LARGEST_SIZE, f"{where}: {name}")
+                _number_within(row[name], LARGEST_SIZE, f"{where}: {name}")
         self.rows = {row["name"]: row for _, row in records}
 
     def of_class(self, *classes: str) -> list[StructureGeometry]:
@@ -294,3 +294,18 @@ def _not_one_model(path: Path) -> str:
         f"{path}: not one model with visuals named <structure>/<part>, as "
         "`cns-drake city` and `import` write it"
     )
+
+
+def _number_within(text: str, largest: float, where: object) -> float:
+    """Returns the number in a cell, from -`largest` to `largest`.
+
+    Raises:
+        InputError: the text is not a number, or its absolute value exceeds
+            `largest`. The message begins with `where`.
+    """
+    value = to_number(text)
+    if not abs(value) <= largest:
+        raise InputError(
+            f"{where}: {text[:40]!r} is no number up to {largest:g}"
+        )
+    return value

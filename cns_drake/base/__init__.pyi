@@ -1,5 +1,4 @@
 from . import commands as commands
-from . import points as points
 from . import poses as poses
 from . import program as program
 from . import shared_options as shared_options
@@ -42,7 +41,6 @@ from .elementary import power as power
 from .elementary import product as product
 from .elementary import rotated as rotated
 from .elementary import sin as sin
-from .elementary import smooth_step as smooth_step
 from .elementary import tan as tan
 from .elementary import turns as turns
 from .errors import InputError as InputError
@@ -62,7 +60,6 @@ from .figures import NEW_RGB as NEW_RGB
 from .figures import UNSEEN_RGB as UNSEEN_RGB
 from .figures import figure_style as figure_style
 from .figures import font_settings as font_settings
-from .figures import parse_length as parse_length
 from .figures import save_figure as save_figure
 from .file_locks import lock_file as lock_file
 from .files import cache_folder as cache_folder
@@ -90,10 +87,8 @@ from .jobs.digests import file_digests as file_digests
 from .jobs.digests import fingerprint as fingerprint
 from .jobs.forecast import Space as Space
 from .jobs.forecast import forecast as forecast
-from .jobs.processes import ALLOCATION as ALLOCATION
 from .jobs.processes import JobError as JobError
 from .jobs.processes import ProcessDiedError as ProcessDiedError
-from .jobs.processes import nothing_left as nothing_left
 from .jobs.processes import run_process as run_process
 from .jobs.running import Cluster as Cluster
 from .jobs.running import Job as Job
@@ -107,7 +102,6 @@ from .json_text import parse_json as parse_json
 from .launch import start as start
 from .npz_archives import read_npz as read_npz
 from .number_format import is_number as is_number
-from .number_format import number_within as number_within
 from .number_format import other_separator as other_separator
 from .number_format import parse_rows as parse_rows
 from .number_format import to_number as to_number
@@ -130,12 +124,7 @@ from .progress_display import show_progress as show_progress
 from .repetitions import repeated as repeated
 from .round_shapes import revolved as revolved
 from .system_libraries import missing_library as missing_library
-from .terminal import next_command as next_command
-from .terminal import next_page as next_page
 from .terminal import note as note
-from .terminal import number_text as number_text
-from .terminal import resumable as resumable
-from .terminal import show as show
 from .units import NS_PER_S as NS_PER_S
 from .units import wrapped as wrapped
 from .version import __version__ as __version__

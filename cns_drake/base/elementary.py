@@ -21,14 +21,6 @@ log = np.vectorize(math.log, otypes=[float])
 power = np.vectorize(math.pow, otypes=[float])
 
 
-def smooth_step(u: np.ndarray) -> np.ndarray:
-    """Returns the value at u of a quintic polynomial: 0 at u = 0, 1 at u = 1.
-
-    The first and second derivatives of the quintic are zero at both ends.
-    """
-    return power(u, 3) * (10 - 15 * u + 6 * u**2)
-
-
 def product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     """Returns the matrix product A @ B for (..., M, K) and (..., K, N).
 

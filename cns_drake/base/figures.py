@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 import contextlib
 import functools
 from pathlib import Path
-import re
 from typing import TYPE_CHECKING, Any
 import warnings
 
@@ -37,9 +36,6 @@ _FURTHER_FONTS = (
 )
 # Part of Matplotlib's warning about a letter that no font has.
 _MISSING = "missing from font"
-
-# Unit of length -> number of them in an inch.
-_IN_AN_INCH = {"in": 1.0, "cm": 2.54, "mm": 25.4, "pt": 72.27}
 
 Rgb = tuple[int, int, int]
 
@@ -127,25 +123,6 @@ def font_settings(font: str) -> dict[str, Any]:
         "font.family": [one for one in fonts if one in there],
         "mathtext.fontset": formulas,
     }
-
-
-def parse_length(name: str, text: str) -> float:
-    """Returns a length [inches] from text with its unit, such as `3.5in`.
-
-    Args:
-        name: what the length is of, for errors.
-        text: a number and `in`, `cm`, `mm` or `pt`, the point of TeX.
-
-    Raises:
-        InputError: the text is no such length.
-    """
-    found = re.fullmatch(r"(\d+\.?\d*|\.\d+) ?(in|cm|mm|pt)", text.strip())
-    if found is None:
-        raise InputError(
-            f"{name}: {text!r}: a number and in, cm, mm or pt is needed, such"
-            " as 3.5in"
-        )
-    return float(found[1]) / _IN_AN_INCH[found[2]]
 
 
 def save_figure(

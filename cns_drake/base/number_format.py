@@ -127,18 +127,3 @@ def whole_number(text: str, where: object) -> int:
             f"{where}: {text[:40]!r} is no whole number of up to 18 digits"
         )
     return int(text)
-
-
-def number_within(text: str, largest: float, where: object) -> float:
-    """Returns the number in a cell, from -`largest` to `largest`.
-
-    Raises:
-        InputError: the text is not a number, or its absolute value exceeds
-            `largest`. The message begins with `where`.
-    """
-    value = to_number(text)
-    if not abs(value) <= largest:
-        raise InputError(
-            f"{where}: {text[:40]!r} is no number up to {largest:g}"
-        )
-    return value

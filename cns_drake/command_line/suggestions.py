@@ -10,7 +10,10 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cns_drake.base import InputError, next_command
+from cns_drake.base import (
+    InputError,
+    terminal,
+)
 
 if TYPE_CHECKING:
     from cns_drake.drives import Drive
@@ -35,7 +38,7 @@ def suggest_export(recording: Path, scenario: Scenario) -> None:
     if len(lidars) > 1 and "lidar" not in lidars:
         # Without a name, an export takes the LiDAR named `lidar`.
         words += ("--lidar", lidars[0])
-    next_command("cns-drake", "export", *words, "--output", output)
+    terminal.next_command("cns-drake", "export", *words, "--output", output)
 
 
 def suggest_evaluation(
@@ -59,9 +62,9 @@ def suggest_evaluation(
         return
     if has_loop(drive):
         words = ("--method", "solid", "--exclude-recent", _EXCLUDED)
-        next_command("cns-eval", "pr", exported, exported, *words)
+        terminal.next_command("cns-eval", "pr", exported, exported, *words)
     elif is_plain:
-        next_command("cns-eval", "tcr", recording, exported)
+        terminal.next_command("cns-eval", "tcr", recording, exported)
 
 
 def has_loop(drive: Drive) -> bool:
@@ -100,14 +103,16 @@ def suggest_recognition(
     """
     folders = [_RECORDINGS / drive.name for drive in drives]
     if not all(map(os.path.lexists, folders)):
-        next_command("cns-drake", "generate", *words, "--output", _RECORDINGS)
+        terminal.next_command(
+            "cns-drake", "generate", *words, "--output", _RECORDINGS
+        )
     usual = type(protocol)()
     given: list[object] = []
     if protocol.query_spacing != usual.query_spacing:
         given += ["--query-spacing", protocol.query_spacing]
     if protocol.half_extent != usual.half_extent:
         given += ["--half-extent", protocol.half_extent]
-    next_command(
+    terminal.next_command(
         "cns-eval",
         "pr",
         *folders,
@@ -125,10 +130,10 @@ def suggest_page(scenario: Scenario, word: str) -> None:
     """Names the command that records a drive, and writes a page of it."""
     if not os.path.lexists(_RECORDINGS / scenario.name):
         words = ("--output", _RECORDINGS, "--recording", "drive.html")
-        next_command("cns-drake", "simulate", word, *words)
+        terminal.next_command("cns-drake", "simulate", word, *words)
 
 
 def suggest_reproduction(folder: Path) -> None:
     """Names the command that simulates the drives of a new map."""
     words = ("reproduce", folder, "--output", "study", "--no-recordings")
-    next_command("cns-drake", *words)
+    terminal.next_command("cns-drake", *words)

@@ -11,14 +11,16 @@ import zlib
 import numpy as np
 
 from cns_drake.base import (
+    FARTHEST_RETURN,
     InputError,
+    check_range,
     listed,
     parse_json,
     poses,
     read_text,
     value_errors,
+    xyz,
 )
-from cns_drake.base import points as point_arrays
 from cns_drake.drives import mcap_messages, ros_types
 from cns_drake.drives.drive import (
     ODOMETRY_DTYPE,
@@ -333,10 +335,10 @@ class McapDrive(Drive):
             if self._is_in_world:
                 points = points.copy()
                 X_SW = poses.inverse(self.X_WS[index])
-                moved = poses.transform(X_SW, point_arrays.xyz(points))
+                moved = poses.transform(X_SW, xyz(points))
                 for axis, values in zip("xyz", moved.T, strict=True):
                     points[axis] = values
-            point_arrays.check_range(points, point_arrays.FARTHEST_RETURN)
+            check_range(points, FARTHEST_RETURN)
             return from_layout(
                 points,
                 self._labels(index, message),

@@ -7,16 +7,12 @@ from .mcap_recorder import McapRecorder as McapRecorder
 from .mcap_recorder import RecordedCamera as RecordedCamera
 from .mcap_recorder import RecordedSensor as RecordedSensor
 from .messages import ENCODINGS as ENCODINGS
-from .messages import (
-    encode_point_cloud as encode_point_cloud,
-)
 from .messages import make_camera_info as make_camera_info
 from .messages import (
     make_compressed_image as make_compressed_image,
 )
 from .messages import make_header as make_header
 from .messages import make_image as make_image
-from .messages import make_imu as make_imu
 from .messages import to_quat_xyzw as to_quat_xyzw
 from .object_messages import (
     RecordedObjects as RecordedObjects,

@@ -13,7 +13,6 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 import shapely
 from shapely import STRtree
 
-from cns_drake.base import smooth_step
 from cns_drake.roads.car_outline import (
     FRONT,
     HALF_WIDTH,
@@ -21,7 +20,7 @@ from cns_drake.roads.car_outline import (
     directions,
     outlines,
 )
-from cns_drake.roads.lane_path import LanePath, sample_lane_path
+from cns_drake.roads.lane_path import LanePath, sample_lane_path, smooth_step
 from cns_drake.roads.network import RoadNetwork
 
 # Distance between the points of the path that `driven_path` needs [m].

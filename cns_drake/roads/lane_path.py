@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.base import InputError, distances_along
+from cns_drake.base import InputError, distances_along, power
 
 # A path must be longer than this to become a trajectory [m].
 _MIN_LENGTH = 20.0
@@ -103,3 +103,11 @@ def sample_lane_path(
         speed_limits=np.minimum(speed_limits[after - 1], speed_limits[after]),
         beside=beside,
     )
+
+
+def smooth_step(u: np.ndarray) -> np.ndarray:
+    """Returns the value at u of a quintic polynomial: 0 at u = 0, 1 at u = 1.
+
+    The first and second derivatives of the quintic are zero at both ends.
+    """
+    return power(u, 3) * (10 - 15 * u + 6 * u**2)

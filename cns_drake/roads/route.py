@@ -7,8 +7,13 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, RootModel, Strict
 
-from cns_drake.base import InputError, smooth_step
-from cns_drake.roads.lane_path import DENSE_SPACING, LanePath, sample_lane_path
+from cns_drake.base import InputError
+from cns_drake.roads.lane_path import (
+    DENSE_SPACING,
+    LanePath,
+    sample_lane_path,
+    smooth_step,
+)
 from cns_drake.roads.network import Connection, RoadNetwork
 from cns_drake.roads.road import Direction, LaneRef, Road
 from cns_drake.roads.u_turn import find_u_turn

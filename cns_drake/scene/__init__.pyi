@@ -5,7 +5,6 @@ from .drake_releases import (
 )
 from .file_references import referenced_files as referenced_files
 from .file_watch import FileWatch as FileWatch
-from .foreign_meshes import ForeignMeshes as ForeignMeshes
 from .labels import MAX_INSTANCE as MAX_INSTANCE
 from .labels import Labels as Labels
 from .labels import number_structures as number_structures
@@ -25,7 +24,6 @@ from .map_reference import metres_on_map as metres_on_map
 from .materials import MATERIALS as MATERIALS
 from .materials import USUAL_MATERIALS as USUAL_MATERIALS
 from .materials import Material as Material
-from .mesh_files import MeshFiles as MeshFiles
 from .perception_geometry import GREY as GREY
 from .perception_geometry import GeometryList as GeometryList
 from .perception_geometry import (

@@ -23,8 +23,8 @@ from cns_drake.base import (
     fingerprint,
     make_folder,
     poses,
-    resumable,
     run_jobs,
+    terminal,
     track,
 )
 from cns_drake.ground_truth import VisibleSurfaces, sights_of
@@ -152,7 +152,7 @@ def make_weights(
         ]
     )
     digest = fingerprint({"cities": [part.identity() for part in parts]})
-    with resumable():
+    with terminal.resumable():
         values, curve = train(
             scans, plan.steps, plan.seed, work / "state.data", digest
         )

@@ -7,8 +7,12 @@ import warnings
 
 import numpy as np
 
-from cns_drake.base import check_regular, user_errors, value_errors
-from cns_drake.base import points as point_arrays
+from cns_drake.base import (
+    check_regular,
+    from_xyz,
+    user_errors,
+    value_errors,
+)
 from evaluation.clouds.notes import OnNote
 from evaluation.clouds.record_reading import check_size, read_records
 
@@ -94,4 +98,4 @@ def _read_columns(
 def _to_cloud(values: np.ndarray) -> np.ndarray:
     if values.dtype.kind != "f":
         values = values.astype(np.float64)
-    return point_arrays.from_xyz(values)
+    return from_xyz(values)

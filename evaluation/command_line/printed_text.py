@@ -6,7 +6,9 @@ from collections.abc import Iterator, Mapping
 import math
 from typing import TYPE_CHECKING
 
-from cns_drake.base import number_text
+from cns_drake.base import (
+    terminal,
+)
 
 if TYPE_CHECKING:
     from evaluation.recognition import Interval
@@ -17,7 +19,8 @@ def spaced_interval(interval: Interval) -> str:
     """Returns an interval after two spaces; "" if it is unknown."""
     if math.isnan(interval.low):
         return ""
-    return f"  [{number_text(interval.low)}, {number_text(interval.high)}]"
+    low, high = map(terminal.number_text, (interval.low, interval.high))
+    return f"  [{low}, {high}]"
 
 
 def metric_rows(
@@ -33,7 +36,7 @@ def metric_rows(
 
     for name, number in found.numbers.items():
         metric = METRICS[name]
-        value = number_text(number.value)
+        value = terminal.number_text(number.value)
         if metric.is_whole and math.isfinite(number.value):
             value = f"{number.value:.0f}"
         text = f"{value}{spaced_interval(number.interval)}"

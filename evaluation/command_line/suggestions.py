@@ -2,7 +2,10 @@
 
 from pathlib import Path
 
-from cns_drake.base import next_page, note
+from cns_drake.base import (
+    note,
+    terminal,
+)
 from evaluation.results import (
     QUERIES,
     RESULTS,
@@ -27,4 +30,4 @@ def show_results(page: Path) -> None:
     print(page)
     if table.is_file():
         note(f"wrote {table} and {QUERIES}")
-    next_page(page)
+    terminal.next_page(page)

@@ -3,7 +3,6 @@ from .data_set_check import check_data_set as check_data_set
 from .data_set_check import data_set_checks as data_set_checks
 from .drive_views import NOT_FINITE as NOT_FINITE
 from .drive_views import CountedDrive as CountedDrive
-from .drive_views import DriveView as DriveView
 from .drive_views import MovedDrive as MovedDrive
 from .drive_views import RecentScans as RecentScans
 from .joined_drive import JoinedDrive as JoinedDrive
@@ -24,6 +23,5 @@ from .scan_clouds import (
 )
 from .scan_clouds import within_cube as within_cube
 from .scan_files import FileDrive as FileDrive
-from .text_tables import parse_seconds as parse_seconds
 from .trajectories import read_poses as read_poses
 from .trajectories import read_quaternions as read_quaternions

@@ -5,7 +5,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cns_drake.base import points
+from cns_drake.base import (
+    xyz,
+)
 from cns_drake.drives import Drive, LidarField
 
 
@@ -106,7 +108,7 @@ class CountedDrive(MovedDrive):
 
     def scan(self, index: int) -> np.ndarray:
         scan = super().scan(index)
-        finite = np.isfinite(points.xyz(scan)).all(axis=1)
+        finite = np.isfinite(xyz(scan)).all(axis=1)
         self._ignored[index] = len(scan) - int(finite.sum())
         return scan
 

@@ -8,8 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.base import InputError, compiled, poses
-from cns_drake.base import points as clouds
+from cns_drake.base import (
+    InputError,
+    compiled,
+    poses,
+    read_only,
+)
 from cns_drake.drives import Drive
 from evaluation.drives.query_sensor import QuerySensor
 
@@ -81,9 +85,7 @@ def cloud_at(
             scan, half_extent, fields, X_FS, source=drive.name
         )
 
-    return clouds.read_only(
-        np.concatenate([*map(cropped_scan, range(first, end))])
-    )
+    return read_only(np.concatenate([*map(cropped_scan, range(first, end))]))
 
 
 def cropped(

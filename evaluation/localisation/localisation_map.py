@@ -8,8 +8,12 @@ from pathlib import Path
 import numpy as np
 import small_gicp
 
-from cns_drake.base import InputError, poses, track
-from cns_drake.base import points as clouds
+from cns_drake.base import (
+    InputError,
+    poses,
+    track,
+    xyz,
+)
 from cns_drake.drives import Drive
 from evaluation.alignment import Surface, make_surface
 from evaluation.clouds import OnNote, no_note, read_blocks
@@ -144,7 +148,7 @@ def _scans_of_map(
     frames = map_frames(drive, keep).tolist()
     for frame in track(frames, f"mapping {drive.name}", len(frames), "scans"):
         scan = drive.scan(frame)
-        p_S = clouds.xyz(scan)
+        p_S = xyz(scan)
         # The map counts the points that are not finite.
         kept = within_cube(p_S, HALF_EXTENT) | ~np.isfinite(p_S).all(axis=1)
         yield scan[kept], drive.X_WS[frame]

@@ -13,8 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import InputError, errors_at, poses, track
-from cns_drake.base import points as clouds
+from cns_drake.base import (
+    InputError,
+    errors_at,
+    from_xyz,
+    poses,
+    track,
+    xyz,
+)
 from cns_drake.drives import Drive
 from evaluation.alignment import Surface
 from evaluation.drives import cropped, sample_frames
@@ -128,7 +134,7 @@ def read_queries(drive: Drive, frames: Sequence[int]) -> Iterator[Query]:
     with errors_at(drive.name):
         for frame in frames:
             # Coordinates alone, since queries may be stored.
-            scan = clouds.from_xyz(clouds.xyz(drive.scan(frame)))
+            scan = from_xyz(xyz(drive.scan(frame)))
             stamp_ns = int(stamps[frame])
             yield Query(frame, stamp_ns, scan, X_WS[frame], R_WT[frame])
 

@@ -5,8 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import InputError, completing, listed, quoted_cell, track
-from cns_drake.base import points as point_arrays
+from cns_drake.base import (
+    InputError,
+    completing,
+    listed,
+    quoted_cell,
+    read_only,
+    track,
+    xyz,
+)
 from evaluation.clouds import OnNote, is_cloud, no_note, read_cloud
 from evaluation.drives import cropped, cropped_with_fields
 from evaluation.methods import Method
@@ -149,7 +156,7 @@ class _CloudReader:
                 needs, or has no point within range.
         """
         scan = read_cloud(path, columns, self._on_note)
-        is_finite = np.isfinite(point_arrays.xyz(scan)).all(axis=1)
+        is_finite = np.isfinite(xyz(scan)).all(axis=1)
         self.num_ignored += int(np.count_nonzero(~is_finite))
         half_extent = RetrievalProtocol.half_extent
         if fields := self._method.point_fields:
@@ -160,7 +167,7 @@ class _CloudReader:
             cloud = cropped(scan, half_extent)
         if len(cloud) == 0:
             raise InputError(f"{path}: no finite point within range")
-        return point_arrays.read_only(cloud)
+        return read_only(cloud)
 
 
 def _scan_files(folder: Path) -> list[Path]:

@@ -21,7 +21,6 @@ from .method_names import in_table_order as in_table_order
 from .method_names import title as title
 from .output_files import check_output as check_output
 from .output_files import make_output as make_output
-from .output_files import remove_earlier as remove_earlier
 from .output_files import write_tables as write_tables
 from .page import write_page as write_page
 from .page_frame import PageSection as PageSection
@@ -63,7 +62,6 @@ from .styles import unit_rgb as unit_rgb
 from .summaries import excesses as excesses
 from .summaries import means as means
 from .summary_tables import summary_lines as summary_lines
-from .survival import MARGIN as MARGIN
 from .survival import Survival as Survival
 from .survival import judge_survival as judge_survival
 from .survival import largest_loss_shown as largest_loss_shown

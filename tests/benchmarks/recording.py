@@ -35,7 +35,7 @@ from cns_drake.base import num_cores
 from cns_drake.drives import serialize
 from cns_drake.motion import VehicleMotion
 from cns_drake.ray_casting import RayCastingScene
-from cns_drake.recording import FRAME_PERIOD, BagWriter, McapRecorder, make_imu
+from cns_drake.recording import FRAME_PERIOD, BagWriter, McapRecorder
 from cns_drake.scenarios import Scenario, load_scenario, plan_drive
 from cns_drake.sensors import Lidar, OdometrySensor, make_pattern, sensor_pose
 from cns_drake.simulation import simulate
@@ -53,9 +53,9 @@ STEPS = {
     "points": ((Lidar, "_calc_measured"),),
     "messages": (
         (sys.modules[McapRecorder.__module__], "encode_point_cloud"),
-        (sys.modules[make_imu.__module__], "make_imu"),
-        (sys.modules[make_imu.__module__], "make_odometry"),
-        (sys.modules[make_imu.__module__], "make_tf"),
+        (sys.modules["cns_drake.recording.messages"], "make_imu"),
+        (sys.modules["cns_drake.recording.messages"], "make_odometry"),
+        (sys.modules["cns_drake.recording.messages"], "make_tf"),
         (sys.modules[serialize.__module__], "serialize"),
     ),
     "compression": ((zstandard, "compress"),),

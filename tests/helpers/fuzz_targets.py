@@ -15,7 +15,6 @@ from cns_drake.city import load_plan, load_stages, make_city, meshes_of
 from cns_drake.export import export_drive
 from cns_drake.imports import import_cityjson, import_openstreetmap
 from cns_drake.pictures import load_views
-from cns_drake.recording import FRAME_PERIOD
 from cns_drake.roads import Route, load_road_network, make_lane_path
 from cns_drake.scenarios import (
     Scenario,
@@ -25,8 +24,8 @@ from cns_drake.scenarios import (
     write_scenarios,
 )
 from cns_drake.scene import load_world, read_perception_geometry
-from cns_drake.sensors import make_beam_pattern, make_pattern
-from cns_drake.simulation import save_scan, scan_world, simulate
+from cns_drake.sensors import LidarSection, make_pattern
+from cns_drake.simulation import scan, simulate
 from cns_drake.studies import study_drives
 from evaluation import drives
 from evaluation.clouds import read_cloud
@@ -182,11 +181,15 @@ def _lay_out(folder: Path) -> None:
 def _scan(folder: Path) -> bytes:
     from pydrake.math import RigidTransform
 
-    world = load_world(folder / "stage_01.sdf")
+    path = folder / "stage_01.sdf"
+    world = load_world(path)
     read_perception_geometry(world.scene_graph.model_inspector())
-    pattern = make_beam_pattern("vlp-16", FRAME_PERIOD, num_columns=8)
-    points = scan_world(world, RigidTransform([0.0, 0.0, 2.0]), pattern)
-    save_scan(points, folder / "out" / "scan.pcd")
+    points = scan(
+        path,
+        RigidTransform([0.0, 0.0, 2.0]),
+        LidarSection(preset="vlp-16", columns=8),
+        output=folder / "out" / "scan.pcd",
+    )
     return points.tobytes()
 
 

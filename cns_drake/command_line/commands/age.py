@@ -13,7 +13,7 @@ from cns_drake.base import (
     ended_by_interrupts,
     errors_at_option,
     shared_options,
-    show,
+    terminal,
     whole_number,
 )
 from cns_drake.command_line.suggestions import suggest_reproduction
@@ -147,5 +147,5 @@ def age(
         "years": dict(aged.years),
         "events": dict(aged.events),
     }
-    show(values, [*rows, ("written", str(output))], json=json)
+    terminal.show(values, [*rows, ("written", str(output))], json=json)
     suggest_reproduction(output)

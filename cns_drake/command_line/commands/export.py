@@ -15,7 +15,7 @@ from cns_drake.base import (
     ended_by_interrupts,
     note,
     shared_options,
-    show,
+    terminal,
 )
 from cns_drake.command_line.suggestions import suggest_evaluation
 from cns_drake.export import export_formats
@@ -119,7 +119,7 @@ def export(
             sequence=sequence,
             on_note=note,
         )
-    show({"output": str(path)}, str(path), json=json)
+    terminal.show({"output": str(path)}, str(path), json=json)
     if layout != _SESSIONS and find_data_sets(path):
         suggest_evaluation(Path(drives[0]), path, is_plain=not given)
 

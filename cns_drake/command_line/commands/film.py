@@ -13,7 +13,7 @@ from cns_drake.base import (
     ended_by_interrupts,
     note,
     shared_options,
-    show,
+    terminal,
 )
 from cns_drake.command_line.suggestions import suggest_page
 
@@ -79,7 +79,7 @@ def film(
         start=start_time,
         on_note=note,
     )
-    show(
+    terminal.show(
         {"output": str(output), "images": number},
         f"{output}: {number} images",
         json=json,

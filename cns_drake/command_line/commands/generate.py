@@ -6,7 +6,11 @@ from typing import Annotated, Any
 
 import typer
 
-from cns_drake.base import ended_by_interrupts, next_command, shared_options
+from cns_drake.base import (
+    ended_by_interrupts,
+    shared_options,
+    terminal,
+)
 from cns_drake.command_line import options
 from cns_drake.command_line.experiment_drives import varied_drives
 from cns_drake.command_line.fields import changed, field_options
@@ -63,4 +67,4 @@ def generate(
     record_all(scenarios, output, cluster, overwrite=overwrite)
     for scenario in scenarios:
         typer.echo(output / scenario.name)
-    next_command("cns-eval", "report", output, "--output", "report")
+    terminal.next_command("cns-eval", "report", output, "--output", "report")

@@ -16,7 +16,7 @@ from cns_drake.base import (
     natural_key,
     note,
     shared_options,
-    show,
+    terminal,
     whole_number,
 )
 from cns_drake.imports import (
@@ -140,7 +140,9 @@ def import_(
         "drives": list(report.drives),
         "faults": {fault.kind: fault.number for fault in report.faults},
     }
-    show(values, _report_rows(report, output, options.years), json=json)
+    terminal.show(
+        values, _report_rows(report, output, options.years), json=json
+    )
 
 
 # The help lists the formats.

@@ -11,7 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import ended_by_interrupts, shared_options, show
+from cns_drake.base import (
+    ended_by_interrupts,
+    shared_options,
+    terminal,
+)
 
 if TYPE_CHECKING:
     from cns_drake.scenarios import DriveRow
@@ -71,7 +75,7 @@ def list_(
             raise no_drives(folder)
         rows += of_map
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-    show(
+    terminal.show(
         {"drives": [asdict(row) for row in rows]},
         "\n".join(table_lines(rows, width)),
         json=json,

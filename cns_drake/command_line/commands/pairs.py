@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import ended_by_interrupts, note, shared_options, show
+from cns_drake.base import ended_by_interrupts, note, shared_options, terminal
 from cns_drake.command_line import options
 from cns_drake.command_line.experiment_drives import varied_drives
 
@@ -76,7 +76,7 @@ def pairs(
         note,
     )
     texts = [str(path) for path in paths]
-    show({"output": texts}, "\n".join(texts), json=json)
+    terminal.show({"output": texts}, "\n".join(texts), json=json)
 
 
 def _learned_drives(

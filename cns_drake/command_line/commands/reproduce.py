@@ -10,8 +10,8 @@ from cns_drake.base import (
     InputError,
     ended_by_interrupts,
     note,
-    resumable,
     shared_options,
+    terminal,
 )
 from cns_drake.command_line import options
 from evaluation.recognition import RetrievalProtocol, with_protocols
@@ -67,7 +67,7 @@ def reproduce(
         raise InputError(
             "--no-recordings and --pages exclude each other; give one of them"
         )
-    with resumable():
+    with terminal.resumable():
         report = reproduce_maps(
             maps,
             output,

@@ -12,7 +12,7 @@ from cns_drake.base import (
     ended_by_interrupts,
     note,
     shared_options,
-    show,
+    terminal,
 )
 from cns_drake.command_line.fields import changed, field_options
 
@@ -91,7 +91,7 @@ def scan(
         output=output,
         on_note=note,
     )
-    show(
+    terminal.show(
         {"output": str(output), "points": len(points)},
         f"{output}: {len(points)} points",
         json=json,

@@ -12,8 +12,8 @@ from cns_drake.base import (
     ended_by_interrupts,
     note,
     parse_changes,
-    resumable,
     shared_options,
+    terminal,
 )
 
 GROUP = "Study what change costs"
@@ -122,7 +122,7 @@ def study(
         from evaluation.results import PrintStyle
 
     printed = PrintStyle.checked(width, font, title)
-    with resumable():
+    with terminal.resumable():
         page = run_study(
             experiment,
             output,

@@ -12,10 +12,9 @@ import typer
 from cns_drake.base import (
     InputError,
     ended_by_interrupts,
-    next_command,
     note,
     shared_options,
-    show,
+    terminal,
 )
 from cns_drake.command_line.suggestions import suggest_recognition
 from evaluation.recognition import RetrievalProtocol
@@ -100,7 +99,7 @@ def _write_overlaps(
 
     drives = [load_scenario(word) for word in words]
     table = write_overlap_table(drives[0], drives[1], output, protocol)
-    show({"output": [str(table)]}, str(table), json=json)
+    terminal.show({"output": [str(table)]}, str(table), json=json)
     suggest_recognition(drives, words, table, protocol)
 
 
@@ -147,5 +146,5 @@ def _write_maps(
             f"{side}: {len(alone)} structures are in this drive's world alone;"
             f" {mapped} are in its map, {right} of them gone or new"
         )
-    show(result, str(output), json=json)
-    next_command("cns-eval", "map-update", output)
+    terminal.show(result, str(output), json=json)
+    terminal.next_command("cns-eval", "map-update", output)

@@ -8,7 +8,11 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import InputError, number_text, shared_options, terminal
+from cns_drake.base import (
+    InputError,
+    shared_options,
+    terminal,
+)
 from evaluation.command_line.printed_text import spaced_interval
 
 # Endings of figures.
@@ -91,7 +95,7 @@ def compare(
     rows = [
         (
             mean.method,
-            f"{number_text(mean.value)}{spaced_interval(mean.interval)}",
+            f"{terminal.number_text(mean.value)}{spaced_interval(mean.interval)}",
         )
         for mean in found.ranked
     ]
@@ -105,7 +109,7 @@ def compare(
         rows.append(
             (
                 f"R@1 of {compared.first} - {compared.second}",
-                f"{number_text(difference.value)}"
+                f"{terminal.number_text(difference.value)}"
                 f"{spaced_interval(difference.interval) or '  cannot show'}"
                 f"  p {_p_text(difference.p_value)}",
             )
@@ -114,7 +118,7 @@ def compare(
         rows.append(
             (
                 f"{one.method}, loss in {one.cities} cities",
-                f"{number_text(one.loss)}{spaced_interval(one.interval)}"
+                f"{terminal.number_text(one.loss)}{spaced_interval(one.interval)}"
                 f"  {one.verdict}",
             )
         )
@@ -122,11 +126,11 @@ def compare(
         rows.append(
             (
                 f"Kendall's tau, {alike.first} and {alike.second}",
-                number_text(alike.tau),
+                terminal.number_text(alike.tau),
             )
         )
         families = (
-            f"{number_text(alike.tau_of_families)}"
+            f"{terminal.number_text(alike.tau_of_families)}"
             f"{spaced_interval(alike.interval)}"
         )
         rows.append(
@@ -145,5 +149,5 @@ def compare(
 
 def _p_text(p_value: float) -> str:
     if isnan(p_value):
-        return number_text(p_value)
+        return terminal.number_text(p_value)
     return "< 0.0001" if p_value < 0.5e-4 else f"{p_value:.4f}"

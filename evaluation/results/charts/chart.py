@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 import math
+import re
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cns_drake.base import InputError, font_settings, parse_length
+from cns_drake.base import InputError, font_settings
 from evaluation.recognition import METRICS
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.styles import MethodStyle
@@ -28,6 +29,8 @@ PX = 1.0 / 96.0
 FONT = 10.0
 # Size of letters in a chart whose width was chosen for a paper [pt].
 _PAPER_FONT = 8.0
+# Unit of length -> number of them in an inch.
+_IN_AN_INCH = {"in": 1.0, "cm": 2.54, "mm": 25.4, "pt": 72.27}
 # Height of a row of values or names [px].
 ROW = 22.0
 
@@ -73,7 +76,7 @@ class PrintStyle:
                 is not installed.
         """
         style = cls(
-            None if width is None else parse_length("--width", width),
+            None if width is None else _parse_length("--width", width),
             font or cls.font,
             title,
         )
@@ -188,3 +191,22 @@ def start_at_zero(axes: Axes, x: str = "", y: str = "") -> None:
     # Markers at 0 are whole.
     axes.update_datalim([(0.0, 0.0)], *is_least)
     axes.autoscale_view()
+
+
+def _parse_length(name: str, text: str) -> float:
+    """Returns a length [inches] from text with its unit, such as `3.5in`.
+
+    Args:
+        name: what the length is of, for errors.
+        text: a number and `in`, `cm`, `mm` or `pt`, the point of TeX.
+
+    Raises:
+        InputError: the text is no such length.
+    """
+    found = re.fullmatch(r"(\d+\.?\d*|\.\d+) ?(in|cm|mm|pt)", text.strip())
+    if found is None:
+        raise InputError(
+            f"{name}: {text!r}: a number and in, cm, mm or pt is needed, such"
+            " as 3.5in"
+        )
+    return float(found[1]) / _IN_AN_INCH[found[2]]

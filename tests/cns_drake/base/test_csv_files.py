@@ -5,7 +5,6 @@ import pytest
 from cns_drake.base import (
     InputError,
     csv_text,
-    number_within,
     read_records,
     read_rows,
     whole_number,
@@ -97,23 +96,6 @@ def test_whole_numbers():
         ) as one:
             whole_number(text, "x")
         assert len(str(one.value)) < 100
-
-
-def test_numbers_up_to_a_size():
-    assert number_within("-2e0", 2.0, "x") == -2.0
-    for text in (
-        "",
-        "abc",
-        "nan",
-        "inf",
-        "-inf",
-        "2.0000001",
-        "1e1000000",
-        "1_0",
-        "٢",
-    ):
-        with pytest.raises(InputError, match=r"^x: .* is no number up to 2"):
-            number_within(text, 2.0, "x")
 
 
 def test_names_that_are_formulas_are_quoted_and_read_as_they_were(tmp_path):

@@ -5,7 +5,9 @@ import sys
 
 import pytest
 
-from cns_drake.base import next_command
+from cns_drake.base import (
+    terminal,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -26,7 +28,7 @@ def test_a_suggestion_works_in_the_shell_that_runs_the_program(
 
     def program(path):
         monkeypatch.setenv("PATH", os.pathsep.join(map(str, path)))
-        next_command("cns-eval", "compare", "a b")
+        terminal.next_command("cns-eval", "compare", "a b")
         return suggested(capsys)
 
     assert program([]) == "next: env/cns-eval compare 'a b'\n"

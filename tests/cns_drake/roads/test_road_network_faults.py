@@ -94,7 +94,7 @@ def test_faults_name_file_field_and_fault(load, cross, fault):
         ("roads: [", "not readable as YAML"),
         ("- 1", r"\(top level\)"),
         ("", r"\(top level\)"),
-        ("roads: {}\njunctions: {}", "junctions: Dictionary should have at"),
+        ("roads: {}\njunctions: {}", "junctions: at least 1 needed"),
     ],
 )
 def test_files_that_hold_no_network(tmp_path, text, fault):

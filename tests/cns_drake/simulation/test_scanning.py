@@ -8,8 +8,8 @@ import pytest
 from cns_drake.base import InputError
 from cns_drake.scene import load_world
 from cns_drake.sensors import make_beam_pattern
-from cns_drake.simulation import save_scan, scan_world
 from cns_drake.simulation import scan as take_scan
+from cns_drake.simulation import scan_world
 
 X_WS = RigidTransform(RollPitchYaw(0.05, -0.1, 2.0), [3.0, -2.0, 1.7])
 
@@ -56,24 +56,17 @@ def expected(scan):
     return np.stack([scan[n] for n in ("x", "y", "z", "intensity")], axis=1)
 
 
-def test_bin_is_kittis(scan, tmp_path):
-    save_scan(scan, tmp_path / "new" / "scan.bin")
+def test_bin_is_kittis(world, scan, tmp_path):
+    take_scan(world, X_WS, output=tmp_path / "new" / "scan.bin")
     read = np.fromfile(tmp_path / "new" / "scan.bin", "<f4").reshape(-1, 4)
     np.testing.assert_array_equal(read, expected(scan))
 
 
-def test_npy(scan, tmp_path):
-    save_scan(scan, tmp_path / "scan.npy")
-    np.testing.assert_array_equal(
-        np.load(tmp_path / "scan.npy"), expected(scan)
-    )
-
-
 @pytest.mark.slow
-def test_pcd_is_read_by_open3d(scan, tmp_path):
+def test_pcd_is_read_by_open3d(world, scan, tmp_path):
     import open3d
 
-    save_scan(scan, tmp_path / "scan.pcd")
+    take_scan(world, X_WS, output=tmp_path / "scan.pcd")
     cloud = open3d.t.io.read_point_cloud(str(tmp_path / "scan.pcd"))
     np.testing.assert_array_equal(
         cloud.point.positions.numpy(), expected(scan)[:, :3]
@@ -83,20 +76,21 @@ def test_pcd_is_read_by_open3d(scan, tmp_path):
     )
 
 
-def test_empty_scans_can_be_saved(scan, tmp_path):
+def test_empty_scans_can_be_saved(world, tmp_path):
+    far = RigidTransform([0.0, 0.0, 5000.0])
     for ending in ("bin", "npy", "pcd"):
-        save_scan(scan[:0], tmp_path / f"scan.{ending}")
+        take_scan(world, far, output=tmp_path / f"scan.{ending}")
     assert (tmp_path / "scan.bin").stat().st_size == 0
     assert np.load(tmp_path / "scan.npy").shape == (0, 4)
 
 
-def test_unknown_ending(scan, tmp_path):
+def test_unknown_ending(world, tmp_path):
     with pytest.raises(InputError, match=r"scan\.txt: unknown ending '.txt'"):
-        save_scan(scan, tmp_path / "scan.txt")
+        take_scan(world, X_WS, output=tmp_path / "scan.txt")
 
 
-def test_nothing_is_left_where_it_cannot_be_written(scan, tmp_path):
+def test_nothing_is_left_where_it_cannot_be_written(world, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"file"):
-        save_scan(scan, tmp_path / "file" / "scan.npy")
+        take_scan(world, X_WS, output=tmp_path / "file" / "scan.npy")
     assert [path.name for path in tmp_path.glob("*scan*")] == []

@@ -14,7 +14,7 @@ import pytest
 
 from cns_drake.base import InputError
 from cns_drake.drives import McapDrive
-from cns_drake.export import Absence
+from cns_drake.export import export_drive
 from cns_drake.scenarios import (
     DrivePlan,
     describe_scenario,
@@ -143,10 +143,13 @@ def test_what_came_is_absent_in_another_stage(tmp_path):
     scenario = tiny_scenario(tmp_path, frames=2, **place)
     simulate(scenario.with_transient(parked_cars=1.0), tmp_path / "out")
     folder = next((tmp_path / "out").iterdir())
-    drive = open_drive(folder)
-    absence = Absence(drive, "02")
-    scan = absence.marked(drive.scan(0), 0)
-    names = {k: entry["name"] for k, entry in absence.instances.items()}
+    marked = open_drive(
+        export_drive(
+            open_drive(folder), "kitti", tmp_path / "kitti", absent_in="02"
+        )
+    )
+    scan = marked.scan(0)
+    names = {k: entry["name"] for k, entry in marked.instances.items()}
     parked = [k for k, name in names.items() if name.startswith("parked_")]
     came = np.isin(scan["instance"], parked)
     assert 0 < came.sum() < len(scan)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import from_xyz
-from evaluation.drives import DriveView
+from cns_drake.drives import Drive
 from evaluation.map_update import (
     Label,
     PairLabels,
@@ -24,7 +24,7 @@ def wall(x, y=(-2.0, 2.0), z=(-1.0, 1.0)):
     return grid.reshape(-1, 3)
 
 
-class OneScan(DriveView):
+class OneScan(Drive):
     """A drive of one scan, whose sensor is at the origin of the world."""
 
     world_frame = "map"
@@ -33,6 +33,10 @@ class OneScan(DriveView):
     def __init__(self, points):
         self.name = "one"
         self._points = points
+
+    @property
+    def stamps_ns(self):
+        return np.zeros(1, np.int64)
 
     @property
     def X_WS(self):

@@ -1211,8 +1211,7 @@ def _(folder):
 
 
 @way(
-    "nclt", "drive", *DRIVES, "data set nclt",
-    "evaluation.drives.parse_seconds", use=drive,
+    "nclt", "drive", *DRIVES, "data set nclt", use=drive,
 )  # fmt: skip
 def _(folder):
     scans = folder / "drive" / "velodyne_sync"
@@ -1244,7 +1243,6 @@ def _(folder):
 NO_FILES = {
     "cns_drake.base.decode_text": "bytes that are in memory",
     "cns_drake.base.import_modules": "modules of this project",
-    "cns_drake.base.parse_length": "a word",
     "cns_drake.base.read_bytes": "bounded by its limit",
     "cns_drake.base.read_text": "bounded by its limit",
     "cns_drake.base.read_only": "an array",

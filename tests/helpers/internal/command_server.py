@@ -30,9 +30,9 @@ import tempfile
 from _pytest.monkeypatch import MonkeyPatch
 
 import cns_drake
-from cns_drake.base import ALLOCATION
 from cns_drake.base.compilation import start_compiler
 from cns_drake.base.jobs import processes
+from cns_drake.base.jobs.processes import ALLOCATION
 from cns_drake.simulation import simulate
 from evaluation.study import chosen_methods
 from helpers.internal.studies import leave_figures_unrendered

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 import numpy as np
 import pytest
 
-from cns_drake.base import Cluster, Reporter, nothing_left
+from cns_drake.base import Cluster, Reporter
+from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.pictures import StageScene
 from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.study import (

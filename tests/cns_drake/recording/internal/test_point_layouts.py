@@ -14,7 +14,7 @@ from cns_drake.drives import (
 )
 from cns_drake.drives.point_cloud2 import to_records
 from cns_drake.drives.point_layouts import from_layout
-from cns_drake.recording import encode_point_cloud
+from cns_drake.recording.messages import encode_point_cloud
 from cns_drake.sensors import POINT_DTYPE
 
 # sensor_msgs/PointField: UINT8 2, UINT16 4, UINT32 6, FLOAT32 7.

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.scene import ForeignMeshes, load_world, read_perception_geometry
+from cns_drake.scene import load_world, read_perception_geometry
+from cns_drake.scene.foreign_meshes import ForeignMeshes
 
 VERTICES = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
 TRIANGLES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]

@@ -3,7 +3,8 @@
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.results import RESULTS, make_output, remove_earlier
+from evaluation.results import RESULTS, make_output
+from evaluation.results.output_files import remove_earlier
 
 TABLE = "experiment,map,task,method,verified,metric,value,low,high,n\n"
 OWN = {

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from cns_drake.roads import blend, sample_stations
+from cns_drake.roads import sample_stations
+from cns_drake.roads.centreline import blend
 
 
 def test_stations_include_both_ends_and_keep_the_spacing():

@@ -12,9 +12,10 @@ from pydrake.geometry import Mesh
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.scene import ForeignMeshes, MeshFiles
+from cns_drake.scene.foreign_meshes import ForeignMeshes
+from cns_drake.scene.mesh_files import MeshFiles
 
-PAGE = Path(__file__).parents[3] / "docs" / "formats.md"
+PAGE = Path(__file__).parents[4] / "docs" / "formats.md"
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.drives import parse_seconds, read_quaternions
+from evaluation.drives import read_quaternions
+from evaluation.drives.text_tables import parse_seconds
 
 
 def test_times_near_zero_and_at_the_end():
