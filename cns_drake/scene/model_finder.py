@@ -172,7 +172,13 @@ def note_of_missing(
     if not uris:
         return ()
     some = ", ".join(list(uris)[:3]) + (", ..." if len(uris) > 3 else "")
-    return (
-        f"{path}: {len(uris)} {what} not found, and left out: {some}; name "
-        "their folder in the variable GZ_SIM_RESOURCE_PATH",
-    )
+    told = f"{path}: {len(uris)} {what} not found, and left out: {some}"
+    first = next(iter(uris))
+    if not first.startswith(("file:", "/")):
+        words = first.rpartition("://")[2].split("/")
+        name = words[-1 if first.startswith("http") else 0]
+        told += (
+            f"; name the folder that has {name} in the variable"
+            " GZ_SIM_RESOURCE_PATH"
+        )
+    return (told,)

@@ -145,7 +145,8 @@ def test_models_are_looked_for_where_gazebo_does(
     tmp_path, models, variable, monkeypatch
 ):
     path = write(tmp_path, include("model://crate", "<pose>5 0 1 0 0 0</pose>"))
-    with pytest.raises(InputError, match="no visual"):
+    cure = "no visual.*name the folder that has crate in the variable GZ_SIM"
+    with pytest.raises(InputError, match=cure):
         load_world(path)
     monkeypatch.setenv(variable, f"/nowhere:{models}")
     assert ranges(load_world(path)) == {"ahead": pytest.approx(4.5)}
