@@ -1,4 +1,3 @@
-from .chosen_methods import STANDARD as STANDARD
 from .chosen_methods import MethodChoice as MethodChoice
 from .chosen_methods import choose_method as choose_method
 from .chosen_methods import choose_methods as choose_methods
@@ -9,11 +8,9 @@ from .experiments.cause_files import causes as causes
 from .experiments.cause_files import register_cause as register_cause
 from .experiments.cause_files import source_of_cause as source_of_cause
 from .experiments.conditions import Condition as Condition
-from .experiments.conditions import baseline_values as baseline_values
 from .experiments.conditions import (
     condition_protocol as condition_protocol,
 )
-from .experiments.conditions import levels_by_case as levels_by_case
 from .experiments.conditions import (
     protocol_from_fields as protocol_from_fields,
 )
@@ -27,10 +24,8 @@ from .experiments.experiment_files import (
 )
 from .experiments.factors import FLEET as FLEET
 from .experiments.factors import SESSIONS as SESSIONS
-from .experiments.factors import SIDES as SIDES
 from .experiments.factors import Case as Case
 from .experiments.factors import Changes as Changes
-from .experiments.method_variants import method_variants as method_variants
 from .features import (
     extract_features as extract_features,
 )
