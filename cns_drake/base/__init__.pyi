@@ -15,7 +15,6 @@ from .compilation import (
 from .complete_files import (
     check_folder_writable as check_folder_writable,
 )
-from .complete_files import check_new_folder as check_new_folder
 from .complete_files import check_writable as check_writable
 from .complete_files import complete_part as complete_part
 from .complete_files import completing as completing
@@ -112,7 +111,6 @@ from .points import encode_bin as encode_bin
 from .points import encode_pcd as encode_pcd
 from .points import from_xyz as from_xyz
 from .points import read_only as read_only
-from .points import to_xyzi as to_xyzi
 from .points import xyz as xyz
 from .polylines import distances_along as distances_along
 from .polylines import length_of as length_of

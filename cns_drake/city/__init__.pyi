@@ -45,7 +45,6 @@ from .generation.generate import generate_city as generate_city
 from .generation.rendering import (
     count_triangles as count_triangles,
 )
-from .generation.rendering import meshes_of as meshes_of
 from .generation.rendering import render_stages as render_stages
 from .generation.rendering import stage_size as stage_size
 from .generation.rendering import structures_csv as structures_csv

@@ -15,12 +15,11 @@ from cns_drake.base import (
     UNSEEN_RGB,
     InputError,
     draft_folder,
-    user_errors,
     write_text,
 )
 from cns_drake.drives import check_same_world
 from cns_drake.ground_truth.exact_labels import label_points
-from cns_drake.ground_truth.labelled import LabelledDrive
+from cns_drake.ground_truth.labelled import LabelledDrive, open_labelled
 from evaluation.map_update import (
     SIDES,
     SPACING,
@@ -35,8 +34,8 @@ from evaluation.map_update import (
 
 
 def write_truth(
-    a: LabelledDrive,
-    b: LabelledDrive,
+    older: LabelledDrive | str | Path,
+    newer: LabelledDrive | str | Path,
     output: Path,
     spacing: float = SPACING,
     *,
@@ -49,8 +48,8 @@ def write_truth(
     new.
 
     Args:
-        a: the older drive A.
-        b: the newer drive B.
+        older: the drive A, or what `open_labelled` opens.
+        newer: the drive B, in the same way.
         output: the folder to write, new or empty.
         spacing: distance driven between two scans [m].
         across_maps: whether the drives' maps may have different names, as an
@@ -65,12 +64,13 @@ def write_truth(
         InputError: the drives are of different worlds, or the folder cannot be
             written.
     """
-    check_same_world(a.drive, b.drive, across_maps=across_maps)
-    _check_same_map(a, b)
-    with user_errors(output):
-        if output.exists() and (not output.is_dir() or any(output.iterdir())):
-            raise InputError(f"{output}: exists already; give a new folder")
     with draft_folder(output) as draft:
+        a, b = (
+            one if isinstance(one, LabelledDrive) else open_labelled(one)
+            for one in (older, newer)
+        )
+        check_same_world(a.drive, b.drive, across_maps=across_maps)
+        _check_same_map(a, b)
         sessions, frames = [], []
         for side, one in zip(SIDES, (a, b), strict=True):
             session, taken = write_session(one.drive, draft / side, spacing)

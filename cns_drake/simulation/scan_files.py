@@ -11,7 +11,6 @@ from cns_drake.base import (
     encode_bin,
     encode_pcd,
     make_folder,
-    to_xyzi,
 )
 
 
@@ -50,7 +49,7 @@ def save_scan(scan: np.ndarray, path: Path) -> None:
 
 def _encode_npy(scan: np.ndarray) -> bytes:
     stream = io.BytesIO()
-    np.save(stream, to_xyzi(scan))
+    np.save(stream, np.frombuffer(encode_bin(scan), "<f4").reshape(-1, 4))
     return stream.getvalue()
 
 

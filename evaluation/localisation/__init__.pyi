@@ -8,7 +8,6 @@ from .localisation_map import (
     LocalisationMap as LocalisationMap,
 )
 from .localisation_map import make_map as make_map
-from .localisation_map import map_frames as map_frames
 from .localisation_map import map_of as map_of
 from .localiser import Localiser as Localiser
 from .localiser import Query as Query

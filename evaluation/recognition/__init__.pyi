@@ -89,7 +89,6 @@ from .retrieval import (
 from .retrieval import query_batches as query_batches
 from .retrieval import retrieve as retrieve
 from .scan_folders import write_scores as write_scores
-from .scoring import score_places as score_places
 from .search import Search as Search
 from .seen_surfaces import TOLERANCE as TOLERANCE
 from .seen_surfaces import SeenSurfaces as SeenSurfaces

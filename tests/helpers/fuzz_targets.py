@@ -11,7 +11,7 @@ import yaml
 
 from cns_drake.base import Cluster, InputError
 from cns_drake.base import InputError as ReadingError
-from cns_drake.city import load_plan, load_stages, make_city, meshes_of
+from cns_drake.city import load_plan, load_stages, make_city
 from cns_drake.export import export_drive
 from cns_drake.imports import import_cityjson, import_openstreetmap
 from cns_drake.pictures import load_views
@@ -175,7 +175,7 @@ def _load_stages(folder: Path) -> None:
 
 
 def _lay_out(folder: Path) -> None:
-    meshes_of(make_city(folder).structures)
+    make_city(folder)
 
 
 def _scan(folder: Path) -> bytes:

@@ -116,13 +116,10 @@ def _write_maps(
         json: whether to print the counts of labels as JSON.
     """
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.base import check_new_folder
-        from cns_drake.ground_truth import open_labelled, write_truth
+        from cns_drake.ground_truth import write_truth
         from evaluation.map_update import Label
 
-    check_new_folder(output)
-    first, second = open_labelled(a), open_labelled(b)
-    counts, table = write_truth(first, second, output, spacing)
+    counts, table = write_truth(a, b, output, spacing)
     result: dict[str, Any] = {"output": str(output)}
     for side, numbers in counts.items():
         named = {

@@ -13,7 +13,7 @@ from evaluation.methods import (
     make_method,
     shipped_methods,
 )
-from evaluation.recognition import retrieve, score_places, write_scores
+from evaluation.recognition import retrieve, write_scores
 
 
 def record(folder, heights, y=0.0):
@@ -207,14 +207,14 @@ def test_scores_that_are_none(drives, scores):
         place_outcome(*drives, Wrong())
 
 
-def test_rows_of_different_lengths_are_no_score_of_one_place():
+def test_rows_of_different_lengths_are_no_score_of_one_place(tmp_path):
     class Ragged(Highest):
         def score(self, query, database, *, exhaustive=False):
             return [[1.0], [1.0, 2.0]]
 
-    known = np.ones(1, dtype=bool)
+    drives = (record(tmp_path / name, [1.0]) for name in "ab")
     with pytest.raises(InputError, match=r"list of shape \(0,\) .* 1 numbers"):
-        score_places(Ragged(), [0.0], None, [0.0], [], known)
+        place_outcome(*drives, Ragged())
 
 
 class SomeNan(Highest):
