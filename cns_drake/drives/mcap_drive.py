@@ -430,12 +430,17 @@ class McapDrive(Drive):
     def _trajectory(self, *later: np.ndarray) -> StampedPoses:
         """Returns the poses of the vehicle in rows of `ODOMETRY_DTYPE`."""
         rows = np.concatenate([self.odometry, *later])
+        # SLAM programs send such poses before they have started.
+        length = np.linalg.norm(rows["quat_xyzw"], axis=1)
+        known = np.isfinite(rows["position"]).all(axis=1) & (length > 0.0)
+        num_unknown = len(rows) - int(known.sum())
+        rows = rows[known] if known.any() else rows
         stamps_ns, kept = np.unique(rows["stamp_ns"], return_index=True)
         X_WB = checked_poses(
             rows["position"][kept], rows["quat_xyzw"][kept], str(self._path)
         )
         source = f"{self._path}: {self._pose_topic}"
-        return StampedPoses(source, stamps_ns, X_WB)
+        return StampedPoses(source, stamps_ns, X_WB, num_unknown)
 
     @property
     def X_BS(self) -> np.ndarray:

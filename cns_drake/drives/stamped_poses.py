@@ -39,11 +39,14 @@ class StampedPoses:
         source: file or topic they come from, for messages.
         stamps_ns: (N,) int64 [ns], strictly increasing.
         X_WB: (N, 4, 4) float64 poses.
+        num_unknown: number of rows or messages that were left out, because they
+            have NaN or no rotation in the place of a pose.
     """
 
     source: object
     stamps_ns: np.ndarray
     X_WB: np.ndarray
+    num_unknown: int = 0
 
     def at_scans(self, stamps_ns: np.ndarray) -> PosedScans:
         """Returns the poses at the stamps of scans.
@@ -89,6 +92,11 @@ class StampedPoses:
                 f" than {_LONGEST_GAP_NS * 1e-9:g} s"
             )
         notes = []
+        if self.num_unknown:
+            notes.append(
+                f"{self.source}: {self.num_unknown} poses without numbers or"
+                " rotation are left out"
+            )
         missing = len(stamps_ns) - len(wanted)
         if missing:
             notes.append(

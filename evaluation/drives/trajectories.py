@@ -1,11 +1,12 @@
 """Trajectories and poses from tables of text."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError, note, poses, value_errors
+from cns_drake.base import InputError, poses, value_errors
 from cns_drake.drives import StampedPoses
 from evaluation.drives.text_tables import (
     check_finite,
@@ -76,7 +77,8 @@ def read_trajectory(path: Path, stamps_ns: np.ndarray) -> StampedPoses:
     Args:
         path: rows of a time [s, or whole ns], x y z [m] and quaternion x y z w
             (TUM), or of columns that a header names, such as EuRoC's; or of 3 x
-            4 matrices, one for each scan (KITTI). Commas may separate columns.
+            4 matrices, one for each scan (KITTI), or behind a time (MulRan) or
+            the number of the scan (KITTI-360). Commas may separate columns.
             Rows with NaN are left out, and noted.
         stamps_ns: (N,) stamps of the scans [ns].
 
@@ -91,17 +93,24 @@ def read_trajectory(path: Path, stamps_ns: np.ndarray) -> StampedPoses:
         known = rows[~np.isnan(rows["values"]).any(axis=1)]
         if not len(known):
             raise InputError(f"{path}: no row without NaN")
-        if len(known) < len(rows):
-            number = len(rows) - len(known)
-            note(f"{path}: {number} rows with NaN are left out")
         with value_errors(f"{path}: time"):
             own_ns = parse_seconds(known["stamp"])
         check_finite(path, known["values"])
-        return _turned_poses(path, own_ns, known["values"])
+        found = _turned_poses(path, own_ns, known["values"])
+        return replace(found, num_unknown=len(rows) - len(known))
+    if columns == 13:
+        rows = read_numbers(
+            path, [("stamp", "U40"), ("values", "f8", 12)], separator
+        )
+        with value_errors(f"{path}: time"):
+            own_ns = _times_or_numbers(rows["stamp"], stamps_ns)
+        X_WS = pose_matrices(path, rows["values"])
+        return _increasing_poses(path, own_ns, X_WS)
     if columns != 12:
         raise InputError(
             f"{path}: rows of {columns} numbers; TUM has 8 (seconds x y z qx qy"
-            " qz qw), KITTI 12; name the columns in a first line"
+            " qz qw), KITTI 12, or 13 with a time; name the columns in a first"
+            " line"
         )
     numbers = read_numbers(path, float, separator)
     X_WS = pose_matrices(path, numbers)
@@ -111,6 +120,19 @@ def read_trajectory(path: Path, stamps_ns: np.ndarray) -> StampedPoses:
             " scans"
         )
     return StampedPoses(path, stamps_ns, X_WS)
+
+
+def _times_or_numbers(texts: np.ndarray, stamps_ns: np.ndarray) -> np.ndarray:
+    """Returns times [ns], (N,), of texts: times, or the numbers of scans.
+
+    Args:
+        texts: (N,) numbers.
+        stamps_ns: (M,) stamps of the scans [ns].
+    """
+    words = texts.tolist()
+    if all(word.isdecimal() and int(word) < len(stamps_ns) for word in words):
+        return stamps_ns[[int(word) for word in words]]
+    return parse_seconds(texts)
 
 
 def read_angles(
