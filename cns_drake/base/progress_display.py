@@ -45,10 +45,6 @@ _MEMORY = 0.25
 # The pace of a kind is that of all jobs, as if jobs of this kind had done this
 # share of all work at that pace.
 _BORROWED = 0.02
-# Time for which the first jobs load the program, and no later job does [s]. The
-# rest is at least a share of what they take.
-_LOADING = 4.0
-_LEAST_WORK = 0.85
 
 
 @dataclass
@@ -58,7 +54,7 @@ class _Job:
     Attributes:
         cost: expected time [s].
         since: when the job was started [s]; None if the job does not run.
-        is_first: whether no job had ended before it was started.
+        has_begun: whether it has told what it does.
         first: share that an earlier run had done; None until the job says how
             far it is.
         taken: time that the job took [s]; None until it has ended.
@@ -66,7 +62,7 @@ class _Job:
 
     cost: float
     since: float | None = None
-    is_first: bool = False
+    has_begun: bool = False
     first: float | None = None
     taken: float | None = None
 
@@ -95,18 +91,25 @@ class TimeLeft:
         """
         self._jobs = {name: _Job(cost) for name, cost in costs.items()}
         self._most_running = 1
-        self._has_ended = False
         self._total = sum(costs.values())
         # Jobs that give a pace, in the order in which they ended.
         self._measured: list[tuple[str, float, float]] = []
 
     def start(self, name: str, now: float) -> None:
         """Records that a job starts, or is started again."""
-        self._jobs[name] = _Job(
-            self._jobs[name].cost, since=now, is_first=not self._has_ended
-        )
+        self._jobs[name] = _Job(self._jobs[name].cost, since=now)
         running = sum(one.since is not None for one in self._jobs.values())
         self._most_running = max(self._most_running, running)
+
+    def begin(self, name: str, now: float) -> None:
+        """Records that a job tells what it does.
+
+        Until then, the first job of a process loads the program, as no later
+        job does.
+        """
+        job = self._jobs[name]
+        if not job.has_begun:
+            job.has_begun, job.since = True, now
 
     def record_done_before(self, name: str, share: float) -> None:
         """Records which share of a job was done before its start, 0 to 1."""
@@ -118,12 +121,8 @@ class TimeLeft:
         job = self._jobs[name]
         job.taken = 0.0 if job.since is None else now - job.since
         job.since = None
-        self._has_ended = True
         if job.taken >= _REAL_SHARE * job.cost:
-            taken = job.taken
-            if job.is_first:
-                taken = max(taken - _LOADING, _LEAST_WORK * taken)
-            self._measured.append((_kind(name), job.expected, taken))
+            self._measured.append((_kind(name), job.expected, job.taken))
 
     def share(self) -> float:
         """Returns the share of all work that has ended, 0 to 1."""
@@ -438,6 +437,7 @@ class _JobsDisplay(JobsListener):
         unit: str = "",
     ) -> None:
         if name in self._tasks:
+            self._left.begin(name, self._now())
             if total:
                 self._left.record_done_before(name, done / total)
             now = self._now()

@@ -71,6 +71,14 @@ def test_the_time_left_of_a_real_run(
     # Nothing is told before the first jobs have ended.
     assert ratios[0][0] < 0.15
     for share, ratio in ratios:
-        # While only drives are measured, methods may be slower, and what the
-        # first jobs take is not known to be all work.
-        assert (0.6 if share < 0.2 else 2 / 3) <= ratio <= 3 / 2, share
+        assert 2 / 3 <= ratio <= 3 / 2, share
+
+
+def test_loading_the_program_is_no_work():
+    """Each job is as quick as the first once it has begun."""
+    left = TimeLeft(dict.fromkeys("abcd", 10.0))
+    left.start("a", 0.0)
+    left.begin("a", 30.0)
+    left.begin("a", 35.0)
+    left.end("a", 40.0)
+    assert left.seconds(40.0) == pytest.approx(30.0)
