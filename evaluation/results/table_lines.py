@@ -43,6 +43,8 @@ _TEXTS = (
     "method",
     "protocol",
 )
+# Tasks that measure drives, and no method.
+_OF_DRIVES = ("change", "seen")
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ class TableLine:
         values["verified"] = self.value("verified", TRUTH)
         known = {name: self.value(name, FACTOR) for name in factors}
         values["factors"] = {n: v for n, v in known.items() if v is not None}
-        if not values["method"] and values["task"] != "change":
+        if not values["method"] and values["task"] not in _OF_DRIVES:
             raise self.fault("method", "empty")
         names = (*PROTOCOL_NAMES, "")
         if values["protocol"] not in names:
