@@ -188,6 +188,16 @@ def test_values_that_cannot_be(tmp_path, column, cell, words):
 
 
 @pytest.mark.parametrize(
+    ("task", "metric"), [("change", "tcr_sym"), ("seen", "seen")]
+)
+def test_tasks_of_drives_have_no_method(tmp_path, task, metric):
+    row = Row(**key(task=task, method=""), metric=metric, value=0.5)
+    Results.of([row]).write_csv(tmp_path / "r.csv")
+    (found,) = Results.read(tmp_path / "r.csv").rows
+    assert (found.task, found.method, found.value) == (task, "", 0.5)
+
+
+@pytest.mark.parametrize(
     ("metric", "value", "fits"),
     [
         ("relative_auc", "1.2", True),
