@@ -48,9 +48,11 @@ _SHADOW_HEIGHT = 120.0
 _SHADOW_PIXELS = 4096.0
 
 _WHITE = [1.0, 1.0, 1.0, 1.0]
+# Lower than that of sRGB, so that asphalt in the shade is not black.
+_GAMMA = 1.8
 # High in the sky.
 _SKY_RGB = [0.30, 0.55, 0.92]
-_SUNLIGHT = 2.3
+_SUNLIGHT = 2.1
 _SKYLIGHT = 2.6
 
 
@@ -233,11 +235,11 @@ def _draw_mesh(
 
 
 def _linear_light(srgb: np.ndarray) -> np.ndarray:
-    """Returns colours of vertices and points in linear light, for the page.
+    """Returns colours of vertices in linear light, for the page.
 
     Meshcat takes only the colour of a whole object as sRGB.
     """
-    return srgb**2.2
+    return srgb**_GAMMA
 
 
 def _on_grid(positions: np.ndarray) -> np.ndarray:

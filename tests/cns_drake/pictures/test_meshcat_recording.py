@@ -168,7 +168,7 @@ def test_city_has_its_own_colours(early):
     for semantic_class, rgb in diffuse.items():
         path = f"/city/{semantic_class}"
         np.testing.assert_allclose(
-            colors(drawn[path]), np.tile(rgb, (8, 1)) ** 2.2, atol=1e-6
+            colors(drawn[path]), np.tile(rgb, (8, 1)) ** 1.8, atol=1e-6
         )
         # The material does not tint them.
         assert settings[path, "color"] == [1.0, 1.0, 1.0, 1.0]
