@@ -99,13 +99,10 @@ def read_trajectory(path: Path, stamps_ns: np.ndarray) -> StampedPoses:
         found = _turned_poses(path, own_ns, known["values"])
         return replace(found, num_unknown=len(rows) - len(known))
     if columns == 13:
-        rows = read_numbers(
-            path, [("stamp", "U40"), ("values", "f8", 12)], separator
-        )
-        with value_errors(f"{path}: time"):
-            own_ns = _times_or_numbers(rows["stamp"], stamps_ns)
-        X_WS = pose_matrices(path, rows["values"])
-        return _increasing_poses(path, own_ns, X_WS)
+        own_ns, values = read_stamped_rows(path, 12, separator)
+        if ((own_ns >= 0) & (own_ns < len(stamps_ns))).all():
+            own_ns = stamps_ns[own_ns]  # Numbers of scans.
+        return _increasing_poses(path, own_ns, pose_matrices(path, values))
     if columns != 12:
         raise InputError(
             f"{path}: rows of {columns} numbers; TUM has 8 (seconds x y z qx qy"
@@ -120,19 +117,6 @@ def read_trajectory(path: Path, stamps_ns: np.ndarray) -> StampedPoses:
             " scans"
         )
     return StampedPoses(path, stamps_ns, X_WS)
-
-
-def _times_or_numbers(texts: np.ndarray, stamps_ns: np.ndarray) -> np.ndarray:
-    """Returns times [ns], (N,), of texts: times, or the numbers of scans.
-
-    Args:
-        texts: (N,) numbers.
-        stamps_ns: (M,) stamps of the scans [ns].
-    """
-    words = texts.tolist()
-    if all(word.isdecimal() and int(word) < len(stamps_ns) for word in words):
-        return stamps_ns[[int(word) for word in words]]
-    return parse_seconds(texts)
 
 
 def read_angles(
