@@ -14,7 +14,7 @@ import struct
 
 import numpy as np
 
-from cns_drake.base import read_bytes, to_number
+from cns_drake.base import read_bytes
 from cns_drake.scene.collada_check import check_collada
 from cns_drake.scene.gltf_check import check_gltf
 from cns_drake.scene.obj_check import LARGEST_FILE, check_obj, unmarked
@@ -92,11 +92,14 @@ def stl_corners(content: bytes) -> np.ndarray | None:
     """
     if not _is_stl_text(content):
         return None
-    rows = [row.split() for row in _STL_VERTEX.findall(content)]
-    if wrong := next((row for row in rows if len(row) != 3), None):
-        raise ValueError(f"has a vertex of STL with {len(wrong)} numbers")
-    words = (word.decode("ascii", "replace") for row in rows for word in row)
-    return np.array([to_number(word) for word in words]).reshape(-1, 3)
+    rows = _STL_VERTEX.findall(content)
+    try:
+        numbers = np.array(b" ".join(rows).split()).astype(float)
+        return numbers.reshape(len(rows), 3)
+    except ValueError:
+        raise ValueError(
+            "has a vertex of STL that is not three numbers"
+        ) from None
 
 
 def _is_stl_text(content: bytes) -> bool:
