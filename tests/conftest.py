@@ -116,6 +116,13 @@ def pytest_addoption(parser):
         help="run what takes too long beside the other tests as well",
     )
     parser.addoption(
+        "--affected",
+        nargs="?",
+        const="main",
+        metavar="COMMIT",
+        help="run only what concerns changes since a commit (default: main)",
+    )
+    parser.addoption(
         "--fuzz",
         type=int,
         default=60,
@@ -124,6 +131,17 @@ def pytest_addoption(parser):
     parser.addoption(
         "--fuzz-seed", type=int, default=0, help="in which ways it does"
     )
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Leaves out the files of tests that no change concerns."""
+    commit = config.option.affected
+    if commit is None or not collection_path.match("test_*.py"):
+        return None
+    from helpers.affected import ROOT, changed_files, concerns
+
+    test = str(collection_path.relative_to(ROOT))
+    return None if concerns(test, changed_files(commit)) else True
 
 
 def pytest_collection_modifyitems(config, items):

@@ -994,6 +994,7 @@ NOT_RUN = {
     " of them",
     ".venv/bin/python -m pytest --night": "takes as long; the workflow runs "
     "all of them",
+    ".venv/bin/python -m pytest --affected": "whatever a change concerns",
     ".venv/bin/python -m pytest -m unit": "the quick tests in one of "
     "them; `.ci/run` runs all",
     "\\includegraphics": "a line for LaTeX",

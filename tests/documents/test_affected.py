@@ -1,0 +1,31 @@
+"""The tests that `pytest --affected` runs."""
+
+from helpers.affected import concerns
+import pytest
+
+
+@pytest.mark.parametrize(
+    ("test", "file", "expected"),
+    [
+        # Far away within a package, through a door and three modules.
+        ("cns_drake/scene/test_sdf_worlds.py", "scene/obj_check.py", True),
+        ("cns_drake/roads/test_route.py", "scene/obj_check.py", False),
+        # In another package, through its door alone.
+        ("cns_drake/sensors/test_lidar.py", "ray_casting/rays.py", False),
+        (
+            "cns_drake/ray_casting/test_ray_casting.py",
+            "scene/surfaces.py",
+            True,
+        ),
+        # Members of families, which nothing imports.
+        ("cns_drake/transient/test_snow.py", "transient/snow.py", True),
+        ("cns_drake/roads/test_towns.py", "transient/snow.py", False),
+    ],
+)
+def test_a_change_concerns_what_imports_it(test, file, expected):
+    assert concerns(f"tests/{test}", [f"cns_drake/{file}"]) is expected
+
+
+def test_pages_concern_the_tests_of_documents():
+    assert concerns("tests/documents/test_links.py", ["docs/city.md"])
+    assert not concerns("tests/cns_drake/roads/test_towns.py", ["docs/city.md"])
