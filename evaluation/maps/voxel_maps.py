@@ -421,7 +421,7 @@ def _add_points(
         left out because they are not finite or too far away.
     """
     scale = divisions / voxel_size
-    last = np.float64(divisions - 1)
+    last = np.int64(divisions - 1)
     skipped = 0
     for i in range(number):
         p = points[0, i], points[1, i], points[2, i]
@@ -451,10 +451,15 @@ def _add_points(
         if divisions > 0:
             # Rounding may put a point just outside the voxel: clip the index to
             # the last part; -0.1 is truncated to 0.
-            parts = min(np.trunc(sx * scale), last)
-            parts = parts * divisions + min(np.trunc(sy * scale), last)
-            parts = parts * divisions + min(np.trunc(sz * scale), last)
-            part = np.uint64(parts)
+            a, b, c = (
+                np.int64(sx * scale),
+                np.int64(sy * scale),
+                np.int64(sz * scale),
+            )
+            a = a if a < last else last
+            b = b if b < last else last
+            c = c if c < last else last
+            part = np.uint64((a * divisions + b) * divisions + c)
             byte = part >> np.uint64(3)
             bit = np.uint8(np.uint64(1) << (part & np.uint64(7)))
             if not sampled[slot, byte] & bit:

@@ -210,11 +210,12 @@ def _look_towards(
     azimuth = math.degrees(math.atan2(y, x)) + 180.0
     # A degree of azimuth is a smaller angle at a high elevation.
     shrink = math.sin(math.radians(elevation))
-    row = min(int(elevation), _ROWS - 1)
-    column = int(azimuth)
-    for r in range(
-        max(row - _REACH_UP, 0), min(row + _REACH_UP, _ROWS - 1) + 1
-    ):
+    # Without `int`, `min` and `max`, each of which is compiled.
+    row, column = np.int64(elevation), np.int64(azimuth)
+    if row >= _ROWS:
+        row = np.int64(_ROWS - 1)
+    low, high = row - _REACH_UP, row + _REACH_UP + 1
+    for r in range(low if low > 0 else 0, high if high < _ROWS else _ROWS):
         for c in range(column - _REACH_ASIDE, column + _REACH_ASIDE + 1):
             # This equals `% _COLUMNS`, which is slow.
             turn = _COLUMNS if c < 0 else -_COLUMNS if c >= _COLUMNS else 0
@@ -228,7 +229,8 @@ def _look_towards(
                 elif side >= 360.0:
                     side -= 360.0
                 side -= 180.0
-                quadrant = 2 * int(up >= 0.0) + int(side >= 0.0)
+                quadrant = 2 if up >= 0.0 else 0
+                quadrant += 1 if side >= 0.0 else 0
                 across = side * shrink
                 # Squares suffice to exclude returns that are too far; square
                 # roots are slow.
@@ -250,9 +252,10 @@ def _look_towards(
         a, b, c = seen[k, 0], seen[k, 1], seen[k, 2]
         reach = math.sqrt(a * a + b * b + c * c)
         number += 1
-        nearest, farthest = min(nearest, reach), max(farthest, reach)
-        if away[quadrant] <= _NEAR_DEG:
-            gap = min(gap, abs(reach - distance))
+        nearest = reach if reach < nearest else nearest
+        farthest = reach if reach > farthest else farthest
+        if away[quadrant] <= _NEAR_DEG and abs(reach - distance) < gap:
+            gap = abs(reach - distance)
     return number, nearest, farthest, gap
 
 
