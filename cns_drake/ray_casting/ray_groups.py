@@ -12,16 +12,13 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base import product, rotated, turns
 from cns_drake.scene import (
+    MOST_COPIED_TRIANGLES,
     HalfSpaceSurface,
     PerceptionGeometry,
     Surface,
     TriangleSurface,
 )
 
-# If the copies of a mesh have more triangles than this together, the mesh is
-# stored once and each copy is an instance. Rays on instances are slower; the
-# many small objects of a city stay merged.
-MOST_COPIED_TRIANGLES = 2**18
 # Largest rotation in a step: Embree interpolates along the shorter rotation.
 _LARGEST_STEP_RAD = 2.0
 # Greatest number of time steps that Embree supports.

@@ -56,6 +56,9 @@ from .structure_table import material_word as material_word
 from .structure_table import read_materials as read_materials
 from .structure_table import shortened as shortened
 from .surfaces import LARGEST_SIZE as LARGEST_SIZE
+from .surfaces import (
+    MOST_COPIED_TRIANGLES as MOST_COPIED_TRIANGLES,
+)
 from .surfaces import CapsuleSurface as CapsuleSurface
 from .surfaces import CylinderSurface as CylinderSurface
 from .surfaces import EllipsoidSurface as EllipsoidSurface

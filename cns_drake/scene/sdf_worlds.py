@@ -46,7 +46,7 @@ from cns_drake.scene.model_finder import (
     note_of_missing,
 )
 from cns_drake.scene.obj_check import check_obj
-from cns_drake.scene.surfaces import LARGEST_SIZE
+from cns_drake.scene.surfaces import LARGEST_SIZE, MOST_COPIED_TRIANGLES
 
 # Boxes (N, 2, 3) in the world [m], each its least and greatest coordinates ->
 # (N,) bool, whether anything in a box can be seen.
@@ -286,7 +286,7 @@ class _Reader:
 
         The origin of rays is in the middle of the places of all geometry (see
         `ray_casting`), so what is beyond the others' places stays. So do meshes
-        of which the world has copies, and what other poses move.
+        whose copies share one surface, and what other poses move.
         """
         paths = {
             id(visual): str(visual.shape.source().path())
@@ -301,8 +301,8 @@ class _Reader:
             boxes = []
             for visual in visuals:
                 path = paths.get(id(visual), "")
-                if copies[path] == 1 and not visual.frame:
-                    found = _box_of_mesh(path, visual)
+                if path and not visual.frame:
+                    found = _box_of_mesh(path, visual, copies[path])
                     if found is not None:
                         name = f"{scope}::{visual.name}"
                         far[id(visual)] = UnseenMesh(name, path, found[1])
@@ -748,7 +748,7 @@ class _Reader:
 
 
 def _box_of_mesh(
-    path: str, visual: _Visual
+    path: str, visual: _Visual, copies: int
 ) -> tuple[np.ndarray, tuple[str, ...]] | None:
     """Returns the box (2, 3) of a mesh G in F, and notes about its file.
 
@@ -761,6 +761,8 @@ def _box_of_mesh(
     except (InputError, ValueError):
         return None  # Whoever reads it tells the fault.
     if faces.box is None or faces.num_triangles == 0:
+        return None
+    if copies > 1 and copies * faces.num_triangles > MOST_COPIED_TRIANGLES:
         return None
     assert isinstance(visual.shape, Mesh)
     scaled = faces.box * visual.shape.scale3()

@@ -11,6 +11,10 @@ from cns_drake.base import revolved
 # Rays are cast in single precision, which cannot resolve a metre beyond this
 # [m].
 LARGEST_SIZE = 1e7
+# If the copies of a mesh have more triangles than this together, the mesh is
+# stored once and each copy is an instance. Rays on instances are slower; the
+# many small objects of a city stay merged.
+MOST_COPIED_TRIANGLES = 2**18
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ An OpenStreetMap file of N detached houses in blocks between streets is written
 and imported. Printed are the time by the clock, the processor time of all
 processes, and the peak of resident memory of the largest of them.
 
-Aims, for 10,000 plain houses: 60 s and 1 GB. Linux only.
+Linux only.
 """
 
 from __future__ import annotations

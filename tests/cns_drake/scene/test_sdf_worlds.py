@@ -707,8 +707,9 @@ def test_meshes_out_of_sight_are_not_loaded(tmp_path):
     """What is in sight is the same, and so are the table and the notes."""
     folder = write(tmp_path).parent
     visuals = ""
+    # The last two have the same mesh.
     for k in range(6):
-        name = f"house_{k}.obj"
+        name = f"house_{min(k, 4)}.obj"
         (folder / name).write_text(f"{obj_text()}l 1 2\n")
         mesh = f"<mesh><uri>{name}</uri><scale>2 2 2</scale></mesh>"
         visuals += (
@@ -742,4 +743,4 @@ def test_meshes_out_of_sight_are_not_loaded(tmp_path):
     assert [one.structure for one in geometries] == near
     assert list(part.structures) == list(whole.structures)
     assert part.notes == whole.notes
-    assert len(part.notes) == 6
+    assert len(part.notes) == 5
