@@ -420,10 +420,12 @@ def _what_shipped_lack(metric: str, task: str) -> str:
             f"the shipped tables have no {metric} of the task {task or 'place'}"
             " with these options"
         )
+    verb = "cns-eval pr DATABASE QUERY --method NAME --output DIR, or "
+    if "place" not in metric_named(metric).tasks:
+        verb = ""
     return (
-        f"the shipped tables have no values of {metric}; measure each method"
-        " (cns-eval pr DATABASE QUERY --method NAME --output DIR, or cns-drake"
-        " study), and give the tables"
+        f"the shipped tables have no values of {metric}; measure it"
+        f" ({verb}cns-drake study), and give the tables"
     )
 
 

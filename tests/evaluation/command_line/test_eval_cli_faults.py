@@ -176,7 +176,10 @@ def test_bad_figures(capsys, tmp_path):
         (["--output", file, "--rankings"], "--rankings has no figure"),
         (["--output", file, "--font", "nofont"], "--font: 'nofont'"),
         (["--output", file, "--width", "3.5"], "--width: '3.5'"),
-        (["--metric", "tcr_sym"], "the shipped tables have no tcr_sym"),
+        (
+            ["--metric", "tcr_sym"],
+            "have no values of tcr_sym; measure it (cns-dr",
+        ),
     ):
         assert_refused(capsys, ["compare", *words], fault)
     assert not file.exists()

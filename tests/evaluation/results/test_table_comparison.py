@@ -184,7 +184,7 @@ def test_a_metric_that_no_shipped_table_has(tmp_path):
     rows = [replace(row, metric="mine") for row in shipped(metric="auc")]
     own = tmp_path / "own.csv"
     Results.of(rows[:1]).write_csv(own)
-    lacking = "the shipped tables have no values of mine; measure each method"
+    lacking = "the shipped tables have no values of mine; measure it"
     assert lacking in compare_tables([own], "mine").notes[-1]
     with pytest.raises(InputError, match=lacking):
         compare_tables([], "mine")
