@@ -12,7 +12,8 @@ transform.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+import hashlib
 import itertools
 import math
 from typing import NamedTuple
@@ -365,6 +366,9 @@ _TO_SECOND = np.array([1, 6, 2, 2])
 _LAST_TURNS = turns(288)
 _LAST_STEPS = np.array([[2, 4], [1, 2]])
 _TO_LAST = np.array([1, 2, 8, 8])
+# Number of queries of which a database keeps climbs: about 5 MB.
+_MOST_CLIMBED = 4096
+_NO_CLIMBS = np.zeros((0, 7), np.int32)
 
 
 class LayeredOverlapConfig(MethodConfig):
@@ -454,6 +458,10 @@ class CoarseMaps:
     bits: np.ndarray
     counts: np.ndarray
 
+    def chosen(self, indices: Sequence[int]) -> "CoarseMaps":
+        """Returns the maps of some of the N places or headings."""
+        return CoarseMaps(self.bits[indices], self.counts[indices])
+
 
 @dataclass(frozen=True)
 class LayeredDatabase:
@@ -464,11 +472,15 @@ class LayeredDatabase:
         first: the coarsest maps of the places, for the first of the method's
             four searches.
         second: finer maps, for the second and the third search.
+        climbed: what `score` found, for `relative_poses`: hash of the query's
+            cells -> (K, 7) int32 place, heading and shifts at which a climb
+            started, and heading and shifts at which it ended.
     """
 
     places: Sequence[LayeredScan]
     first: CoarseMaps
     second: CoarseMaps
+    climbed: dict[bytes, np.ndarray] = field(default_factory=dict)
 
 
 @register("layered-overlap")
@@ -532,11 +544,18 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         )
         if not exhaustive:
             poses = poses[: config.candidates]
+        climbed = []
         for pose in poses:
             place = database.places[pose[0]]
             if len(place.cells) > 0:
                 found = self._climb(query, place, pose[1:])
                 scores[pose[0]] = self._score(query, place, found)
+                climbed.append((*pose, *found[:3]))
+        while len(database.climbed) >= _MOST_CLIMBED:
+            del database.climbed[next(iter(database.climbed))]
+        database.climbed[_key(query)] = np.array(
+            climbed[: config.candidates], np.int32
+        ).reshape(-1, 7)
         return scores
 
     def relative_poses(
@@ -557,20 +576,32 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
             return poses
         # An exhaustive search refines every place at every heading.
         every = len(scans) * len(_FIRST_TURNS)
-        database_of_places = self.build_database(scans)
+        chosen = list(places)
+        database_of_places = LayeredDatabase(
+            scans,
+            database.first.chosen(chosen),
+            database.second.chosen(chosen),
+        )
+        climbed = {
+            tuple(row[:4]): row[4:]
+            for row in database.climbed.get(_key(query), _NO_CLIMBS).tolist()
+        }
         for start in _search(query, database_of_places, every, every):
-            scan = scans[start[0]]
-            if len(scan.cells) > 0:
-                found = self._climb(query, scan, start[1:])
-                poses[start[0]] = self._to_pose(found)
+            k = start[0]
+            if len(scans[k].cells) > 0:
+                # A climb from the same start ends at the same pose.
+                found = climbed.get((places[k], *start[1:].tolist()))
+                if found is None:
+                    found = self._climb(query, scans[k], start[1:])[:3]
+                poses[k] = self._to_pose(*found)
         return poses
 
-    def _to_pose(self, found: _FinePose) -> np.ndarray:
-        """Returns X_PQ (4, 4) for a pose on fine maps."""
-        c, s = _LAST_TURNS[found.heading] / _LAST_TURNS[0, 0]
+    def _to_pose(self, heading: int, rows: int, columns: int) -> np.ndarray:
+        """Returns X_PQ (4, 4) for a pose on fine maps, see `_FinePose`."""
+        c, s = _LAST_TURNS[heading] / _LAST_TURNS[0, 0]
         R_PQ = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         half_cell = 0.5 * self.config.cell
-        x, y = found.rows * half_cell, found.columns * half_cell
+        x, y = rows * half_cell, columns * half_cell
         return poses.make_pose(R_PQ, np.array([x, y, 0.0]))
 
     def _climb(
@@ -611,6 +642,11 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         if of_query == 0 or of_place == 0:
             return 0.0
         return common / math.sqrt(of_query * of_place)
+
+
+def _key(scan: LayeredScan) -> bytes:
+    """Returns a hash of a scan, whose object may be read from a file again."""
+    return hashlib.sha256(scan.cells.tobytes() + scan.starts.tobytes()).digest()
 
 
 def _search(

@@ -7,7 +7,7 @@ from helpers.layered_scans import image, some_cells, town
 import numpy as np
 import pytest
 
-from evaluation.methods import LayeredOverlap, make_method
+from evaluation.methods import LayeredOverlap, layered_overlap, make_method
 from evaluation.methods.layered_overlap import LayeredScan, climb, turns
 from evaluation.methods.overlap_layers import layer_cells
 
@@ -195,3 +195,16 @@ def test_search_by_brute_force(seed):
     chosen = method(poses=12, refined=5, candidates=2)
     scores = chosen.score(query, chosen.build_database(places))
     np.testing.assert_allclose(scores, expected, rtol=1e-12)
+
+
+def test_poses_are_those_of_the_score(monkeypatch):
+    chosen = make_method("layered-overlap", {})
+    query, *scans = (chosen.describe(town(seed)) for seed in (2, 1, 2, 3))
+    database = chosen.build_database(scans)
+    alone = chosen.relative_poses(query, database, [2, 0, 1])
+    chosen.score(query, database)
+    # The climbs of the score are not made again.
+    monkeypatch.setattr(layered_overlap, "climb", None)
+    again = LayeredScan(query.cells.copy(), query.starts.copy())
+    found = chosen.relative_poses(again, database, [2, 0, 1])
+    np.testing.assert_array_equal(found, alone)
