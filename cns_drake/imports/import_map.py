@@ -93,7 +93,7 @@ def import_city(
         return _import_roads(kind, source, output, options, own, finish)
     city = kind.read(source, options)
     staged = stage_city(source, city, options)
-    _note_implausible_sizes(staged.kept, city.faults)
+    plausible = _check_sizes(staged.kept, city.faults)
     changes = None
     if options.grow is not None:
         staged, changes = grow(staged, options.grow, options.seed)
@@ -101,7 +101,8 @@ def import_city(
     ground = ground_of(staged.kept)
     space = find_free_space(staged.kept, ground)
     side = options.drive_on or ("left" if city.keeps_left else "right")
-    drives = own or _find_drives(city, space, side)
+    # The cells of a city in millimetres would be searched for minutes.
+    drives = own or (_find_drives(city, space, side) if plausible else [])
     if options.within is not None:
         staged = _cropped_city(staged, drives, options.within, city.faults)
         ground = ground_of(staged.kept)
@@ -139,24 +140,25 @@ def import_city(
     return report
 
 
-def _note_implausible_sizes(
+def _check_sizes(
     objects: Sequence[ImportedObject], faults: ImportFaults
-) -> None:
-    """Counts the buildings as a fault if they are too small or too large.
+) -> bool:
+    """Returns whether the sizes of the buildings are plausible.
 
-    Each value of a file in another unit is plausible, but the city is not.
+    If not, the buildings are counted as a fault. Each value of a file in
+    another unit is plausible, but the city is not.
     """
     buildings = [
         one for one in objects if "building" in one.object_type.lower()
     ]
     if not buildings:
-        return
+        return True
     height = float(
         np.median([np.ptp(one.triangles[:, :, 2]) for one in buildings])
     )
     low, high = _PLAUSIBLE_HEIGHTS
     if low <= height <= high:
-        return
+        return True
     away = {
         factor: abs(math.log(max(height, 1e-9) * factor / _USUAL_HEIGHT))
         for factor in _FACTORS
@@ -164,10 +166,12 @@ def _note_implausible_sizes(
     side = "too small" if height < low else "too large"
     faults.add(
         f"{side}: the median building is {height:.3g} m high; multiply"
-        f" coordinates by {min(away, key=lambda one: away[one]):g}?",
+        f" coordinates by {min(away, key=lambda one: away[one]):g}? No drive is"
+        " looked for.",
         buildings[0].structure.name,
         len(buildings),
     )
+    return False
 
 
 def with_usual_growth(source: Path, options: ImportOptions) -> ImportOptions:

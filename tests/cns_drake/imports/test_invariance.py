@@ -168,6 +168,7 @@ def test_roads_that_are_moved_have_the_same_town(tmp_path):
 
 
 @pytest.mark.parametrize("scale", [1, 1e-3, 0.01, 100, 1 / 0.0254])
+@pytest.mark.slow
 def test_the_factor_that_is_named_cures_the_city(tmp_path, scale):
     def advice(name, scale):
         path = write(tmp_path / f"{name}.city.json", scale=scale)
