@@ -148,6 +148,11 @@ class DriveChanger:
             unit = left.pop("lidar")
             folder = Path(self._source).parent
             where = f"{self._source}: {place}.lidar"
+            if not isinstance(unit, str | Path):
+                raise InputError(
+                    f"{where}: neither a preset nor the file of a data sheet;"
+                    " fields of a LiDAR belong in lidars"
+                )
             with value_errors(where), errors_at(where, "unit: "):
                 if is_sheet_file(unit, folder):
                     unit = folder / unit

@@ -15,6 +15,8 @@ SIDES = ("both", "database", "query")
 SESSIONS = "sessions"
 # Field of the database with drives that are sampled at random.
 FLEET = "fleet"
+# Field of a LiDAR with its data sheet: one value, whatever lists it contains.
+_SHEET = "unit"
 # The section of each drive -> the fields that a case sets there.
 Case = dict[str, dict[str, Any]]
 
@@ -153,7 +155,7 @@ def leaves(
         if name == SESSIONS and _is_list_of(dict, value):
             # Each drive's fields can be factors, named by its number.
             value = {str(k): one for k, one in enumerate(value, start=1)}
-        if isinstance(value, dict) and value:
+        if isinstance(value, dict) and value and name != _SHEET:
             yield from leaves(value, place)
             continue
         try:

@@ -264,7 +264,7 @@ FAULTS = [
     ("database: {viewpoint: [101, 0]}", r"database.viewpoint: \[101, 0\] is"),
     ("database: {viewpoint: [0, 361]}", r"database.viewpoint: \[0, 361\] is"),
     ("query: {lidar: sonar}", "query.lidar: .*unknown preset 'sonar'"),
-    ("query: {lidar: 3}", "query.lidar: "),
+    ("query: {lidar: {unit: {ranges: [1, 9]}}}", "query.lidar: .*in lidars"),
     ("query: {returns: shiny}", "query.returns: 'shiny' is neither ideal nor"),
     (
         "query: {weather: {visibility: 50}}",

@@ -156,6 +156,7 @@ def test_values_of_factors(read, value, found):
         "route: [{road: a, direction: forward, lane: 1}]",
         "lidars: {lidar: {xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}}",
         "field: {from: 1, to: 2}",
+        "lidars: {lidar: {unit: {ranges: [1, 9], rings_deg: [[9, -9, 4]]}}}",
     ],
 )
 def test_lists_that_are_one_value(read, field):
