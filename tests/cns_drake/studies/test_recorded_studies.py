@@ -176,7 +176,7 @@ def test_drives_without_a_control(tmp_path):
         ({"database": {"years": [0, 5]}}, "database.years: the recordings"),
         ({"database": {"distractors": 9}}, "database.distractors: the rec"),
         ({"query": {"hide_sector": 90}}, "query.hide_sector: the recordings"),
-        ({"database": {"keep": 2}}, "database.keep: .* database.sessions; nam"),
+        ({"database": {"keep": 2}}, "database.keep: .* database.sessions; "),
         ({"query": {"stage": "last"}}, "query.stage: the recordings"),
         ({"database": {"stage": "last"}}, "database.stage: the recordings"),
         ({"both": {"lidar": "vlp-16"}}, "both.lidar: the recordings"),

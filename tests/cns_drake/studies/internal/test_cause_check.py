@@ -24,7 +24,7 @@ def test_shipped_causes_can_be_used():
     [
         ({"transient": {"snwo": [0.1]}}, "transient.snwo: "),
         ({"transient": {"snow": [0.1, -1.0]}}, "transient.snow: "),
-        ({"wether": {"rain": [1]}}, "wether: "),
+        ({"wheatherr": {"rain": [1]}}, "wheatherr: "),
         ({"lidar": ["cns", "vlp-99"]}, "lidar: unknown preset 'vlp-99'"),
         ({"hide_sector": [1000]}, "hide_sector: 1000 is not from 0"),
         ({"distractors": [3]}, "distractors: it is a field of database"),
