@@ -147,31 +147,38 @@ def overlaps_with_best_match(
     X_WQs: np.ndarray,
     matches: np.ndarray,
 ) -> np.ndarray:
-    """Returns the share of each query's scan that its best match shows, (Q,).
+    """Returns the share of each query's scan that its best match shows.
+
+    Scans are sorted and compared once for all radii of a match.
 
     Args:
         place_scans: D scans (N, 3), each in the frame of its sensor.
         X_WPs: (D, 4, 4) poses of these sensors.
         query_scans: Q scans.
         X_WQs: (Q, 4, 4) poses of their sensors.
-        matches: (Q, D) bool, whether a place is a true match of a query.
+        matches: (R, Q, D) bool, whether a place is a true match of a query, by
+            each of R radii.
 
     Returns:
-        (Q,) greatest share of the query's scan that the scan of a match shows;
-        NaN for a query without points or without a match.
+        (R, Q) greatest share of the query's scan that the scan of a match
+        shows; NaN for a query without points or without a match.
     """
-    matched = np.flatnonzero(matches.any(axis=0)).tolist()
+    matched = np.flatnonzero(matches.any(axis=(0, 1))).tolist()
     seen = {k: SeenSurfaces.of(place_scans[k].astype(float)) for k in matched}
-    result = np.full(len(query_scans), math.nan)
+    result = np.full(matches.shape[:2], math.nan)
     for row, scan in enumerate(query_scans):
         X_WQ = X_WQs[row]
         p_W = sample_points(scan).astype(float) @ X_WQ[:3, :3].T + X_WQ[:3, 3]
-        shares = [
-            seen[k].share_of((p_W - X_WPs[k, :3, 3]) @ X_WPs[k, :3, :3])
-            for k in np.flatnonzero(matches[row]).tolist()
-        ]
-        if shares:
-            result[row] = max(shares)
+        near = np.flatnonzero(matches[:, row].any(axis=0))
+        shares = np.array(
+            [
+                seen[k].share_of((p_W - X_WPs[k, :3, 3]) @ X_WPs[k, :3, :3])
+                for k in near.tolist()
+            ]
+        )
+        for number, is_match in enumerate(matches[:, row, near]):
+            if is_match.any():
+                result[number, row] = shares[is_match].max()
     return result
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-import itertools
 import math
 from typing import NamedTuple, Protocol, TypeAlias
 
@@ -311,24 +310,23 @@ def shown_overlaps(
             chosen = kept
             if len(rows_here) < len(kept):
                 chosen = LongList.of(kept[row] for row in rows_here)
-        for radius, rows in itertools.product(
-            radii, query_batches(len(asked), len(of))
-        ):
+        for rows in query_batches(len(asked), len(of)):
             batch = slice(rows.start, rows.stop)
-            matches = matches_within_radius(
-                database,
-                query,
-                replace(protocol, radius=radius),
-                rows,
-            )
+            matches = [
+                matches_within_radius(
+                    database, query, replace(protocol, radius=radius), rows
+                )[:, of]
+                for radius in radii
+            ]
             shown = overlaps_with_best_match(
                 chosen,
                 database.places.X_WS[of],
                 asked[batch],
                 queries.X_WS[batch],
-                matches[:, of],
+                np.array(matches),
             )
-            found[radius][batch] = np.fmax(found[radius][batch], shown)
+            for radius, by_radius in zip(radii, shown, strict=True):
+                found[radius][batch] = np.fmax(found[radius][batch], by_radius)
     return found
 
 
@@ -420,12 +418,12 @@ def _overlaps_of_matches(
         return known[radius][batch]
     if (radius, rows) not in overlaps:
         scans = places.scans
-        overlaps[radius, rows] = overlaps_with_best_match(
+        (overlaps[radius, rows],) = overlaps_with_best_match(
             scans,
             database.places.X_WS[: len(scans)],
             queries.scans[batch],
             query.queries.X_WS[batch],
-            matches[:, : len(scans)],
+            matches[None, :, : len(scans)],
         )
     return overlaps[radius, rows]
 

@@ -18,6 +18,7 @@ from evaluation.recognition import (
     RetrievalProtocol,
     SeenSurfaces,
     overlap_matrix,
+    overlaps_with_best_match,
     retrieve,
 )
 
@@ -59,6 +60,21 @@ def test_what_is_hidden_or_not_there_is_not_shown():
     )
     # Surfaces above the field of view are unknown.
     assert seen.share_of(np.array([[0.5, 0.0, 10.0]])) == 0.0
+
+
+def test_the_best_match_by_each_radius():
+    few, half = BEAMS[:8000], BEAMS[:4000]
+    places = [20.0 * few, 10.0 * half, 10.0 * few]
+    queries = [10.0 * few, np.zeros((0, 3)), 20.0 * few]
+    still = np.tile(np.eye(4), (3, 1, 1))
+    matches = np.zeros((3, 3, 3), bool)
+    matches[0, 0, 0] = matches[1, 0, :2] = matches[2] = True
+    found = overlaps_with_best_match(places, still, queries, still, matches)
+    np.testing.assert_allclose(
+        found,
+        [[0.0, np.nan, np.nan], [0.5, np.nan, np.nan], [1.0, np.nan, 1.0]],
+        atol=0.03,
+    )
 
 
 def test_nothing():
