@@ -41,7 +41,7 @@ _LEAST_TIME = 3.0
 _REAL_SHARE = 0.05
 # Work that is older than this share of all work hardly counts in the pace of
 # jobs, which follows the load of the machine.
-_MEMORY = 0.25
+_MEMORY = 0.15
 # The pace of a kind is that of all jobs, as if jobs of this kind had done this
 # share of all work at that pace.
 _BORROWED = 0.02

@@ -82,3 +82,10 @@ def test_loading_the_program_is_no_work():
     left.begin("a", 35.0)
     left.end("a", 40.0)
     assert left.seconds(40.0) == pytest.approx(30.0)
+
+
+def test_the_time_left_follows_the_load_of_the_machine():
+    """A quarter of the work after the load has halved, it is told."""
+    jobs = [(str(k), 10.0, 20.0 if k < 20 else 10.0) for k in range(40)]
+    (told,) = (told for now, told, _ in replay(jobs, 1) if now == 500.0)
+    assert 100.0 <= told <= 400.0 / 3.0
