@@ -41,4 +41,5 @@ from .study import register_cause as register_cause
 from .verbs import change_between as change_between
 from .verbs import localise as localise
 from .verbs import recognise as recognise
+from .verbs import report as report
 from .verbs import update_map as update_map

@@ -1,5 +1,6 @@
 from .cause_check import causes as causes
 from .cause_check import register_cause as register_cause
+from .chosen_drives import named_drives as named_drives
 from .drives.changed_drives import Losses as Losses
 from .drives.sampled_drives import DrawnRoute as DrawnRoute
 from .drives.sampled_drives import Fleet as Fleet

@@ -45,8 +45,8 @@ def record_all(
     cluster: Cluster,
     *,
     overwrite: bool = True,
-) -> None:
-    """Records scenarios as `<output>/<name>/`.
+) -> list[Path]:
+    """Records scenarios as `<output>/<name>/`; returns these folders.
 
     A finished recording of the same scenario and world is kept.
 
@@ -63,6 +63,7 @@ def record_all(
     jobs = plan_recordings(scenarios, output, overwrite=overwrite)
     make_folder(output)
     run_jobs(jobs, cluster, "drives")
+    return [output / one.name for one in scenarios]
 
 
 def plan_recordings(

@@ -31,9 +31,10 @@ from cns_drake.base import (
 )
 from cns_drake.export import claim_folder
 from cns_drake.ground_truth import exact_overlaps
-from cns_drake.scenarios import Scenario
+from cns_drake.scenarios import Scenario, load_scenario
 from cns_drake.scene import CLASS_IDS, GROUND_CLASSES
 from cns_drake.simulation import SimulationSource
+from cns_drake.studies import named_drives
 from evaluation.drives import cloud_at, sample_frames
 from evaluation.maps import downsample
 from evaluation.recognition import (
@@ -76,19 +77,6 @@ class ExportOptions:
     half_extent: float = 50.0
 
 
-def claim_pairs(output: Path) -> None:
-    """Makes the folder of a set of training data, before minutes of work.
-
-    Args:
-        output: the folder.
-
-    Raises:
-        InputError: the folder contains anything but an earlier set, or cannot
-            be written.
-    """
-    claim_folder(output, "pointnetvlad", _EXPLAINED)
-
-
 def write_overlap_table(
     database: Scenario,
     query: Scenario,
@@ -121,6 +109,43 @@ def write_overlap_table(
     return path
 
 
+def write_pairs(
+    drives: Sequence[str],
+    held_out: Sequence[str],
+    output: Path,
+    options: ExportOptions,
+    cluster: Cluster,
+    *,
+    vary: str | None = None,
+    on_note: Callable[[str], None] = lambda note: None,
+) -> list[Path]:
+    """Writes training data of named drives; returns the index files.
+
+    See `export_pairs`.
+
+    Args:
+        drives: names of shipped drives, or scenario files. If none is given,
+            these are the drives of `vary`, or all shipped drives.
+        held_out: drives for evaluation only, even if `drives` or `vary` names
+            them.
+        output: the folder of the set.
+        options: spacing and extent of the exported clouds.
+        cluster: runs the work.
+        vary: experiment whose drives are added, if any; see `named_drives`.
+        on_note: is called with notes on missing parts of the set.
+
+    Raises:
+        InputError: see `named_drives` and `export_pairs`.
+    """
+    if vary is not None:  # Its scenarios are written to the same folder.
+        _claim(output)
+    learned = named_drives(drives, vary, output, cluster)
+    tested = [load_scenario(name) for name in held_out]
+    names = {drive.name for drive in tested}
+    learned = [drive for drive in learned if drive.name not in names]
+    return export_pairs(learned, tested, output, options, cluster, on_note)
+
+
 def export_pairs(
     scenarios: Sequence[Scenario],
     held_out: Sequence[Scenario],
@@ -146,7 +171,8 @@ def export_pairs(
     Raises:
         InputError: there is no drive to learn from, two drives have the same
             name, or drives cannot be simulated (the error names all of these),
-            or the folder is refused by `claim_pairs`.
+            or the folder contains anything but an earlier set, or cannot be
+            written.
     """
     if not scenarios:
         raise InputError("export: no drive to learn from")
@@ -154,7 +180,7 @@ def export_pairs(
     names = [one.name for one in every]
     for name in repeated(names):
         raise InputError(f"export: two drives are named {name}")
-    claim_pairs(output)
+    _claim(output)
     output = output.absolute()
     parts = {name: Part(output / "parts" / f"{name}.data") for name in names}
     jobs = [
@@ -321,6 +347,11 @@ def write_pickles(
         with completing(path) as part, open(part, "wb") as stream:
             pickle.dump(values, stream, protocol=pickle.HIGHEST_PROTOCOL)
     return [output / f"{name}.pickle" for name in every_drive]
+
+
+def _claim(output: Path) -> None:
+    """Makes the folder of a set of training data, before minutes of work."""
+    claim_folder(output, "pointnetvlad", _EXPLAINED)
 
 
 def _locations(

@@ -2,7 +2,7 @@
 
 `recognise`, `change_between`, `localise` and `update_map` measure two drives or
 maps. What they return has all that a command prints, and the rows of its
-tables.
+tables. `report` evaluates a folder of recordings.
 """
 
 import lazy_loader

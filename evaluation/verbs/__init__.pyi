@@ -5,3 +5,4 @@ from .map_update import update_map as update_map
 from .measured import Measured as Measured
 from .recognition import Recognition as Recognition
 from .recognition import recognise as recognise
+from .reporting import report as report

@@ -12,7 +12,6 @@ from cns_drake.base import (
     terminal,
 )
 from cns_drake.command_line import options
-from cns_drake.command_line.experiment_drives import varied_drives
 from cns_drake.command_line.fields import changed, field_options
 
 GROUP = "Drive through them"
@@ -51,20 +50,11 @@ def generate(
     """
     with ended_by_interrupts("cns-drake"):
         from cns_drake.base import choose_cluster
-        from cns_drake.scenarios import load_scenario, recordable_drives
-        from cns_drake.studies import record_all
+        from cns_drake.studies import named_drives, record_all
 
     cluster = choose_cluster(jobs, scheduler)
-    if not names and vary is None:
-        names = list(recordable_drives())
-    scenarios = [load_scenario(name) for name in names or ()]
-    if vary is not None:
-        varied = varied_drives(vary, output, cluster)
-        scenarios += [
-            scenario for scenario in varied if scenario not in scenarios
-        ]
-    scenarios = [changed(scenario, changes) for scenario in scenarios]
-    record_all(scenarios, output, cluster, overwrite=overwrite)
-    for scenario in scenarios:
-        typer.echo(output / scenario.name)
+    drives = named_drives(names or (), vary, output, cluster)
+    scenarios = [changed(drive, changes) for drive in drives]
+    for path in record_all(scenarios, output, cluster, overwrite=overwrite):
+        typer.echo(path)
     terminal.next_command("cns-eval", "report", output, "--output", "report")

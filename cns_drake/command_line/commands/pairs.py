@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from cns_drake.base import ended_by_interrupts, note, shared_options, terminal
 from cns_drake.command_line import options
-from cns_drake.command_line.experiment_drives import varied_drives
-
-if TYPE_CHECKING:
-    from cns_drake.base import Cluster
-    from cns_drake.scenarios import Scenario
 
 GROUP = "Convert for other programs"
 
@@ -58,42 +53,17 @@ def pairs(
     """
     with ended_by_interrupts("cns-drake"):
         from cns_drake.base import choose_cluster
-        from cns_drake.scenarios import load_scenario
-        from cns_drake.training import ExportOptions, claim_pairs, export_pairs
+        from cns_drake.training import ExportOptions, write_pairs
 
     cluster = choose_cluster(jobs, scheduler)
-    if vary is not None:  # Its scenarios are written to the same folder.
-        claim_pairs(output)
-    learned = _learned_drives(drives or [], vary, output, cluster)
-    tested = [load_scenario(name) for name in held_out or ()]
-    taken = {drive.name for drive in tested}
-    paths = export_pairs(
-        [drive for drive in learned if drive.name not in taken],
-        tested,
+    paths = write_pairs(
+        drives or (),
+        held_out or (),
         output,
         ExportOptions(spacing, scans, half_extent),
         cluster,
-        note,
+        vary=vary,
+        on_note=note,
     )
     texts = [str(path) for path in paths]
     terminal.show({"output": texts}, "\n".join(texts), json=json)
-
-
-def _learned_drives(
-    names: list[str], vary: str | None, output: Path, cluster: Cluster
-) -> list[Scenario]:
-    """Returns the drives of training data, except the drives held out.
-
-    These are the named drives and the drives of the experiment `vary`, or all
-    shipped drives if neither is given.
-    """
-    with ended_by_interrupts("cns-drake"):
-        from cns_drake.scenarios import load_scenario, recordable_drives
-
-    if not names and vary is None:
-        names = list(recordable_drives())
-    learned = [load_scenario(name) for name in names]
-    if vary is not None:
-        varied = varied_drives(vary, output, cluster)
-        learned += [drive for drive in varied if drive not in learned]
-    return learned

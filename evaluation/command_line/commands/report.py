@@ -47,30 +47,19 @@ def report(
     from cns_drake.base import choose_cluster
     from evaluation.command_line.suggestions import show_results
     from evaluation.results import PrintStyle
-    from evaluation.study import (
-        choose_methods,
-        find_recordings,
-        study_recordings,
-    )
+    from evaluation.verbs import report as report_of
 
-    printed = PrintStyle.checked(width, font, title)
-    cluster = choose_cluster(jobs, scheduler)
-    chosen = choose_methods(method or (), parameter or ())
-    found = find_recordings(recordings, terminal.note, lidar, columns)
-    for choice in chosen:
-        made = choice.make()
-        for note in {made.assumption(one.lidar_field) for one in found}:
-            if note is not None:
-                terminal.note(note)
-    page = study_recordings(
-        found,
+    page = report_of(
+        recordings,
         output,
-        cluster,
-        chosen,
-        protocols,
-        source=str(recordings),
+        method or (),
+        settings=parameter or (),
+        protocols=protocols,
+        lidar=lidar,
+        columns=columns,
+        printed=PrintStyle.checked(width, font, title),
+        cluster=choose_cluster(jobs, scheduler),
         with_costs=costs,
-        printed=printed,
         on_note=terminal.note,
     )
     show_results(page)
