@@ -1,4 +1,3 @@
-from .path_geometry import SmoothPath as SmoothPath
 from .road_profile import RoadProfile as RoadProfile
 from .road_profile import RoughnessClass as RoughnessClass
 from .suspension import Suspension as Suspension
@@ -10,5 +9,4 @@ from .suspension import ride_on_springs as ride_on_springs
 from .trajectory import Trajectory as Trajectory
 from .trajectory import pose_at as pose_at
 from .vehicle_motion import VehicleMotion as VehicleMotion
-from .vehicle_sweep import Sweep as Sweep
 from .vehicle_sweep import VehicleSweep as VehicleSweep

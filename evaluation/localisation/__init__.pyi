@@ -13,11 +13,9 @@ from .localiser import Localiser as Localiser
 from .localiser import Query as Query
 from .localiser import localise as localise
 from .localiser import mapped_frames as mapped_frames
-from .localiser import path_axes as path_axes
 from .localiser import query_frames as query_frames
 from .localiser import read_queries as read_queries
 from .one_scan import OneScan as OneScan
-from .results import COLUMNS as COLUMNS
 from .results import QUERY as QUERY
 from .results import (
     RIGHT_TRANSLATION as RIGHT_TRANSLATION,

@@ -57,7 +57,6 @@ from .styles import FIGURE_STYLE as FIGURE_STYLE
 from .styles import INK as INK
 from .styles import PALE as PALE
 from .styles import method_style as method_style
-from .styles import method_styles as method_styles
 from .styles import unit_rgb as unit_rgb
 from .summaries import excesses as excesses
 from .summaries import means as means

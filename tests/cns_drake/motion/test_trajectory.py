@@ -14,7 +14,7 @@ from helpers.drives import (
 import numpy as np
 import pytest
 
-from cns_drake.motion import SmoothPath, Trajectory
+from cns_drake.motion import Trajectory
 from cns_drake.roads import LanePath, Speeds
 
 
@@ -121,7 +121,7 @@ def test_the_path_turns_without_jumps_and_without_roll():
     # Three full turns: the heading must not fall back by 2 pi.
     points = helix_points(20.0, 0.05, 200)
     turned = np.unwrap(np.arctan2(points[:, 1] + 7, points[:, 0] - 5))
-    path = SmoothPath(points, SPACING)
+    path = Trajectory(lane_path(points), CAREFUL).path
     u = np.linspace(0, path.end, 5000)
     jet = path.evaluate(u)
     assert np.abs(np.diff(jet.yaw)).max() < 0.01
@@ -152,7 +152,7 @@ def test_bounds_hold_on_hills_and_where_limits_drop():
 
 
 def test_path_integrals():
-    path = SmoothPath(helix_points(25.0, 0.0, 60), SPACING)
+    path = Trajectory(lane_path(helix_points(25.0, 0.0, 60)), CAREFUL).path
     travelled = path.integral(lambda jet: jet.speed)
     # Inside the bend the curve is a circle; its ends are not.
     u = np.array([20.0, 20.0 + 1e-9, 31.7, 90.0])

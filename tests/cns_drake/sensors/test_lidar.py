@@ -15,7 +15,6 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.perception import PointCloud
 import pytest
 
-from cns_drake.motion import Sweep
 from cns_drake.scene import StructureEntry, StructureTable
 from cns_drake.sensors import POINT_DTYPE, MeasurementModel
 
@@ -220,14 +219,12 @@ def test_a_cloned_context_has_poses_of_its_own():
 
     def ahead_from(x):
         columns = FORWARD.num_columns
-        sweep = Sweep(
-            np.tile(np.eye(3), (columns, 1, 1)),
-            np.tile([x, 0.0, 0.0], (columns, 1)),
-        )
+        X_WB = np.eye(4)[:3]
+        X_WB[0, 3] = x
         port = stage.lidar.GetInputPort("sweep")
         port.FixValue(
             stage.lidar.GetMyMutableContextFromRoot(stage.context),
-            sweep.numbers(),
+            np.tile(X_WB, (columns, 1, 1)).ravel(),
         )
         return ahead(stage.eval())
 

@@ -18,7 +18,6 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import InputError, from_xyz, poses
 from evaluation.drives import open_drive
 from evaluation.localisation import (
-    COLUMNS,
     METHODS,
     QUERY,
     InitialPose,
@@ -34,7 +33,6 @@ from evaluation.localisation import (
     map_of,
     mapped_frames,
     note_sparse,
-    path_axes,
     read_queries,
 )
 from evaluation.recognition import auroc, numbers_of
@@ -186,19 +184,6 @@ def test_starts_lie_on_a_sphere_and_depend_on_seed_and_frame_alone():
     assert not np.array_equal(starts.draw(7), Starts(2.0, 10.0, 4).draw(7))
 
 
-def test_axes_of_a_way():
-    p_WS = np.array([[0.0, 0, 0], [0, 2, 0], [0, 4, 2], [0, 4, 2], [0, 4, 2]])
-    X_WS = np.tile(np.eye(4), (5, 1, 1))
-    axes = path_axes(p_WS, X_WS)
-    assert np.allclose(axes[0], [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
-    slope = np.array([0.0, 2.0, 1.0]) / math.sqrt(5.0)
-    assert np.allclose(axes[1][:, 0], slope)
-    assert np.allclose(axes[1][:, 2], [0.0, -slope[2], slope[1]])
-    # It stands: x of the LiDAR.
-    assert np.allclose(axes[4], np.eye(3))
-    assert np.allclose(axes @ axes.swapaxes(1, 2), np.eye(3))
-
-
 def write_street(folder, name, side, seed, *, far=0.0):
     """Records a drive of twelve scans with an oblique mount, turning."""
     X_BS = poses.make_pose(QUAT_BS.as_matrix(), np.array(P_BS))
@@ -242,7 +227,7 @@ def test_drives_with_an_oblique_mount(streets, tmp_path, capsys):
     # All are right: there is nothing to separate.
     assert values["auroc_own_score"] is None
     lines = (tmp_path / "localisation.csv").read_text().splitlines()
-    assert lines[0] == ",".join(COLUMNS)
+    assert lines[0] == ",".join(QUERY.names)
     assert len(lines) == 13
     status, out, _ = run(capsys, *both, *options)
     assert status == 0
@@ -279,7 +264,7 @@ def test_order_does_not_matter(streets, method):
     drive = open_drive(streets["query"])
     place = make_map(open_drive(streets["map"]), Settings())
     assert mapped_frames(streets["map"], place, drive).all()
-    columns = [name for name in COLUMNS if name != "seconds"]
+    columns = [name for name in QUERY.names if name != "seconds"]
     starts = Starts(1.0, 5.0)
     settings = Settings()
     found = Localiser(place, make_estimator(method, settings), settings)

@@ -15,7 +15,7 @@ from evaluation.results import (
     Answers,
     QueryRows,
     Results,
-    method_styles,
+    draw_chart,
     write_page,
 )
 
@@ -76,7 +76,8 @@ def test_the_method_stands_among_the_shipped_ones(shipped, tmp_path):
     # Only the own method has a colour.
     colours = {*re.findall(r"#[0-9a-f]{6}", text[text.index("<main>") :])}
     assert {"#d81b60", "#7a8594"} <= colours
-    others = method_styles(changed.distinct("method")).values()
+    chart = {"kind": "lines", "over": "seed", "metric": METRIC}
+    others = draw_chart(chart, changed).legend.values()
     assert "#d55e00" in {one.colour.lower() for one in others}
     assert "#d55e00" not in colours
 

@@ -25,7 +25,6 @@ from evaluation.results import (
     draw_chart,
     draw_comparison,
     draw_track,
-    method_styles,
     save_figure,
     summary_lines,
     write_page,
@@ -689,7 +688,13 @@ def test_a_method_has_one_style_in_all_charts():
 
 
 def test_many_methods_have_different_styles():
-    styles = method_styles([f"mine_{number}" for number in range(20)])
+    results = Results.of(
+        replace(row, method=f"mine_{number}")
+        for number in range(20)
+        for row in aged().where(method="solid").rows
+    )
+    chart = {"kind": "lines", "over": YEARS, "metric": "auc"}
+    styles = draw_chart(chart, results).legend
     assert len(set(styles.values())) == 20
 
 

@@ -6,7 +6,7 @@ import pytest
 from cns_drake.base import Reporter
 from evaluation.drives import open_drive
 from evaluation.localisation import (
-    COLUMNS,
+    QUERY,
     Localised,
     Localiser,
     Starts,
@@ -39,7 +39,7 @@ def test_a_pair_is_localised_as_each_scan_alone(towns, found):
     found_alone = Localiser(place, make_estimator("gicp", settings), settings)
     queries = read_queries(asked, range(8))
     (alone,) = localise([found_alone], queries, STARTS[1:], asked.name, 8)
-    for name in COLUMNS:
+    for name in QUERY.names:
         if name != "seconds":
             assert np.array_equal(found[3][name], alone[name])
 
