@@ -260,12 +260,17 @@ def eleven_columns(root, folder):
         (replace("calib.txt", "Tr: ", "Tr: x"), "Tr: could not convert 'x4"),
     ],
 )
-def test_files_that_do_not_fit(tmp_path, change, fault):
+def test_the_file_that_a_fault_names_is_the_one_to_mend(
+    tmp_path, change, fault
+):
     folder, _ = write_drive(tmp_path)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*.txt")}
     path = change(tmp_path, folder)
     with pytest.raises(InputError, match=f"^{path}: .*{fault}") as info:
         open_drive(folder)
     assert "\n" not in str(info.value)
+    path.write_bytes(before[path])
+    assert len(open_drive(folder).X_WS)
 
 
 def test_missing_files(tmp_path):

@@ -140,7 +140,7 @@ def test_an_image_without_a_stamp_is_refused(tmp_path):
     [(zstandard.compress, "zstd"), (lz4.frame.compress, "lz4")],
 )
 @pytest.mark.parametrize("topic", ["/lidar/points", "/odometry", "/tf_static"])
-def test_compressed_messages_are_named_as_such(
+def test_a_recording_without_compressed_messages_is_read(
     tmp_path, monkeypatch, compress, name, topic
 ):
     add_message = Writer.add_message
@@ -151,23 +151,30 @@ def test_compressed_messages_are_named_as_such(
             data = compress(data)
         add_message(writer, channel_id, log_time, data, *others)
 
-    monkeypatch.setattr(Writer, "add_message", add)
-    path, _, _ = record(tmp_path / "s")
-    with pytest.raises(
-        InputError, match=f"{topic}: each message is compressed by {name}"
-    ):
+    with monkeypatch.context() as patch:
+        patch.setattr(Writer, "add_message", add)
+        path, _, _ = record(tmp_path / "s")
+    said = f"{topic}: each message is compressed by {name}.*; convert the rec"
+    with pytest.raises(InputError, match=said):
         _ = open_drive(path).X_WS
+    path, _, _ = record(tmp_path / "converted")
+    assert len(open_drive(path).X_WS)
 
 
 @pytest.mark.parametrize("ending", ["zstd", "zst"])
-def test_a_compressed_file_is_named_as_such(tmp_path, ending):
+def test_a_compressed_file_is_read_when_uncompressed(tmp_path, ending):
     path, _, _ = record(tmp_path / "s")
     packed = path.with_name(f"{path.name}.{ending}")
     packed.write_bytes(zstandard.compress(path.read_bytes()))
     path.unlink()
     for one in (packed, packed.parent):
-        with pytest.raises(InputError, match=f"{packed.name}: the whole rec"):
+        said = f"{packed.name}: the whole rec.*; uncompress it first"
+        with pytest.raises(InputError, match=said):
             open_drive(one)
+    path.write_bytes(zstandard.decompress(packed.read_bytes()))
+    packed.unlink()
+    for one in (path, path.parent):
+        assert len(open_drive(one).X_WS)
 
 
 def test_hidden_files_are_no_recordings(tmp_path):
