@@ -20,7 +20,6 @@ from .complete_files import complete_part as complete_part
 from .complete_files import completing as completing
 from .complete_files import draft_folder as draft_folder
 from .complete_files import part_path as part_path
-from .complete_files import remove_folder as remove_folder
 from .complete_files import sole_writer as sole_writer
 from .complete_files import write_part as write_part
 from .complete_files import write_text as write_text
@@ -41,7 +40,6 @@ from .elementary import product as product
 from .elementary import rotated as rotated
 from .elementary import sin as sin
 from .elementary import tan as tan
-from .elementary import turns as turns
 from .errors import InputError as InputError
 from .errors import (
     describe_validation_error as describe_validation_error,
@@ -95,7 +93,6 @@ from .jobs.running import choose_cluster as choose_cluster
 from .jobs.running import run_jobs as run_jobs
 from .jobs.step import Reporter as Reporter
 from .jobs.step import Step as Step
-from .jobs.step import Steps as Steps
 from .json_text import json_values as json_values
 from .json_text import parse_json as parse_json
 from .launch import start as start

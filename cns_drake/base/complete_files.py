@@ -77,23 +77,6 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
             shutil.rmtree(part, ignore_errors=True)
 
 
-def remove_folder(folder: Path) -> None:
-    """Renames a folder, then removes it.
-
-    If the process is killed before the folder is removed, no incomplete folder
-    is left under the original name.
-
-    Raises:
-        InputError: if the folder cannot be removed.
-    """
-    part = part_path(folder)
-    with user_errors(folder):
-        # A run that was killed may have left one behind.
-        shutil.rmtree(part, ignore_errors=True)
-        os.replace(folder, part)
-        shutil.rmtree(part)
-
-
 def check_new_folder(folder: Path) -> None:
     """Raises an error if a folder that is to be made already contains files.
 

@@ -32,27 +32,6 @@ def product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     return result
 
 
-def turns(rotvecs: np.ndarray) -> np.ndarray:
-    """Returns the rotation matrices (N, 3, 3) of rotation vectors (N, 3).
-
-    The length of a rotation vector is its angle [rad]. The matrices follow from
-    Rodrigues' formula.
-    """
-    x, y, z = rotvecs.T
-    half = np.sqrt(x * x + y * y + z * z) / 2.0
-    # sin(half) / half.
-    part = np.where(half > 0.0, sin(half) / np.where(half > 0.0, half, 1), 1.0)
-    along, across = part * cos(half), part * part / 2.0
-    zero = np.zeros_like(x)
-    K = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
-    K = np.moveaxis(K, 2, 0)
-    return (
-        np.eye(3)
-        + along[:, None, None] * K
-        + across[:, None, None] * product(K, K)
-    )
-
-
 def rotated(R: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Returns vectors (..., 3) rotated by matrices (..., 3, 3)."""
     return product(R, vectors[..., None])[..., 0]

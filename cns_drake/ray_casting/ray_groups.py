@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
-from cns_drake.base import product, rotated, turns
+from cns_drake.base import cos, product, rotated, sin
 from cns_drake.scene import (
     MOST_COPIED_TRIANGLES,
     HalfSpaceSurface,
@@ -77,7 +77,7 @@ class Motion(NamedTuple):
             relative to the given pose of F.
         """
         t = self.duration * np.asarray(times, float)[:, None] + self.start
-        return turns(t * self.w), t * self.v
+        return _turns(t * self.w), t * self.v
 
 
 @dataclass
@@ -294,4 +294,25 @@ def _find_shared(
         key
         for key, count in num_triangles.items()
         if count > MOST_COPIED_TRIANGLES and copies[key] > 1
+    )
+
+
+def _turns(rotvecs: np.ndarray) -> np.ndarray:
+    """Returns the rotation matrices (N, 3, 3) of rotation vectors (N, 3).
+
+    The length of a rotation vector is its angle [rad]. The matrices follow from
+    Rodrigues' formula.
+    """
+    x, y, z = rotvecs.T
+    half = np.sqrt(x * x + y * y + z * z) / 2.0
+    # sin(half) / half.
+    part = np.where(half > 0.0, sin(half) / np.where(half > 0.0, half, 1), 1.0)
+    along, across = part * cos(half), part * part / 2.0
+    zero = np.zeros_like(x)
+    K = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
+    K = np.moveaxis(K, 2, 0)
+    return (
+        np.eye(3)
+        + along[:, None, None] * K
+        + across[:, None, None] * product(K, K)
     )

@@ -6,7 +6,6 @@ same steps again, on any machine: finished steps are skipped.
 
 import abc
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 import time
 
@@ -98,29 +97,3 @@ class Step(abc.ABC):
         dictionary.
         """
         return {**inputs, "version": [__version__, self.version]}
-
-
-@dataclass(frozen=True)
-class Steps(Step):
-    """Several steps that run in order, except steps that are already done.
-
-    Attributes:
-        place: the file or folder that only one process at a time may write; see
-            `Step.output`.
-        steps: the steps, in an order in which each step finds its inputs.
-    """
-
-    place: Path
-    steps: tuple[Step, ...]
-
-    @property
-    def output(self) -> Path:
-        return self.place
-
-    def is_done(self) -> bool:
-        return all(step.is_done() for step in self.steps)
-
-    def run(self, reporter: Reporter) -> None:
-        for step in self.steps:
-            if not step.is_done():
-                step.run(reporter)

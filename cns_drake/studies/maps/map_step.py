@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import os
 from pathlib import Path
+import shutil
 
 from cns_drake.base import (
     Cluster,
@@ -13,7 +14,7 @@ from cns_drake.base import (
     Reporter,
     Step,
     make_folder,
-    remove_folder,
+    part_path,
     run_jobs,
     user_errors,
 )
@@ -51,7 +52,7 @@ class MakeMap(Step):
     def run(self, reporter: Reporter) -> None:
         made_of = self.made_of(self.sources())
         if is_older := self.check():
-            remove_folder(self.folder)
+            _remove_folder(self.folder)
         self.make(
             lambda draft: Part(draft / _PART).write(made_of, None), reporter
         )
@@ -110,3 +111,20 @@ def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
         make_folder(output)
     jobs = [Job(f"city {one.folder.name}", one, cost=_COST) for one in steps]
     run_jobs(jobs, cluster, "cities")
+
+
+def _remove_folder(folder: Path) -> None:
+    """Renames a folder, then removes it.
+
+    If the process is killed before the folder is removed, no incomplete folder
+    is left under the original name.
+
+    Raises:
+        InputError: if the folder cannot be removed.
+    """
+    part = part_path(folder)
+    with user_errors(folder):
+        # A run that was killed may have left one behind.
+        shutil.rmtree(part, ignore_errors=True)
+        os.replace(folder, part)
+        shutil.rmtree(part)

@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Job, Reporter, Steps, track
+from cns_drake.base import Job, Reporter, Step, track
 from evaluation.recognition import (
     NUM_TRIALS,
     Number,
@@ -68,7 +69,7 @@ class PoseTask(Task):
                 PlaceTask.version,
             )
             compared = compared._replace(overlaps=overlaps)
-            step = Steps(overlaps.path, (shown, *_by_method(parts, compared)))
+            step = _Steps(overlaps.path, (shown, *_by_method(parts, compared)))
         else:
             for (drive, role), side in zip(pair.roles, sides, strict=True):
                 if not isinstance(side, tuple):
@@ -113,7 +114,33 @@ def _by_method(
 
 
 @dataclass(frozen=True)
-class _AtOnce(Steps):
+class _Steps(Step):
+    """Several steps that run in order, except steps that are already done.
+
+    Attributes:
+        place: the file or folder that only one process at a time may write; see
+            `Step.output`.
+        steps: the steps, in an order in which each step finds its inputs.
+    """
+
+    place: Path
+    steps: tuple[Step, ...]
+
+    @property
+    def output(self) -> Path:
+        return self.place
+
+    def is_done(self) -> bool:
+        return all(step.is_done() for step in self.steps)
+
+    def run(self, reporter: Reporter) -> None:
+        for step in self.steps:
+            if not step.is_done():
+                step.run(reporter)
+
+
+@dataclass(frozen=True)
+class _AtOnce(_Steps):
     """The steps of `_by_method`, for which a drive is read once.
 
     Attributes:
