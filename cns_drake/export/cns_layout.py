@@ -10,14 +10,14 @@ from cns_drake.base import InputError, encode_pcd
 from cns_drake.drives import Drive
 from cns_drake.export.layout import (
     Layout,
-    Trajectory,
+    PoseColumns,
     checked_name,
     imu_files,
-    lidar_trajectory,
+    lidar_poses,
     scenario_files,
     stamped_rows,
     vehicle_notes,
-    vehicle_trajectory,
+    vehicle_poses,
 )
 
 
@@ -33,7 +33,7 @@ def _drive_folder(drive: Drive) -> PurePosixPath:
 
 
 def _outer_files(drive: Drive) -> dict[str, str]:
-    X_BS = _trajectory(drive).X_BS
+    X_BS = _poses(drive).X_BS
     height = X_BS[2, 3]
     if height < 0.0:
         # Readers would take the mounting pose for its inverse.
@@ -49,7 +49,7 @@ def _outer_files(drive: Drive) -> dict[str, str]:
 
 def _inner_files(drive: Drive) -> dict[str, str]:
     imu = drive.imu
-    poses = _trajectory(drive)
+    poses = _poses(drive)
     files = {"gt.csv": stamped_rows(poses.stamps_ns, poses.columns, ",")}
     if imu is not None:
         names = ("quat_xyzw", "angular_velocity", "specific_force")
@@ -58,9 +58,9 @@ def _inner_files(drive: Drive) -> dict[str, str]:
     return files | imu_files(drive) | scenario_files(drive)
 
 
-def _trajectory(drive: Drive) -> Trajectory:
+def _poses(drive: Drive) -> PoseColumns:
     """Returns the poses of the vehicle; without them, those of the LiDAR."""
-    return vehicle_trajectory(drive) or lidar_trajectory(drive)
+    return vehicle_poses(drive) or lidar_poses(drive)
 
 
 def _mount_yaml(X_BC: np.ndarray) -> str:

@@ -121,7 +121,7 @@ def structure_files(table: Mapping[int, Mapping] | None) -> dict[str, str]:
     return {"structures.json": text + "\n"}
 
 
-class Trajectory(NamedTuple):
+class PoseColumns(NamedTuple):
     """Poses of a frame that carries the LiDAR.
 
     Attributes:
@@ -135,7 +135,7 @@ class Trajectory(NamedTuple):
     X_BS: np.ndarray
 
 
-def vehicle_trajectory(drive: Drive) -> Trajectory | None:
+def vehicle_poses(drive: Drive) -> PoseColumns | None:
     """Returns the poses of a drive's vehicle; None if it has none.
 
     Quaternions in the recording may have any length.
@@ -144,27 +144,36 @@ def vehicle_trajectory(drive: Drive) -> Trajectory | None:
         InputError: a quaternion has no direction, or a coordinate of a position
             is not finite, or not below `poses.FARTHEST`.
     """
-    odometry, X_BS = drive.odometry, drive.X_BS
-    if odometry is None or len(odometry) == 0 or X_BS is None:
+    found = _vehicle(drive)
+    if found is None:
         return None
+    odometry, X_BS = found
     columns = _odometry_columns(drive.name, odometry)
-    return Trajectory(odometry["stamp_ns"], columns, X_BS)
+    return PoseColumns(odometry["stamp_ns"], columns, X_BS)
 
 
-def lidar_trajectory(drive: Drive) -> Trajectory:
+def lidar_poses(drive: Drive) -> PoseColumns:
     """Returns the poses of a drive's LiDAR, as if it were the vehicle."""
     X_WS = drive.X_WS
     quat_WS = Rotation.from_matrix(X_WS[:, :3, :3]).as_quat(canonical=True)
-    return Trajectory(drive.stamps_ns, [X_WS[:, :3, 3], quat_WS], np.eye(4))
+    return PoseColumns(drive.stamps_ns, [X_WS[:, :3, 3], quat_WS], np.eye(4))
 
 
 def vehicle_notes(drive: Drive) -> Iterator[str]:
     """Yields a note if a drive has no poses of a vehicle."""
-    if vehicle_trajectory(drive) is None:
+    if _vehicle(drive) is None:
         yield (
             f"{drive.name}: has no poses of the vehicle; those of the LiDAR are"
             " written alone"
         )
+
+
+def _vehicle(drive: Drive) -> tuple[np.ndarray, np.ndarray] | None:
+    """Returns a drive's odometry and X_BS; None if it has no vehicle."""
+    odometry, X_BS = drive.odometry, drive.X_BS
+    if odometry is None or len(odometry) == 0 or X_BS is None:
+        return None
+    return odometry, X_BS
 
 
 def _odometry_columns(name: str, odometry: np.ndarray) -> list[np.ndarray]:

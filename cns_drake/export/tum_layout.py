@@ -7,18 +7,18 @@ from cns_drake.export.layout import (
     Layout,
     checked_name,
     imu_files,
-    lidar_trajectory,
+    lidar_poses,
     seconds_text,
     stamped_rows,
     vehicle_notes,
-    vehicle_trajectory,
+    vehicle_poses,
 )
 
 
 def _inner_files(drive: Drive) -> dict[str, str]:
     trajectories = {
-        "base_link.tum": vehicle_trajectory(drive),
-        "lidar.tum": lidar_trajectory(drive),
+        "base_link.tum": vehicle_poses(drive),
+        "lidar.tum": lidar_poses(drive),
     }
     files = {
         name: stamped_rows(

@@ -161,7 +161,7 @@ def changed_above(
     return heights
 
 
-class Change(NamedTuple):
+class PassedChange(NamedTuple):
     """A structure that only one of two stages has, beside a route.
 
     Attributes:
@@ -184,7 +184,7 @@ def greatest_changes(
     other: Mapping[str, Sequence[ColouredPart]],
     p_WBset: np.ndarray,
     most: int,
-) -> list[Change]:
+) -> list[PassedChange]:
     """Returns the changes that look greatest from a route, in order of time.
 
     Args:
@@ -210,7 +210,7 @@ def greatest_changes(
                 kind = kind_in_name(name) or parts[0].semantic_class
                 size = height * float(np.linalg.norm((high - low)[:2]))
                 x, y, z = ((low + high) / 2.0).tolist()
-                change = Change(
+                change = PassedChange(
                     frame, kind.replace("_", " "), height, is_own, (x, y, z)
                 )
                 found.append((size, change))

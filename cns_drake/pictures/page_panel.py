@@ -13,7 +13,7 @@ import numpy as np
 
 from cns_drake.base import GONE_RGB, NEW_RGB, length_of
 from cns_drake.pictures import meshcat_drawing as drawing
-from cns_drake.pictures.city_parts import Change
+from cns_drake.pictures.city_parts import PassedChange
 from cns_drake.pictures.drive_record import DriveRecord, ScanRecord
 from cns_drake.scene import CLASS_IDS, MOVING_IDS, World
 
@@ -122,7 +122,7 @@ def make_panel(
     title: str,
     drive: DriveRecord,
     sides: Set[str],
-    changes: Sequence[Change],
+    changes: Sequence[PassedChange],
     shown: ShownStages,
 ) -> str:
     """Returns the HTML of the page's title, switches, legend and plots.
