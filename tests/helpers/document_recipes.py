@@ -115,10 +115,6 @@ RECIPES = {
         ),
         prepare=shorten_drives,
     ),
-    "help: city": Recipe(
-        "cns-drake city town --new\n",
-        after=("start a city",),
-    ),
     "own city": Recipe(
         ".venv/bin/cns-drake list town\n",
         changes=(("town_output", "output"),),
@@ -163,15 +159,6 @@ RECIPES = {
         after=("imported scenario",),
         prints=("drive a", "stage 02"),
         makes=("town01/from_above.png", "study/town01_01/metadata.yaml"),
-    ),
-    "help: import": Recipe(
-        "cns-drake import delft",
-        changes=(
-            ("delft.city.jsonl", "blocks.json"),
-            ("output delft", "output imported"),
-        ),
-        after=("imported scenario",),
-        prints=("stage 01",),
     ),
     "study of an own city": Recipe(
         ".venv/bin/cns-drake study stages town --quick",
@@ -245,15 +232,6 @@ RECIPES = {
         by_night=True,
     ),
     "RKO-LIO settings": Recipe("voxel_size: 2.0\n", file="rko.yaml"),
-    "help: list": Recipe("cns-drake list", prints=("metropolis_04",)),
-    "help: simulate": Recipe(
-        "cns-drake simulate metropolis_01 --output drives",
-        changes=(
-            ("metropolis_01", "town/sequence_01.yaml"),
-            ("drives", "output --recording town.html"),
-        ),
-        after=("own city",),
-    ),
     "films": Recipe(
         ".venv/bin/cns-drake film metropolis_01 --output film.webp",
         changes=(
@@ -267,86 +245,15 @@ RECIPES = {
         makes=("film.webp", "drive.webp"),
         by_night=True,
     ),
-    "help: generate": Recipe(
-        "cns-drake generate metropolis_01 metropolis_04",
-        changes=(
-            ("metropolis_01 metropolis_04", "town/sequence_*.yaml"),
-            ("drives", "output"),
-        ),
-        after=("own city",),
-        prints=("output/town_01", "output/town_02"),
-    ),
-    "help: scan": Recipe(
-        "cns-drake scan worlds/metropolis/stage_01.sdf",
-        changes=(
-            ("worlds/metropolis", "town"),
-            ("0 0 1.6 0 0 1.57", "90 0 1.6 0 0 0"),
-            ("scan.pcd", "before.pcd"),
-        ),
-        after=("scans",),
-    ),
-    "help: export": Recipe(
-        "cns-drake export drives/metropolis_01",
-        changes=(("drives/metropolis_01", "output/town_02"),),
-        after=("exports",),
-    ),
-    "help: reproduce": Recipe(
-        "cns-drake reproduce metropolis",
-        changes=(
-            ("metropolis", "town"),
-            ("--output study", "--output output"),
-        ),
-        after=("own city",),
-        all_methods=True,
-    ),
-    "help: tcr": Recipe(
-        "cns-eval tcr drives/metropolis_01",
-        changes=(
-            (
-                "drives/metropolis_01 drives/metropolis_04",
-                "before.pcd after.pcd",
-            ),
-        ),
-        after=("scans",),
-    ),
-    "help: pr": Recipe(
-        "cns-eval pr drives/metropolis_01",
-        changes=(_FIRST, _LAST, ("drives/", "output/")),
-        after=("evaluation",),
-    ),
-    "help: localise": Recipe(
-        "cns-eval localise drives/metropolis_01",
-        changes=(_FIRST, _LAST, ("drives/", "output/")),
-        after=("evaluation",),
-        prints=("AUROC",),
-    ),
     "scores": Recipe(
         ".venv/bin/cns-eval scores kitti",
         changes=(("sequences/04", "sequences/02"),),
         after=("exports",),
         makes=("scores.csv",),
     ),
-    "help: scores": Recipe(
-        "cns-eval scores kitti",
-        changes=(("sequences/04", "sequences/02"),),
-        after=("exports",),
-        makes=("scores.csv",),
-    ),
-    "help: report": Recipe(
-        "cns-eval report drives",
-        changes=(("report drives", "report output"),),
-        after=("own city",),
-        prints=("report/index.html",),
-    ),
     "table of an entrant": Recipe("experiment,map,database", file="mine.csv"),
     "compare": Recipe(
         ".venv/bin/cns-eval compare mine.csv",
-        after=("table of an entrant",),
-        prints=("mine ", "layered-overlap "),
-    ),
-    "help: compare": Recipe(
-        "cns-eval compare mine/results.csv",
-        changes=(("mine/results.csv", "mine.csv"),),
         after=("table of an entrant",),
         prints=("mine ", "layered-overlap "),
     ),
@@ -903,11 +810,6 @@ RECIPES = {
         after=("map truth",),
         prints=("mean IoU", "by structure"),
     ),
-    "help: map-update": Recipe(
-        "cns-eval map-update maps",
-        after=("map truth",),
-        prints=("mean IoU",),
-    ),
     "map sessions": Recipe(
         ".venv/bin/cns-drake export drives/metropolis_01 "
         "drives/metropolis_04 --format map-sessions",
@@ -1039,6 +941,23 @@ NOT_RUN = {
     ".venv/bin/python diagrams/hardware_scenario.py": "runs in real time; "
     "test_example_diagrams runs it, too",
     "cns-drake film": "the recipe films runs it",
+    "cns-drake city town --new\n": "the recipe start a city runs it",
+    "cns-drake import delft": "the recipe imports runs it",
+    "cns-drake list": "the recipe own city runs it",
+    "cns-drake simulate metropolis_01 --output drives": "the recipe first "
+    "drive runs it",
+    "cns-drake generate metropolis_01 metropolis_04": "the recipe recording "
+    "varied drives runs it",
+    "cns-drake scan worlds/metropolis/stage_01.sdf": "the recipe scans runs it",
+    "cns-drake export drives/metropolis_01": "the recipe exports runs it",
+    "cns-drake reproduce metropolis": "the recipe reproduce runs it",
+    "cns-eval tcr drives/metropolis_01": "the recipe evaluation runs it",
+    "cns-eval pr drives/metropolis_01": "the recipe evaluation runs it",
+    "cns-eval localise drives/metropolis_01": "the recipe localisation runs it",
+    "cns-eval scores kitti": "the recipe scores runs it",
+    "cns-eval report drives": "the recipe own scans, report runs it",
+    "cns-eval compare mine/results.csv": "the recipe compare runs it",
+    "cns-eval map-update maps": "the recipe map update runs it",
     "cns-drake pairs": "the recipe pairs runs it",
     "cns-drake truth": "the recipe map truth runs it",
     ".venv/bin/cns-drake truth suburbia_01": "drives through a shipped city, "

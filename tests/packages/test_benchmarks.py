@@ -15,20 +15,6 @@ RUNS = {
         ("--drive", "{drive}", "--roadsides", 0, 1, "--scans", 1),
         "semantic-kitti",
     ),
-    "effects.py": (
-        (
-            "{drive}",
-            "--rounds",
-            1,
-            "--frames",
-            2,
-            "--loads",
-            1,
-            "--only",
-            "imu",
-        ),
-        "of ideal",
-    ),
     "many_houses.py": (("--houses", 16), "16 houses: "),
     "many_places.py": (
         ("--methods", "solid", "--places", 5, 10, "--queries", 2),
@@ -39,7 +25,6 @@ RUNS = {
         ("{drive}", "--rounds", 1, "--frames", 2),
         "ms a frame",
     ),
-    "start.py": (("{drive}", "--runs", 2), "simulate "),
 }
 # They take minutes or a recording, need packages of the extra `benchmark`, or
 # files that cannot be shipped; what they share with others is run above.
@@ -49,7 +34,6 @@ BY_HAND = {
     "interruptions.py",
     "interval_coverage.py",
     "lidar_odometry.py",
-    "memory.py",
     "peers.py",
     "predicts_failure.py",
     "real_or_simulated.py",
