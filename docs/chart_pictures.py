@@ -19,14 +19,7 @@ import yaml
 from cns_drake.motion import RoadProfile
 from cns_drake.sensors import ImuErrors, ImuNoise
 from docs.fill_numbers import csv_rows
-from docs.picture_parts import (
-    DPI,
-    ROOT,
-    STYLE,
-    WIDTH,
-    add_heading,
-    make_plain,
-)
+from docs.picture_parts import DPI, ROOT, STYLE, WIDTH, add_heading, make_plain
 from evaluation.methods import shipped_methods
 from evaluation.results import (
     INK,

@@ -19,9 +19,7 @@ from .methods import make_method as make_method
 from .methods import method_checks as method_checks
 from .methods import register as register
 from .recognition import Metric as Metric
-from .recognition import (
-    PlaceRecognitionMetrics as PlaceRecognitionMetrics,
-)
+from .recognition import PlaceRecognitionMetrics as PlaceRecognitionMetrics
 from .recognition import QueryOutcomes as QueryOutcomes
 from .recognition import Retrieval as Retrieval
 from .recognition import RetrievalProtocol as RetrievalProtocol

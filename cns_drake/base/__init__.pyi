@@ -9,12 +9,8 @@ from .changes import parse_changes as parse_changes
 from .commands import example as example
 from .commands import with_options as with_options
 from .compilation import compiled as compiled
-from .compilation import (
-    compiled_callback as compiled_callback,
-)
-from .complete_files import (
-    check_folder_writable as check_folder_writable,
-)
+from .compilation import compiled_callback as compiled_callback
+from .complete_files import check_folder_writable as check_folder_writable
 from .complete_files import check_writable as check_writable
 from .complete_files import complete_part as complete_part
 from .complete_files import completing as completing
@@ -41,9 +37,7 @@ from .elementary import rotated as rotated
 from .elementary import sin as sin
 from .elementary import tan as tan
 from .errors import InputError as InputError
-from .errors import (
-    describe_validation_error as describe_validation_error,
-)
+from .errors import describe_validation_error as describe_validation_error
 from .errors import did_you_mean as did_you_mean
 from .errors import errors_at as errors_at
 from .errors import errors_at_option as errors_at_option
@@ -75,9 +69,7 @@ from .images import to_jpeg as to_jpeg
 from .input_models import InputModel as InputModel
 from .input_models import Name as Name
 from .input_models import Section as Section
-from .interrupts import (
-    ended_by_interrupts as ended_by_interrupts,
-)
+from .interrupts import ended_by_interrupts as ended_by_interrupts
 from .interrupts import interrupts_wait as interrupts_wait
 from .interrupts import uninterrupted as uninterrupted
 from .jobs.digests import file_digests as file_digests

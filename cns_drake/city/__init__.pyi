@@ -38,13 +38,9 @@ from .generation.city_structures import City as City
 from .generation.city_structures import CityStreets as CityStreets
 from .generation.city_structures import build_along as build_along
 from .generation.city_structures import make_city as make_city
-from .generation.generate import (
-    differing_files as differing_files,
-)
+from .generation.generate import differing_files as differing_files
 from .generation.generate import generate_city as generate_city
-from .generation.rendering import (
-    count_triangles as count_triangles,
-)
+from .generation.rendering import count_triangles as count_triangles
 from .generation.rendering import render_stages as render_stages
 from .generation.rendering import stage_size as stage_size
 from .generation.rendering import structures_csv as structures_csv
@@ -70,9 +66,7 @@ from .geometry.object_models import OBJECT_MESHES as OBJECT_MESHES
 from .geometry.object_models import assemble as assemble
 from .geometry.object_models import bar as bar
 from .geometry.object_models import block as block
-from .geometry.object_models import (
-    ground_footprint as ground_footprint,
-)
+from .geometry.object_models import ground_footprint as ground_footprint
 from .geometry.object_models import post as post
 from .geometry.occupancy import Occupancy as Occupancy
 from .geometry.polygon_meshes import surface_mesh as surface_mesh
@@ -81,13 +75,9 @@ from .geometry.polygons import hull_of as hull_of
 from .geometry.polygons import placed as placed
 from .geometry.polygons import polygons_of as polygons_of
 from .geometry.polygons import snap as snap
-from .geometry.rectangles import (
-    largest_rectangle as largest_rectangle,
-)
+from .geometry.rectangles import largest_rectangle as largest_rectangle
 from .geometry.structures import Structure as Structure
-from .geometry.structures import (
-    ground_triangles as ground_triangles,
-)
+from .geometry.structures import ground_triangles as ground_triangles
 from .geometry.triangles import from_above as from_above
 from .geometry.triangles import long_normals as long_normals
 from .geometry.triangles import looks_up as looks_up

@@ -10,10 +10,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cns_drake.base import (
-    InputError,
-    terminal,
-)
+from cns_drake.base import InputError, terminal
 
 if TYPE_CHECKING:
     from cns_drake.drives import Drive

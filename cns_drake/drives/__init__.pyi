@@ -17,9 +17,7 @@ from .mcap_messages import STAMPED_RECORD as STAMPED_RECORD
 from .mcap_messages import read_stamp as read_stamp
 from .mulran_frames import ORIGIN as ORIGIN
 from .mulran_frames import X_BS as X_BS
-from .point_cloud2 import (
-    point_field_datatype as point_field_datatype,
-)
+from .point_cloud2 import point_field_datatype as point_field_datatype
 from .point_cloud2 import to_points as to_points
 from .point_layouts import LayoutName as LayoutName
 from .point_layouts import to_labels as to_labels
@@ -43,7 +41,5 @@ from .sensor_names import BASE_FRAME as BASE_FRAME
 from .sensor_names import IMU_FRAME as IMU_FRAME
 from .sensor_names import MAP_FRAME as MAP_FRAME
 from .sensor_names import check_sensor_name as check_sensor_name
-from .sensor_names import (
-    check_sensor_names as check_sensor_names,
-)
+from .sensor_names import check_sensor_names as check_sensor_names
 from .stamped_poses import StampedPoses as StampedPoses

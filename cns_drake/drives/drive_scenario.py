@@ -11,12 +11,7 @@ from cns_drake.base import (
     read_yaml,
     value_errors,
 )
-from cns_drake.units import (
-    MOST_RINGS,
-    check_one_unit,
-    make_sheet,
-    read_sheet,
-)
+from cns_drake.units import MOST_RINGS, check_one_unit, make_sheet, read_sheet
 
 # Name of the file with the scenario, in the folder of an exported drive.
 SCENARIO = "scenario.yaml"

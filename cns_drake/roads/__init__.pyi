@@ -1,8 +1,6 @@
 from .car_outline import outlines as outlines
 from .carriageway import Areas as Areas
-from .carriageway import (
-    union_without_slits as union_without_slits,
-)
+from .carriageway import union_without_slits as union_without_slits
 from .centreline import sample_stations as sample_stations
 from .driver_offsets import FINE_SPACING as FINE_SPACING
 from .driver_offsets import driven_path as driven_path

@@ -7,18 +7,12 @@ from .planning import count_frames as count_frames
 from .planning import ground_notes as ground_notes
 from .planning import plan_drive as plan_drive
 from .provenance import INPUTS_KEY as INPUTS_KEY
-from .provenance import (
-    SIMULATION_VERSION as SIMULATION_VERSION,
-)
+from .provenance import SIMULATION_VERSION as SIMULATION_VERSION
 from .provenance import combined_digest as combined_digest
-from .provenance import (
-    dependency_versions as dependency_versions,
-)
+from .provenance import dependency_versions as dependency_versions
 from .provenance import digest_file as digest_file
 from .provenance import digest_inputs as digest_inputs
-from .provenance import (
-    recording_fingerprint as recording_fingerprint,
-)
+from .provenance import recording_fingerprint as recording_fingerprint
 from .scenario import SUMO_INSTEAD as SUMO_INSTEAD
 from .scenario import DriverConfig as DriverConfig
 from .scenario import RideConfig as RideConfig
@@ -26,21 +20,13 @@ from .scenario import Scenario as Scenario
 from .scenario import TrafficConfig as TrafficConfig
 from .scenario import TransientConfig as TransientConfig
 from .scenario_files import check_files as check_files
-from .scenario_files import (
-    check_written_scenarios as check_written_scenarios,
-)
-from .scenario_files import (
-    describe_scenario as describe_scenario,
-)
+from .scenario_files import check_written_scenarios as check_written_scenarios
+from .scenario_files import describe_scenario as describe_scenario
 from .scenario_files import load_scenario as load_scenario
-from .scenario_files import (
-    make_paths_absolute as make_paths_absolute,
-)
+from .scenario_files import make_paths_absolute as make_paths_absolute
 from .scenario_files import make_scenario as make_scenario
 from .scenario_files import set_fields as set_fields
-from .scenario_files import (
-    write_scenarios as write_scenarios,
-)
+from .scenario_files import write_scenarios as write_scenarios
 from .shipped import recordable_drives as recordable_drives
 from .shipped import recordable_map as recordable_map
 from .shipped import recordable_maps as recordable_maps

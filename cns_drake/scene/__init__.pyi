@@ -26,12 +26,8 @@ from .materials import USUAL_MATERIALS as USUAL_MATERIALS
 from .materials import Material as Material
 from .perception_geometry import GREY as GREY
 from .perception_geometry import GeometryList as GeometryList
-from .perception_geometry import (
-    PerceptionGeometry as PerceptionGeometry,
-)
-from .perception_geometry import (
-    anchored_frames as anchored_frames,
-)
+from .perception_geometry import PerceptionGeometry as PerceptionGeometry
+from .perception_geometry import anchored_frames as anchored_frames
 from .perception_geometry import geometry_port as geometry_port
 from .perception_geometry import list_geometry as list_geometry
 from .perception_geometry import merge_surfaces as merge_surfaces
@@ -49,16 +45,12 @@ from .structure_names import kind_in_name as kind_in_name
 from .structure_names import structure_name as structure_name
 from .structure_table import StructureEntry as StructureEntry
 from .structure_table import StructureTable as StructureTable
-from .structure_table import (
-    load_structure_table as load_structure_table,
-)
+from .structure_table import load_structure_table as load_structure_table
 from .structure_table import material_word as material_word
 from .structure_table import read_materials as read_materials
 from .structure_table import shortened as shortened
 from .surfaces import LARGEST_SIZE as LARGEST_SIZE
-from .surfaces import (
-    MOST_COPIED_TRIANGLES as MOST_COPIED_TRIANGLES,
-)
+from .surfaces import MOST_COPIED_TRIANGLES as MOST_COPIED_TRIANGLES
 from .surfaces import CapsuleSurface as CapsuleSurface
 from .surfaces import CylinderSurface as CylinderSurface
 from .surfaces import EllipsoidSurface as EllipsoidSurface

@@ -13,10 +13,7 @@ from pydrake.systems.framework import (
     System,
 )
 
-from cns_drake.sensors.carriers import (
-    body_and_pose,
-    find_motion,
-)
+from cns_drake.sensors.carriers import body_and_pose, find_motion
 from cns_drake.sensors.system_names import check_new_sensor
 
 

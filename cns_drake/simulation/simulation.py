@@ -52,10 +52,7 @@ from cns_drake.sensors import (
     optical_pose,
     sensor_pose,
 )
-from cns_drake.simulation.loaded_drive import (
-    LoadedDrive,
-    load_drive,
-)
+from cns_drake.simulation.loaded_drive import LoadedDrive, load_drive
 from cns_drake.simulation.stage_loading import load_stage, sight_along
 from cns_drake.simulation.station import make_station
 

@@ -10,9 +10,7 @@ from .maps.redrawing import redrawn_inputs as redrawn_inputs
 from .maps.turned_inputs import turned_content as turned_content
 from .recording import is_recorded as is_recorded
 from .recording import record_all as record_all
-from .reproduction import (
-    reproduce_maps as reproduce_maps,
-)
+from .reproduction import reproduce_maps as reproduce_maps
 from .study import TASKS as TASKS
 from .study import run_study as run_study
 from .study import study_drives as study_drives

@@ -9,7 +9,5 @@ from .recorded_traffic import read_recorded as read_recorded
 from .traffic_motion import TrafficMotion as TrafficMotion
 from .traffic_motion import add_traffic as add_traffic
 from .traffic_motion import connect_traffic as connect_traffic
-from .traffic_motion import (
-    traffic_structures as traffic_structures,
-)
+from .traffic_motion import traffic_structures as traffic_structures
 from .traffic_plan import TrafficPlan as TrafficPlan

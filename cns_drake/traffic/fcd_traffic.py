@@ -25,11 +25,7 @@ from cns_drake.base import (
 )
 from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meets_ego
 from cns_drake.traffic.tracks import Tracks
-from cns_drake.traffic.traffic_plan import (
-    WALKER_SIZE,
-    TrafficPlan,
-    gait_phases,
-)
+from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan, gait_phases
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
 
 # A drive may take this much longer than the trace because of rounding [s].

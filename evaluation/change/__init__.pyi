@@ -1,14 +1,8 @@
 from .drive_change import ChangeReport as ChangeReport
 from .drive_change import change_of_maps as change_of_maps
-from .drive_change import (
-    registered_change as registered_change,
-)
-from .drive_change import (
-    same_stage_partner as same_stage_partner,
-)
-from .drive_change import (
-    spread_over_grids as spread_over_grids,
-)
+from .drive_change import registered_change as registered_change
+from .drive_change import same_stage_partner as same_stage_partner
+from .drive_change import spread_over_grids as spread_over_grids
 from .drive_maps import DriveMap as DriveMap
 from .drive_maps import map_source as map_source
 from .drive_maps import read_map as read_map

@@ -2,10 +2,7 @@
 
 from pathlib import Path
 
-from cns_drake.base import (
-    note,
-    terminal,
-)
+from cns_drake.base import note, terminal
 from evaluation.results import (
     QUERIES,
     RESULTS,

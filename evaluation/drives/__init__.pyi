@@ -18,9 +18,7 @@ from .sampling import sample_frames as sample_frames
 from .sampling import travelled as travelled
 from .scan_clouds import cloud_at as cloud_at
 from .scan_clouds import cropped as cropped
-from .scan_clouds import (
-    cropped_with_fields as cropped_with_fields,
-)
+from .scan_clouds import cropped_with_fields as cropped_with_fields
 from .scan_clouds import within_cube as within_cube
 from .scan_files import FileDrive as FileDrive
 from .trajectories import read_poses as read_poses

@@ -5,9 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cns_drake.base import (
-    xyz,
-)
+from cns_drake.base import xyz
 from cns_drake.drives import Drive, LidarField
 
 

@@ -8,12 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.base import (
-    InputError,
-    compiled,
-    poses,
-    read_only,
-)
+from cns_drake.base import InputError, compiled, poses, read_only
 from cns_drake.drives import Drive
 from evaluation.drives.query_sensor import QuerySensor
 

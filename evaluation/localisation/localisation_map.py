@@ -8,12 +8,7 @@ from pathlib import Path
 import numpy as np
 import small_gicp
 
-from cns_drake.base import (
-    InputError,
-    poses,
-    track,
-    xyz,
-)
+from cns_drake.base import InputError, poses, track, xyz
 from cns_drake.drives import Drive
 from evaluation.alignment import Surface, make_surface
 from evaluation.clouds import OnNote, no_note, read_blocks
@@ -23,10 +18,7 @@ from evaluation.drives import (
     sample_frames,
     within_cube,
 )
-from evaluation.localisation.settings import (
-    HALF_EXTENT,
-    Settings,
-)
+from evaluation.localisation.settings import HALF_EXTENT, Settings
 from evaluation.maps import VoxelAccumulator
 from evaluation.recognition import KEEP_ALL, kept_places
 

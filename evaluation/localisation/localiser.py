@@ -13,14 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import (
-    InputError,
-    errors_at,
-    from_xyz,
-    poses,
-    track,
-    xyz,
-)
+from cns_drake.base import InputError, errors_at, from_xyz, poses, track, xyz
 from cns_drake.drives import Drive
 from evaluation.alignment import Surface
 from evaluation.drives import cropped, sample_frames

@@ -3,9 +3,7 @@ from .baselines import run_baseline as run_baseline
 from .labels import SIDES as SIDES
 from .labels import Label as Label
 from .labels import PairLabels as PairLabels
-from .nearest_points import (
-    nearest_distances as nearest_distances,
-)
+from .nearest_points import nearest_distances as nearest_distances
 from .scores import score as score
 from .sessions import SPACING as SPACING
 from .sessions import Session as Session
@@ -19,12 +17,8 @@ from .sessions import write_session as write_session
 from .sessions import write_sessions as write_sessions
 from .structures import StructureChange as StructureChange
 from .structures import class_names as class_names
-from .structures import (
-    structure_changes as structure_changes,
-)
-from .structures import (
-    write_structures as write_structures,
-)
+from .structures import structure_changes as structure_changes
+from .structures import write_structures as write_structures
 from .upkeep import MAINTAINERS as MAINTAINERS
 from .upkeep import NOT_MAINTAINED as NOT_MAINTAINED
 from .upkeep import TRUTH as TRUTH

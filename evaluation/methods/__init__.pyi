@@ -1,7 +1,5 @@
 from .layered_overlap import LayeredOverlap as LayeredOverlap
-from .layered_overlap import (
-    LayeredOverlapConfig as LayeredOverlapConfig,
-)
+from .layered_overlap import LayeredOverlapConfig as LayeredOverlapConfig
 from .learned import FEATURES as FEATURES
 from .learned import FREQUENCIES as FREQUENCIES
 from .learned import HEADINGS as HEADINGS

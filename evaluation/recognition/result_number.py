@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from evaluation.recognition.sign_flips import (
-    UNKNOWN,
-    Interval,
-)
+from evaluation.recognition.sign_flips import UNKNOWN, Interval
 
 
 class Number(NamedTuple):

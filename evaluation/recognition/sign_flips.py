@@ -17,10 +17,7 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base import json_values
-from evaluation.recognition.query_outcomes import (
-    QueryOutcomes,
-    common_blocks,
-)
+from evaluation.recognition.query_outcomes import QueryOutcomes, common_blocks
 
 # A difference is significant if its p-value is below this value; intervals
 # contain their value with a probability of 1 minus this.

@@ -26,32 +26,18 @@ from .page import write_page as write_page
 from .page_frame import PageSection as PageSection
 from .page_frame import page_section as page_section
 from .ranking import rank_methods as rank_methods
-from .sections.browser import (
-    browser_section as browser_section,
-)
-from .sections.camera_images import (
-    nearest_images as nearest_images,
-)
-from .sections.change_pictures import (
-    ChangePicture as ChangePicture,
-)
-from .sections.change_pictures import (
-    DrivenMap as DrivenMap,
-)
-from .sections.change_pictures import (
-    change_section as change_section,
-)
+from .sections.browser import browser_section as browser_section
+from .sections.camera_images import nearest_images as nearest_images
+from .sections.change_pictures import ChangePicture as ChangePicture
+from .sections.change_pictures import DrivenMap as DrivenMap
+from .sections.change_pictures import change_section as change_section
 from .sections.cities import cities_section as cities_section
 from .sections.found import found_lines as found_lines
 from .sections.found import lacks_baseline as lacks_baseline
-from .sections.point_rendering import (
-    OrthographicView as OrthographicView,
-)
+from .sections.point_rendering import OrthographicView as OrthographicView
 from .sections.point_rendering import render as render
 from .sections.routes import PageDrive as PageDrive
-from .sections.routes import (
-    make_page_drive as make_page_drive,
-)
+from .sections.routes import make_page_drive as make_page_drive
 from .sections.routes import routes_section as routes_section
 from .styles import FIGURE_STYLE as FIGURE_STYLE
 from .styles import INK as INK

@@ -8,11 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evaluation.recognition import (
-    Interval,
-    city_interval,
-    metric_named,
-)
+from evaluation.recognition import Interval, city_interval, metric_named
 from evaluation.results.table import Row
 
 

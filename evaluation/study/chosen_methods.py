@@ -7,12 +7,7 @@ from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 
-from cns_drake.base import (
-    InputError,
-    did_you_mean,
-    file_digests,
-    repeated,
-)
+from cns_drake.base import InputError, did_you_mean, file_digests, repeated
 from evaluation.methods import (
     Method,
     MethodConfig,

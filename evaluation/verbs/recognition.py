@@ -10,12 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from cns_drake.base import (
-    InputError,
-    check_regular,
-    did_you_mean,
-    note,
-)
+from cns_drake.base import InputError, check_regular, did_you_mean, note
 from cns_drake.drives import Drive
 from evaluation.alignment import When, open_in_one_world
 from evaluation.drives import NOT_FINITE, CountedDrive, Reading

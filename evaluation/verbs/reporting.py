@@ -8,11 +8,7 @@ from pathlib import Path
 from cns_drake.base import Cluster, choose_cluster, note
 from evaluation.recognition import PROTOCOLS, RetrievalProtocol
 from evaluation.results import PrintStyle
-from evaluation.study import (
-    choose_methods,
-    find_recordings,
-    study_recordings,
-)
+from evaluation.study import choose_methods, find_recordings, study_recordings
 
 
 def report(

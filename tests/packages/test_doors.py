@@ -5,12 +5,7 @@ from pathlib import Path
 import subprocess
 import sys
 
-from helpers.door_contract import (
-    ROOTS,
-    inner_imports,
-    listed,
-    offered_modules,
-)
+from helpers.door_contract import ROOTS, inner_imports, listed, offered_modules
 import pytest
 
 ROOT = Path(__file__).parents[2]

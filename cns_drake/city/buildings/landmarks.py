@@ -28,13 +28,7 @@ from pydantic import BaseModel
 from cns_drake.base import parse_yaml
 from cns_drake.city.dice import Rgb
 from cns_drake.city.facades.building import Building
-from cns_drake.city.geometry import (
-    Finish,
-    Mesh,
-    MeshShape,
-    read_mesh,
-    triple,
-)
+from cns_drake.city.geometry import Finish, Mesh, MeshShape, read_mesh, triple
 
 _MODELS = Path(__file__).parent / "landmark_models"
 _Triple = tuple[float, float, float]

@@ -3,11 +3,7 @@
 import numpy as np
 import shapely
 
-from cns_drake.city.geometry.triangles import (
-    from_above,
-    looks_up,
-    unit_normals,
-)
+from cns_drake.city.geometry.triangles import from_above, looks_up, unit_normals
 
 
 class UpperSides:

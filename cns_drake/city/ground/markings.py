@@ -5,11 +5,7 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city.geometry import (
-    Mesh,
-    Structure,
-    merge_meshes,
-)
+from cns_drake.city.geometry import Mesh, Structure, merge_meshes
 from cns_drake.city.ground.coverings import Covering
 from cns_drake.roads import (
     ENDS,

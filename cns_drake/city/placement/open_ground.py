@@ -10,11 +10,7 @@ from shapely.geometry import LineString, Polygon
 from shapely.ops import unary_union
 
 from cns_drake.base import InputError
-from cns_drake.city.city_plan import (
-    LinePlan,
-    ObjectPlan,
-    ScatterPlan,
-)
+from cns_drake.city.city_plan import LinePlan, ObjectPlan, ScatterPlan
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import station_at

@@ -6,11 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from cns_drake.base import (
-    ended_by_interrupts,
-    shared_options,
-    terminal,
-)
+from cns_drake.base import ended_by_interrupts, shared_options, terminal
 from cns_drake.command_line import options
 from cns_drake.command_line.fields import changed, field_options
 

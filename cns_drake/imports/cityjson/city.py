@@ -13,21 +13,14 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city import Finish
 from cns_drake.imports import colours
-from cns_drake.imports.building_years import (
-    construction_year,
-    demolition_year,
-)
+from cns_drake.imports.building_years import construction_year, demolition_year
 from cns_drake.imports.cityjson.city_file import (
     CityFile,
     CityGeometry,
     CityObject,
 )
 from cns_drake.imports.cityjson.reading import read_cityjson
-from cns_drake.imports.faces import (
-    face_triangles,
-    joined_triangles,
-    valid_area,
-)
+from cns_drake.imports.faces import face_triangles, joined_triangles, valid_area
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.imported_objects import ImportedObject, make_object

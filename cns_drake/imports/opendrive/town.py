@@ -13,12 +13,7 @@ from shapely import GEOSException
 from shapely.geometry import LineString, MultiLineString
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base import (
-    InputError,
-    distances_along,
-    doing,
-    value_errors,
-)
+from cns_drake.base import InputError, distances_along, doing, value_errors
 from cns_drake.city import (
     City,
     CityPlan,

@@ -15,10 +15,7 @@ from pydrake.geometry import (
     RenderCameraCore,
 )
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
-from pydrake.systems.framework import (
-    DiagramBuilder,
-    OutputPort,
-)
+from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.sensors import (
     CameraInfo,
     ImageDepth32F,

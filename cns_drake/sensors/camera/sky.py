@@ -5,14 +5,8 @@ import functools
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import (
-    Context,
-    LeafSystem,
-)
-from pydrake.systems.sensors import (
-    CameraInfo,
-    ImageRgba8U,
-)
+from pydrake.systems.framework import Context, LeafSystem
+from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 
 from cns_drake.sensors.camera.looks import tiling_noise
 

@@ -45,10 +45,7 @@ from cns_drake.sensors.lidar.ray_queries import (
 )
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE, set_points
 from cns_drake.sensors.lidar.scanner import MeasuredReturns, Scanner
-from cns_drake.sensors.lidar.seen_geometry import (
-    GeometryView,
-    SeenGeometry,
-)
+from cns_drake.sensors.lidar.seen_geometry import GeometryView, SeenGeometry
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.

@@ -8,11 +8,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import (
-    InputError,
-    shared_options,
-    terminal,
-)
+from cns_drake.base import InputError, shared_options, terminal
 from evaluation.command_line.printed_text import spaced_interval
 
 # Endings of figures.

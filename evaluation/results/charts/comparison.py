@@ -20,11 +20,7 @@ from evaluation.results.charts.chart import (
 from evaluation.results.charts.words import in_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.method_names import title
-from evaluation.results.styles import (
-    FIGURE_STYLE,
-    PALE,
-    method_styles,
-)
+from evaluation.results.styles import FIGURE_STYLE, PALE, method_styles
 from evaluation.results.survival import MARGIN
 from evaluation.results.table_comparison import Comparison
 

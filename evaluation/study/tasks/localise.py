@@ -40,9 +40,7 @@ from evaluation.localisation import (
 )
 from evaluation.recognition import KEEP_ALL, Number, numbers_of
 from evaluation.study.parts import MakePart, Part
-from evaluation.study.sources import (
-    JoinedSource,
-)
+from evaluation.study.sources import JoinedSource
 from evaluation.study.tasks.jobs import OPENING_COST, Jobs
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Answered, Task, check_positive

@@ -5,9 +5,7 @@ import sys
 
 import pytest
 
-from cns_drake.base import (
-    terminal,
-)
+from cns_drake.base import terminal
 
 
 @pytest.fixture(autouse=True)

@@ -2,12 +2,7 @@
 
 import math
 
-from helpers.small_opendrive import (
-    lane,
-    straight,
-    turn,
-    write_roads,
-)
+from helpers.small_opendrive import lane, straight, turn, write_roads
 import numpy as np
 import pytest
 from typer.testing import CliRunner

@@ -13,10 +13,7 @@ from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
 
-from cns_drake.imports import (
-    import_cityjson,
-    import_openstreetmap,
-)
+from cns_drake.imports import import_cityjson, import_openstreetmap
 
 # The most used keys on ways and nodes that can describe a thing, by taginfo,
 # with a usual value.

@@ -5,12 +5,7 @@ from pydrake.geometry import FrameId, GeometryId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.ray_casting import (
-    Ball,
-    KnownPoses,
-    Motion,
-    RayCastingScene,
-)
+from cns_drake.ray_casting import Ball, KnownPoses, Motion, RayCastingScene
 from cns_drake.scene import (
     CapsuleSurface,
     CylinderSurface,

@@ -7,11 +7,7 @@ import pytest
 import yaml
 
 from cns_drake.base import InputError
-from cns_drake.scenarios import (
-    load_scenario,
-    shipped_maps,
-    write_scenarios,
-)
+from cns_drake.scenarios import load_scenario, shipped_maps, write_scenarios
 
 
 def test_written_scenarios_are_the_same(tmp_path):

@@ -9,11 +9,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.scene import (
-    load_world,
-    merge_surfaces,
-    read_perception_geometry,
-)
+from cns_drake.scene import load_world, merge_surfaces, read_perception_geometry
 
 ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs" / "formats.md"

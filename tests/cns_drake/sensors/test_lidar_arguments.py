@@ -5,10 +5,7 @@ import warnings
 import numpy as np
 from pydrake.geometry import Box, Role, SceneGraph
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import (
-    AddMultibodyPlantSceneGraph,
-    MultibodyPlant,
-)
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ConstantVectorSource
 import pytest

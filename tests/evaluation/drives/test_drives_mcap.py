@@ -1,11 +1,7 @@
 import struct
 import tracemalloc
 
-from helpers.contradictions import (
-    add_images,
-    read_messages,
-    write_messages,
-)
+from helpers.contradictions import add_images, read_messages, write_messages
 from helpers.drive_files import (
     PERIOD_NS,
     T0_NS,
@@ -22,10 +18,7 @@ import pytest
 import zstandard
 
 from cns_drake.base import InputError, poses
-from cns_drake.drives import (
-    check_same_world,
-    to_points,
-)
+from cns_drake.drives import check_same_world, to_points
 from evaluation import drives
 from evaluation.drives import open_drive
 

@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.methods import (
-    LAYERS,
-    SECTORS,
-    TURNS,
-    make_method,
-    polar_image,
-)
+from evaluation.methods import LAYERS, SECTORS, TURNS, make_method, polar_image
 
 
 def write(path, **changes):

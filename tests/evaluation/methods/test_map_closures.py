@@ -11,11 +11,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.methods import (
-    known_methods,
-    make_method,
-    shipped_methods,
-)
+from evaluation.methods import known_methods, make_method, shipped_methods
 from evaluation.study import choose_methods
 
 NAME = "map-closures"

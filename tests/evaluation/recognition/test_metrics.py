@@ -3,11 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from evaluation.recognition import (
-    evaluate,
-    judge,
-    weighted_metrics,
-)
+from evaluation.recognition import evaluate, judge, weighted_metrics
 
 NAN = np.nan
 

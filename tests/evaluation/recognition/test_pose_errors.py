@@ -9,11 +9,7 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
-from evaluation.recognition import (
-    QueryOutcomes,
-    evaluate,
-    pose_error,
-)
+from evaluation.recognition import QueryOutcomes, evaluate, pose_error
 
 
 def random_pose(rng):

@@ -8,14 +8,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.results import (
-    Answers,
-    Key,
-    QueryRows,
-    Results,
-    Row,
-    as_factor,
-)
+from evaluation.results import Answers, Key, QueryRows, Results, Row, as_factor
 
 FACTOR = "query.transient.snow"
 HEADER = (

@@ -11,11 +11,7 @@ from cns_drake.base import InputError
 from evaluation.change import read_map
 from evaluation.drives import open_drive
 from evaluation.recognition import PAPER_PROTOCOL
-from evaluation.study import (
-    RecordingSource,
-    choose_methods,
-    extract_features,
-)
+from evaluation.study import RecordingSource, choose_methods, extract_features
 
 pytestmark = pytest.mark.slow
 

@@ -18,12 +18,7 @@ from evaluation import (
     update_map,
 )
 from evaluation.recognition import METRICS, RetrievalProtocol
-from evaluation.results import (
-    QueryRows,
-    Results,
-    compare_tables,
-    draw_chart,
-)
+from evaluation.results import QueryRows, Results, compare_tables, draw_chart
 
 OWN = """
 from evaluation import register_metric

@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from cns_drake.city.ground.elevation import (
-    with_gaps_filled,
-)
+from cns_drake.city.ground.elevation import with_gaps_filled
 
 
 def test_relaxed_fills_a_strip_linearly():

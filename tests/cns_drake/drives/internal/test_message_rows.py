@@ -5,11 +5,7 @@ import numpy as np
 import pytest
 
 from cns_drake.drives import ros_types
-from cns_drake.drives.message_rows import (
-    MessageRows,
-    imu_row,
-    odometry_row,
-)
+from cns_drake.drives.message_rows import MessageRows, imu_row, odometry_row
 
 ROWS = {ros_types.ODOMETRY: odometry_row, ros_types.IMU: imu_row}
 

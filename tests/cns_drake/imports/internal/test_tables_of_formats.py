@@ -13,11 +13,7 @@ from helpers.small_cityjson import house
 import pytest
 import yaml
 
-from cns_drake.imports import (
-    cityjson,
-    import_cityjson,
-    opendrive,
-)
+from cns_drake.imports import cityjson, import_cityjson, opendrive
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.road_reader import read_roads
 

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.pictures.aerial_pictures import (
-    view_from_above,
-)
+from cns_drake.pictures.aerial_pictures import view_from_above
 
 pytestmark = pytest.mark.slow
 

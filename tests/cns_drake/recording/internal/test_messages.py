@@ -2,9 +2,7 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
-from cns_drake.drives import (
-    serialize,
-)
+from cns_drake.drives import serialize
 from cns_drake.recording import messages
 
 # The variance of a value without noise.

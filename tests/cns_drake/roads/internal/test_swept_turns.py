@@ -4,9 +4,7 @@ from helpers.turning_roads import drive, driven, leg, network_of
 import numpy as np
 import pytest
 
-from cns_drake.roads import (
-    TIGHTEST_RADIUS,
-)
+from cns_drake.roads import TIGHTEST_RADIUS
 from cns_drake.roads.car_outline import swept_area
 
 # Numbers of lanes, and lanes of the turn; the loop is as wide as their

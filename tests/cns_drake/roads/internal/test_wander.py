@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.roads import (
-    FINE_SPACING,
-    LanePath,
-)
+from cns_drake.roads import FINE_SPACING, LanePath
 from cns_drake.roads.driver_offsets import _change_lanes, _draw_offsets
 
 NOTHING = shapely.STRtree([])

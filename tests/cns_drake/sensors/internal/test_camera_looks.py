@@ -10,9 +10,7 @@ from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 import pytest
 
 from cns_drake.sensors.camera import camera_scene, looks, sky
-from cns_drake.sensors.camera.camera_scene import (
-    repeated_coordinates,
-)
+from cns_drake.sensors.camera.camera_scene import repeated_coordinates
 
 
 @pytest.mark.parametrize("name", looks.LOOKS)

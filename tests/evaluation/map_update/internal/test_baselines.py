@@ -4,10 +4,7 @@ from helpers.labelled_maps import clouds, write_map
 import numpy as np
 import pytest
 
-from evaluation.map_update import (
-    Label,
-    read_pair,
-)
+from evaluation.map_update import Label, read_pair
 from evaluation.map_update.baselines import by_distance, by_free_space
 
 

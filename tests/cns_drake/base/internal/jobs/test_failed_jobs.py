@@ -8,12 +8,7 @@ from helpers import job_functions
 from helpers.job_functions import Call
 import pytest
 
-from cns_drake.base import (
-    Cluster,
-    Job,
-    run_jobs,
-    show_progress,
-)
+from cns_drake.base import Cluster, Job, run_jobs, show_progress
 from cns_drake.base.errors import FailedJobsError
 from cns_drake.base.file_locks import exclusive
 

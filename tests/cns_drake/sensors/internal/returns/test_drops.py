@@ -10,9 +10,7 @@ from cns_drake.scene import CLASS_IDS
 from cns_drake.sensors import Weather
 from cns_drake.sensors.returns.link_budget import fit_link_budget
 from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
-from cns_drake.sensors.returns.weather import (
-    tabulate_scattering,
-)
+from cns_drake.sensors.returns.weather import tabulate_scattering
 from cns_drake.units import LIDAR_PRESETS
 
 OUTLIER = CLASS_IDS["outlier"]

@@ -8,10 +8,7 @@ from pydrake.math import RigidTransform
 
 from cns_drake.ray_casting import SceneHits, SurfaceFrames
 from cns_drake.scene import StructureEntry, StructureTable
-from cns_drake.sensors import (
-    CalibratedReturns,
-    make_beam_pattern,
-)
+from cns_drake.sensors import CalibratedReturns, make_beam_pattern
 from cns_drake.sensors.returns.materials import LAMBERT, Materials
 
 # The frame of surfaces that do not move.
