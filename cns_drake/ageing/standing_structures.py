@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.ageing.events import PUT_UP, TAKEN_DOWN, Event
 from cns_drake.ageing.old_world import OldWorld
-from cns_drake.city import Structure, part_triangles
+from cns_drake.city import Structure, part_mesh
 from cns_drake.scene import GROUND_CLASSES, StructureEntry
 
 
@@ -145,8 +145,8 @@ def structure_triangles(structure: Structure) -> np.ndarray:
     """Returns the triangles (M, 3, 3) of a structure in W [m]."""
     found = [np.zeros((0, 3, 3))]
     for part in structure.model.parts:
-        vertices, triangles = part_triangles(part, structure.model.meshes)
-        found.append(vertices[triangles])
+        mesh = part_mesh(part, structure.model.meshes)
+        found.append(mesh.vertices[mesh.triangles()])
     p = np.concatenate(found)
     c, s = math.cos(structure.yaw), math.sin(structure.yaw)
     x, y, z = np.moveaxis(p, -1, 0)

@@ -60,7 +60,6 @@ from .geometry.models import Part as Part
 from .geometry.models import Shape as Shape
 from .geometry.models import SphereShape as SphereShape
 from .geometry.models import part_mesh as part_mesh
-from .geometry.models import part_triangles as part_triangles
 from .geometry.models import triple as triple
 from .geometry.object_models import OBJECT_MESHES as OBJECT_MESHES
 from .geometry.object_models import assemble as assemble

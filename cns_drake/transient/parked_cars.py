@@ -8,7 +8,7 @@ import shapely
 from shapely import Polygon
 
 from cns_drake.base import product
-from cns_drake.city import PARKED_CARS, Model, part_triangles
+from cns_drake.city import PARKED_CARS, Model, part_mesh
 from cns_drake.scene import GROUND_CLASSES
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.ground_surface import GroundSurface
@@ -253,6 +253,6 @@ def _replace_car(
 def _extent(model: Model) -> tuple[np.ndarray, np.ndarray]:
     """Returns the least and the greatest x and y (2,) of a car's model [m]."""
     corners = np.concatenate(
-        [part_triangles(part, model.meshes)[0] for part in model.parts]
+        [part_mesh(part, model.meshes).vertices for part in model.parts]
     )[:, :2]
     return corners.min(axis=0), corners.max(axis=0)

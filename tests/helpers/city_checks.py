@@ -5,7 +5,7 @@ import pytest
 import shapely
 from shapely.strtree import STRtree
 
-from cns_drake.city import part_triangles
+from cns_drake.city import part_mesh
 
 # Only parts below this height take ground [m].
 HEADROOM = 2.4
@@ -49,7 +49,8 @@ def check_things_stand_on_the_ground(structures):
     for structure in structures:
         if is_ground(structure):
             for part in structure.model.parts:
-                p, triangles = part_triangles(part, structure.model.meshes)
+                mesh = part_mesh(part, structure.model.meshes)
+                p, triangles = mesh.vertices, mesh.triangles()
                 scene.add_triangles(
                     p.astype(np.float32), triangles.astype(np.uint32)
                 )
@@ -76,7 +77,7 @@ def _feet(structure) -> np.ndarray:
     """Returns the frame and the lowest vertices of a structure, in W."""
     model = structure.model
     p = np.concatenate(
-        [part_triangles(part, model.meshes)[0] for part in model.parts]
+        [part_mesh(part, model.meshes).vertices for part in model.parts]
     )
     bottom = p[:, 2].min()
     low = p[p[:, 2] < bottom + 0.001]
@@ -113,7 +114,8 @@ def _low_points(part, meshes) -> np.ndarray:
 
     An awning may hang at head height.
     """
-    p, triangles = part_triangles(part, meshes)
+    mesh = part_mesh(part, meshes)
+    p, triangles = mesh.vertices, mesh.triangles()
     points = [p[p[:, 2] < HEADROOM - 1e-6]]
     for i, j in ((0, 1), (1, 2), (2, 0)):
         a, b = p[triangles[:, i]], p[triangles[:, j]]

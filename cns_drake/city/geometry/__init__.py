@@ -11,7 +11,6 @@ from cns_drake.city.geometry.models import (
     Shape,
     SphereShape,
     part_mesh,
-    part_triangles,
     triple,
 )
 from cns_drake.city.geometry.object_models import (
@@ -80,7 +79,6 @@ __all__ = [
     "mesh_part",
     "object_mesh",
     "part_mesh",
-    "part_triangles",
     "pillar",
     "placed",
     "polygons_of",

@@ -143,19 +143,6 @@ def triple(values: Iterable[float]) -> tuple[float, float, float]:
     return float(x), float(y), float(z)
 
 
-def part_triangles(
-    part: Part, meshes: Mapping[str, Mesh]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the vertices (N, 3) [m] and the triangles (M, 3) of a part.
-
-    The vertices are in the structure's frame S; triangles contain indices of
-    vertices. Cylinders and spheres become slightly larger prisms, which have
-    sides but no ends.
-    """
-    mesh = part_mesh(part, meshes)
-    return mesh.vertices, mesh.triangles()
-
-
 def part_mesh(part: Part, meshes: Mapping[str, Mesh]) -> Mesh:
     """Returns the mesh of a part, in the structure's frame S [m].
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.city import part_triangles
+from cns_drake.city import part_mesh
 
 pytestmark = [pytest.mark.slow, pytest.mark.night]
 
@@ -86,7 +86,8 @@ def test_paint_lies_on_the_ramps(name):
     road = network().roads[name]
     structure = structures()["markings"]
     part = next(p for p in structure.model.parts if p.name == name)
-    p, triangles = part_triangles(part, structure.model.meshes)
+    mesh = part_mesh(part, structure.model.meshes)
+    p, triangles = mesh.vertices, mesh.triangles()
     middle = p[triangles].mean(axis=1)
     assert np.ptp(middle[:, 2]) > 6.0
     gap = middle[:, 2] - Surface(["carriageway"]).heights(middle[:, :2])
@@ -146,7 +147,7 @@ def test_the_monument_stands_in_the_roundabout():
     obelisk = structures()["obelisk_001"]
     assert np.hypot(*obelisk.xyz[:2]) < 1.5
     top = max(
-        part_triangles(part, obelisk.model.meshes)[0][:, 2].max()
+        part_mesh(part, obelisk.model.meshes).vertices[:, 2].max()
         for part in obelisk.model.parts
     )
     assert 19 < top < 23

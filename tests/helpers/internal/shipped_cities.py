@@ -16,7 +16,7 @@ from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
 from cns_drake.base import fingerprint
-from cns_drake.city import City, Structure, make_city, part_triangles
+from cns_drake.city import City, Structure, make_city, part_mesh
 from cns_drake.city.generation import rendering
 from cns_drake.city.ground.coverings import GROUND_TAG
 from cns_drake.city.growth.stage_structures import GrowingCity
@@ -163,8 +163,8 @@ def ground_triangles(name: str, structure_name: str) -> np.ndarray:
     assert GROUND_TAG in structure.tags
     corners = []
     for part in structure.model.parts:
-        p, triangles = part_triangles(part, structure.model.meshes)
-        corners.append(p[triangles])
+        mesh = part_mesh(part, structure.model.meshes)
+        corners.append(mesh.vertices[mesh.triangles()])
     return np.concatenate(corners)
 
 
