@@ -18,7 +18,6 @@ from .mcap_messages import read_stamp as read_stamp
 from .mulran_frames import ORIGIN as ORIGIN
 from .mulran_frames import X_BS as X_BS
 from .point_cloud2 import point_field_datatype as point_field_datatype
-from .point_cloud2 import to_points as to_points
 from .point_layouts import LayoutName as LayoutName
 from .point_layouts import to_labels as to_labels
 from .point_layouts import to_layout as to_layout
@@ -29,7 +28,6 @@ from .ros_types import ODOMETRY as ODOMETRY
 from .ros_types import POINT_CLOUD as POINT_CLOUD
 from .ros_types import SCENE_UPDATE as SCENE_UPDATE
 from .ros_types import TF as TF
-from .ros_types import deserialize as deserialize
 from .ros_types import make_message as make_message
 from .ros_types import message_class as message_class
 from .ros_types import message_definition as message_definition

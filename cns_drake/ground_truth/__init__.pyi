@@ -5,5 +5,4 @@ from .exact_overlap import exact_overlaps as exact_overlaps
 from .exact_overlap import sights_of as sights_of
 from .labelled import LabelledDrive as LabelledDrive
 from .labelled import labelled_drive as labelled_drive
-from .labelled import open_labelled as open_labelled
 from .map_truth import write_truth as write_truth

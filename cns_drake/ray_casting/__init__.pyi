@@ -8,5 +8,4 @@ from .ray_casting_scene import RayCastingScene as RayCastingScene
 from .ray_casting_scene import SceneHits as SceneHits
 from .ray_casting_scene import SurfaceFrames as SurfaceFrames
 from .ray_groups import Motion as Motion
-from .ray_groups import group_geometries as group_geometries
 from .rays import rotate as rotate

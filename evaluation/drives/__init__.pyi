@@ -22,4 +22,3 @@ from .scan_clouds import cropped_with_fields as cropped_with_fields
 from .scan_clouds import within_cube as within_cube
 from .scan_files import FileDrive as FileDrive
 from .trajectories import read_poses as read_poses
-from .trajectories import read_quaternions as read_quaternions

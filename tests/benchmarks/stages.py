@@ -11,7 +11,7 @@ import open3d
 from pydrake.geometry import FrameId, GeometryId
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cns_drake.ray_casting import RayCastingScene, group_geometries
+from cns_drake.ray_casting import RayCastingScene
 from cns_drake.scenarios import load_scenario, plan_drive
 from cns_drake.scene import (
     PerceptionGeometry,
@@ -56,14 +56,15 @@ class Open3dStage:
 
     def __init__(self, geometries: Sequence[PerceptionGeometry]):
         """Builds the scene."""
-        stands = {geometry.frame_id for geometry in geometries}
-        self._p_WO, groups = group_geometries(
-            enumerate(geometries), stands, still
-        )
-        for group in groups:
-            group.place(self._p_WO, still)
+        # Ranges in float32 are most precise near the middle.
+        places = np.array([one.X_FG.translation() for one in geometries])
+        self._p_WO = (places.min(axis=0) + places.max(axis=0)) / 2.0
+        X_OW = RigidTransform(-self._p_WO)
         surface, _ = merge_triangles(
-            [(k, X, tessellate(one, 128)) for k, X, one in groups[0].members]
+            [
+                (k, X_OW @ one.X_FG, tessellate(one.surface, 128))
+                for k, one in enumerate(geometries)
+            ]
         )
         self.scene = open3d.t.geometry.RaycastingScene(nthreads=1)
         self.scene.add_triangles(

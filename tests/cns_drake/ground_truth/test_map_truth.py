@@ -11,7 +11,7 @@ import yaml
 
 from cns_drake.__main__ import main
 from cns_drake.base import InputError
-from cns_drake.ground_truth import open_labelled
+from cns_drake.ground_truth import write_truth
 from evaluation.map_update import Label, read_pair
 
 
@@ -60,7 +60,7 @@ def test_files_beside_a_recording_may_be_those_of_another(
     # The folder has moved, not the map.
     values["map"] = str((short_recording / values["map"]).resolve())
     file.write_text(yaml.safe_dump(values))
-    open_labelled(folder)
+    write_truth(folder, folder, tmp_path / "truth")
     (lidar,) = values["lidars"]
     for change, field in (
         ({"seed": 77}, "seed"),
@@ -69,4 +69,4 @@ def test_files_beside_a_recording_may_be_those_of_another(
     ):
         file.write_text(yaml.safe_dump(values | change))
         with pytest.raises(InputError, match=f"{field}: .* of another drive"):
-            open_labelled(folder)
+            write_truth(folder, folder, tmp_path / "other")

@@ -5,9 +5,7 @@ from helpers.contradictions import add_images, read_messages, write_messages
 from helpers.drive_files import (
     PERIOD_NS,
     T0_NS,
-    TYPES,
     make_scan,
-    point_cloud,
     write_recording,
     yaw_pose,
 )
@@ -18,7 +16,7 @@ import pytest
 import zstandard
 
 from cns_drake.base import InputError, poses
-from cns_drake.drives import check_same_world, to_points
+from cns_drake.drives import check_same_world
 from evaluation import drives
 from evaluation.drives import open_drive
 
@@ -487,70 +485,6 @@ def test_index_out_of_range(tmp_path):
     for index in (-1, len(drive)):
         with pytest.raises(IndexError):
             drive.scan(index)
-
-
-class TestPointCloud2:
-    """Messages as other programs write them."""
-
-    def decode(self, **changes):
-        scan = make_scan(np.arange(12.0).reshape(4, 3))
-        message = point_cloud(scan, **changes)
-        # The message goes through CDR and back, as in a file.
-        data = TYPES.serialize_cdr(message, message.__msgtype__)
-        return scan, to_points(TYPES.deserialize_cdr(data, message.__msgtype__))
-
-    def test_rows_with_padding(self):
-        scan = make_scan(np.arange(12.0).reshape(4, 3))
-        rows = scan.view(np.uint8).reshape(2, 2 * scan.itemsize)
-        padded = np.pad(rows, ((0, 0), (0, 5)), constant_values=99)
-        _, points = self.decode(
-            height=2,
-            width=2,
-            row_step=padded.shape[1],
-            data=padded.ravel(),
-        )
-        np.testing.assert_array_equal(points, scan)
-
-    def test_packed_big_endian_doubles(self):
-        field = TYPES.types["sensor_msgs/msg/PointField"]
-        dtype = np.dtype(
-            {
-                "names": ["x", "y", "z", "tag"],
-                "formats": [">f8", ">f8", ">f8", ">u2"],
-                "offsets": [1, 9, 17, 25],
-                "itemsize": 29,
-            }
-        )
-        records = np.zeros(3, dtype=dtype)
-        records["y"] = [1.5, -2.5, 1e300]
-        records["tag"] = [1, 2, 65535]
-        _, points = self.decode(
-            fields=[
-                field(name=n, offset=dtype.fields[n][1], datatype=t, count=c)
-                for n, t, c in zip(
-                    dtype.names, (8, 8, 8, 4), (1, 1, 1, 0), strict=True
-                )
-            ],
-            is_bigendian=True,
-            width=3,
-            point_step=29,
-            row_step=87,
-            data=np.frombuffer(records.tobytes(), dtype=np.uint8),
-        )
-        for name in dtype.names:
-            np.testing.assert_array_equal(points[name], records[name])
-
-    @pytest.mark.parametrize(
-        ("changes", "fault"),
-        [
-            ({"width": 5}, "overlap"),
-            ({"height": 2}, "bytes instead of"),
-            ({"fields": []}, "no field x"),
-        ],
-    )
-    def test_contradictions(self, changes, fault):
-        with pytest.raises(ValueError, match=fault):
-            self.decode(**changes)
 
 
 def test_pose_arithmetic():

@@ -1198,10 +1198,7 @@ def _(folder):
     table.write_text("\n".join(lines))
 
 
-@way(
-    "helipr", "drive", *DRIVES, "data set helipr",
-    "evaluation.drives.read_quaternions", use=drive,
-)  # fmt: skip
+@way("helipr", "drive", *DRIVES, "data set helipr", use=drive)
 def _(folder):
     from helpers import helipr_drive
 
@@ -1253,7 +1250,6 @@ NO_FILES = {
     "cns_drake.scene.find_bus": "an object",
     "cns_drake.simulation.load_drive": "reads by load_world",
     "cns_drake.simulation.load_stage": "reads by load_world",
-    "cns_drake.ground_truth.open_labelled": "reads by open_drive",
     "evaluation.drives.find_data_sets": "names of files alone",
     "evaluation.localisation.read_queries": "an open drive",
     "evaluation.methods.find_method": "a name",

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cns_drake.drives import DETECTIONS_3D, SCENE_UPDATE, deserialize
+from cns_drake.drives import DETECTIONS_3D, SCENE_UPDATE
+from cns_drake.drives.ros_types import deserialize
 from cns_drake.recording.object_messages import (
     BoxMessages,
     marked_boxes,

@@ -4,16 +4,10 @@ from helpers.drive_files import write_recording
 import numpy as np
 import pytest
 
-from cns_drake.drives import (
-    POINT_CLOUD,
-    McapDrive,
-    deserialize,
-    to_labels,
-    to_layout,
-    to_points,
-)
-from cns_drake.drives.point_cloud2 import to_records
+from cns_drake.drives import POINT_CLOUD, McapDrive, to_labels, to_layout
+from cns_drake.drives.point_cloud2 import to_points, to_records
 from cns_drake.drives.point_layouts import from_layout
+from cns_drake.drives.ros_types import deserialize
 from cns_drake.recording.messages import encode_point_cloud
 from cns_drake.sensors import POINT_DTYPE
 

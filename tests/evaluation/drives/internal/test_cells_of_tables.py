@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.drives import read_quaternions
 from evaluation.drives.text_tables import parse_seconds
+from evaluation.drives.trajectories import read_quaternions
 
 
 def test_times_near_zero_and_at_the_end():

@@ -11,7 +11,8 @@ from cns_drake.base import InputError
 from evaluation.change import read_map
 from evaluation.drives import open_drive
 from evaluation.recognition import PAPER_PROTOCOL
-from evaluation.study import RecordingSource, choose_methods, extract_features
+from evaluation.study import RecordingSource, choose_methods
+from evaluation.study.features import extract_features
 
 pytestmark = pytest.mark.slow
 
