@@ -3,6 +3,7 @@
 import base64
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 import io
 from pathlib import Path
 
@@ -33,6 +34,33 @@ from evaluation.map_update import (
 )
 
 
+@dataclass(frozen=True)
+class Truth:
+    """The ground truth of one of two maps.
+
+    Attributes:
+        points: name of a label -> number of the map's points that have it.
+        structures: the change of each structure.
+    """
+
+    points: Mapping[str, int]
+    structures: Sequence[StructureChange]
+
+    def alone(self) -> tuple[int, int, int]:
+        """Counts the structures that are in this drive's world alone.
+
+        Returns:
+            How many there are, how many of them are in the map, and how many
+            of these are gone or new.
+        """
+        found = [row for row in self.structures if row.alone and not row.moves]
+        return (
+            len(found),
+            sum(row.points > 0 for row in found),
+            sum(row.verdict in ("gone", "new") for row in found),
+        )
+
+
 def write_truth(
     older: LabelledDrive | str | Path,
     newer: LabelledDrive | str | Path,
@@ -40,7 +68,7 @@ def write_truth(
     spacing: float = SPACING,
     *,
     across_maps: bool = False,
-) -> tuple[Mapping[str, Counter[int]], list[StructureChange]]:
+) -> dict[str, Truth]:
     """Writes the maps of two drives, with exact labels of what changed.
 
     `evaluation.map_update.sessions` describes the files of the maps. The files
@@ -56,9 +84,7 @@ def write_truth(
             aged map has.
 
     Returns:
-        The counts of points, and a list with the change of each structure. The
-        counts map A and B to a mapping from each label to the number of the
-        map's points with this label.
+        The ground truth of the maps A and B.
 
     Raises:
         InputError: the drives are of different worlds, or the folder cannot be
@@ -94,11 +120,16 @@ def write_truth(
             table,
             (a.drive.name, b.drive.name),
         )
-    counts = {
-        side: Counter(labels.tolist())
+    return {
+        side: Truth(
+            {
+                Label(label).name.lower(): number
+                for label, number in sorted(Counter(labels.tolist()).items())
+            },
+            [row for row in table if row.side == side],
+        )
         for side, labels in zip(SIDES, truth, strict=True)
     }
-    return counts, table
 
 
 def _check_same_map(a: LabelledDrive, b: LabelledDrive) -> None:

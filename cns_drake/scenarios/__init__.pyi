@@ -1,6 +1,6 @@
+from .city_building import build_city as build_city
 from .drive_table import DriveRow as DriveRow
-from .drive_table import check_table as check_table
-from .drive_table import drive_rows as drive_rows
+from .drive_table import listed_drives as listed_drives
 from .drive_table import write_table as write_table
 from .planning import DrivePlan as DrivePlan
 from .planning import count_frames as count_frames

@@ -5,7 +5,7 @@ of drives. Each row of the table therefore contains a checksum of its input
 files. If a checksum changes, the figures of the row are computed again.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import get_type_hints
@@ -23,7 +23,8 @@ from cns_drake.base import (
 from cns_drake.recording import frames_within
 from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scene import MapFolder, drive_name
+from cns_drake.scenarios.shipped import shipped_cities
+from cns_drake.scene import MapFolder, drive_name, no_drives
 
 
 @dataclass(frozen=True)
@@ -55,22 +56,30 @@ class DriveRow:
     triangles: int
 
 
-def drive_rows(
+def listed_drives(folders: Iterable[Path] = ()) -> list[DriveRow]:
+    """Returns the drives whose stages exist, as `cns-drake list` shows them.
+
+    Args:
+        folders: folders of maps; by default those of the shipped cities.
+
+    Raises:
+        InputError: if a folder has no drive, a drive cannot be read or planned,
+            or its stage cannot be parsed.
+    """
+    rows = []
+    for folder in folders or shipped_cities().values():
+        of_map = _drive_rows(folder)
+        if folders and not of_map:
+            raise no_drives(folder)
+        rows += of_map
+    return rows
+
+
+def _drive_rows(
     folder: Path,
     sizes: Mapping[str, tuple[int, int]] | None = None,
 ) -> list[DriveRow]:
-    """Returns the table rows of a map's drives whose stages exist.
-
-    Args:
-        folder: folder of the map.
-        sizes: stage -> numbers of structures and triangles in the stage, if
-            known. For a stage without an entry, the world is loaded to count
-            structures and triangles, which takes long.
-
-    Raises:
-        InputError: if a drive cannot be read or planned, or its stage cannot
-            be parsed.
-    """
+    """Returns the rows of a map's drives, see `write_table`."""
     map_folder = MapFolder(folder)
     known = {row.checksum: row for row in _known_rows(map_folder.drive_table)}
     # Names and sizes stand for the meshes: reading them all would take too long
@@ -123,13 +132,19 @@ def write_table(
 ) -> None:
     """Updates the table of drives in a map's folder.
 
-    A folder without drives gets no table. The arguments are the same as for
-    `drive_rows`.
+    A folder without drives gets no table.
+
+    Args:
+        folder: folder of the map.
+        sizes: stage -> numbers of structures and triangles in the stage, if
+            known. For a stage without an entry, the world is loaded to count
+            structures and triangles, which takes long.
 
     Raises:
-        InputError: as `drive_rows` or `check_table`.
+        InputError: if a drive cannot be read or planned, its stage cannot be
+            parsed, or the table may not be written.
     """
-    rows = drive_rows(folder, sizes)
+    rows = _drive_rows(folder, sizes)
     if not rows:
         return
     check_table(folder)

@@ -1,5 +1,4 @@
 from .film import make_film as make_film
-from .film import with_some_traffic as with_some_traffic
 from .loaded_drive import load_drive as load_drive
 from .scanning import scan as scan
 from .scanning import scan_world as scan_world

@@ -96,6 +96,7 @@ def make_film(
     seconds: float = 20.0,
     size: tuple[int, int] = (640, 360),
     start: float | None = None,
+    traffic: int | None = None,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> int:
     """Films a drive and its LiDAR points in all stages of the city.
@@ -110,6 +111,8 @@ def make_film(
         size: width and height of the film's images [pixels].
         start: time of the drive at which the stretch begins [s]; by default the
             stretch whose two ends lie farthest apart is shown.
+        traffic: number of vehicles, and of pedestrians, of the map's recorded
+            traffic; by default those of the scenario, or 60 if it has none.
         on_note: called with notes for the user.
 
     Returns:
@@ -123,6 +126,10 @@ def make_film(
         name: view.replaced(width=size[0], height=size[1])
         for name, view in _VIEWS.items()
     }
+    if traffic is None:
+        scenario = with_some_traffic(scenario)
+    else:
+        scenario = scenario.with_traffic(traffic)
     scenario = scenario.replaced(cameras=views)
     stages = (
         [scenario.stage]

@@ -15,7 +15,7 @@ from cns_drake.base import (
     xyz,
 )
 from evaluation.clouds import OnNote, is_cloud, no_note, read_cloud
-from evaluation.drives import cropped, cropped_with_fields
+from evaluation.drives import NOT_FINITE, cropped, cropped_with_fields
 from evaluation.methods import Method
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.scoring import score_places
@@ -30,7 +30,7 @@ def write_scores(
     verification_radius: float | None = None,
     columns: int | None = None,
     on_note: OnNote = no_note,
-) -> int:
+) -> None:
     """Writes the score of every query with every place as CSV.
 
     Columns are `query`, `database` (file stems) and `score`, which is empty if
@@ -49,10 +49,7 @@ def write_scores(
             without this verification.
         columns: number of columns of `.bin` files, see `read_cloud`.
         on_note: is called with notes on how scans were read, one note of each
-            kind.
-
-    Returns:
-        The number of points left out because they are not finite.
+            kind, and on what the method assumes.
 
     Raises:
         InputError: if the method combines queries (`center_scores` needs all
@@ -103,7 +100,10 @@ def write_scores(
                 text = "" if np.isnan(value) else repr(float(value))
                 names = quoted_cell(path.stem), quoted_cell(place.stem)
                 writer.writerow([*names, text])
-    return reader.num_ignored
+    if reader.num_ignored:
+        on_note(f"{reader.num_ignored} {NOT_FINITE}")
+    if (assumed := method.assumption(None)) is not None:
+        on_note(assumed)
 
 
 def _first_of_each_kind(on_note: OnNote) -> OnNote:

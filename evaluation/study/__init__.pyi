@@ -1,7 +1,6 @@
 from .chosen_methods import MethodChoice as MethodChoice
 from .chosen_methods import choose_method as choose_method
 from .chosen_methods import choose_methods as choose_methods
-from .chosen_methods import expanded_names as expanded_names
 from .chosen_methods import method_settings as method_settings
 from .experiments.cause_files import Cause as Cause
 from .experiments.cause_files import causes as causes
@@ -12,7 +11,6 @@ from .experiments.conditions import condition_protocol as condition_protocol
 from .experiments.conditions import protocol_from_fields as protocol_from_fields
 from .experiments.experiment import Experiment as Experiment
 from .experiments.experiment import MadeMap as MadeMap
-from .experiments.experiment import named_programs as named_programs
 from .experiments.experiment_files import experiment_text as experiment_text
 from .experiments.experiment_files import load_experiment as load_experiment
 from .experiments.experiment_files import (
@@ -22,7 +20,6 @@ from .experiments.factors import FLEET as FLEET
 from .experiments.factors import SESSIONS as SESSIONS
 from .experiments.factors import Case as Case
 from .experiments.factors import Changes as Changes
-from .features import extract_features as extract_features
 from .parts import LongList as LongList
 from .parts import MakePart as MakePart
 from .parts import Part as Part

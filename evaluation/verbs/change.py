@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from cns_drake.base import note
+from cns_drake.base import json_values, note
 from cns_drake.drives import Drive
 from evaluation.alignment import When, open_in_one_world
 from evaluation.change import (
@@ -33,6 +34,19 @@ class Change(Measured):
     """
 
     report: ChangeReport
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns what `cns-eval tcr --json` prints."""
+        return json_values(
+            {
+                "source": self.report.source,
+                "target": self.report.target,
+                "tcr_sym_registered": None,
+                "registration_yaw_deg": None,
+                **self.metrics,
+                **self.report.to_json(),
+            }
+        )
 
 
 def change_between(

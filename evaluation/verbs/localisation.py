@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import InputError, note
+from cns_drake.base import InputError, json_values, note
 from cns_drake.drives import Drive
 from evaluation.alignment import When, open_in_one_world
 from evaluation.drives import Reading
@@ -46,6 +46,7 @@ class Localisation(Measured):
         method: name of the registration method.
         map_name: name of the map's drive or file.
         query_name: name of the queries' drive or file.
+        starts: the initial guesses.
         odometry_drift: drift of the odometry with which the drive was tracked;
             None if single scans were localised.
         rows: (K,) results of single queries, records of
@@ -55,8 +56,25 @@ class Localisation(Measured):
     method: str
     map_name: str
     query_name: str
+    starts: Starts
     odometry_drift: float | None
     rows: np.ndarray
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns what `cns-eval localise --json` prints."""
+        values = {
+            "method": self.method,
+            "map": self.map_name,
+            "query": self.query_name,
+            "start": self.starts.radius,
+            "start_turn_deg": self.starts.turn_deg,
+            "seed": self.starts.seed,
+            **self.metrics,
+            "seconds_mean": float(self.rows["seconds"].mean()),
+        }
+        if self.odometry_drift is not None:
+            values["odometry_drift"] = self.odometry_drift
+        return json_values(values)
 
 
 def localise(
@@ -194,6 +212,7 @@ def localise(
         name,
         source.name,
         drive.name,
+        starts,
         odometry_drift,
         rows,
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import InputError, Reporter, one_line
+from cns_drake.base import InputError, Reporter, json_values, one_line
 from evaluation.map_update import BASELINES, PairLabels, read_pair
 from evaluation.recognition import numbers_of
 from evaluation.results import QueryRows, Results
@@ -27,6 +27,12 @@ class MapUpdate(Measured):
     method: str
     scores: dict[str, Any]
     labels: PairLabels
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns what `cns-eval map-update --json` prints."""
+        return json_values(
+            {"method": self.method, **self.scores, **self.metrics}
+        )
 
 
 def update_map(

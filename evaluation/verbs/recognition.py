@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from cns_drake.base import InputError, check_regular, did_you_mean, note
+from cns_drake.base import (
+    InputError,
+    check_regular,
+    did_you_mean,
+    json_values,
+    note,
+)
 from cns_drake.drives import Drive
 from evaluation.alignment import When, open_in_one_world
 from evaluation.drives import NOT_FINITE, CountedDrive, Reading
@@ -64,6 +71,31 @@ class Recognition(Measured):
     outcome: PlaceOutcome
     mode: Mode
     overlaps: np.ndarray | None
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns what `cns-eval pr --json` prints."""
+        outcome, metrics = self.outcome, self.metrics
+        return json_values(
+            {
+                "method": outcome.method,
+                "mode": self.mode,
+                "database": outcome.database,
+                "query": outcome.query,
+                **metrics,
+                "intervals_95": {
+                    name: one.to_json()
+                    for name, one in self.intervals.items()
+                    if not math.isnan(one.low)
+                },
+                "recall_at_1": metrics["r1"],
+                "recall_at_n": [
+                    outcome.outcomes.recall_at(rank) for rank in range(1, 26)
+                ],
+                "queries_with_match": metrics["with_match"],
+                "protocol": outcome.protocol.to_json(),
+                "parameters": self.method.config.model_dump(mode="json"),
+            }
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from cns_drake.pictures import load_views
 from cns_drake.roads import Route, load_road_network, make_lane_path
 from cns_drake.scenarios import (
     Scenario,
-    drive_rows,
+    listed_drives,
     load_scenario,
     plan_drive,
     write_scenarios,
@@ -152,7 +152,7 @@ def _load_roads(folder: Path) -> None:
 
 
 def _list_town(folder: Path) -> None:
-    drive_rows(folder)
+    listed_drives([folder])
 
 
 def _write_city(folder: Path) -> None:

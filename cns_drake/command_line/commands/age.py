@@ -9,7 +9,6 @@ import typer
 
 from cns_drake.base import (
     InputError,
-    did_you_mean,
     ended_by_interrupts,
     errors_at_option,
     shared_options,
@@ -118,17 +117,11 @@ def age(
         raise InputError(f"give one map, not {' '.join(maps) or 'none'}")
     with ended_by_interrupts("cns-drake"):
         from cns_drake.ageing import age_map, draw_pictures, read_rates
-        from cns_drake.scenarios import shipped_maps
+        from cns_drake.scenarios import recordable_map
 
-    folder = shipped_maps().get(maps[0], Path(maps[0]))
-    if not folder.is_dir():
-        raise InputError(
-            f"{maps[0]}: neither a shipped map ({', '.join(shipped_maps())}) "
-            f"nor a folder{did_you_mean(maps[0], shipped_maps())}"
-        )
     with errors_at_option("--output", "output"):
         aged = age_map(
-            folder,
+            recordable_map(maps[0]),
             wanted,
             seed,
             read_rates(rates, rate),

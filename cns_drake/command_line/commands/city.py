@@ -43,8 +43,8 @@ def city(
         cns-drake city town --new
     """
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.city import differing_files, generate_city, start_city
-        from cns_drake.scenarios import check_table, write_table
+        from cns_drake.city import differing_files
+        from cns_drake.scenarios import build_city
 
     if seed is not None and not new:
         raise InputError("--seed: has no effect without --new")
@@ -59,10 +59,8 @@ def city(
         if changed:
             raise typer.Exit(1)
         return
-    check_table(folder)
-    if new:
-        start_city(folder, seed or 0, note)
-    files = generate_city(folder, note, repair_stages=repair_stages)
-    write_table(folder)
+    files = build_city(
+        folder, new=new, seed=seed or 0, repair_stages=repair_stages
+    )
     note(f"{len(files)} files")
     suggest_reproduction(folder)

@@ -57,7 +57,7 @@ def film(
     """
     with ended_by_interrupts("cns-drake"):
         from cns_drake.scenarios import load_scenario
-        from cns_drake.simulation import make_film, with_some_traffic
+        from cns_drake.simulation import make_film
 
     drive = load_scenario(scenario)
     match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", size)
@@ -67,16 +67,13 @@ def film(
             f"--size: '{size}' is not of the form WxH with 32 to 1920 pixels, "
             "such as 640x360"
         )
-    if traffic is None:
-        drive = with_some_traffic(drive)
-    else:
-        drive = drive.with_traffic(traffic)
     number = make_film(
         drive,
         output,
         seconds=seconds,
         size=(width, height),
         start=start_time,
+        traffic=traffic,
         on_note=note,
     )
     terminal.show(

@@ -61,15 +61,9 @@ def list_(
         cns-drake list
     """
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.scenarios import drive_rows, shipped_cities
-        from cns_drake.scene import no_drives
+        from cns_drake.scenarios import listed_drives
 
-    rows = []
-    for folder in folders or shipped_cities().values():
-        of_map = drive_rows(folder)
-        if folders and not of_map:
-            raise no_drives(folder)
-        rows += of_map
+    rows = listed_drives(folders or ())
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     terminal.show(
         {"drives": [asdict(row) for row in rows]},

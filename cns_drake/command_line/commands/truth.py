@@ -117,31 +117,19 @@ def _write_maps(
     """
     with ended_by_interrupts("cns-drake"):
         from cns_drake.ground_truth import write_truth
-        from evaluation.map_update import Label
 
-    counts, table = write_truth(a, b, output, spacing)
     result: dict[str, Any] = {"output": str(output)}
-    for side, numbers in counts.items():
-        named = {
-            Label(label).name.lower(): number
-            for label, number in sorted(numbers.items())
-        }
-        result[side] = named
+    for side, found in write_truth(a, b, output, spacing).items():
+        result[side] = found.points
         text = ", ".join(
             f"{number} {name.replace('_', ' ')}"
-            for name, number in named.items()
+            for name, number in found.points.items()
         )
         note(f"{side}: {text}")
-        alone = [
-            row
-            for row in table
-            if row.side == side and row.alone and not row.moves
-        ]
-        mapped = sum(row.points > 0 for row in alone)
-        right = sum(row.verdict in ("gone", "new") for row in alone)
+        number, mapped, changed = found.alone()
         note(
-            f"{side}: {len(alone)} structures are in this drive's world alone;"
-            f" {mapped} are in its map, {right} of them gone or new"
+            f"{side}: {number} structures are in this drive's world alone;"
+            f" {mapped} are in its map, {changed} of them gone or new"
         )
     terminal.show(result, str(output), json=json)
     terminal.next_command("cns-eval", "map-update", output)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import json_values, shared_options, terminal
+from cns_drake.base import shared_options, terminal
 from evaluation.command_line import options
 from evaluation.command_line.printed_text import metric_rows
 
@@ -99,18 +99,6 @@ def localise(
         **shared_options.readings(lidar, odometry, poses, columns),
         processes=choose_cluster(jobs, None).num_workers,
     )
-    values: dict = {
-        "method": found.method,
-        "map": found.map_name,
-        "query": found.query_name,
-        "start": start,
-        "start_turn_deg": start_turn,
-        "seed": seed,
-        **found.metrics,
-        "seconds_mean": float(found.rows["seconds"].mean()),
-    }
-    if track:
-        values["odometry_drift"] = found.odometry_drift
     if output is not None:
         title = (
             f"{found.query_name}, tracked by {name} in the map of"
@@ -123,7 +111,7 @@ def localise(
         ("initial guess", f"{start:g} m, {start_turn:g} deg"),
         *metric_rows(found),
     ]
-    terminal.show(json_values(values), rows, json=json)
+    terminal.show(found.to_json(), rows, json=json)
 
 
 def _write_results(

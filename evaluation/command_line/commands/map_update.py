@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import InputError, json_values, shared_options, terminal
+from cns_drake.base import InputError, shared_options, terminal
 from evaluation.command_line import options
 from evaluation.command_line.printed_text import metric_rows
 
@@ -72,7 +72,7 @@ def map_update(
         for side, labels in zip("AB", found.labels, strict=True):
             write_labels(output / f"{side}.npy", labels)
     terminal.show(
-        json_values({"method": found.method, **found.scores, **found.metrics}),
+        found.to_json(),
         [("method", found.method), *metric_rows(found)],
         json=json,
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -13,7 +12,6 @@ from cns_drake.base import (
     InputError,
     check_writable,
     errors_at_option,
-    json_values,
     shared_options,
     terminal,
 )
@@ -147,39 +145,12 @@ def pr(
         terminal.note(f"wrote {overlaps}")
     if output is not None:
         options.write_tables(found, output)
-    terminal.show(json_values(_values(found)), _rows(found), json=json)
-
-
-def _values(found: Recognition) -> dict[str, Any]:
-    """Returns the results of `pr` for JSON."""
-    outcome, metrics = found.outcome, found.metrics
-    return {
-        "method": outcome.method,
-        "mode": found.mode,
-        "database": outcome.database,
-        "query": outcome.query,
-        **metrics,
-        "intervals_95": {
-            name: one.to_json()
-            for name, one in found.intervals.items()
-            if not isnan(one.low)
-        },
-        "recall_at_1": metrics["r1"],
-        "recall_at_n": [
-            outcome.outcomes.recall_at(rank) for rank in range(1, 26)
-        ],
-        "queries_with_match": metrics["with_match"],
-        "protocol": outcome.protocol.to_json(),
-        "parameters": found.method.config.model_dump(mode="json"),
-    }
+    terminal.show(found.to_json(), _rows(found), json=json)
 
 
 def _rows(found: Recognition) -> Iterator[tuple[str, str]]:
     """Yields names and values of the results of `pr`."""
     outcome, counts = found.outcome, found.metrics
-    right, counted = (
-        counts[f"f1_max_{name}"] for name in ("true_positives", "counted")
-    )
     yield "method", outcome.method
     yield "database -> query", f"{outcome.database} -> {outcome.query}"
     yield "mode", found.mode
@@ -189,7 +160,8 @@ def _rows(found: Recognition) -> Iterator[tuple[str, str]]:
             "r1": f"TP {counts['true_positives']:.0f}"
             f" of N {counts['with_match']:.0f}",
             "auc_strict": "recall = TP / N",
-            "f1_max": f"TP {right:.0f}, FP + FN {counted - right:.0f}",
+            "f1_max": f"TP {counts['f1_max_true_positives']:.0f}"
+            f" of TP + FP + FN {counts['f1_max_counted']:.0f}",
         },
     )
     yield "protocol", outcome.protocol.to_text()

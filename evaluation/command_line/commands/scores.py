@@ -46,14 +46,13 @@ def scores(
             kitti/sequences/04/velodyne --method solid \\
             --output scores.csv
     """
-    from evaluation.drives import NOT_FINITE
     from evaluation.recognition import write_scores
     from evaluation.study import choose_method
 
     choice = choose_method(method, parameter or ()).at_height(sensor_height)
     with errors_at_option("--method", "name"):
         made = choice.make()
-    num_ignored = write_scores(
+    write_scores(
         made,
         database,
         query,
@@ -62,8 +61,4 @@ def scores(
         columns=columns,
         on_note=terminal.note,
     )
-    if num_ignored:
-        terminal.note(f"{num_ignored} {NOT_FINITE}")
     terminal.note(f"wrote {output}")
-    if (assumed := made.assumption(None)) is not None:
-        terminal.note(assumed)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import json_values, shared_options, terminal
+from cns_drake.base import shared_options, terminal
 from evaluation.command_line import options
 from evaluation.command_line.printed_text import metric_rows
 
@@ -62,19 +62,11 @@ def tcr(
     report = found.report
     if output is not None:
         options.write_tables(found, output)
-    values = {
-        "source": report.source,
-        "target": report.target,
-        "tcr_sym_registered": None,
-        "registration_yaw_deg": None,
-        **found.metrics,
-        **report.to_json(),
-    }
     rows = [
         ("first <-> second", f"{report.source} <-> {report.target}"),
         *metric_rows(found, _beside(report)),
     ]
-    terminal.show(json_values(values), rows, json=json)
+    terminal.show(found.to_json(), rows, json=json)
 
 
 def _beside(report: ChangeReport) -> dict[str, str]:

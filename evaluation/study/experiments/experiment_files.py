@@ -22,6 +22,7 @@ from cns_drake.base import (
     value_errors,
 )
 from evaluation.results import SETTINGS, as_factor, chart_factors, check_factors
+from evaluation.study.chosen_methods import expanded_names
 from evaluation.study.experiments.cause_files import ALL, with_cases
 from evaluation.study.experiments.conditions import levels_by_case
 from evaluation.study.experiments.experiment import (
@@ -70,6 +71,7 @@ def load_experiment(
     quick: bool = False,
     tasks: Sequence[str] = (),
     methods: Sequence[str] = (),
+    allow_code: bool = True,
 ) -> Experiment:
     """Reads an experiment.
 
@@ -82,12 +84,39 @@ def load_experiment(
             replace its other fields.
         tasks: tasks to measure instead of the experiment's tasks; the settings
             of the experiment stay.
-        methods: methods to run, in the same way.
+        methods: methods to run, in the same way; `standard` stands for all
+            standard methods.
+        allow_code: whether the file may name Python files, which a study runs.
+            Those of the other arguments are the user's own.
 
     Raises:
-        InputError: there is no such experiment, or a field is unknown or not
-            usable.
+        InputError: there is no such experiment, a field is unknown or not
+            usable, or the file names a program that may not run.
     """
+    overrides = list(overrides)
+    methods = expanded_names(methods)
+    found = _loaded(name_or_file, overrides, quick, tasks, methods)
+    if not allow_code:
+        # Others may have written the file.
+        own = named_programs([methods, [*map(_fields_of, overrides)]])
+        for field in ("methods", "metrics", "tasks"):
+            for file in named_programs(getattr(found, field)):
+                if file not in own:
+                    raise InputError(
+                        f"{name_or_file}: {field}: {file} is a program, and"
+                        " would run with your permissions; read it, then add"
+                        " --allow-code"
+                    )
+    return found
+
+
+def _loaded(
+    name_or_file: str | Path,
+    overrides: Sequence[str | tuple[str, Any]],
+    quick: bool,
+    tasks: Sequence[str],
+    methods: Sequence[str],
+) -> Experiment:
     path = _experiment_file(name_or_file)
     values = read_yaml(path)
     if not isinstance(values, dict):
@@ -95,7 +124,6 @@ def load_experiment(
     values = with_cases(values, path)
     values = in_long_form({"name": path.stem, **values})
     short = values.get("quick")
-    overrides = list(overrides)
     chosen = {"tasks": tasks, "methods": methods}
     if quick:
         if not isinstance(short, dict):
@@ -281,13 +309,19 @@ def _chosen_anew(values: Changes, changes: Changes) -> dict[str, Any]:
     return {**merged(values, changes), **chosen}
 
 
+def _fields_of(override: str | tuple[str, Any]) -> dict[str, Any]:
+    if isinstance(override, str):
+        return parse_changes([override])
+    return dict([override])
+
+
 def _overridden(
     values: Changes, override: str | tuple[str, Any]
 ) -> dict[str, Any]:
     """Returns fields of an experiment with an override."""
+    fields = _fields_of(override)
     if not isinstance(override, str):
-        return {**values, **dict([override])}
-    fields = parse_changes([override])
+        return {**values, **fields}
     if "." not in override.partition("=")[0]:
         return _chosen_anew(values, fields)
     (first,) = fields

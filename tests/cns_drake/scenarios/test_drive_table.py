@@ -11,7 +11,7 @@ import yaml
 from cns_drake.base import InputError
 from cns_drake.scenarios import (
     count_frames,
-    drive_rows,
+    listed_drives,
     load_scenario,
     plan_drive,
     shipped_drives,
@@ -41,7 +41,7 @@ def folder(tmp_path):
 def measured(folder):
     """The rows, and the drives that were measured."""
     with listening() as heard:
-        rows = drive_rows(folder)
+        rows = listed_drives([folder])
     said = [one.partition("measuring ") for one in heard.activities]
     return rows, [name for _, found, name in said if found]
 
@@ -114,7 +114,7 @@ def test_a_spoilt_table_is_measured_anew(folder, text):
 def test_a_drive_that_is_no_mapping_is_named(folder):
     (folder / "sequence_01.yaml").write_text("- a\n")
     with pytest.raises(InputError, match=r"sequence_01.yaml: not a mapping"):
-        drive_rows(folder)
+        listed_drives([folder])
 
 
 @pytest.mark.slow

@@ -9,10 +9,9 @@ import numpy as np
 from PIL import Image
 import pytest
 
-from cns_drake import load_scenario
 from cns_drake.base import InputError
 from cns_drake.scenarios import make_scenario
-from cns_drake.simulation import make_film, with_some_traffic
+from cns_drake.simulation import make_film
 
 SIZE = (96, 54)
 # A scan costs little with it.
@@ -113,13 +112,3 @@ def test_mp4_needs_ffmpeg(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(InputError, match=r"a\.mp4: there is no ffmpeg"):
         make_film(tiny_scenario(tmp_path), tmp_path / "a.mp4", size=SIZE)
-
-
-def test_traffic_comes_where_it_was_recorded(tmp_path):
-    shipped = load_scenario("metropolis_01")
-    assert with_some_traffic(shipped).traffic.vehicles == 60
-    assert with_some_traffic(shipped).traffic.walkers == 60
-    busy = shipped.with_traffic(7)
-    assert with_some_traffic(busy) == busy
-    bare = tiny_scenario(tmp_path)
-    assert with_some_traffic(bare) == bare

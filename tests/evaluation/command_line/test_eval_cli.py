@@ -291,7 +291,7 @@ def test_pr_table_modes_and_parameters(capsys, towns):
         "TP 8 of N 8",
         "AUC",
         "F1max",
-        ", FP + FN 0)",
+        " of TP + FP + FN 8)",
         "R@1%",
     ):
         assert text in out

@@ -1,7 +1,5 @@
 """Fields of experiments."""
 
-from evaluation.study import named_programs
-
 
 def test_lists_of_whole_numbers_can_be_spread(read):
     experiment = read(
@@ -22,13 +20,3 @@ def test_lists_of_whole_numbers_can_be_spread(read):
         (int, 500),
         (int, 1000),
     ]
-
-
-def test_programs_are_found_wherever_they_are_named():
-    assert named_programs(
-        {
-            "methods": ["solid", "a.py", ("sub/B.PY", {"x": {"y": ["c.py"]}})],
-            "d.py": {"weights": "e.pt", "radius": 3.0},
-            "f": None,
-        }
-    ) == ["d.py", "a.py", "sub/B.PY", "c.py"]
