@@ -3,9 +3,10 @@
     python tests/benchmarks/table1_sources.py A B [A_UNCHANGED B ...]
 
 For each pair of drives, a row for each choice that the paper leaves open (hull,
-grid, spacing of scans, voxel centres) and for each small difference between the
-frames of the two drives (yaw, offset). `docs/notes/cities.md` shows the
-result for Metropolis.
+grid, spacing of scans, voxel centres) and for frames that differ by a yaw, and
+the least and greatest share of B's picture that is new since A, by several
+distances and from four sides, as red in the paper's Figure 1.
+`docs/notes/cities.md` shows the result for Metropolis.
 """
 
 import argparse
@@ -15,43 +16,52 @@ import sys
 
 import numpy as np
 
+from cns_drake.base import poses
 from evaluation import map_drive, open_drive
-from evaluation.change import temporal_change
+from evaluation.change import lacks_counterpart, temporal_change
 from evaluation.drives import sample_frames
 from evaluation.maps import CELL_SIZE, VOXEL_SIZE, VoxelMap
+from evaluation.results import OrthographicView, render
 
 # Distances between the scans of a map [m]; 0 takes all of them.
 SPACINGS = (0.0, 10.0, 50.0)
 YAWS_DEG = (0.5, 1.0, 1.5, 2.0)
-OFFSETS = {
-    "0.5 m in z": (0.0, 0.0, 0.5),
-    "1 m in x and y": (1.0, 1.0, 0.0),
-}
+# What is red: distances from the older map, and directions of the view.
+RED_DISTANCES = (1.0, 2.0, 4.5)
+AZIMUTHS_DEG = (-55.0, 35.0, 125.0, 215.0)
+RED_SPACING, RED_VOXEL = 2.5, 0.5
 
 
 def read(path: Path) -> dict[float, VoxelMap]:
-    """Returns spacing of the scans [m] -> map of a drive, in voxels of 1 m."""
+    """Returns spacing of the scans [m] -> map of a drive."""
     drive = open_drive(path)
     p_WS = drive.X_WS[:, :3, 3]
     return {
         spacing: map_drive(
-            drive, CELL_SIZE, sample_frames(p_WS, spacing) if spacing else None
+            drive, voxel_size, sample_frames(p_WS, spacing) if spacing else None
         )
-        for spacing in SPACINGS
+        for spacing, voxel_size in (
+            *((one, CELL_SIZE) for one in SPACINGS),
+            (RED_SPACING, RED_VOXEL),
+        )
     }
 
 
-def moved(yaw_deg: float = 0.0, xyz=(0.0, 0.0, 0.0), about=(0.0, 0.0, 0.0)):
-    """Returns the (4, 4) pose of the world in a frame that differs from it."""
-    c, s = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
-    X = np.eye(4)
-    X[:2, :2] = [[c, -s], [s, c]]
-    X[:3, 3] = np.add(xyz, about) - X[:3, :3] @ np.asarray(about)
-    return X
+def red_shares(a: np.ndarray, b: np.ndarray):
+    """Yields shares of pictures of a map B that map A does not have."""
+    for tau in RED_DISTANCES:
+        red = lacks_counterpart(b, a, tau)
+        rgb = np.where(red[:, None], (255, 0, 0), (0, 0, 255)).astype(np.uint8)
+        for azimuth_deg in AZIMUTHS_DEG:
+            view = OrthographicView(azimuth_deg, 38.0, 2.0)
+            image = render(b, rgb, view, size_px=2).image
+            # Only paper is green.
+            shown = image[image[..., 1] == 0]
+            yield float((shown[:, 0] > shown[:, 2]).mean())
 
 
 def rows(a: dict[float, VoxelMap], b: dict[float, VoxelMap]):
-    """Yields (choice, TCR_sym) of two maps."""
+    """Yields (choice, TCR_sym or share) of two maps."""
     fine_a, fine_b = a[0.0], b[0.0]
     about = fine_a.centroids_W.mean(axis=0)
 
@@ -76,12 +86,14 @@ def rows(a: dict[float, VoxelMap], b: dict[float, VoxelMap]):
         )
     yield "voxel centres", tcr(of="centres_W")
     for yaw_deg in YAWS_DEG:
-        X = moved(yaw_deg, about=about)
+        X = poses.yaw_pose(np.radians(yaw_deg))
+        X[:3, 3] = about - poses.transform(X, about)
         yield f"yaw of {yaw_deg:g} deg", tcr(X)
         yield f"yaw of {yaw_deg:g} deg, voxel centres", tcr(X, of="centres_W")
-    for name, xyz in OFFSETS.items():
-        yield name, tcr(moved(xyz=xyz))
-        yield f"{name}, voxel centres", tcr(moved(xyz=xyz), of="centres_W")
+    clouds = [one[RED_SPACING].centroids_W for one in (a, b)]
+    shares = list(red_shares(*clouds))
+    yield "least red share", min(shares)
+    yield "greatest red share", max(shares)
 
 
 def main() -> None:
@@ -92,7 +104,7 @@ def main() -> None:
         parser.error("drives come in pairs")
     maps = {path: read(path) for path in dict.fromkeys(drives)}
     table = csv.writer(sys.stdout, lineterminator="\n")
-    table.writerow(["database", "query", "choice", "tcr_sym"])
+    table.writerow(["database", "query", "choice", "value"])
     for a, b in zip(drives[::2], drives[1::2], strict=True):
         for choice, value in rows(maps[a], maps[b]):
             table.writerow([a.name, b.name, choice, f"{value:.4f}"])
