@@ -64,7 +64,6 @@ from .files import natural_key as natural_key
 from .files import read_bytes as read_bytes
 from .files import read_text as read_text
 from .files import user_errors as user_errors
-from .images import open_image as open_image
 from .images import to_jpeg as to_jpeg
 from .input_models import InputModel as InputModel
 from .input_models import Name as Name
@@ -72,8 +71,6 @@ from .input_models import Section as Section
 from .interrupts import ended_by_interrupts as ended_by_interrupts
 from .interrupts import interrupts_wait as interrupts_wait
 from .interrupts import uninterrupted as uninterrupted
-from .jobs.digests import file_digests as file_digests
-from .jobs.digests import fingerprint as fingerprint
 from .jobs.forecast import Space as Space
 from .jobs.forecast import forecast as forecast
 from .jobs.processes import JobError as JobError
@@ -85,6 +82,7 @@ from .jobs.running import choose_cluster as choose_cluster
 from .jobs.running import run_jobs as run_jobs
 from .jobs.step import Reporter as Reporter
 from .jobs.step import Step as Step
+from .json_text import fingerprint as fingerprint
 from .json_text import json_values as json_values
 from .json_text import parse_json as parse_json
 from .launch import start as start

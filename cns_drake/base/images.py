@@ -1,56 +1,18 @@
-"""Images: opened from untrusted sources, and encoded as JPEG."""
+"""Images as JPEG."""
 
 from __future__ import annotations
 
 import io
-from pathlib import Path
 from typing import TYPE_CHECKING
-import warnings
 
 import numpy as np
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-# Formats of recorded images. Pillow reads many others, some by other programs.
-_FORMATS = ("JPEG", "PNG", "TIFF", "WEBP")
-# Greatest number of pixels: those of an image of 8K. A few kilobytes can stand
-# for far more.
-_MOST_PIXELS = 1 << 25
-
 # Levels of a picture of one level are divided by this instead of by zero; 255
 # times its reciprocal is finite.
 _LEAST_SPREAD = 1e-300
-
-
-def open_image(source: Path | bytes) -> Image:
-    """Opens an image, whose pixels are decoded when they are used.
-
-    Args:
-        source: the file, or its content.
-
-    Returns:
-        The image, which is a context manager.
-
-    Raises:
-        ValueError: the image has too many pixels.
-        OSError, SyntaxError: the file cannot be read, or is no such image.
-    """
-    from PIL import Image
-
-    file = io.BytesIO(source) if isinstance(source, bytes) else source
-    with warnings.catch_warnings():
-        # Pillow warns of more pixels than are allowed here.
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-        try:
-            picture = Image.open(file, formats=_FORMATS)
-        except Image.DecompressionBombError as error:
-            raise ValueError(str(error)) from error
-    width, height = picture.size
-    if width * height > _MOST_PIXELS:
-        picture.close()
-        raise ValueError(f"{width} x {height} pixels, too many for an image")
-    return picture
 
 
 def to_jpeg(

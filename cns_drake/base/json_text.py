@@ -1,5 +1,7 @@
 """JSON from untrusted sources, and numbers for JSON."""
 
+from collections.abc import Mapping
+import hashlib
 import json
 import math
 import re
@@ -26,6 +28,12 @@ def json_values(value: Any) -> Any:
         return [json_values(entry) for entry in value]
     is_unknown = isinstance(value, float) and not math.isfinite(value)
     return None if is_unknown else value
+
+
+def fingerprint(inputs: Mapping[str, object]) -> str:
+    """Returns a short hash of inputs, which must be JSON values."""
+    text = json.dumps(inputs, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def parse_json(data: bytes) -> Any:

@@ -119,15 +119,17 @@ def write_pairs(
     vary: str | None = None,
     on_note: Callable[[str], None] = lambda note: None,
 ) -> list[Path]:
-    """Writes training data of named drives; returns the index files.
+    """Writes training data for other programs; returns the index files.
 
-    See `export_pairs`.
+    The index files are PointNetVLAD's pickles, as `write_pickles` writes them.
+    Finished drives are not simulated again.
 
     Args:
         drives: names of shipped drives, or scenario files. If none is given,
             these are the drives of `vary`, or all shipped drives.
         held_out: drives for evaluation only, even if `drives` or `vary` names
-            them.
+            them. If there are none, all drives are used for training and
+            evaluation.
         output: the folder of the set.
         options: spacing and extent of the exported clouds.
         cluster: runs the work.
@@ -135,48 +137,20 @@ def write_pairs(
         on_note: is called with notes on missing parts of the set.
 
     Raises:
-        InputError: see `named_drives` and `export_pairs`.
+        InputError: a drive or `vary` cannot be used, there is no drive to
+            learn from, two drives have the same name, or drives cannot be
+            simulated (the error names all of these), or the folder contains
+            anything but an earlier set, or cannot be written.
     """
     if vary is not None:  # Its scenarios are written to the same folder.
         _claim(output)
-    learned = named_drives(drives, vary, output, cluster)
     tested = [load_scenario(name) for name in held_out]
-    names = {drive.name for drive in tested}
-    learned = [drive for drive in learned if drive.name not in names]
-    return export_pairs(learned, tested, output, options, cluster, on_note)
-
-
-def export_pairs(
-    scenarios: Sequence[Scenario],
-    held_out: Sequence[Scenario],
-    output: Path,
-    options: ExportOptions,
-    cluster: Cluster,
-    on_note: Callable[[str], None] = lambda note: None,
-) -> list[Path]:
-    """Writes training data for other programs; returns the index files.
-
-    The index files are PointNetVLAD's pickles, as `write_pickles` writes them.
-    Finished drives are not simulated again.
-
-    Args:
-        scenarios: the drives to learn from.
-        held_out: drives for evaluation only. If there are none, all drives are
-            used for training and evaluation.
-        output: the folder of the set.
-        options: spacing and extent of the exported clouds.
-        cluster: runs the work.
-        on_note: is called with notes on missing parts of the set.
-
-    Raises:
-        InputError: there is no drive to learn from, two drives have the same
-            name, or drives cannot be simulated (the error names all of these),
-            or the folder contains anything but an earlier set, or cannot be
-            written.
-    """
-    if not scenarios:
+    left_out = {one.name for one in tested}
+    named = named_drives(drives, vary, output, cluster)
+    learned = [one for one in named if one.name not in left_out]
+    if not learned:
         raise InputError("export: no drive to learn from")
-    every = [*scenarios, *held_out]
+    every = [*learned, *tested]
     names = [one.name for one in every]
     for name in repeated(names):
         raise InputError(f"export: two drives are named {name}")
@@ -203,8 +177,10 @@ def export_pairs(
         ExportedDrive(f"runs/{name}", runs[name], numbers.index(city))
         for name, city in zip(names, cities, strict=True)
     ]
-    learned, tested = placed[: len(scenarios)], placed[len(scenarios) :]
-    return write_pickles(output, learned, tested or learned, on_note)
+    first = len(learned)
+    return write_pickles(
+        output, placed[:first], placed[first:] or placed, on_note
+    )
 
 
 def export_run(

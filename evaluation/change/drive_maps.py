@@ -9,7 +9,6 @@ import numpy as np
 
 from cns_drake.drives import Drive
 from evaluation.clouds import read_blocks
-from evaluation.drives import Reading
 from evaluation.maps import CELL_SIZE, VoxelAccumulator, VoxelMap, map_drive
 
 
@@ -31,15 +30,6 @@ class DriveMap:
     positions: np.ndarray | None = None
     drive: Drive | None = None
     notes: tuple[str, ...] = ()
-
-
-def read_map(path: Path) -> DriveMap:
-    """Reads a drive or map file, and returns its voxel map.
-
-    Raises:
-        InputError: if the path can be read neither as a drive nor as a map.
-    """
-    return map_source(Reading().open_source(path))
 
 
 def map_source(source: Drive | Path, columns: int | None = None) -> DriveMap:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 
-from cns_drake.base import InputError, did_you_mean, file_digests, repeated
+from cns_drake.base import InputError, did_you_mean, repeated
 from evaluation.methods import (
     Method,
     MethodConfig,
@@ -18,6 +18,7 @@ from evaluation.methods import (
     shipped_methods,
 )
 from evaluation.results import SETTINGS
+from evaluation.study.digests import file_digests
 
 # The value of a parameter, as text.
 Setting = str | tuple[str, ...]

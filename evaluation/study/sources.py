@@ -12,9 +12,9 @@ from typing import Protocol
 
 import numpy as np
 
-from cns_drake.base import file_digests
 from cns_drake.drives import Drive
 from evaluation.drives import JoinedDrive, MovedDrive, open_drive
+from evaluation.study.digests import file_digests
 
 
 class DriveSource(Protocol):

@@ -6,7 +6,7 @@ import yaml
 
 from cns_drake.motion import Trajectory
 from cns_drake.roads import LanePath, Speeds, load_road_network, make_lane_path
-from cns_drake.scenarios import Scenario, shipped_drives
+from cns_drake.scenarios import Scenario, recordable_drives
 
 SPACING = 2.0
 NO_LIMIT = 100.0
@@ -107,7 +107,7 @@ def check_derivatives(trajectory, times, *, velocity_atol, acceleration_atol):
 
 def shipped_drive(name) -> tuple[Scenario, LanePath, Trajectory]:
     """Returns a shipped drive with its lane path and trajectory."""
-    values = yaml.safe_load(shipped_drives()[name].read_text())
+    values = yaml.safe_load(recordable_drives()[name].read_text())
     scenario = Scenario.model_validate({"name": name, **values})
     network = load_road_network(scenario.folder.roads)
     path = make_lane_path(

@@ -13,7 +13,6 @@ from cns_drake.base import Cluster, InputError
 from cns_drake.base import InputError as ReadingError
 from cns_drake.city import load_plan, load_stages, make_city
 from cns_drake.export import export_drive
-from cns_drake.imports import import_cityjson, import_openstreetmap
 from cns_drake.pictures import load_views
 from cns_drake.roads import Route, load_road_network, make_lane_path
 from cns_drake.scenarios import (
@@ -39,6 +38,7 @@ from helpers import (
 )
 from helpers.fuzz_mutations import mutate_osm
 from helpers.fuzzing import Target
+from helpers.imported_cities import read_city
 from helpers.internal.opendrive_fuzzing import read_opendrive, write_opendrive
 from helpers.small_city import PLAN, ROADS, STAGES
 from helpers.small_cityjson import CityWriter
@@ -314,7 +314,7 @@ def _write_cityjson(folder: Path) -> None:
 
 def _read_cityjson(folder: Path) -> None:
     for name in ("city.json", "city.city.jsonl"):
-        import_cityjson(folder / name, None, None)
+        read_city(folder / name)
 
 
 def _write_osm(folder: Path) -> None:
@@ -322,7 +322,7 @@ def _write_osm(folder: Path) -> None:
 
 
 def _read_osm(folder: Path) -> None:
-    import_openstreetmap(folder / "corner.osm", None)
+    read_city(folder / "corner.osm")
 
 
 _TOWN = ("roads.yaml", "stage_01.sdf", "structures.csv", "wedge.obj")

@@ -5,7 +5,7 @@ import shutil
 import numpy as np
 import yaml
 
-from cns_drake.scenarios import shipped_drives, shipped_maps
+from cns_drake.scenarios import recordable_drives, shipped_maps
 
 _WORLD = """<?xml version="1.0"?>
 <sdf version="1.9">
@@ -63,7 +63,7 @@ def write_small_map(folder):
 
 def scenario_values(map_folder, drive="metropolis_04"):
     """The fields of a shipped drive, moved to another map."""
-    path = shipped_drives()[drive]
+    path = recordable_drives()[drive]
     values = yaml.safe_load(path.read_text())
     return values | {"map": str(map_folder), "name": drive}
 

@@ -1,16 +1,29 @@
 """Camera images that a report's page shows beside LiDAR frames."""
 
+from __future__ import annotations
+
 import base64
 from collections.abc import Callable
 from dataclasses import dataclass
+import io
+from typing import TYPE_CHECKING
+import warnings
 
 import numpy as np
 
-from cns_drake.base import open_image, to_jpeg
+from cns_drake.base import to_jpeg
 from cns_drake.drives import Drive
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 # Longer side of a shown image [pixels].
 _IMAGE_SIDE = 320
+# Formats of recorded images. Pillow reads many others, some by other programs.
+_FORMATS = ("JPEG", "PNG", "TIFF", "WEBP")
+# Greatest number of pixels: those of an image of 8K. A few kilobytes can stand
+# for far more.
+_MOST_PIXELS = 1 << 25
 
 
 @dataclass(frozen=True)
@@ -82,6 +95,35 @@ def nearest_images(
     if not shown:
         return None
     return CameraImages(stamps_ns, times_ns[list(shown)], [*shown.values()])
+
+
+def open_image(data: bytes) -> Image:
+    """Opens an untrusted image, whose pixels are decoded when they are used.
+
+    Args:
+        data: the content of its file.
+
+    Returns:
+        The image, which is a context manager.
+
+    Raises:
+        ValueError: the image has too many pixels.
+        OSError, SyntaxError: it cannot be read, or is no such image.
+    """
+    from PIL import Image
+
+    with warnings.catch_warnings():
+        # Pillow warns of more pixels than are allowed here.
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        try:
+            picture = Image.open(io.BytesIO(data), formats=_FORMATS)
+        except Image.DecompressionBombError as error:
+            raise ValueError(str(error)) from error
+    width, height = picture.size
+    if width * height > _MOST_PIXELS:
+        picture.close()
+        raise ValueError(f"{width} x {height} pixels, too many for an image")
+    return picture
 
 
 def _nearest_index(times_ns: np.ndarray, wanted_ns: np.ndarray) -> np.ndarray:

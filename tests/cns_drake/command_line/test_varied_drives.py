@@ -1,6 +1,6 @@
 """A study without recordings gives the results of recordings."""
 
-from helpers.measured_pairs import compare_maps, place_outcome, values_of
+from helpers.measured_pairs import place_outcome, values_of
 from helpers.small_city import write_small_city
 import pytest
 from typer.testing import CliRunner
@@ -8,7 +8,7 @@ import yaml
 
 from cns_drake.city import generate_city
 from cns_drake.command_line import app
-from evaluation.change import read_map
+from evaluation import change_between
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition import RANDOM_YAW_PROTOCOL
@@ -67,11 +67,9 @@ def test_simulated_and_recorded_drives_agree(tmp_path, jobs_done):
         (0.5, "town_01_missing_0p5_4"),
     ):
         here = results.where(**{"database.missing": part, "verified": False})
-        change = compare_maps(
-            read_map(recorded / member), read_map(recorded / "town_02")
-        )
+        change = change_between(recorded / member, recorded / "town_02")
         (found,) = here.where(metric="tcr_sym").rows
-        assert found.value == pytest.approx(change.change.symmetric, abs=1e-9)
+        assert found.value == pytest.approx(change.metrics["tcr_sym"], abs=1e-9)
         for method in ("solid", "btc"):
             outcome = place_outcome(
                 open_drive(recorded / member),

@@ -3,19 +3,19 @@
 import json
 from types import SimpleNamespace
 
+from helpers.imported_cities import read_city
 from helpers.small_cityjson import CityWriter
 import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.imports import import_cityjson
 
 ORIGIN = np.array([85000.0, 446000.0, 3.0])
 
 
 def structures(path, lod=None, year_attribute=None):
     """Returns the city, and name -> structure about ORIGIN."""
-    city = import_cityjson(path, lod, year_attribute)
+    city = read_city(path, lod=lod, year_attribute=year_attribute)
     return city, {
         one.structure.name: SimpleNamespace(
             structure=one.structure,
@@ -272,7 +272,7 @@ def test_files_that_are_none(tmp_path, text, fault):
     path = tmp_path / "city.json"
     path.write_text(text)
     with pytest.raises(InputError) as info:
-        import_cityjson(path, None, None)
+        read_city(path)
     assert str(info.value).startswith(str(path))
     assert fault in str(info.value)
     assert "\n" not in str(info.value)
@@ -399,7 +399,7 @@ def test_transforms_that_are_not_read(tmp_path, change, fault):
     path = tmp_path / "city.json"
     path.write_text(json.dumps(document))
     with pytest.raises(InputError, match=fault):
-        import_cityjson(path, None, None)
+        read_city(path)
 
 
 def test_members_of_objects_that_are_not_read_are_counted(tmp_path):

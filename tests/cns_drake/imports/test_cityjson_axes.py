@@ -3,12 +3,12 @@
 import json
 import re
 
+from helpers.imported_cities import read_city
 from helpers.small_cityjson import CityWriter
 import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.imports import import_cityjson
 
 FOOT = 1200 / 3937  # The survey foot of the United States.
 NORTH_FIRST = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -19,7 +19,7 @@ MADRID = "EPSG:25830"
 
 def read(path):
     """Returns a city, and name -> (N, 3) corners in its reference system."""
-    city = import_cityjson(path, None, None)
+    city = read_city(path)
     return city, {
         one.structure.name: one.triangles.reshape(-1, 3) + city.origin
         for one in city.objects

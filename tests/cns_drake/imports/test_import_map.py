@@ -7,6 +7,7 @@ import re
 import resource
 import shlex
 
+from helpers.imported_cities import read_city
 from helpers.small_cityjson import CityWriter, write_blocks
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ import yaml
 
 from cns_drake.base import InputError
 from cns_drake.command_line import app
-from cns_drake.imports import ImportOptions, import_city, import_cityjson
+from cns_drake.imports import ImportOptions, import_city
 from cns_drake.scenarios import load_scenario, plan_drive
 from evaluation.clouds import read_cloud
 from evaluation.drives import open_drive
@@ -297,7 +298,9 @@ def test_options_that_cannot_be(tmp_path, capsys, options, fault):
 def year_of(tmp_path, attributes, name=None):
     city = CityWriter()
     city.box("a", 0.0, 0.0, (20.0, 20.0, 6.0), attributes=attributes)
-    imported = import_cityjson(city.write(tmp_path / "city.json"), None, name)
+    imported = read_city(
+        city.write(tmp_path / "city.json"), year_attribute=name
+    )
     (one,) = imported.objects
     return one.year
 

@@ -3,6 +3,7 @@
 import csv
 import re
 
+from helpers.imported_cities import read_city
 from helpers.small_cityjson import CityWriter
 from helpers.small_opendrive import cubic, straight, write_roads
 from helpers.small_osm import OsmWriter
@@ -14,8 +15,6 @@ import yaml
 from cns_drake.imports import (
     ImportOptions,
     import_city,
-    import_cityjson,
-    import_openstreetmap,
 )
 
 # Boxes: place, size, height of the foot.
@@ -52,7 +51,7 @@ def corners(path, move=(0, 0, 0), turn_deg=0.0):
     R = np.array(
         [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     )
-    city = import_cityjson(path, None, None)
+    city = read_city(path)
     found = {}
     for one in city.objects:
         p = one.triangles.reshape(-1, 3) + city.origin - [85000, 446000, 3]
@@ -99,7 +98,7 @@ def osm_corners(path, order=1, **change):
     osm.node(90, -40, man_made="chimney", height="45", diameter="1")
     osm.node(-60, -10, natural="tree", height="7")
     osm.rows = osm.rows[::order]
-    city = import_openstreetmap(osm.write(path), None, dressed=True)
+    city = read_city(osm.write(path), dressed=True)
     turn = np.radians(-change.get("turn_deg", 0.0))
     R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     found = {one.structure.name: one.triangles for one in city.objects}

@@ -2,13 +2,13 @@
 
 import re
 
-from helpers.imported_osm import bounds, import_osm, volume
+from helpers.imported_cities import bounds, import_osm, read_city, volume
 from helpers.small_osm import LAT, LON, OsmWriter
 import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from cns_drake.imports import ImportOptions, import_city, import_openstreetmap
+from cns_drake.imports import ImportOptions, import_city
 
 BOMB = """<?xml version="1.0"?>
 <!DOCTYPE osm [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;">]>
@@ -122,7 +122,7 @@ def test_files_that_are_none(tmp_path, text, fault):
     path = tmp_path / "city.osm"
     path.write_text(text)
     with pytest.raises(InputError) as info:
-        import_openstreetmap(path, None)
+        read_city(path)
     assert fault in str(info.value)
     assert "\n" not in str(info.value)
 
@@ -171,7 +171,7 @@ def test_why_no_building_is_usable_is_said(tmp_path, text, fault):
     path = tmp_path / "city.osm"
     path.write_text(text)
     with pytest.raises(InputError) as info:
-        import_openstreetmap(path, None)
+        read_city(path)
     message = str(info.value)
     assert message.startswith(f"{path}: the file has no usable building; ")
     assert fault in message
@@ -183,7 +183,7 @@ def test_half_a_country_is_refused(tmp_path):
     osm.box(0, 0, 10, 10, building="yes")
     osm.box(30_000, 0, 10, 10, building="yes")
     with pytest.raises(InputError, match="30 km across"):
-        import_openstreetmap(osm.write(tmp_path / "city.osm"), None)
+        read_city(osm.write(tmp_path / "city.osm"))
 
 
 @pytest.mark.parametrize(
@@ -208,7 +208,7 @@ def test_a_town_on_both_sides_of_the_180th_meridian(tmp_path, houses):
         )
     path = tmp_path / "city.osm"
     path.write_text(f'<osm version="0.6">{"".join(nodes + ways)}</osm>')
-    city = import_openstreetmap(path, None)
+    city = read_city(path)
     x, y = np.sort(
         [one.triangles[:, :, :2].mean(axis=(0, 1)) for one in city.objects],
         axis=0,
@@ -221,7 +221,7 @@ def test_a_town_on_both_sides_of_the_180th_meridian(tmp_path, houses):
 
 def test_no_such_file(tmp_path):
     with pytest.raises(InputError, match="No such file"):
-        import_openstreetmap(tmp_path / "none.osm", None)
+        read_city(tmp_path / "none.osm")
 
 
 def test_objects_cut_off_at_the_edge_are_noted(tmp_path):

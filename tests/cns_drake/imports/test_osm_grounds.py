@@ -1,15 +1,16 @@
 """Grounds, the sea, bridges and tunnels of OpenStreetMap."""
 
+from helpers.imported_cities import read_city
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
 
-from cns_drake.imports import ImportOptions, import_city, import_openstreetmap
+from cns_drake.imports import ImportOptions, import_city
 
 
 def read(osm, folder, dressed=True):
     path = osm.write(folder / "city.osm")
-    return import_openstreetmap(path, None, dressed)
+    return read_city(path, dressed=dressed)
 
 
 def area(one):

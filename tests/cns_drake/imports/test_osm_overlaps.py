@@ -2,19 +2,20 @@
 
 import re
 
+from helpers.imported_cities import read_city
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
 from shapely.geometry import box
 
-from cns_drake.imports import ImportOptions, import_city, import_openstreetmap
+from cns_drake.imports import ImportOptions, import_city
 
 TWICE = "building drawn twice, taken once"
 NESTED = "building inside another one, taken as its part"
 
 
 def read(osm, path, dressed=True):
-    city = import_openstreetmap(osm.write(path / "a.osm"), None, dressed)
+    city = read_city(osm.write(path / "a.osm"), dressed=dressed)
     buildings = [one for one in city.objects if one.object_type == "Building"]
     kinds = {kind: (number, name) for kind, number, name in city.faults.rows()}
     return {one.structure.name: one for one in buildings}, kinds

@@ -1,10 +1,9 @@
 """Ways that lead through buildings, walls and fences of OpenStreetMap."""
 
+from helpers.imported_cities import read_city
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
-
-from cns_drake.imports import import_openstreetmap
 
 HOUSE = {"building": "yes", "height": "12"}
 
@@ -14,7 +13,7 @@ def read(osm, tmp_path, dressed=False):
     for x in (-300, 299):
         for y in (-200, 199):
             osm.box(x, y, 1, 1, building="yes")
-    city = import_openstreetmap(osm.write(tmp_path / "a.osm"), None, dressed)
+    city = read_city(osm.write(tmp_path / "a.osm"), dressed=dressed)
     return city, {one.structure.name: one for one in city.objects}
 
 

@@ -2,7 +2,7 @@
 
 import re
 
-from helpers.imported_osm import bounds, import_osm, volume
+from helpers.imported_cities import bounds, import_osm, volume
 from helpers.small_osm import OsmWriter
 import pytest
 

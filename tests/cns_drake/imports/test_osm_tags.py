@@ -1,6 +1,6 @@
 """What OpenStreetMap's tags say about buildings: heights, roofs, years."""
 
-from helpers.imported_osm import bounds, import_osm, volume
+from helpers.imported_cities import bounds, import_osm, volume
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest

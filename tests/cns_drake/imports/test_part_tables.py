@@ -7,13 +7,11 @@ changes no shape.
 
 import json
 
-from helpers.imported_osm import import_osm, volume
+from helpers.imported_cities import import_osm, read_city, volume
 from helpers.small_cityjson import house
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
-
-from cns_drake.imports import import_cityjson, import_openstreetmap
 
 # The most used keys on ways and nodes that can describe a thing, by taginfo,
 # with a usual value.
@@ -68,7 +66,7 @@ def write_elements(path, more):
 
 
 def triangles_by_element(path, dressed=False):
-    city = import_openstreetmap(path, None, dressed)
+    city = read_city(path, dressed=dressed)
     found = {}
     for one in city.objects:
         found.setdefault(one.structure.name.split("_")[1], []).append(
@@ -148,7 +146,7 @@ def write_dressed(path, more):
 def test_each_key_is_accounted_for_in_a_dressed_city(tmp_path, key):
     path = tmp_path / "a.osm"
     write_dressed(path, {key: KEYS[key]})
-    city = import_openstreetmap(path, None, True)
+    city = read_city(path, dressed=True)
     told = [fault.kind for fault in city.faults.rows()]
     lines = [line.split(": ", 2) for line in city.faults.parts()]
     for element in ("tree row", "small object", "coastline", "building",
@@ -169,7 +167,7 @@ def test_trees_of_a_row_have_its_height(tmp_path):
         write_dressed(path, {"height": height} if height else {})
         trees = [
             one
-            for one in import_openstreetmap(path, None, True).small_objects
+            for one in read_city(path, dressed=True).small_objects
             if one.element == "natural=tree_row"
         ]
         expected = None if height is None else float(height)
@@ -260,7 +258,7 @@ def test_attributes_of_cityjson_are_accounted_for(
 ):
     path = tmp_path / "a.json"
     path.write_text(json.dumps(house({attribute: value})))
-    city = import_cityjson(path, None, None)
+    city = read_city(path)
     kinds = [fault.kind for fault in city.faults.rows()]
     assert (f"{attribute} of attributes, not read" in kinds) == is_counted
     assert is_counted or attribute in " ".join(city.faults.parts()).split()
@@ -270,7 +268,7 @@ def test_a_demolished_house_of_cityjson_has_an_end(tmp_path):
     path = tmp_path / "a.json"
     dates = {"yearOfConstruction": 1900, "yearOfDemolition": "1950-05-01"}
     path.write_text(json.dumps(house(dates)))
-    (one,) = import_cityjson(path, None, None).objects
+    (one,) = read_city(path).objects
     assert (one.year, one.until) == (1900, 1950)
 
 
@@ -300,7 +298,7 @@ def test_semantics_of_cityjson_that_do_not_fit_are_counted(
     geometry["semantics"] = semantics
     path = tmp_path / "a.json"
     path.write_text(json.dumps(document))
-    city = import_cityjson(path, None, None)
+    city = read_city(path)
     (one,) = city.objects
     assert len(one.triangles) == 12
     told = {

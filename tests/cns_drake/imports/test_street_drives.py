@@ -1,12 +1,13 @@
 """Drives in the lanes of streets: sides, one-way streets, overlap, stripes."""
 
+from helpers.imported_cities import read_city
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
 from shapely.geometry import LineString, Point
 
 from cns_drake.base import InputError
-from cns_drake.imports import ImportOptions, import_city, import_openstreetmap
+from cns_drake.imports import ImportOptions, import_city
 from cns_drake.scenarios import load_scenario, plan_drive
 
 STEP = 90.0
@@ -113,9 +114,9 @@ def test_drives_share_a_part(tmp_path):
 
 def test_the_file_may_set_the_side(tmp_path):
     write_grid(tmp_path / "city.osm", driving_side="left")
-    assert import_openstreetmap(tmp_path / "city.osm", None).keeps_left
+    assert read_city(tmp_path / "city.osm").keeps_left
     write_grid(tmp_path / "city.osm")
-    assert not import_openstreetmap(tmp_path / "city.osm", None).keeps_left
+    assert not read_city(tmp_path / "city.osm").keeps_left
 
 
 def test_zebra_crossings_have_stripes(tmp_path):
@@ -128,7 +129,7 @@ def test_zebra_crossings_have_stripes(tmp_path):
         osm.node(40, 0),
     ]
     osm.way_of(nodes, highway="residential", width="7")
-    city = import_openstreetmap(osm.write(tmp_path / "city.osm"), None)
+    city = read_city(osm.write(tmp_path / "city.osm"))
     (one,) = (o for o in city.objects if o.object_type == "Crossing")
     assert one.structure.semantic_class == "road"
     a, b, c = np.moveaxis(one.triangles, 1, 0)

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from cns_drake.pictures import draw_drives
-from cns_drake.scenarios import load_scenario, shipped_drives
+from cns_drake.scenarios import load_scenario, recordable_drives
 
 pytestmark = pytest.mark.slow
 
@@ -18,7 +18,7 @@ def test_drives_are_drawn_over_their_stages(tmp_path):
     folder = write_small_map(tmp_path / "boxes")
     scenarios = {}
     for stage in ("01", "04"):
-        source = shipped_drives()[f"metropolis_{stage}"]
+        source = recordable_drives()[f"metropolis_{stage}"]
         values = yaml.safe_load(source.read_text()) | {"map": "."}
         path = folder / f"sequence_{stage}.yaml"
         path.write_text(yaml.safe_dump(values))

@@ -14,7 +14,7 @@ from cns_drake.scenarios import (
     listed_drives,
     load_scenario,
     plan_drive,
-    shipped_drives,
+    recordable_drives,
     shipped_maps,
     write_table,
 )
@@ -29,7 +29,7 @@ def folder(tmp_path):
     """A map with two drives; the stage of a third one is missing."""
     folder = write_small_map(tmp_path / "boxes")
     for name in ("01", "04"):
-        source = shipped_drives()[f"metropolis_{name}"]
+        source = recordable_drives()[f"metropolis_{name}"]
         entries = yaml.safe_load(source.read_text()) | {"map": "."}
         path = folder / f"sequence_{name}.yaml"
         path.write_text(yaml.safe_dump(entries))

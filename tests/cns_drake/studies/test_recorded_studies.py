@@ -3,14 +3,14 @@
 from helpers.drive_files import make_scan, write_recording
 from helpers.internal import studies
 from helpers.internal.eval_program import write_towns
-from helpers.measured_pairs import compare_maps, place_scores
+from helpers.measured_pairs import place_scores
 from helpers.small_towns import drive
 import numpy as np
 import pytest
 
 from cns_drake.base import Cluster, InputError
 from cns_drake.studies import run_study
-from evaluation.change import read_map
+from evaluation import change_between
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition import RANDOM_YAW_PROTOCOL, RetrievalProtocol
@@ -73,9 +73,9 @@ def test_the_numbers_are_those_of_the_single_commands(folder, tmp_path):
             protocol=RANDOM_YAW_PROTOCOL,
         )
         assert found[stage]["auc"] == pytest.approx(alone.auc, abs=1e-9)
-        change = compare_maps(read_map(folder / name), read_map(query)).change
+        change = change_between(folder / name, query)
         assert values(results, **here, task="change")["tcr_sym"] == (
-            pytest.approx(change.symmetric, abs=1e-9)
+            pytest.approx(change.metrics["tcr_sym"], abs=1e-9)
         )
     kept = found["own"]["auc"] / found["last"]["auc"]
     assert found["own"]["relative_auc"] == pytest.approx(kept, abs=1e-6)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError, from_xyz
-from evaluation.change import DriveMap, read_map
+from evaluation.change import DriveMap, map_source
+from evaluation.drives import open_drive
 from evaluation.maps import CELL_SIZE, voxelise
 
 
@@ -45,8 +46,8 @@ def drive(folder, stage, route, reach=70.0, **options):
 def drives(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drives")
     return {
-        (stage, route): read_map(
-            drive(folder / f"{stage}_{route}", stage, route)
+        (stage, route): map_source(
+            open_drive(drive(folder / f"{stage}_{route}", stage, route))
         )
         for stage in TOWN
         for route in ROUTE
@@ -132,7 +133,7 @@ def test_what_no_scan_can_measure_leaves_the_change(
 
 def test_control_on_a_third_route(tmp_path, drives):
     other = drive(tmp_path / "other", "late", "south", reach=50.0)
-    shifted = read_map(other)
+    shifted = map_source(open_drive(other))
     a, b = drives["early", "south"], drives["late", "north"]
 
     def aside(y):
@@ -150,8 +151,7 @@ def test_control_on_a_third_route(tmp_path, drives):
 
 
 def test_other_worlds_are_refused(tmp_path, drives):
-    other = read_map(
-        drive(tmp_path / "utm", "late", "south", world_frame="utm")
-    )
+    utm = drive(tmp_path / "utm", "late", "south", world_frame="utm")
+    other = map_source(open_drive(utm))
     with pytest.raises(InputError, match="frame 'utm'"):
         compare_maps(drives["early", "south"], other)

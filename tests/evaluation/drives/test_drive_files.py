@@ -1,8 +1,6 @@
 """The files that a reader names are those that it opens."""
 
-import hashlib
 import os
-from pathlib import Path
 import pickle
 import shutil
 import struct
@@ -21,7 +19,7 @@ from helpers.drive_files import make_scan, write_recording
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError, file_digests
+from cns_drake.base import InputError
 from evaluation.drives import MovedDrive, open_drive
 from evaluation.study import RecordingSource
 
@@ -156,10 +154,6 @@ def test_every_file_that_is_opened_is_named(tmp_path, write):
         assert write is mcap
 
 
-def digest(data):
-    return hashlib.sha256(data).hexdigest()
-
-
 def test_corrected_poses_are_another_drive(tmp_path):
     folder = kitti(tmp_path)
     first = RecordingSource(folder).identity()
@@ -217,30 +211,6 @@ def test_a_link_may_have_a_name_of_its_own(tmp_path, write):
     np.testing.assert_array_equal(drive.X_WS, wanted.X_WS)
     if write not in (kitti, cns):  # Their scenarios name them.
         assert "mine" in drive.name
-
-
-def test_digests_are_kept_until_a_file_changes(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    path = tmp_path / "scan.bin"
-    path.write_bytes(b"points")
-    expected = [digest(b"points")]
-    # A file that was just written is read each time.
-    assert file_digests([path]) == expected
-    assert str(path) in opened_by(lambda: file_digests([path]))
-    monkeypatch.setattr("time.time_ns", lambda: path.stat().st_ctime_ns + 3e9)
-    assert file_digests([path]) == expected
-    assert str(path) not in opened_by(lambda: file_digests([path]))
-    # The time of the content can be set back, that of the inode cannot.
-    stat = path.stat()
-    path.write_bytes(b"pointz")
-    os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
-    assert file_digests([path]) == [digest(b"pointz")]
-    # A damaged cache, or none, costs time only.
-    for kept in Path(tmp_path / "cache").rglob("*.json"):
-        kept.write_text('{"a": 1}')
-    assert file_digests([path]) == [digest(b"pointz")]
-    monkeypatch.setenv("XDG_CACHE_HOME", "/proc/nowhere")
-    assert file_digests([path]) == [digest(b"pointz")]
 
 
 def test_the_one_of_two_tables_that_is_read_is_named(tmp_path):

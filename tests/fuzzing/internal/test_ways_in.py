@@ -522,21 +522,17 @@ for _name, _text in {
 
 def cloud(file):
     def use(folder):
-        from evaluation.change import read_map
+        from evaluation.change import map_source
         from evaluation.clouds import read_blocks, read_cloud
 
         list(read_blocks(folder / file))
         read_cloud(folder / file)
-        return read_map(folder / file)
+        return map_source(folder / file)
 
     return use
 
 
-CLOUDS = (
-    "evaluation.clouds.read_blocks",
-    "evaluation.clouds.read_cloud",
-    "evaluation.change.read_map",
-)
+CLOUDS = ("evaluation.clouds.read_blocks", "evaluation.clouds.read_cloud")
 
 
 def pcd(fields, sizes, kinds, counts, points, data, body=b""):
@@ -646,26 +642,25 @@ def png(width, height, mode=0, rows=9):
 
 
 def show(folder):
-    from cns_drake.base import open_image, to_jpeg, user_errors, value_errors
+    from cns_drake.base import to_jpeg, user_errors, value_errors
+    from evaluation.results.sections.camera_images import open_image
 
     file = folder / "x.png"
     with user_errors(file), value_errors(file):
         return to_jpeg(open_image(file.read_bytes()))
 
 
-@way("image: large", "x.png", "cns_drake.base.open_image", use=show)
+@way("image: large", "x.png", use=show)
 def _(folder):
     (folder / "x.png").write_bytes(png(9000, 9000, 2))
 
 
-@way(
-    "image: as large as allowed", "x.png", "cns_drake.base.open_image", use=show
-)
+@way("image: as large as allowed", "x.png", use=show)
 def _(folder):
     (folder / "x.png").write_bytes(png(5700, 5700, 2, 5700))
 
 
-@way("image: declared", "x.png", "cns_drake.base.open_image", use=show)
+@way("image: declared", "x.png", use=show)
 def _(folder):
     (folder / "x.png").write_bytes(png(65_535, 65_535))
 
@@ -951,7 +946,6 @@ for _name, _one in OSM.items():
 
     @way(
         f"osm: {_name}", "x.osm", "source OpenStreetMap",
-        "cns_drake.imports.import_openstreetmap",
         "cns_drake.imports.import_city", use=imported("x.osm"),
     )  # fmt: skip
     def _(folder, one=_one):
@@ -1002,7 +996,7 @@ for _name, _data in {
 
     @way(
         f"osm: PBF, {_name}", "x.osm.pbf", "source OpenStreetMap",
-        "cns_drake.imports.import_openstreetmap", use=imported("x.osm.pbf"),
+        use=imported("x.osm.pbf"),
     )  # fmt: skip
     def _(folder, data=_data):
         (folder / "x.osm.pbf").write_bytes(data)
@@ -1037,7 +1031,7 @@ def city_json(folder, *faces, templates=0):
     city.write(folder / "x.json")
 
 
-CITYJSON = ("source CityJSON", "cns_drake.imports.import_cityjson")
+CITYJSON = ("source CityJSON",)
 
 
 @way("CityJSON: far", "x.json", *CITYJSON, use=imported("x.json"))
@@ -1091,9 +1085,10 @@ for _name, _road in {
 
 
 def drive(folder):
-    from evaluation.change import read_map
+    from evaluation.change import map_source
+    from evaluation.drives import open_drive
 
-    return read_map(folder / "drive")
+    return map_source(open_drive(folder / "drive"))
 
 
 DRIVES = (
@@ -1144,13 +1139,13 @@ def _(folder):
 
 
 def kitti(folder):
-    from evaluation.change import read_map
+    from evaluation.change import map_source
     from evaluation.drives import open_drive, sample_frames
 
     path = folder / "kitti" / "sequences" / "07"
     drive = open_drive(path)
     sample_frames(drive.X_WS[:, :3, 3], 0.001)
-    return read_map(path)
+    return map_source(drive)
 
 
 @way(
@@ -1272,7 +1267,10 @@ OPENERS = {
     "np.load": ("evaluation.clouds.npy_files",),
     "np.lib.format.read_array": ("cns_drake.base.npz_archives",),
     # Films are made of the program's own pictures.
-    "Image.open": ("cns_drake.base.images", "cns_drake.simulation.film"),
+    "Image.open": (
+        "evaluation.results.sections.camera_images",
+        "cns_drake.simulation.film",
+    ),
     "yaml.load": (),
     "yaml.safe_load": (),
     # After `read_yaml` of the same file.

@@ -9,11 +9,12 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
+from helpers.imported_cities import read_city
 from helpers.small_cityjson import house
 import pytest
 import yaml
 
-from cns_drake.imports import cityjson, import_cityjson, opendrive
+from cns_drake.imports import cityjson, opendrive
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.road_reader import read_roads
 
@@ -132,7 +133,7 @@ def test_each_member_of_each_thing_of_cityjson_is_accounted_for(
         thing[key] = "1.5"
     path = tmp_path / "a.json"
     path.write_text(json.dumps(document))
-    city = import_cityjson(path, None, None)
+    city = read_city(path)
     assert len(city.objects) == 1
     told = {fault.kind for fault in city.faults.rows()}
     lines = {

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.change import read_map
+from evaluation.change import map_source
 from evaluation.drives import open_drive
 from evaluation.recognition import PAPER_PROTOCOL
 from evaluation.study import RecordingSource, choose_methods
@@ -52,7 +52,7 @@ def recorded(folder):
 def test_maps_are_those_of_which_the_tcr_is_measured(folder, recorded, roles):
     asked = {"a": (choose_methods()[0].make(), roles, PAPER_PROTOCOL)}
     found = extract_features(recorded, roles, asked)
-    assert_equal(found.drive.coarse, read_map(folder).voxels)
+    assert_equal(found.drive.coarse, map_source(recorded).voxels)
 
 
 def test_a_recording_is_identified_by_its_files(tmp_path):

@@ -1,12 +1,17 @@
-"""Cities imported from OpenStreetMap files, and sizes of their structures."""
+"""Cities as sources of maps read them, and sizes of their structures."""
 
 import numpy as np
 
-from cns_drake.imports import import_openstreetmap
+from cns_drake.imports import ImportOptions, map_sources
+
+
+def read_city(path, **options):
+    (source,) = (one for one in map_sources() if path.suffix in one.suffixes)
+    return source.read(path, ImportOptions(**options))
 
 
 def import_osm(path, year_attribute=None):
-    city = import_openstreetmap(path, year_attribute)
+    city = read_city(path, year_attribute=year_attribute)
     return city, {one.structure.name: one for one in city.objects}
 
 

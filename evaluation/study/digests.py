@@ -1,4 +1,4 @@
-"""Digests of inputs; a file is read again only if it has changed.
+"""Digests of files; a file is read again only if it has changed.
 
 A file is identified by a digest of its content and not by its time of change: a
 copy counts as the same file, and a corrected file as another file, even if both
@@ -7,7 +7,7 @@ user's cache folder, together with the size and the times that the file system
 states for each file.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import contextlib
 import hashlib
 import json
@@ -15,19 +15,12 @@ import os
 from pathlib import Path
 import time
 
-from cns_drake.base.complete_files import write_text
-from cns_drake.base.files import cache_folder, check_regular, user_errors
+from cns_drake.base import cache_folder, check_regular, user_errors, write_text
 
 _BLOCK_BYTES = 1 << 20
 # A file that was changed so recently may change again without another time:
 # some file systems count whole seconds [ns].
 _SETTLED_NS = 2_000_000_000
-
-
-def fingerprint(inputs: Mapping[str, object]) -> str:
-    """Returns a short hash of inputs, which must be JSON values."""
-    text = json.dumps(inputs, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def file_digests(files: Sequence[Path]) -> list[str]:
