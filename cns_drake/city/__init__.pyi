@@ -92,12 +92,12 @@ from .ground.markings import DASH_GAP as DASH_GAP
 from .ground.streets import kerb_area as kerb_area
 from .ground.streets import parking_bays as parking_bays
 from .ground.streets import street_surfaces as street_surfaces
-from .growth.building_sites import building_site as building_site
-from .growth.lot_uses import lot_objects as lot_objects
-from .growth.lot_uses import use_by_size as use_by_size
 from .growth.lowering import STOREY as STOREY
 from .growth.lowering import lowered as lowered
 from .growth.lowering import top_of as top_of
+from .growth.stage_structures import building_site as building_site
+from .growth.stage_structures import lot_objects as lot_objects
+from .growth.stage_structures import use_by_size as use_by_size
 from .placement.draft import Draft as Draft
 from .placement.draft import name_stem as name_stem
 from .placement.frontage import lines_along as lines_along

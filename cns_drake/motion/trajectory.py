@@ -12,8 +12,13 @@ from pydrake.trajectories import BsplineTrajectory
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base import cos, product, rotated, sin
-from cns_drake.motion.body_ride import BodyRide, RideMoments, ride_motion
-from cns_drake.motion.frame_motion import FrameMotion, cross
+from cns_drake.motion.body_ride import (
+    BodyRide,
+    FrameMotion,
+    RideMoments,
+    cross,
+    ride_motion,
+)
 from cns_drake.motion.path_geometry import PathJet, SmoothPath
 from cns_drake.motion.splines import (
     REACH,

@@ -1,6 +1,7 @@
 """A single scan of any SDF world from any pose."""
 
 from collections.abc import Callable, Iterable
+import io
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,15 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
-from cns_drake.base import check_writable, doing
+from cns_drake.base import (
+    InputError,
+    check_writable,
+    completing,
+    doing,
+    encode_bin,
+    encode_pcd,
+    make_folder,
+)
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.scene import World, load_world
 from cns_drake.sensors import (
@@ -21,7 +30,6 @@ from cns_drake.sensors import (
     connect_lidar,
     make_lidar_model,
 )
-from cns_drake.simulation.scan_files import check_ending, save_scan
 
 
 def scan(
@@ -147,3 +155,45 @@ def _stationary_lidar(
     connect_lidar(builder, scene_graph, lidar)
     context = builder.Build().CreateDefaultContext()
     return lidar, lidar.GetMyContextFromRoot(context)
+
+
+def check_ending(path: Path) -> None:
+    """Checks that `save_scan` knows the format of a file from its ending.
+
+    Raises:
+        InputError: the ending is not .pcd, .bin or .npy.
+    """
+    if path.suffix not in _ENCODERS:
+        raise InputError(
+            f"{path}: unknown ending '{path.suffix}'; use one of "
+            f"{', '.join(_ENCODERS)}"
+        )
+
+
+def save_scan(scan: np.ndarray, path: Path) -> None:
+    """Saves x, y, z and intensity of a scan to a file.
+
+    The ending of the file name sets the format: `.bin` is KITTI's format
+    (float32 x y z intensity), `.npy` is an array (N, 4) of the same numbers,
+    and `.pcd` is a binary PCD file.
+
+    Args:
+        scan: structured array (N,) with these four fields.
+        path: the file.
+
+    Raises:
+        InputError: the file has another ending or cannot be written.
+    """
+    check_ending(path)
+    make_folder(path.parent)
+    with completing(path) as part:
+        part.write_bytes(_ENCODERS[path.suffix](scan))
+
+
+def _encode_npy(scan: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, np.frombuffer(encode_bin(scan), "<f4").reshape(-1, 4))
+    return stream.getvalue()
+
+
+_ENCODERS = {".bin": encode_bin, ".npy": _encode_npy, ".pcd": encode_pcd}

@@ -8,7 +8,7 @@ from pydrake.geometry import Box, Capsule, Cylinder, Mesh, Shape
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cns_drake.city import OBJECT_MESHES, PAINTS, TRIM, WHITE
-from cns_drake.traffic.vehicle_kinds import VehicleKind
+from cns_drake.traffic.traffic_plan import VehicleKind
 
 Rgb = tuple[float, float, float]
 Point = tuple[float, float, float]

@@ -8,7 +8,7 @@ import shapely
 
 from cns_drake.base import cos, sin
 from cns_drake.roads import outlines
-from cns_drake.traffic.tracks import Tracks
+from cns_drake.traffic.traffic_plan import Tracks
 
 # Greatest time between two comparisons of road users with the ego car [s]: they
 # notice everything that crosses its path.

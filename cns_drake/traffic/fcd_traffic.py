@@ -24,9 +24,14 @@ from cns_drake.base import (
     wrapped,
 )
 from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meets_ego
-from cns_drake.traffic.tracks import Tracks
-from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan, gait_phases
-from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
+from cns_drake.traffic.traffic_plan import (
+    KINDS,
+    WALKER_SIZE,
+    Tracks,
+    TrafficPlan,
+    VehicleKind,
+    gait_phases,
+)
 
 # A drive may take this much longer than the trace because of rounding [s].
 _ROUNDING = 1e-6

@@ -11,9 +11,12 @@ import shapely
 from cns_drake.base import arcsin, arctan2, distances_along
 from cns_drake.roads import ENDS, Connection, End, LaneRef, Road, RoadNetwork
 from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath
-from cns_drake.traffic.tracks import Tracks
-from cns_drake.traffic.traffic_plan import TrafficPlan
-from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
+from cns_drake.traffic.traffic_plan import (
+    KINDS,
+    Tracks,
+    TrafficPlan,
+    VehicleKind,
+)
 
 # Least and greatest gap between vehicles in a queue [m].
 _GAPS = (1.5, 3.5)

@@ -15,9 +15,13 @@ import numpy as np
 
 from cns_drake.base import read_npz, value_errors
 from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meets_ego
-from cns_drake.traffic.tracks import Tracks
-from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan, gait_phases
-from cns_drake.traffic.vehicle_kinds import KINDS
+from cns_drake.traffic.traffic_plan import (
+    KINDS,
+    WALKER_SIZE,
+    Tracks,
+    TrafficPlan,
+    gait_phases,
+)
 
 _NAMES = (
     "period", "units", "kinds",

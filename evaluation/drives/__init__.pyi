@@ -13,9 +13,9 @@ from .opening import data_sets as data_sets
 from .opening import find_data_sets as find_data_sets
 from .opening import open_drive as open_drive
 from .opening import register_data_set as register_data_set
-from .query_sensor import QuerySensor as QuerySensor
 from .sampling import sample_frames as sample_frames
 from .sampling import travelled as travelled
+from .scan_clouds import QuerySensor as QuerySensor
 from .scan_clouds import cloud_at as cloud_at
 from .scan_clouds import cropped as cropped
 from .scan_clouds import cropped_with_fields as cropped_with_fields

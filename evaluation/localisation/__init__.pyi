@@ -3,6 +3,7 @@ from .initial_poses import InitialPose as InitialPose
 from .initial_poses import Starts as Starts
 from .localisation_map import FEWEST_POINTS as FEWEST_POINTS
 from .localisation_map import LocalisationMap as LocalisationMap
+from .localisation_map import OneScan as OneScan
 from .localisation_map import make_map as make_map
 from .localisation_map import map_of as map_of
 from .localiser import Localiser as Localiser
@@ -11,7 +12,6 @@ from .localiser import localise as localise
 from .localiser import mapped_frames as mapped_frames
 from .localiser import query_frames as query_frames
 from .localiser import read_queries as read_queries
-from .one_scan import OneScan as OneScan
 from .results import QUERY as QUERY
 from .results import RIGHT_TRANSLATION as RIGHT_TRANSLATION
 from .results import Localised as Localised

@@ -14,6 +14,7 @@ from .faults import FAULTS as FAULTS
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .metrics import Mode as Mode
+from .metrics import Number as Number
 from .metrics import choose_metrics as choose_metrics
 from .metrics import kept_share as kept_share
 from .metrics import load_metrics as load_metrics
@@ -33,8 +34,6 @@ from .place_outcome import check_has_match as check_has_match
 from .place_selection import KEEP_ALL as KEEP_ALL
 from .place_selection import checked_keep as checked_keep
 from .place_selection import kept_places as kept_places
-from .pose_errors import PoseErrors as PoseErrors
-from .pose_errors import pose_error as pose_error
 from .precision_recall import pr_curve as pr_curve
 from .precision_recall import weighted_metrics as weighted_metrics
 from .protocol import PAPER_PROTOCOL as PAPER_PROTOCOL
@@ -46,11 +45,12 @@ from .protocol import ProtocolFieldError as ProtocolFieldError
 from .protocol import RetrievalProtocol as RetrievalProtocol
 from .protocol_options import with_protocol as with_protocol
 from .protocol_options import with_protocols as with_protocols
+from .query_outcomes import PoseErrors as PoseErrors
 from .query_outcomes import QueryOutcomes as QueryOutcomes
 from .query_outcomes import auroc as auroc
 from .query_outcomes import common_blocks as common_blocks
 from .query_outcomes import judge as judge
-from .result_number import Number as Number
+from .query_outcomes import pose_error as pose_error
 from .retrieval import Retrieval as Retrieval
 from .retrieval import compare_at_radii as compare_at_radii
 from .retrieval import matches_within_radius as matches_within_radius

@@ -14,7 +14,7 @@ import inspect
 import math
 from operator import methodcaller
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,6 @@ from evaluation.recognition.precision_recall import (
     weighted_metrics,
 )
 from evaluation.recognition.query_outcomes import QueryOutcomes
-from evaluation.recognition.result_number import Number
 from evaluation.recognition.sign_flips import (
     UNKNOWN,
     Interval,
@@ -920,3 +919,25 @@ def choose_metrics(names: Iterable[str]) -> list[Metric]:
                 f"{did_you_mean(name, METRICS)}"
             )
     return found
+
+
+class Number(NamedTuple):
+    """A result of a task.
+
+    Attributes:
+        method: method, estimator or baseline; "" if there is none. For a place
+            recognition method, it is the method's name with its settings.
+        verified: whether geometric verification was used.
+        metric: name of the metric.
+        value: its value.
+        interval: its 95 % interval.
+        n: number of queries, points or other items from which the value is
+            computed.
+    """
+
+    method: str
+    verified: bool
+    metric: str
+    value: float
+    interval: Interval = UNKNOWN
+    n: int = 0

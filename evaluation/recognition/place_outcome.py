@@ -12,11 +12,10 @@ import numpy as np
 from cns_drake.base import InputError
 from evaluation.methods import Method
 from evaluation.recognition.faults import faults
-from evaluation.recognition.metrics import Mode, numbers_of
+from evaluation.recognition.metrics import Mode, Number, numbers_of
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.ranking import ranked_places
-from evaluation.recognition.result_number import Number
 from evaluation.recognition.retrieval import Retrieval
 
 # Number of top-ranked places that are kept for each query.

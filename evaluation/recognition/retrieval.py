@@ -18,8 +18,8 @@ from evaluation.recognition.geometric_verification import (
     verified_by_poses,
 )
 from evaluation.recognition.overlap_truth import overlap_matrix
-from evaluation.recognition.pose_errors import PoseErrors, pose_error
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.query_outcomes import PoseErrors, pose_error
 from evaluation.recognition.ranking import ranked_places
 from evaluation.recognition.search import Search
 

@@ -54,8 +54,7 @@ from cns_drake.city.buildings import (
     waterfront_hall,
 )
 from cns_drake.city.buildings.landmarks import LANDMARKS, Landmark
-from cns_drake.city.facades.archetype import Archetype
-from cns_drake.city.facades.building import Building
+from cns_drake.city.facades.building import Archetype, Building
 from cns_drake.city.facades.site import Site
 from cns_drake.city.geometry.models import Model
 

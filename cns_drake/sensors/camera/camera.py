@@ -34,8 +34,7 @@ from cns_drake.recording import (
 )
 from cns_drake.sensors.camera.camera_scene import CameraScene
 from cns_drake.sensors.camera.config import CameraSection
-from cns_drake.sensors.camera.renderer import RENDERER
-from cns_drake.sensors.camera.sky import SkyPainter
+from cns_drake.sensors.camera.renderer import RENDERER, SkyPainter
 
 # Near clipping distance [m].
 _NEAR = 0.05

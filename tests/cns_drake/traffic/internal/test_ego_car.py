@@ -7,7 +7,7 @@ from shapely import affinity
 
 from cns_drake.traffic import EgoBox
 from cns_drake.traffic.ego_car import meets_ego
-from cns_drake.traffic.tracks import Tracks
+from cns_drake.traffic.traffic_plan import Tracks
 
 BOX = EgoBox(-1.0, 3.0, 1.0)
 

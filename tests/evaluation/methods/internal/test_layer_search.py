@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 
 from evaluation.methods import LayeredOverlap, layered_overlap, make_method
-from evaluation.methods.layered_overlap import LayeredScan, climb, turns
-from evaluation.methods.overlap_layers import layer_cells
+from evaluation.methods.layered_overlap import (
+    LayeredScan,
+    climb,
+    layer_cells,
+    turns,
+)
 
 
 def method(**parameters) -> LayeredOverlap:
