@@ -890,8 +890,6 @@ NOT_RUN = {
     " the repository's hooks",
     ".venv/bin/pip install nbconvert": "installs from the network and changes"
     " the notebooks",
-    ".venv/bin/python tests/benchmarks/first_hour.py": "installs from the "
-    "network, and takes many minutes",
     ".venv/bin/python -m pytest tests/": "tests in a test; `.ci/run` runs all"
     " of them",
     ".venv/bin/python -m pytest --night": "takes as long; the workflow runs "

@@ -30,7 +30,6 @@ RUNS = {
 # files that cannot be shipped; what they share with others is run above.
 BY_HAND = {
     "any_diagram.py",
-    "first_hour.py",
     "interruptions.py",
     "interval_coverage.py",
     "lidar_odometry.py",

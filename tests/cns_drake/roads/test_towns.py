@@ -30,44 +30,6 @@ FACTS = {
     ),
 }  # fmt: skip
 
-# Points read off the towns' centrelines, all round each network.
-POINTS = {
-    "riverside": [
-        (365.4, 0.0), (290.4, 0.0), (209.5, 0.0), (121.1, 0.0), (44.2, 0.0),
-        (157.0, -131.4), (268.1, -131.5), (45.8, -328.6), (155.2, -328.6),
-        (270.6, -328.6), (366.9, -328.6), (394.3, -267.1), (394.3, -165.3),
-        (394.3, -63.0), (125.2, -57.5), (207.2, -57.5), (283.2, -57.5),
-        (391.8, -2.7), (157.0, -197.2), (268.1, -197.2), (2.8, -2.4),
-        (391.5, -326.1), (0.0, -61.7), (0.0, -163.5), (0.0, -264.7),
-        (336.9, -30.6), (336.8, -96.8), (336.8, -163.7), (336.7, -264.3),
-        (2.6, -325.3), (90.4, -30.6), (90.4, -96.0), (90.4, -165.0),
-        (90.4, -263.8), (156.0, -30.6),
-    ],
-    "suburbia": [
-        (-5.4, -270.8), (-5.4, -224.8), (-5.4, -151.4), (-2.6, -302.3),
-        (188.7, -110.3), (19.0, -189.6), (87.9, -189.6), (164.8, -189.6),
-        (43.9, -272.9), (43.8, -212.4), (134.1, -214.7), (162.8, -238.9),
-        (89.8, -238.9), (149.6, -107.4), (91.6, -107.4), (38.2, -107.4),
-        (191.7, -266.8), (191.7, -214.7), (191.7, -151.9), (-2.1, -110.0),
-        (188.2, -301.9), (19.6, -304.6), (87.8, -304.5), (149.4, -304.5),
-    ],
-    "downtown": [
-        (119.9, 196.2), (46.2, 198.1), (-67.5, 195.2), (-79.9, 95.2),
-        (-79.7, 35.8), (-79.4, -72.7), (223.7, -4.1), (188.8, -3.6),
-        (115.3, -2.5), (56.0, -1.6), (117.3, 134.0), (46.0, 135.5),
-        (-39.1, 137.4), (-132.4, 126.8), (-147.2, 53.5), (-147.3, -28.2),
-        (-147.3, -87.9), (-127.6, -134.4), (-42.4, -133.2), (-0.1, 87.1),
-        (1.9, 166.5), (-0.6, -82.4), (-0.1, -154.7), (0.1, -183.6),
-        (84.4, 164.8), (82.4, 104.5), (80.1, 39.1), (-115.5, -33.9),
-        (201.5, -60.6), (131.9, -60.7), (-35.4, -175.1), (117.4, 74.6),
-        (-53.9, 1.1), (-115.4, 1.5), (-154.0, 1.7), (204.6, 202.2),
-        (243.7, 137.7), (241.7, 54.0), (239.6, -33.5), (237.6, -115.6),
-        (210.5, -185.6), (132.4, -202.0), (50.9, -202.2), (-32.3, -202.4),
-        (-80.9, -172.4), (153.0, 179.0), (152.7, 158.0), (151.7, 102.3),
-        (150.6, 38.6), (49.6, -132.1), (116.8, -131.2), (166.7, -104.8),
-    ],
-}  # fmt: skip
-
 
 @pytest.fixture(scope="module")
 def networks():
@@ -106,17 +68,6 @@ def test_a_town_has_the_dimensions_of_its_original(networks, town):
     assert found_arms == arms
     assert {road.lane_width for road in roads} == {lane_width}
     assert {road.sidewalk for road in roads} == {sidewalk}
-
-
-@pytest.mark.parametrize("town", POINTS)
-def test_centrelines_pass_through_the_original_ones(networks, town):
-    lines = [
-        LineString(road.evaluate(np.arange(0, road.full_length, 0.5))[:, :2])
-        for road in networks[town].roads.values()
-    ]
-    for point in POINTS[town]:
-        off = min(line.distance(Point(point)) for line in lines)
-        assert off < 0.7, point
 
 
 @pytest.mark.parametrize("town", FACTS)
@@ -168,51 +119,6 @@ def test_streets_are_one_piece_and_sidewalks_line_them(networks, town):
             offset = side * (road.half_width + road.parking + 0.1)
             x, y = road.evaluate(middle, offset)[0, :2]
             assert network.areas.sidewalks.contains(Point(x, y)), road.name
-
-
-def test_towns_without_hills_are_flat(networks):
-    for town in ("riverside", "suburbia", "metropolis"):
-        for road in networks[town].roads.values():
-            assert np.all(road.centreline()[:, 2] == 0.0)
-
-
-def test_speed_limits_are_those_of_the_originals(networks):
-    for town in ("riverside", "suburbia"):
-        for road in networks[town].roads.values():
-            assert road.speed_limit == pytest.approx(25 * 0.44704, abs=0.05)
-    limits = Counter()
-    for road in networks["downtown"].roads.values():
-        limits[round(road.speed_limit / 0.44704)] += 1
-    # 55 mph, some 50, and 25 in the close's loop.
-    assert limits.keys() == {55, 50, 25}
-    assert limits[25] == 1
-
-
-def test_downtown_rises_where_its_original_does(downtown):
-    surface = RoadSurface(downtown)
-    # Points of Town03's centrelines with their heights.
-    known = [
-        (119.9, 196.2, 0.0), (-79.8, 71.5, -0.9), (-79.7, 35.8, -0.4),
-        (-79.4, -72.7, 0.8), (188.8, -3.6, 0.0), (117.3, 134.0, 8.0),
-        (61.5, 135.2, 7.1), (46.0, 135.5, 4.0), (30.5, 135.9, 1.1),
-        (-132.4, 126.8, 0.9), (-147.2, 53.5, 0.1), (-0.1, 87.1, 0.0),
-        (82.4, 104.5, 8.0), (117.4, 74.6, 8.0),
-        (152.8, 165.7, 2.9), (152.6, 154.2, 5.7), (151.7, 102.3, 8.0),
-        (237.6, -115.6, 0.6), (210.5, -185.6, 2.2), (174.0, -200.0, 2.8),
-        (132.4, -202.0, 2.0), (50.9, -202.2, 0.2), (116.8, -131.2, 0.3),
-    ]  # fmt: skip
-    points = np.array(known)
-    np.testing.assert_allclose(
-        surface.heights(points[:, :2]), points[:, 2], atol=0.5
-    )
-    # The two southern ramps end 2 m earlier than the original's, so that
-    # their junctions are level; the north-western one is less steep.
-    ramps = np.array(
-        [(80.1, 39.1, 3.3), (150.6, 38.6, 2.9), (84.4, 164.8, 4.7)]
-    )
-    np.testing.assert_allclose(
-        surface.heights(ramps[:, :2]), ramps[:, 2], atol=1.2
-    )
 
 
 def test_ramps_are_smooth(downtown):
@@ -272,25 +178,3 @@ def test_the_roundabout_turns_one_way(downtown):
             and way.outgoing.road.startswith("circle_")
             for way in downtown.connections(entry.end)
         )
-
-
-def test_downtown_has_its_special_places(downtown):
-    five = downtown.junctions["five_ways"]
-    assert len(five.arms) == 5
-    box = downtown.junction_areas["five_ways"].bounds
-    middle = (np.array(box[:2]) + box[2:]) / 2
-    np.testing.assert_allclose(middle, [-83.3, -6.7], atol=4.0)
-    loop = downtown.roads["close_loop"]
-    assert loop.start == loop.end == "loop"
-    points = loop.centreline()
-    np.testing.assert_allclose(points.mean(axis=0)[:2], [80, -60], atol=3.0)
-    # West of x = -100 only the bulge, with two lanes.
-    for name in ("bulge_north", "bulge_middle", "bulge_south"):
-        assert sum(downtown.roads[name].lanes.values()) == 2
-    corners = [
-        "grid_north_west",
-        "grid_north_east",
-        "grid_south_west",
-        "grid_south_east",
-    ]
-    assert [downtown.junctions[name].height for name in corners] == [8.0] * 4

@@ -251,8 +251,6 @@ def faulty_files(folder):
         "1 instead of 2 rows",
     )
     yield "odd.ply", header % (b"binary", b"float"), "unknown format"
-    yield "type.ply", header % (b"ascii", b"quad"), "'quad'"
-    yield "ints.ply", header % (b"ascii", b"int"), "property z"
 
 
 def test_faults_are_one_line_that_names_the_file(tmp_path):
@@ -270,9 +268,6 @@ def test_faults_are_one_line_that_names_the_file(tmp_path):
     [
         (b"'descr': '<f4'", b"'descr': '<f4"),
         (b"(500, 3)", b"(500, -3)"),
-        (b"(500, 3)", b"(500, 3"),
-        (b"(500, 3)", b"('a', 3)"),
-        (b"(500, 3)", b"(500.)"),
         (b"'shape'", b"7      "),
     ],
 )
@@ -286,20 +281,6 @@ def test_damaged_npy_headers(tmp_path, old, new):
         read_cloud(path)
 
 
-@pytest.mark.parametrize("digits", [9, 15, 17, 18, 19, 20, 40])
-def test_a_number_of_points_that_numpy_cannot_count(tmp_path, digits):
-    """It is refused without a warning beside the error."""
-    path = tmp_path / "map.npy"
-    for shape in (f"({10**digits}, 3)", f"({10**digits}, {10**digits})"):
-        header = "{'descr': '<f8', 'fortran_order': False, 'shape': " + shape
-        header = (header + "}").ljust(245) + "\n"
-        path.write_bytes(b"\x93NUMPY\x01\x00\xf6\x00" + header.encode())
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            with pytest.raises(InputError, match=r"map\.npy: "):
-                read_cloud(path)
-
-
 def test_archives_and_records_of_no_numbers(tmp_path):
     np.savez(tmp_path / "a.npz", POINTS)
     (tmp_path / "a.npz").rename(tmp_path / "a.npy")
@@ -308,16 +289,6 @@ def test_archives_and_records_of_no_numbers(tmp_path):
     np.save(tmp_path / "b.npy", np.zeros(3, [(n, "S4") for n in "xyz"]))
     with pytest.raises(InputError, match="no number x"):
         read_cloud(tmp_path / "b.npy")
-
-
-def test_pcd_field_of_no_size(tmp_path):
-    write_pcd(
-        tmp_path / "map.pcd",
-        HEADER | {"SIZE": "4 4 5", "DATA": "ascii"},
-        b"1 2 3\n" * 500,
-    )
-    with pytest.raises(InputError, match=r"map.pcd: PCD header: "):
-        read_cloud(tmp_path / "map.pcd")
 
 
 @pytest.mark.parametrize(("z", "fine"), [(9.9e7, True), (1.01e8, False)])
@@ -484,10 +455,7 @@ def notes_of(path):
     [
         (None, False),
         ("0 0 0 1 0 0 0", False),
-        ("0.0 -0.0 0e0 1.000 0 0 0", False),
         ("30 5 0 0.7071 0 0 0.7071", True),
-        ("0 0 1e-3 1 0 0 0", True),
-        ("0 0 0 0 0 0 1", True),
         ("0 0 0 1", True),
         ("a b c 1 0 0 0", True),
     ],

@@ -173,18 +173,6 @@ def swap_rows(stamps_ns, X_UB):
     stamps_ns[10], stamps_ns[11] = stamps_ns[11], stamps_ns[10]
 
 
-def same_time(stamps_ns, X_UB):
-    stamps_ns[10] = stamps_ns[9]
-
-
-def nan_value(stamps_ns, X_UB):
-    X_UB[20, 1, 3] = np.nan
-
-
-def no_rotation(stamps_ns, X_UB):
-    X_UB[20, 0, 0] += 0.01
-
-
 def mirrored(stamps_ns, X_UB):
     X_UB[:, :3, 2] *= -1.0
 
@@ -205,9 +193,6 @@ def long_gap(stamps_ns, X_UB):
     ("change", "fault"),
     [
         (swap_rows, "time: pose 12 at .* is not later"),
-        (same_time, "time: pose 11 at .* is not later"),
-        (nan_value, "row 21: a number is not finite"),
-        (no_rotation, "row 21: no rotation matrix"),
         (mirrored, "row 1: no rotation matrix"),
         (lost_for_a_while, "easting: .* is no UTM coordinate"),
         (other_day, "no pose for any scan"),
@@ -226,12 +211,7 @@ def test_poses_that_cannot_be_used(tmp_path, change, fault):
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("", "no row of numbers"),
         ("1561000444390857631,1,0,0\n", "row"),
-        (
-            "1561000444390857631," + ",".join("abcdefghijkl"),
-            "could not convert 'a'",
-        ),
         ("12x," + ",".join("100010001000"), "no row of numbers"),
         ("1561000444390857631," * 13, "row"),
     ],
@@ -243,15 +223,6 @@ def test_tables_of_another_form(tmp_path, text, fault):
     with pytest.raises(InputError, match=f"^{path}: .*{fault}") as info:
         open_drive(tmp_path / "s")
     assert "\n" not in str(info.value)
-
-
-def test_a_row_cut_off_in_the_middle(tmp_path):
-    write_drive(tmp_path / "s")
-    path = tmp_path / "s" / "global_pose.csv"
-    text = path.read_text()
-    path.write_text(text[: text.rindex(",")])
-    with pytest.raises(InputError, match=f"^{path}: "):
-        open_drive(tmp_path / "s")
 
 
 def test_missing_parts(tmp_path):
@@ -294,18 +265,6 @@ def test_beams_without_a_return_have_no_finite_point(tmp_path, value):
     assert np.flatnonzero(~np.isfinite(scan["y"])).tolist() == [4]
 
 
-@pytest.mark.parametrize("value", [1.1e4, -3e30])
-def test_a_point_that_is_no_point(tmp_path, value):
-    write_drive(tmp_path / "s")
-    path = tmp_path / "s/sensor_data/Ouster" / f"{T0_NS}.bin"
-    points = make_points(20)
-    points[4, 1] = value
-    write_bytes(path, xyzi(points))
-    drive = open_drive(tmp_path / "s")
-    with pytest.raises(InputError, match=f"^{path}: y: point 4 is at"):
-        drive.scan(0)
-
-
 def test_files_with_other_names(tmp_path):
     write_drive(tmp_path / "s")
     folder = tmp_path / "s/sensor_data/Ouster"
@@ -314,11 +273,3 @@ def test_files_with_other_names(tmp_path):
     write_bytes(folder / "first.bin", b"")
     with pytest.raises(InputError, match=r"'first' is no time"):
         open_drive(tmp_path / "s")
-
-
-def test_index_out_of_range(tmp_path):
-    write_drive(tmp_path / "s")
-    drive = open_drive(tmp_path / "s")
-    for index in (-1, NUM_SCANS):
-        with pytest.raises(IndexError):
-            drive.scan(index)

@@ -96,10 +96,6 @@ class TestAxes:
 
 
 class TestCountBits:
-    @pytest.mark.parametrize("word", [0, 1, 2, 1 << 61, (1 << 62) - 1, 0xF0F1])
-    def test_one(self, word):
-        assert count_bits(word) == bin(word).count("1")
-
     def test_many(self):
         words = np.random.default_rng(41).integers(0, 1 << 62, (30, 20))
         expected = [[bin(word).count("1") for word in row] for row in words]
@@ -107,48 +103,6 @@ class TestCountBits:
 
 
 class TestHeightImage:
-    def test_bits_and_means(self):
-        image = draw(
-            [
-                *CORNERS,
-                [0.1, 2.2, 0.05],
-                [0.1, 2.2, 0.07],
-                [0.1, 2.2, -0.95],
-                [0.2, 2.0, 3.85],
-            ]
-        )
-        # The grid starts at -10.25: (2.2 + 10.25) / 0.5 is 24.9, and
-        # (0.1 + 10.25) / 0.5 is 20.7.
-        assert image.heights[24, 20] == bits(10, 0, 48)
-        np.testing.assert_allclose(image.means[24, 20], [2.15, 0.125])
-        assert np.count_nonzero(image.heights) == 5
-        assert np.isnan(image.means[24, 21]).all()
-        # 42 cells with points: 9 segments, and one for neighbours.
-        assert image.heights.shape == (50, 50)
-
-    @pytest.mark.parametrize(
-        ("height", "expected"),
-        [
-            (-1.001, None),
-            (-0.999, bits(0)),
-            (-0.901, bits(0)),
-            (-0.899, bits(1)),
-            (3.899, bits(48)),
-            (3.901, 0),
-            (3.999, 0),
-            (4.001, None),
-        ],
-    )
-    def test_limits_of_layers(self, height, expected):
-        # Above the last layer a point has no bit, but counts for the mean.
-        points = np.concatenate([CORNERS, CORNERS, [[0.1, 2.2, height]]])
-        image = draw(points)
-        if expected is None:
-            assert np.isnan(image.means[24, 20]).all()
-        else:
-            assert image.heights[24, 20] == expected
-            np.testing.assert_allclose(image.means[24, 20], [2.2, 0.1])
-
     def test_in_the_frame_of_the_plane(self):
         points = np.concatenate(
             [CORNERS, post(1.1, 2.2, 0, 2), post(-3.4, 7.7, 1, 3)]
@@ -202,56 +156,6 @@ class TestLeaningAxes:
 
 
 class TestPeaks:
-    def found(self, cells, min_heights=10, shape=(20, 15)):
-        image = np.zeros(shape, dtype=np.int64)
-        for cell, value in cells.items():
-            image[cell] = value
-        return list(zip(*peaks(image, min_heights), strict=True))
-
-    def test_alone(self):
-        assert self.found({(7, 8): 20}) == [(7, 8)]
-
-    @pytest.mark.parametrize(("height", "number"), [(9, 0), (10, 1)])
-    def test_lowest(self, height, number):
-        assert len(self.found({(7, 8): height})) == number
-
-    def test_highest_of_a_segment_the_first_of_equal_ones(self):
-        assert self.found({(6, 6): 20, (8, 8): 21}) == [(8, 8)]
-        assert self.found({(6, 8): 20, (8, 6): 20}) == [(6, 8)]
-        # Another segment begins at column 10.
-        cells = {(6, 6): 20, (8, 12): 21}
-        assert self.found(cells) == [(6, 6), (8, 12)]
-
-    def test_not_in_the_first_row_or_column(self):
-        cells = {(0, 6): 30, (7, 0): 30, (1, 1): 30}
-        assert self.found(cells) == [(1, 1)]
-
-    @pytest.mark.parametrize("direction", [(0, 1), (1, 0), (1, 1), (1, -1)])
-    @pytest.mark.parametrize("sign", [1, -1])
-    @pytest.mark.parametrize(
-        ("one", "other", "stays"),
-        [
-            (17, 10, False),
-            (16, 10, True),
-            (17, 9, True),
-            (16, 16, True),
-            (20, 20, False),
-        ],
-    )
-    def test_line(self, direction, sign, one, other, stays):
-        # Nearly as high is 20 - 3, half as high is 10.
-        down, right = direction[0] * sign, direction[1] * sign
-        cells = {
-            (7 - down, 7 - right): other,
-            (7 + down, 7 + right): one,
-            (7, 7): 20,
-        }
-        # Heights are equal: the first of the segment is the one compared, so
-        # the middle one must be the highest without a bonus.
-        if one == 20:
-            cells[7, 7] = 21
-        assert ((7, 7) in self.found(cells)) == stays
-
     @pytest.mark.parametrize("seed", range(3))
     def test_brute_force(self, seed):
         rng = np.random.default_rng([seed, 43])
@@ -312,28 +216,6 @@ class TestKeypoints:
     def make(self, positions, numbers):
         heights = np.array([(1 << n) - 1 for n in numbers], dtype=np.int64)
         return Keypoints(np.asarray(positions, float), heights)
-
-    @pytest.mark.parametrize(
-        ("distance", "numbers", "left"),
-        [
-            (1.99, (12, 15), [1]),
-            (1.99, (15, 12), [0]),
-            (1.99, (12, 12), []),
-            (2.01, (12, 15), [0, 1]),
-            (2.01, (12, 12), [0, 1]),
-        ],
-    )
-    def test_suppression(self, distance, numbers, left):
-        keypoints = self.make([[3, 4, 5], [3, 4 + distance, 5]], numbers)
-        kept = suppress(keypoints, 2.0, 500)
-        np.testing.assert_array_equal(kept.positions, keypoints.positions[left])
-        np.testing.assert_array_equal(kept.heights, keypoints.heights[left])
-
-    def test_suppressed_ones_suppress(self):
-        # The last one removes the middle one, and that removes the first.
-        positions = [[0, 0, 0], [1.5, 0, 0], [3.0, 0, 0]]
-        kept = suppress(self.make(positions, (10, 11, 12)), 2.0, 500)
-        assert kept.positions.tolist() == [[3.0, 0.0, 0.0]]
 
     def test_suppression_brute_force(self):
         rng = np.random.default_rng(44)

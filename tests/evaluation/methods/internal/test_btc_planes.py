@@ -138,25 +138,6 @@ class TestMerging:
         labels = group_alike(centers, normals, 0.1, 0.3)
         assert (labels + 1).tolist() == expected
 
-    @pytest.mark.parametrize(
-        ("angle", "height", "alike"),
-        [
-            (0.0, 0.29, True),
-            (0.0, 0.31, False),
-            (0.0999, 0.0, True),
-            (0.1002, 0.0, False),
-            (math.pi - 0.05, 0.0, True),
-        ],
-    )
-    def test_limits(self, angle, height, alike):
-        # Normals at an angle a differ by 2 sin(a / 2).
-        normals = np.array(
-            [[0.0, 0.0, 1.0], [math.sin(angle), 0.0, math.cos(angle)]]
-        )
-        centers = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, height]])
-        labels = group_alike(centers, normals, 0.1, 0.3)
-        assert (labels[0] == labels[1] == 0) == alike
-
     def test_merged_plane_has_the_moments_of_all_points(self):
         parts = [
             patch(k, 20 + k, [4.0 * k + 1.0, 1.0, 1.0], [0.0, 0.0, 1.0], 0.02)
