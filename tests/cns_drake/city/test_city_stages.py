@@ -77,12 +77,6 @@ def test_there_is_no_stage_03(tmp_path):
     ("old", "new", "fault"),
     [
         ("[tower_001]", "[tower_009]", "01.absent.a tower: unknown structure "),
-        ("a tower: [tower_001]", "a: [car_*, bus_*]", "structure bus_*"),
-        (
-            "story: nothing yet",
-            _first("lower", "height: 1, structures: [tree_001]"),
-            "y.height",
-        ),
         (
             "story: nothing yet",
             _first("sites", "height: 9, structures: [tree_9]"),
@@ -99,12 +93,8 @@ def test_there_is_no_stage_03(tmp_path):
             "the last stage",
         ),
         ("[tower_002]", "[tower_001]", "tower_001 is already in stages.01"),
-        ("[tower_002]", "[tree_002]", "tree_002 is already in stages.02"),
         ("all of it", "all\n    absent: {x: [car_001]}", "the last stage"),
         ('"01"', '"05"', "rising order"),
-        ('"01"', '"one"', "stages.one"),
-        ("story: a tower", "tale: a tower", "stages.02.tale"),
-        ("stages:", "lot: {}\nstages:", "lot: Extra inputs"),
         ("stages:", "lots: {pool: []}\nstages:", "lots.pool"),
         ("stages:", "stages: [", "not readable as YAML"),
         (GOOD, "stages: {}", "at least one stage"),

@@ -45,23 +45,15 @@ def files(tmp_path_factory, small_map):
     wall = box_visual("wall", (8, 0, 2, 0, 0, 0), (1, 40, 4))
     (folder / "good.sdf").write_text(world_text([wall]))
     mesh = "<mesh><uri>gone.obj</uri></mesh>"
-    for name, geometry in [
-        ("gone", mesh),
-        ("plane", "<plane><normal>0 0 1</normal></plane>"),
-    ]:
-        visual = f'<visual name="v"><geometry>{geometry}</geometry></visual>'
-        (folder / f"{name}.sdf").write_text(world_text([visual]))
-    (folder / "torn.sdf").write_text("<sdf><world>")
+    visual = f'<visual name="v"><geometry>{mesh}</geometry></visual>'
+    (folder / "gone.sdf").write_text(world_text([visual]))
     (folder / "bare.sdf").write_text(world_text([]))
     values = scenario_values(small_map) | {"frames": 3}
     for name, change in [
         ("drive", {}),
         ("typo", {"stge": "04"}),
         ("stage", {"stage": "77"}),
-        ("map", {"map": "nowhere"}),
-        ("type", {"frames": "all"}),
         ("long", {"frames": 10**7}),
-        ("road", {"route": [dict(values["route"][0], road="milky_way")]}),
     ]:
         text = yaml.safe_dump(values | {"name": name} | change)
         (folder / f"{name}.yaml").write_text(text)
@@ -212,54 +204,25 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
         (["simulate", "{files}"], "a folder without a drive"),
         (["simulate", "{files}/none.yaml"], "none.yaml: no such"),
         (["simulate", "{files}/typo.yaml"], "typo.yaml: stge: "),
-        (["simulate", "{files}/type.yaml"], "type.yaml: frames: "),
         (["simulate", "{files}/stage.yaml"], "stage.yaml: stage: .*'77'"),
-        (["simulate", "{files}/map.yaml"], "map.yaml: map: .*nowhere"),
-        (["simulate", "{files}/road.yaml"], "road.*milky_way"),
         (["simulate", "{files}/long.yaml"], "frames: 10000000"),
-        (["simulate", "{files}/file"], "file: not a mapping"),
         (["simulate", "{files}/drive.yaml", "--lidar", "x"], "--lidar: .*'x'"),
-        (["simulate", "{files}/drive.yaml", "--frames", "0"], "--frames"),
         (["simulate", "{files}/drive.yaml", "--bogus"], "--bogus"),
         (["simulate", "{files}/drive.yaml", "--camera", "6x4@2 "], "WxH@RATE"),
-        (["simulate", "{files}/drive.yaml", "--camera", "-1x3@2"], "WxH@RATE"),
-        (["film", "atlantis_01"], "unknown drive 'atlantis_01'"),
         (
             ["film", "{files}/drive.yaml", "--size", "64"],
             "--size: '64'",
-        ),
-        (
-            ["film", "{files}/drive.yaml", "--size", "31x64"],
-            "--size: '31x64'",
-        ),
-        (
-            ["film", "{files}/drive.yaml", "--size", "64x1921"],
-            "--size: ",
-        ),
-        (
-            ["film", "{files}/drive.yaml", "--seconds", "0"],
-            "--seconds",
-        ),
-        (
-            ["film", "{files}/drive.yaml", "--seconds", "nan"],
-            "--seconds",
-        ),
-        (
-            ["film", "{files}/drive.yaml", "--start-time", "-1"],
-            "--start-time",
         ),
         (
             ["film", "{files}/drive.yaml", "--start-time", "1e6"],
             "--start-time: 1e.06 s: ",
         ),
         (["scan", "{files}/gone.sdf", *POSE], "gone.sdf: .*gone.obj"),
-        (["scan", "{files}/torn.sdf", *POSE], "torn.sdf: "),
         (
             ["scan", "{files}/bare.sdf", *POSE],
             "bare.sdf: the world has no visuals",
         ),
         (["scan", "{files}/no.sdf", *POSE], "no.sdf: no such file"),
-        (["scan", "{files}/good.sdf", "--pose", "1"], "--pose"),
         (
             ["scan", "{files}/good.sdf", "--pose", *"00000", "nan"],
             "--pose: not finite",
@@ -267,17 +230,11 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
         (["reproduce", "atlantis"], "unknown map 'atlantis'"),
         (["study"], "study: give an experiment, or --list"),
         (["study", "war"], "war: neither an experiment of this package"),
-        (["study", "{files}"], "neither an experiment"),
-        (["study", "{files}/file"], "file: not a mapping of an experiment"),
         (["study", "{files}/typo.yaml"], "typo.yaml: .*: Extra inputs"),
         (["study", "levels", "--quick"], "levels.yaml: quick: missing"),
-        (["study", "ladder", "atlantis"], "unknown map 'atlantis'"),
         (["study", "ladder", "--task", "dance"], "ladder: tasks: no task 'dan"),
         (["study", "ladder", "--method", "bow"], "ladder: methods: no method"),
-        (["study", "ladder", "--method", "no.py"], "methods: .*no.py: no such"),
         (["study", "ladder", "--set", "levels"], "'levels' is not FIELD=VALUE"),
-        (["study", "ladder", "--set", "levels=[]"], "ladder.yaml: levels: "),
-        (["study", "ladder", "--jobs", "0"], "--jobs"),
         (
             ["reproduce", "--no-recordings", "--pages"],
             "--no-recordings and --pages exclude each other",
@@ -289,9 +246,6 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
             ["simulate", "{files}/drive.yaml", "--lidar", "os1_64"],
             "mean os1-64\\?",
         ),
-        (["age", "subrbia", "--years", "1"], "mean suburbia\\?"),
-        (["reproduce", "metropolos"], "mean metropolis\\?"),
-        (["study", "laddr"], "mean ladder\\?"),
         (["study", "ladder", "--method", "ring+++"], "mean ring\\+\\+\\?"),
         (["study", "ladder", "--task", "plaec"], "mean place\\?"),
     ],

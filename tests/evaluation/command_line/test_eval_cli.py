@@ -1,4 +1,3 @@
-import csv
 import json
 import subprocess
 import sys
@@ -176,30 +175,6 @@ def test_tcr_json(capsys, towns):
     assert values["in_hull"] > 100
 
 
-def test_tcr_of_itself_by_any_path(capsys, towns):
-    for path in (
-        towns / "town_01",
-        towns / "town_01" / "town_01_0.mcap",
-        towns / "town_01.npy",
-    ):
-        _, out, _ = run(capsys, "tcr", path, path, "--json")
-        assert json.loads(out)["tcr_sym"] == 0.0
-
-
-def test_tcr_table(capsys, towns):
-    a, b = towns / "town_01", towns / "town_02"
-    status, out, _ = run(capsys, "tcr", a, b, "--no-change", a)
-    assert status == 0
-    for text in (
-        "town_01 <-> town_02",
-        "TCR_sym ",
-        "(town_02 -> town_01)",
-        "where both drove",
-        "TCR_sym of only the routes",
-    ):
-        assert text in out
-
-
 def test_drives_far_apart_say_why_nothing_is_measured_where_both_drove(
     capsys, tmp_path
 ):
@@ -225,15 +200,6 @@ def test_tcr_undefined_is_null_with_a_reason(capsys, towns, tmp_path):
     status, out, _ = run(capsys, *arguments)
     assert status == 0
     assert "undefined" in out
-
-
-def test_tcr_notes_points_that_are_not_finite(capsys, towns, tmp_path):
-    points = np.load(towns / "town_01.npy")
-    points[3] = np.nan
-    np.save(tmp_path / "a.npy", points)
-    status, _, err = run(capsys, "tcr", tmp_path / "a.npy", tmp_path / "a.npy")
-    assert status == 0
-    assert "a.npy: 1 points are not finite" in err
 
 
 def test_pr_json(capsys, towns):
@@ -302,31 +268,6 @@ def test_pr_table_modes_and_parameters(capsys, towns):
     assert parameters["sensor_height"] == 1.8
 
 
-def test_scores_of_all_pairs(capsys, towns, tmp_path):
-    output = tmp_path / "scores.csv"
-    status, out, err = run(
-        capsys,
-        "scores",
-        towns / "town_01_scans",
-        towns / "town_02_scans",
-        "--method",
-        "scan-context++",
-        "--output",
-        output,
-    )
-    assert (status, out) == (0, "")
-    assert str(output) in err
-    with output.open(newline="") as stream:
-        rows = list(csv.DictReader(stream))
-    names = [f"{i:06d}" for i in range(4)]
-    assert [(r["query"], r["database"]) for r in rows] == [
-        (q, d) for q in names for d in names
-    ]
-    scores = np.array([float(r["score"]) for r in rows]).reshape(4, 4)
-    assert scores.argmax(axis=1).tolist() == [0, 1, 2, 3]
-    assert not list(tmp_path.glob("*.part"))
-
-
 @pytest.mark.slow
 def test_help_is_instant_and_modules_stay_apart():
     # The imported modules are tested in place of a time.
@@ -345,22 +286,6 @@ def test_help_is_instant_and_modules_stay_apart():
     assert done.returncode == 0, done.stderr
     for command in ("tcr", "pr", "localise", "report"):
         assert command in done.stdout
-
-
-@pytest.mark.slow
-@pytest.mark.night
-def test_nothing_imports_the_simulator():
-    code = (
-        "import pkgutil, importlib, sys, evaluation\n"
-        "for m in pkgutil.walk_packages(evaluation.__path__, 'evaluation.'):\n"
-        "    if not m.name.endswith('__main__'):\n"
-        "        importlib.import_module(m.name)\n"
-        "assert not {'pydrake', 'open3d'} & set(sys.modules)\n"
-        "rooms = {m.split('.')[1] for m in sys.modules"
-        " if m.startswith('cns_drake.')}\n"
-        "assert rooms == {'base'}, rooms\n"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.slow

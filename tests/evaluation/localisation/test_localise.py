@@ -472,21 +472,11 @@ def test_bad_input(streets, tmp_path, capsys, monkeypatch):
     np.save(tmp_path / "street.npy", street())
     for arguments, *words in (
         ([*pair, *gicp, "--start", "0"], "--start: 0 m"),
-        ([*pair, *gicp, "--start", "50.1"], "--start: 50.1 m"),
-        (
-            [*pair, *gicp, "--start", "nan"],
-            "--start: nan m",
-        ),
-        ([*pair, *gicp, "--start-turn", "181"], "--start-turn: 181 deg"),
         ([*pair, *gicp, "--seed", "-1"], "--seed"),
         ([*pair, *gicp, "--query-spacing", "0"], "--query-spacing: 0"),
         (
             [*pair, *gicp, "--track", "--query-spacing", "10"],
             "--query-spacing: not together",
-        ),
-        (
-            [*pair, *gicp, "--track", "--odometry-drift", "2"],
-            "--odometry-drift: 2",
         ),
         (
             [*pair, *gicp, "--odometry-drift", "0.01"],
@@ -497,13 +487,10 @@ def test_bad_input(streets, tmp_path, capsys, monkeypatch):
             "--align always: ",
             "street.npy",
         ),
-        ([*pair, *gicp, "--set", "width=x"], "--set: width"),
         ([*pair, *gicp, "--set", "wide=1"], "gicp has no setting 'wide'"),
         ([*pair, "--method", "ndt"], "no method 'ndt'"),
-        ([*pair, "--method", "nowhere.py"], "nowhere.py: no such file"),
         ([streets["map"], streets["away"], *gicp], "away", "the nearest scan"),
         ([tmp_path / "none.npy", pair[1], *gicp], "none.npy", "0 points"),
-        ([tmp_path / "few.npy", pair[1], *gicp], "few.npy", "1 points"),
         ([pair[0], tmp_path / "none.npy", *gicp], "none.npy: no scan has 10"),
         ([tmp_path / "street.npy", streets["away"], *gicp], "the nearest scan"),
     ):

@@ -79,18 +79,12 @@ def test_the_shown_method_finds_turned_places(tmp_path):
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("x = ", "SyntaxError"),
         ("1 / 0", "ZeroDivisionError: division by zero"),
         ("x = 1", "registers 0 methods"),
         (
             "from evaluation.methods import METHODS, register\n"
             "register('btc')(type('A', (METHODS['solid'],), {}))",
             "there is another method 'btc'",
-        ),
-        (
-            "from evaluation.methods import METHODS, register\n"
-            "register('bevplace')(type('A', (METHODS['solid'],), {}))",
-            "there is another method 'bevplace'",
         ),
         (
             "from evaluation.methods import Method, register\n"
@@ -132,19 +126,12 @@ class Own(Method):
     [
         ("return -abs", "-abs", "score returned NoneType of shape"),
         ("-abs(database - query)", "np.zeros(1)", "of shape (1,) instead of"),
-        ("-abs(database - query)", "np.zeros(())", "of shape () instead of"),
-        (
-            "-abs(database - query)",
-            "np.zeros((len(database), 1))",
-            "1) instead of",
-        ),
         (
             "-abs(database - query).astype(float)",
             "np.array(['a'] * len(database))",
             "score returned ndarray",
         ),
         ("return len(points)", "1 / 0", "line 10: ZeroDivisionError: division"),
-        ("return len(points)", "raise SystemExit(0)", "line 10: SystemExit: 0"),
         ("return np.array(places)", "places.x", "line 13: AttributeError"),
         ("import numpy", "raise SystemExit(0)\nimport numpy", "line 2: System"),
         ("    def score", "    def scare", "Own: lacks score"),
@@ -165,11 +152,6 @@ class Own(Method):
             "line 10: SystemExit",
         ),
         ("    def desc", "    Config = dict\n    def desc", "Config: <class"),
-        (
-            "return len(points)",
-            "raise type('Stop', (BaseException,), {})('x')",
-            "line 10: Stop: x",
-        ),
         ("return len(points)", "raise GeneratorExit", "line 10: GeneratorExit"),
         ("return len(points)", "points -= 1.0", "change a copy of it"),
         (
@@ -207,13 +189,6 @@ def test_faults_of_a_method_are_one_line(
             "    def describe_place(self, points):\n        exit(0)",
             "Parent",
             "line 9: SystemExit: 0",
-        ),
-        (
-            "class Parent(Method):\n"
-            "    @staticmethod\n"
-            "    def describe_place(points):\n        exit(len(points) < 1)",
-            "Parent",
-            "line 10: SystemExit: False",
         ),
         (
             "class Parent(Method):\n"
@@ -274,8 +249,6 @@ def test_a_relative_path_has_line_and_traceback(
         ("relative_poses(self, *three)", "return []", "list of length 0"),
         ("relative_poses(self, *three)", "pass", "NoneType of length None"),
         ("relative_pose(self, *three)", "return 5", "int of shape ()"),
-        ("relative_pose(self, *three)", "return np.ones((4, 4))", "no pose"),
-        ("relative_pose(self, *three)", "return np.nan * np.eye(4)", "no pose"),
         (
             "relative_pose(self, *three)",
             "return np.diag([1.0, 1.0, -1.0, 1.0])",
