@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 import pytest
 
-from cns_drake.sensors.camera import camera_scene, looks, sky
+from cns_drake.sensors.camera import camera_scene, looks, renderer
 from cns_drake.sensors.camera.camera_scene import repeated_coordinates
 
 
@@ -90,7 +90,7 @@ def test_walls_have_heights_in_rows_and_metres_across(heading):
 def test_the_sky_is_brighter_below_and_brightest_at_the_sun():
     tilt = np.deg2rad([1.0, 30.0, 85.0])
     d_W = np.stack([np.cos(tilt), 0 * tilt, np.sin(tilt)], axis=1)
-    colours = sky.sky_rgb(np.vstack([d_W, sky.SUN_W])).astype(int)
+    colours = renderer.sky_rgb(np.vstack([d_W, renderer.SUN_W])).astype(int)
     assert colours[0, 0] > colours[2, 0]
     assert (colours[3] == 255).all()
     assert (colours[:, 2] >= colours[:, 0]).all()
