@@ -22,7 +22,7 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 import scipy.fft
 import scipy.sparse
 import small_gicp
@@ -38,6 +38,9 @@ _NUM_FEATURES = 6
 # authors' program uses. It removes a third of the power of the channel with the
 # variance of z, and is therefore part of the method.
 _NORM_EPSILON = 1e-5
+# With the setting `candidates`, this number of the lowest radial frequencies
+# chooses the places that are compared by all frequencies.
+_FIRST_FREQUENCIES = 20
 # Number of spectra of places kept in memory, a third of a megabyte each.
 _REFERENCES_KEPT = 64
 # Number of pairs of a query and a place whose shifts are kept in memory, two
@@ -76,6 +79,9 @@ class RingPlusPlusConfig(MethodConfig):
             describe the shape around a point.
         cells: number of rows and of columns of the map from above, and also of
             angles and of rays of its Radon transform.
+        candidates: number of places that a query is compared with by all radial
+            frequencies: the most similar ones by the lowest 20. By default
+            these are all places, as in the authors' program.
     """
 
     half_width: PositiveFloat = 70.0
@@ -85,6 +91,7 @@ class RingPlusPlusConfig(MethodConfig):
     height_unit: PositiveFloat = 10.0
     neighbours: Annotated[int, Field(ge=2)] = 30
     cells: Annotated[int, Field(ge=2)] = 120
+    candidates: PositiveInt | None = None
 
     @model_validator(mode="after")
     def _limits_are_in_order(self) -> RingPlusPlusConfig:
@@ -216,15 +223,54 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     def score(
         self, query: Ring, database: RingDatabase, *, exhaustive: bool = False
     ) -> np.ndarray:
-        del exhaustive  # Always true here.
+        number = self.config.candidates
+        if exhaustive or number is None:
+            number = len(database.places)
+        return self.score_best(query, database, number)
+
+    @property
+    def num_shortlisted(self) -> int | None:
+        return self.config.candidates
+
+    def shortlist(self, query: Ring, database: RingDatabase) -> np.ndarray:
+        return self._most_similar(query, database)[1]
+
+    def score_best(
+        self, query: Ring, database: RingDatabase, number: int
+    ) -> np.ndarray:
+        scores = np.full(len(database.places), np.nan)
         if len(query.filled) == 0:
-            return np.full(len(database.places), np.nan)
+            return scores
+        chosen: Sequence[int] = range(len(scores))
+        if number < len(scores):
+            chosen = self._most_similar(query, database)[0][:number].tolist()
         conjugate = self._weighted_spectrum(query).conj()
-        scores = np.empty(len(database.places))
         shifts = database.shifts(query)
-        for k, place in enumerate(database.places):
-            scores[k], shifts[k] = self._best_shift(conjugate, place.spectrum)
+        for k in chosen:
+            scores[k], shifts[k] = self._best_shift(
+                conjugate, database.places[k].spectrum
+            )
         return np.where(database.is_empty, np.nan, scores)
+
+    def _most_similar(
+        self, query: Ring, database: RingDatabase
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the places most similar by low radial frequencies, and how.
+
+        The results are (K,) places, best first, and (K,) decreasing
+        correlations, with K at most `candidates`.
+        """
+        conjugate = _low_rows(self._weighted_spectrum(query).conj())
+        correlations = np.array(
+            [
+                self._best_shift(conjugate, _low_rows(place.spectrum))[0]
+                for place in database.places
+            ]
+        )
+        best = np.argsort(-correlations, kind="stable")[
+            : self.config.candidates
+        ]
+        return best, correlations[best]
 
     def relative_poses(
         self, query: Ring, database: RingDatabase, places: Sequence[int]
@@ -384,6 +430,13 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         # The product with the other one's conjugate runs backwards.
         best = int(correlation.argmax())
         return float(correlation[best]), -best % n
+
+
+def _low_rows(spectrum: np.ndarray) -> np.ndarray:
+    """Returns the rows of the lowest radial frequencies of each channel."""
+    num_angular = spectrum.shape[1]
+    channels = spectrum.reshape(_NUM_FEATURES, -1, num_angular)
+    return channels[:, :_FIRST_FREQUENCIES].reshape(-1, num_angular)
 
 
 def _without_duplicates(points: np.ndarray) -> np.ndarray:

@@ -228,6 +228,57 @@ class TestScore:
         assert one.features.tobytes() == two.features.tobytes()
 
 
+@pytest.fixture(scope="module")
+def rings():
+    """Descriptors of places, and of each from elsewhere."""
+    method = ring(cells=60)
+    scenes = [make_scene(seed) for seed in range(40, 60)]
+    places = [method.describe_place(one) for one in scenes]
+    motions = [pose(0.2 * k, 2.0 - 0.2 * k, 17.0 * k) for k in range(20)]
+    queries = [
+        method.describe(seen_from(motion, scene))
+        for motion, scene in zip(motions, scenes, strict=True)
+    ]
+    return places, queries
+
+
+class TestCandidates:
+    def test_all_places_are_the_default(self, rings):
+        places, queries = rings
+        whole, part = ring(cells=60), ring(cells=60, candidates=20)
+        database = whole.build_database(places)
+        for query in queries[:5]:
+            expected = whole.score(query, database)
+            found = part.score(query, database)
+            np.testing.assert_array_equal(found, expected)
+
+    def test_the_best_places_have_their_scores(self, rings):
+        places, queries = rings
+        whole, part = ring(cells=60), ring(cells=60, candidates=5)
+        for query in queries:
+            database = part.build_database(places)
+            found = part.score(query, database)
+            chosen = ~np.isnan(found)
+            assert chosen.sum() == 5
+            expected = whole.score(query, database)
+            np.testing.assert_array_equal(found[chosen], expected[chosen])
+            assert np.nanargmax(found) == expected.argmax()
+            # If places are excluded, each is compared.
+            every = part.score(query, database, exhaustive=True)
+            np.testing.assert_array_equal(every, expected)
+
+    def test_all_frequencies_choose_the_best(self):
+        """A map of 38 cells has 20 radial frequencies."""
+        method = ring(cells=38, candidates=3)
+        places = [method.describe(make_scene(seed)) for seed in range(8)]
+        database = method.build_database(places)
+        query = method.describe(make_scene(3)[::2])
+        scores = method.score(query, database, exhaustive=True)
+        scores[np.argsort(scores)[:-3]] = np.nan
+        found = method.score(query, database)
+        np.testing.assert_array_equal(found, scores)
+
+
 class TestRelativePose:
     @pytest.mark.parametrize(
         ("x", "y", "yaw_deg"),
