@@ -47,8 +47,8 @@ Costs = Annotated[
     bool,
     typer.Option(
         "--costs/--no-costs",
-        help="Whether to also measure the time and memory that each method "
-        "needs. The measured costs differ from run to run.",
+        help="Whether the page shows the time and memory that each method "
+        "took. They differ from run to run.",
     ),
 ]
 

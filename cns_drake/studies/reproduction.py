@@ -88,7 +88,7 @@ def reproduce_maps(
         methods: names or Python files of methods; by default the standard
             methods.
         settings: settings of methods, each `METHOD.NAME=VALUE`.
-        with_costs: whether times are measured.
+        with_costs: whether the page shows the times and memory of methods.
         printed: style of the charts for print; None for the default.
         on_note: is called with each note for the user, such as on how long the
             jobs take on this machine, and how much space they need.

@@ -1,9 +1,4 @@
-from .costs import NUM_TRIALS as NUM_TRIALS
-from .costs import Cost as Cost
-from .costs import QueryCost as QueryCost
-from .costs import measure_cost as measure_cost
-from .costs import measure_search as measure_search
-from .costs import query_ms as query_ms
+from .describing import DescribingCost as DescribingCost
 from .describing import Request as Request
 from .describing import Role as Role
 from .describing import describe_drive as describe_drive
@@ -58,6 +53,7 @@ from .retrieval import query_batches as query_batches
 from .retrieval import retrieve as retrieve
 from .scan_folders import write_scores as write_scores
 from .search import Search as Search
+from .search import SearchCost as SearchCost
 from .seen_surfaces import TOLERANCE as TOLERANCE
 from .seen_surfaces import SeenSurfaces as SeenSurfaces
 from .sign_flips import LEAST_CITIES as LEAST_CITIES

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Set
+from dataclasses import dataclass
+import time
 from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
@@ -21,6 +23,22 @@ Role = Literal["places", "queries"]
 _Waiting: TypeAlias = "tuple[int, Mapping[Role, np.ndarray]]"
 # A method, the roles in which it describes a drive, and the protocol.
 Request: TypeAlias = "tuple[Method, Set[Role], RetrievalProtocol]"
+
+
+@dataclass(frozen=True)
+class DescribingCost:
+    """What a method's descriptors of a drive have taken.
+
+    Attributes:
+        scans: number of scans that are merged into a cloud.
+        points: mean number of points of a cloud.
+        time: median CPU time to describe a cloud [s]. The first does not count,
+            because it includes loading and compiling.
+    """
+
+    scans: int
+    points: float
+    time: float
 
 
 class _CloudKind(NamedTuple):
@@ -48,6 +66,7 @@ def describe_drive(
     visit: Callable[[int, np.ndarray], None] | None = None,
     further: Iterable[Request] = (),
     make_list: Callable[[], Any] = list,
+    costs: list[DescribingCost] | None = None,
 ) -> list[DriveDescriptors]:
     """Describes the places and queries of a drive.
 
@@ -70,6 +89,7 @@ def describe_drive(
             to describe, and a protocol.
         make_list: function that returns an empty sequence with a method
             `append`, which holds the descriptors of one method in one role.
+        costs: list to which the cost of each result is appended.
 
     Returns:
         One `DriveDescriptors` for each method, followed by one for each entry
@@ -109,7 +129,10 @@ def describe_drive(
             f"{drive.name}: no finite point within {protocol.half_extent:g} m"
             f" of the LiDAR in any of {len(wanted)} scans"
         )
-    return [describer.finish() for describer in describing]
+    found = [describer.finish() for describer in describing]
+    if costs is not None:
+        costs += [describer.cost for describer in describing]
+    return found
 
 
 class _FrameClouds:
@@ -204,6 +227,9 @@ class _DriveDescriber:
         self._protocol = protocol
         self._waiting: list[_Waiting] = []
         self._members: dict[Role, set[int]] = {}
+        # CPU time of a cloud for each batch [ns], and points of each cloud.
+        self._spent_ns: list[float] = []
+        self._num_points: list[int] = []
         scans = {}
         for role in get_args(Role):
             frames = _frames_of_role(drive, role, protocol)
@@ -245,6 +271,18 @@ class _DriveDescriber:
     def frames(self) -> set[int]:
         """All frames that are described."""
         return set().union(*self._members.values())
+
+    @property
+    def cost(self) -> DescribingCost:
+        """What the descriptors have taken."""
+        if not self._spent_ns and self._alike is not None:
+            return self._alike.cost  # It has described all of these queries.
+        first, *others = self._spent_ns
+        return DescribingCost(
+            self._cloud_kind.num_scans,
+            float(np.mean(self._num_points)),
+            1e-9 * float(np.median(others or [first])),
+        )
 
     def add(self, seen: _FrameClouds) -> None:
         """Adds a frame as a place, a query or both.
@@ -321,9 +359,12 @@ class _DriveDescriber:
         asked = {k: cloud for k, cloud in chosen.items() if k not in known}
         found: list = []
         if asked:
+            start = time.process_time_ns()
             found = self._method.describe_batch(
                 list(asked.values()), of_places=role == "places"
             )
+            self._spent_ns.append((time.process_time_ns() - start) / len(asked))
+            self._num_points += map(len, asked.values())
         check_number(self._method, "describe_batch", found, len(asked))
         described = {**known, **dict(zip(asked, found, strict=True))}
         drive = self._drive

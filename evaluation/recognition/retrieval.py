@@ -130,7 +130,7 @@ def retrieve(
     (places,) = describe_drive(database, [method], {"places"}, protocol)
     (queries,) = describe_drive(query, [method], {"queries"}, protocol)
     batches = compare_at_radii(
-        method,
+        Search(method, places.places),
         places,
         queries,
         protocol,
@@ -179,7 +179,7 @@ def query_batches(
 
 
 def compare_at_radii(
-    method: Method,
+    search: Search,
     database: DriveDescriptors,
     query: DriveDescriptors,
     protocol: RetrievalProtocol,
@@ -197,7 +197,7 @@ def compare_at_radii(
     queries has one batch.
 
     Args:
-        method: method that described both drives.
+        search: search in the database by the method that described both drives.
         database: drive with described places.
         query: drive with described queries, in the same world frame.
         protocol: protocol by which both drives were described; its field
@@ -217,9 +217,8 @@ def compare_at_radii(
     """
     places = database.places
     queries = query.queries
-    search = Search(method, places)
     batches = query_batches(len(queries.frames), len(places.frames), most_pairs)
-    if method.config.center_scores:
+    if search.method.config.center_scores:
         batches = iter([range(len(queries.frames))])
     for rows in batches:
         yield (

@@ -1,7 +1,9 @@
 """Searches a database, which can be larger than the memory."""
 
 from collections.abc import Iterator, Sequence
-from time import process_time_ns
+from dataclasses import dataclass
+import pickle
+import time
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,28 @@ from evaluation.recognition.scoring import score_places
 from evaluation.recognition.stored_places import StoredDescriptors
 
 
+@dataclass(frozen=True)
+class SearchCost:
+    """What a search takes, in CPU time and memory.
+
+    Times differ from run to run, so no outcome contains them.
+
+    Attributes:
+        method: name of the method, with its settings.
+        places: number of places.
+        memory: size of the pickled descriptors of all places [bytes].
+        build_time: time to build the database from descriptors [s].
+        query_time: median time to compare a query with all places [s], see
+            `Search.query_time`.
+    """
+
+    method: str
+    places: int
+    memory: int
+    build_time: float
+    query_time: float
+
+
 class Search:
     """A method's search in a database, one group of places after another.
 
@@ -24,7 +48,6 @@ class Search:
 
     Attributes:
         method: the method.
-        query_ms: (Q,) CPU time of each query of the last call of `scores` [ms].
     """
 
     def __init__(self, method: Method, places: DescribedScans):
@@ -42,14 +65,40 @@ class Search:
             self._groups = descriptors.groups
         # Number of the group in memory, and its database.
         self._built: tuple[int, Any] | None = None
-        # Group -> CPU time to build its database [ms].
-        self._build_ms: dict[int, float] = {}
-        self.query_ms = np.zeros(0)
+        # Group -> CPU time to build its database [ns].
+        self._build_ns: dict[int, int] = {}
+        # Number of a query -> CPU time of its scores [ns].
+        self._query_ns: dict[int, int] = {}
 
     @property
-    def build_ms(self) -> float:
-        """CPU time to build the database of each group so far, summed [ms]."""
-        return sum(self._build_ms.values())
+    def query_time(self) -> float:
+        """Median CPU time of the scores of the queries so far [s].
+
+        A query is compared with all places. The time includes the second stage,
+        if the method has one. It includes neither geometric verification nor
+        poses, because not every method estimates poses, and their time does not
+        depend on the number of places. The first query does not count, because
+        it includes loading and compiling.
+        """
+        first, *others = self._query_ns.values()
+        return 1e-9 * float(np.median(others or [first]))
+
+    def cost(self, name: str) -> SearchCost:
+        """Returns what the search takes, after its queries.
+
+        Args:
+            name: name of the method, with its settings.
+        """
+        return SearchCost(
+            method=name,
+            places=len(self._places.frames),
+            memory=sum(
+                len(pickle.dumps(one, protocol=5))
+                for one in self._places.descriptors
+            ),
+            build_time=1e-9 * sum(self._build_ns.values()),
+            query_time=self.query_time,
+        )
 
     def scores(
         self,
@@ -70,14 +119,14 @@ class Search:
         Raises:
             InputError: the method returns something other than scores.
         """
-        self.query_ms = np.zeros(len(rows))
+        self._query_ns |= dict.fromkeys(rows, 0)
         entries = self._entries_by_group(query, rows, is_known)
         scores = np.empty(is_known.shape)
         for number, group in self._groups_in_memory():
             for k in self._tracked(query, rows):
                 # Reading a descriptor from a file is not the method's time.
                 _ = query.queries.descriptors[rows[k]]
-                start = process_time_ns()
+                start = time.process_time_ns()
                 scores[k, group] = self._scores_in_group(
                     query,
                     rows[k],
@@ -85,7 +134,7 @@ class Search:
                     group,
                     None if entries is None else int(entries[k, number]),
                 )
-                self.query_ms[k] += (process_time_ns() - start) * 1e-6
+                self._query_ns[rows[k]] += time.process_time_ns() - start
         return scores
 
     def poses(
@@ -151,11 +200,11 @@ class Search:
             for k in self._tracked(query, rows):
                 if not is_known[k].all():
                     continue
-                start = process_time_ns()
+                start = time.process_time_ns()
                 shortlists[k][number] = method.shortlist(
                     query.queries.descriptors[rows[k]], self._database
                 )
-                self.query_ms[k] += (process_time_ns() - start) * 1e-6
+                self._query_ns[rows[k]] += time.process_time_ns() - start
         entries = np.zeros((len(rows), len(self._groups)), np.int64)
         for k, of_groups in enumerate(shortlists):
             of = np.repeat(
@@ -223,9 +272,9 @@ class Search:
     def _build(self, number: int) -> None:
         """Builds the database of a group."""
         descriptors = self._places.descriptors[self._groups[number]]
-        start = process_time_ns()
+        start = time.process_time_ns()
         database = self.method.build_database(descriptors)
-        self._build_ms[number] = (process_time_ns() - start) * 1e-6
+        self._build_ns[number] = time.process_time_ns() - start
         self._built = number, database
 
     @property

@@ -32,6 +32,7 @@ from evaluation.maps import (
 from evaluation.methods import MethodConfig
 from evaluation.recognition import (
     RANDOM_YAW_PROTOCOL,
+    DescribingCost,
     DriveDescriptors,
     Request,
     RetrievalProtocol,
@@ -140,9 +141,11 @@ class ExtractedFeatures:
     Attributes:
         described: key of a method -> its descriptors of the places and
             queries; empty if the drive has neither.
+        costs: key -> what these descriptors have taken.
     """
 
     described: dict[str, DriveDescriptors]
+    costs: dict[str, DescribingCost]
 
 
 @dataclass(frozen=True)
@@ -235,9 +238,12 @@ def extract_features(
         shown = cropped(scan, protocol.half_extent)
         thumbnails.append(thumbnail(shown, height, seed=frame))
 
-    described = {}
+    described: dict[str, DriveDescriptors] = {}
+    costs: dict[str, DescribingCost] = {}
     if roles:
-        described = _described(mapped, roles, asked, protocol, keep, folder)
+        described, costs = _described(
+            mapped, roles, asked, protocol, keep, folder
+        )
     coarse, fine = mapped.finish()
     if len(coarse) == 0:
         raise InputError(f"{mapped.name}: no scan holds a point")
@@ -259,7 +265,7 @@ def extract_features(
             np.array(frames, np.int64),
             kept,
         )
-    return MappedFeatures(described, summary, fine, scans)
+    return MappedFeatures(described, costs, summary, fine, scans)
 
 
 def map_source(
@@ -301,8 +307,8 @@ def describe_recording(
     def keep(frame: int, cloud: np.ndarray) -> None:
         seen.append(cloud.astype(np.float32))
 
-    described = _described(drive, roles, asked, protocol, keep, folder)
-    return ScannedFeatures(described, seen)
+    found = _described(drive, roles, asked, protocol, keep, folder)
+    return ScannedFeatures(*found, seen)
 
 
 def _most_scans(asked: Mapping[str, Request]) -> int:
@@ -317,7 +323,8 @@ def _described(
     protocol: RetrievalProtocol,
     visit: Callable[[int, np.ndarray], None],
     folder: Path | None,
-) -> dict[str, DriveDescriptors]:
+) -> tuple[dict[str, DriveDescriptors], dict[str, DescribingCost]]:
+    costs: list[DescribingCost] = []
     found = describe_drive(
         drive,
         (),
@@ -326,8 +333,12 @@ def _described(
         visit,
         asked.values(),
         partial(LongList, folder),
+        costs,
     )
-    return dict(zip(asked, found, strict=True))
+    return (
+        dict(zip(asked, found, strict=True)),
+        dict(zip(asked, costs, strict=True)),
+    )
 
 
 @dataclass(frozen=True)
@@ -372,7 +383,8 @@ class FeatureExtraction(Step):
         asked = {
             key: (choice.make(), roles, protocol)
             for key, (choice, roles, protocol) in self._asked.items()
-            if self.files.described(key) in missing
+            if missing.keys()
+            & {self.files.described(key), self.files.cost(key)}
         }
         arguments = (
             self.source(),
@@ -398,6 +410,7 @@ class FeatureExtraction(Step):
             values = {self.files.scans: found.shown_scans}
         for key, described in found.described.items():
             values[self.files.described(key)] = described
+            values[self.files.cost(key)] = found.costs[key]
         doing("writing maps and descriptors")
         for part, made_of in missing.items():
             part.write(made_of, values[part])
@@ -431,13 +444,11 @@ class FeatureExtraction(Step):
             )
 
         own = inputs(self.roles, self.protocol)
-        expected: dict[Part, Mapping] = {
-            self.files.described(key): {
-                **inputs(roles, protocol),
-                "method": choice.identity(),
-            }
-            for key, (choice, roles, protocol) in self._asked.items()
-        }
+        expected: dict[Part, Mapping] = {}
+        for key, (choice, roles, protocol) in self._asked.items():
+            parts = self.files.described(key), self.files.cost(key)
+            made_of = inputs(roles, protocol) | {"method": choice.identity()}
+            expected |= dict.fromkeys(parts, made_of)
         if self.with_scans:
             expected[self.files.scans] = own
         if self.with_map:

@@ -1,6 +1,6 @@
 """Measures place recognition between two drives."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 import math
@@ -20,6 +20,8 @@ from evaluation.recognition import (
     QueryDrive,
     RetrievalProtocol,
     Role,
+    Search,
+    SearchCost,
     StoredDrives,
     compare_at_radii,
     joined_scans,
@@ -27,7 +29,6 @@ from evaluation.recognition import (
     matches_within_radius,
     overlaps_with_best_match,
     query_batches,
-    query_ms,
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.features import KeptScans, describe_recording
@@ -37,8 +38,10 @@ from evaluation.study.parts import LongList, Part
 # scans and of its descriptors by each method.
 DescribedSource: TypeAlias = "Callable[[], Drive] | tuple[Part, ...]"
 
-# A method that takes longer for all queries is left out [ms].
-_LONGEST_MS = 3.6e6
+# A method that takes longer for all queries is left out [s].
+_LONGEST = 3600.0
+# Number of queries from which this time is estimated.
+_NUM_TRIALS = 12
 # With at most this number of places, no method is expected to take so long.
 _MANY = 5000
 
@@ -165,8 +168,8 @@ class PlaceComparison(NamedTuple):
         overlaps: file with the share of each query's scan that its best match
             shows, the result of `shown_overlaps`; None to compute it from the
             scans.
-        leaves_out_slow: whether to leave out a method that would take more than
-            an hour for all queries.
+        in_study: whether to leave out a method that would take more than an
+            hour for all queries, and to find the costs of searches.
     """
 
     database: DescribedSource
@@ -180,7 +183,7 @@ class PlaceComparison(NamedTuple):
     keep: str | int = KEEP_ALL
     truth: np.ndarray | None = None
     overlaps: Part | None = None
-    leaves_out_slow: bool = True
+    in_study: bool = True
 
     def by_methods(self, numbers: Collection[int]) -> "PlaceComparison":
         """Returns the comparison by some methods, given their numbers."""
@@ -332,10 +335,10 @@ def shown_overlaps(
 
 def measure_places(
     reporter: Reporter, compared: PlaceComparison
-) -> list[PlaceOutcome]:
-    """Returns the outcomes of methods, for several radii of a match.
+) -> Iterator[tuple[list[PlaceOutcome], SearchCost | None]]:
+    """Yields the outcomes of each method, and in a study what its search costs.
 
-    There are two outcomes for each method and radius. The first counts all
+    There are two outcomes for each radius of a match. The first counts all
     candidates. The second is with geometric verification, which rejects
     candidates that lie beyond the radius according to the method's own pose
     estimate.
@@ -355,7 +358,6 @@ def measure_places(
     known: Mapping[float, np.ndarray] = {}
     if compared.overlaps is not None:
         known = compared.overlaps.read()
-    outcomes = []
     for k, choice in enumerate(
         track(methods, "comparing", len(methods), "methods")
     ):
@@ -366,9 +368,10 @@ def measure_places(
         if isinstance(asked, Part):
             asked = asked.read()
         searched = compared.searched(k, mapped, method)
-        outcomes += _method_outcomes(
+        search = Search(method, searched.described.places)
+        outcomes = _method_outcomes(
             choice,
-            method,
+            search,
             searched,
             asked,
             compared,
@@ -383,7 +386,7 @@ def measure_places(
             ),
             reporter,
         )
-    return outcomes
+        yield outcomes, search.cost(choice.key) if compared.in_study else None
 
 
 def _overlaps_of_matches(
@@ -430,7 +433,7 @@ def _overlaps_of_matches(
 
 def _method_outcomes(
     choice: MethodChoice,
-    method: Method,
+    search: Search,
     database: _Searched,
     query: DriveDescriptors,
     compared: PlaceComparison,
@@ -440,8 +443,8 @@ def _method_outcomes(
     """Returns a method's outcomes; none if the method would take too long.
 
     Args:
-        choice: the method, as it was chosen.
-        method: the method, as it was made.
+        choice: the method.
+        search: the method's search in the database.
         database: the places that are searched.
         query: the described queries.
         compared: the comparison.
@@ -454,9 +457,9 @@ def _method_outcomes(
     protocol, radii = compared.protocol, compared.radii
     truth = compared.truth
     if (
-        compared.leaves_out_slow
+        compared.in_study
         and len(searched.places.frames) > _MANY
-        and _takes_long(method, searched, query)
+        and _takes_long(search, query, len(searched.places.frames))
     ):
         reporter.note(
             f"{choice.name}: left out, because it would take over an hour"
@@ -466,7 +469,7 @@ def _method_outcomes(
     # each batch of queries.
     outcomes: list[list[PlaceOutcome]] = [[] for _ in range(2 * len(radii))]
     for rows, (plain, *by_radius) in compare_at_radii(
-        method,
+        search,
         searched,
         query,
         protocol,
@@ -490,7 +493,7 @@ def _method_outcomes(
                 outcomes[2 * k + is_verified].append(
                     PlaceOutcome.of(
                         choice.key,
-                        method,
+                        search.method,
                         replace(
                             protocol, verified=bool(is_verified), radius=radius
                         ),
@@ -505,12 +508,13 @@ def _method_outcomes(
 
 
 def _takes_long(
-    method: Method,
-    database: DriveDescriptors,
-    query: DriveDescriptors,
+    search: Search, query: DriveDescriptors, num_places: int
 ) -> bool:
-    one_ms = query_ms(method, database.places, query)
-    return one_ms * len(query.queries.frames) > _LONGEST_MS
+    number = len(query.queries.frames)
+    rows = np.linspace(0, number - 1, min(number, _NUM_TRIALS)).astype(int)
+    is_known = np.ones((len(rows), num_places), bool)
+    search.scores(query, rows.tolist(), is_known)
+    return number * search.query_time > _LONGEST
 
 
 class _DescribedDrive(Protocol):

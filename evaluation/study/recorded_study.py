@@ -7,18 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from cns_drake.base import Cluster, InputError, Job, Reporter, Space
-from evaluation.drives import MovedDrive, cloud_at
+from cns_drake.base import Cluster, InputError, Job, Space
 from evaluation.paper import paper, paper_section
 from evaluation.recognition import (
-    NUM_TRIALS,
     PAPER_PROTOCOL,
     PROTOCOLS,
-    Cost,
     RetrievalProtocol,
-    measure_cost,
 )
 from evaluation.results import (
     LAST,
@@ -41,8 +35,6 @@ from evaluation.results import (
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.experiments.experiment import Experiment
 from evaluation.study.experiments.experiment_files import load_experiment
-from evaluation.study.parts import MakePart, Part
-from evaluation.study.place_measurements import PlaceComparison
 from evaluation.study.recorded_city import ShownCity, add_city
 from evaluation.study.recordings.map_drives import (
     RecordingInfo,
@@ -51,16 +43,10 @@ from evaluation.study.recordings.map_drives import (
     unlike_shipped,
 )
 from evaluation.study.recordings.recorded_pairs import recorded_pairs
-from evaluation.study.sources import DriveSource
 from evaluation.study.study import Study
 from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.change import ChangeTask
-from evaluation.study.tasks.place import (
-    CostTask,
-    PlaceTask,
-    PoseTask,
-    measure_costs,
-)
+from evaluation.study.tasks.place import PlaceTask, PoseTask, search_cost
 from evaluation.study.tasks.task import Task
 
 # The seed of the experiment.
@@ -70,8 +56,6 @@ _TASKS: Mapping[str, type[Task]] = {
 }
 # The question if nothing was measured without the change.
 _ALONE = "Who finds how many places again?"
-# Expected time to measure costs [s].
-_COSTS_COST = 5.0
 
 
 def study_recordings(
@@ -105,7 +89,7 @@ def study_recordings(
             one, and the only one with the control. As a further protocol,
             `paper` measures the paper's methods alone.
         source: where the recordings come from, for errors.
-        with_costs: whether times and memory are measured, after all other jobs.
+        with_costs: whether the page shows the times and memory of methods.
         further_jobs: jobs that make recordings, or belong beside the study.
         space: space on the disk that all jobs need, if known.
         pages: name of a recording -> address of its 3-D page, relative to
@@ -156,9 +140,6 @@ def study_recordings(
         raise InputError(f"{source}: {alone[0]}")
     for text in alone:
         on_note(text)
-    if with_costs:
-        job = _cost_job(study, shown[0], protocols[main])
-        study.jobs[job.name] = job
     study.jobs = {**{job.name: job for job in further_jobs}, **study.jobs}
     results, queries = study.measure(space)
     StudyFiles(study.output).remove_other_changes(
@@ -179,7 +160,7 @@ def study_recordings(
         ],
         [
             *recorded_sections(shown, results, queries, output, pages or {}),
-            *([_costs_section(output)] if with_costs else []),
+            *([_costs_section(study)] if with_costs else []),
         ],
         about=_ALONE if lacks_baseline(results) else None,
         own_methods=own,
@@ -297,86 +278,21 @@ def _note_missed_routes(
         on_note(f"{query}: no query has a match in {database}")
 
 
-def _cost_job(
-    study: Study, shown: ShownCity, protocol: RetrievalProtocol
-) -> Job:
-    """Returns the job that measures costs on the first pair of a city."""
-    pair = shown.city.recognition_pairs(with_itself=True)[0]
+def _costs_section(study: Study) -> PageSection:
+    """Returns the section with the costs of the methods on the first pair."""
+    pair = next(one for one in study.results if study.results[one])
     files = StudyFiles(study.output)
-    methods = tuple(choice for choice, _ in study.methods.values())
-    places, queries = (files.features(one.name) for one in pair)
-    stored = [
-        (found.scans, *(found.described(one.key) for one in methods))
-        for found in (places, queries)
-    ]
-    compared = PlaceComparison(
-        database=stored[0],
-        query=stored[1],
-        methods=methods,
-        protocol=protocol,
-        radii=(protocol.radius,),
-    )
-    step = MakePart(
-        files.part("costs", "costs"),
-        measure_method_costs,
-        (pair[1].source, queries.drive, compared),
-        CostTask.version,
-    )
-    return Job("costs of the methods", step, tuple(study.jobs), _COSTS_COST)
-
-
-def measure_method_costs(
-    reporter: Reporter,
-    source: DriveSource,
-    summary: Part,
-    compared: PlaceComparison,
-) -> list[Cost]:
-    """Returns the time and memory that each method needs on one core.
-
-    The cost of a search is the result of the task `cost`; the time to describe
-    a cloud is added.
-
-    Args:
-        reporter: reports progress.
-        source: opens the query drive.
-        summary: file with the `DriveSummary` of the query drive, from which
-            the drive's poses are read.
-        compared: the drives, which are in files, and the methods to measure.
-    """
-    protocol = compared.protocol
-    searches = measure_costs(reporter, compared)
-    drive = source()
-    known = summary.read()
-    # A recording would be unpacked as a whole for its poses.
-    drive = MovedDrive(drive, known.X_WS, drive.world_frame, drive.datum)
-    costs = []
-    for choice in compared.methods:
-        method = choice.make()
-        number = protocol.scans(method)
-        last = max(len(drive) - number, 0)
-        clouds = [
-            cloud_at(
-                drive,
-                frame,
-                number,
-                protocol.half_extent,
-                method.point_fields,
-                protocol.scans_before(method),
-            )
-            for frame in np.linspace(0, last, NUM_TRIALS).astype(int).tolist()
-        ]
-        search = searches[choice.key]
-        costs.append(measure_cost(method, clouds, number, search))
-    return costs
-
-
-def _costs_section(output: Path) -> PageSection:
-    """Returns the section with the costs of the methods."""
-    costs: Any = StudyFiles(output.absolute()).part("costs", "costs").read()
-    of_method = {cost.method: cost for cost in costs}
+    described = files.features(pair.query.name)
+    costs = {
+        choice.name: (
+            described.cost(key).read(),
+            search_cost(files, pair.key, key).read(),
+        )
+        for key, (choice, _) in study.methods.items()
+    }
     return page_section(
         "costs",
         "Costs",
-        "the first pair of drives, measured on one core; in no table",
-        costs=[of_method[name] for name in in_table_order(of_method)],
+        "the first pair of drives, on one core; in no table",
+        costs=[(name, *costs[name]) for name in in_table_order(costs)],
     )

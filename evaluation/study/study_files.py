@@ -57,6 +57,10 @@ class FeatureFiles:
         """
         return Part(self.folder / f"described_{file_name(key)}.data")
 
+    def cost(self, key: str) -> Part:
+        """Returns the file with the `DescribingCost` of these descriptors."""
+        return Part(self.folder / f"cost_{file_name(key)}.data")
+
 
 @dataclass(frozen=True)
 class StudyFiles:

@@ -193,7 +193,7 @@ def recognise(
     )
     places, queries = drives = [_scans_of(one) for one in opened]
     overlaps = _overlaps(places, queries, protocol, exact_overlaps)
-    outcomes = measure_places(
+    ((outcomes, _),) = measure_places(
         noting(on_note),
         PlaceComparison(
             lambda: places,
@@ -202,7 +202,7 @@ def recognise(
             protocol,
             (protocol.radius,),
             truth=overlaps,
-            leaves_out_slow=False,
+            in_study=False,
         ),
     )
     outcomes = [replace(one, method=choice.name) for one in outcomes]

@@ -41,7 +41,7 @@ def report(
         lidar: name of the LiDAR, for recordings with several LiDARs.
         columns: number of columns of `.bin` files.
         cluster: runs the jobs; by default a job for each core.
-        with_costs: whether times and memory are measured, too.
+        with_costs: whether the page shows the times and memory of methods.
         printed: style of the charts for print.
         on_note: is called with notes for the user.
 

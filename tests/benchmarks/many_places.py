@@ -165,7 +165,11 @@ def measure(
             loading.clear()
             start = time.process_time()
             for _, (found, *_) in compare_at_radii(
-                method, database, query, RANDOM_YAW_PROTOCOL, radii
+                Search(method, places),
+                database,
+                query,
+                RANDOM_YAW_PROTOCOL,
+                radii,
             ):
                 right += int((found.best_places == found.query_frames).sum())
         spent = time.process_time() - start - sum(loading)

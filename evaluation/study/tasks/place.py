@@ -3,15 +3,12 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-from cns_drake.base import Job, Reporter, Step, track
+from cns_drake.base import Job, Reporter, Step
 from evaluation.recognition import (
-    NUM_TRIALS,
     Number,
     PlaceOutcome,
-    QueryCost,
-    measure_search,
+    SearchCost,
     numbers_of,
 )
 from evaluation.study.parts import MakePart, Part
@@ -21,6 +18,7 @@ from evaluation.study.place_measurements import (
     measure_places,
     shown_overlaps,
 )
+from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.jobs import STARTING_COST, Jobs, num_described
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Answered, Task
@@ -46,39 +44,7 @@ class PoseTask(Task):
     asks = True
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
-        if not any(pair.has_method(one.name) for one in jobs.methods):
-            return ()
-        needs: list[str] = []
-        compared = _comparison(pair, jobs, needs, kept=pair.is_composed)
-        num_queries = num_described(pair.query, "queries", pair.protocol)
-        cost = _search_cost(pair, jobs, num_queries)
-        cost += _OVERLAP_COST * num_queries
-        # The task `place` reads the same files. Each method has a file, so that
-        # another method leaves it as it is.
-        parts = tuple(
-            jobs.files.part("place", pair.key, one.key)
-            for one in compared.methods
-        )
-        sides = compared.database, compared.query
-        if all(isinstance(one, tuple) for one in sides):
-            overlaps = jobs.files.part("overlaps", pair.key)
-            shown = MakePart(
-                overlaps,
-                shown_overlaps,
-                (ScansOf(compared),),
-                PlaceTask.version,
-            )
-            compared = compared._replace(overlaps=overlaps)
-            step = _Steps(overlaps.path, (shown, *_by_method(parts, compared)))
-        else:
-            for (drive, role), side in zip(pair.roles, sides, strict=True):
-                if not isinstance(side, tuple):
-                    cost += jobs.reading_cost(drive, role, pair.protocol)
-                    cost += jobs.description_cost(drive, role, pair.protocol)
-            step = _AtOnce(parts[0].path, _by_method(parts, compared), compared)
-        name = f"place {pair.key}"
-        jobs.jobs[name] = Job(name, step, tuple(needs), cost, pair.title)
-        return parts
+        return tuple(one.part for one in _steps_by_method(pair, jobs))
 
     def found(self, pair: Pair, results: Sequence[Result]) -> Outcomes:
         radius = pair.protocol.radius
@@ -98,66 +64,94 @@ class PoseTask(Task):
             yield from now.numbers(self.name, then)
 
 
-def _by_method(
-    parts: Sequence[Part], compared: PlaceComparison
-) -> tuple[MakePart, ...]:
-    """Returns a step for each method, which writes its outcomes to a file."""
-    return tuple(
+def _steps_by_method(pair: Pair, jobs: Jobs) -> tuple[MakePart, ...]:
+    """Returns a step for each method, and adds the job that does all of them.
+
+    Several tasks read the files of these steps.
+    """
+    if not any(pair.has_method(one.name) for one in jobs.methods):
+        return ()
+    needs: list[str] = []
+    compared = _comparison(pair, jobs, needs, kept=pair.is_composed)
+    num_queries = num_described(pair.query, "queries", pair.protocol)
+    cost = _search_cost(pair, jobs, num_queries)
+    cost += _OVERLAP_COST * num_queries
+    sides = compared.database, compared.query
+    before: tuple[MakePart, ...] = ()
+    if all(isinstance(one, tuple) for one in sides):
+        overlaps = jobs.files.part("overlaps", pair.key)
+        shown = MakePart(
+            overlaps,
+            shown_overlaps,
+            (ScansOf(compared),),
+            PlaceTask.version,
+        )
+        before = (shown,)
+        compared = compared._replace(overlaps=overlaps)
+    else:
+        for (drive, role), side in zip(pair.roles, sides, strict=True):
+            if not isinstance(side, tuple):
+                cost += jobs.reading_cost(drive, role, pair.protocol)
+                cost += jobs.description_cost(drive, role, pair.protocol)
+    # Each method has files, so that another method leaves them as they are.
+    steps = tuple(
         MakePart(
-            part,
+            jobs.files.part("place", pair.key, one.key),
             measure_places,
             (compared.by_methods([k]),),
             PlaceTask.version,
+            (search_cost(jobs.files, pair.key, one.key).path,),
         )
-        for k, part in enumerate(parts)
+        for k, one in enumerate(compared.methods)
     )
+    step = _ByMethod(compared, before, steps)
+    name = f"place {pair.key}"
+    jobs.jobs[name] = Job(name, step, tuple(needs), cost, pair.title)
+    return steps
+
+
+def search_cost(files: StudyFiles, pair: str, method: str) -> Part:
+    """Returns the file with the `SearchCost` of a method, by keys."""
+    return files.part("cost", pair, method)
 
 
 @dataclass(frozen=True)
-class _Steps(Step):
-    """Several steps that run in order, except steps that are already done.
-
-    Attributes:
-        place: the file or folder that only one process at a time may write; see
-            `Step.output`.
-        steps: the steps, in an order in which each step finds its inputs.
-    """
-
-    place: Path
-    steps: tuple[Step, ...]
-
-    @property
-    def output(self) -> Path:
-        return self.place
-
-    def is_done(self) -> bool:
-        return all(step.is_done() for step in self.steps)
-
-    def run(self, reporter: Reporter) -> None:
-        for step in self.steps:
-            if not step.is_done():
-                step.run(reporter)
-
-
-@dataclass(frozen=True)
-class _AtOnce(_Steps):
-    """The steps of `_by_method`, for which a drive is read once.
+class _ByMethod(Step):
+    """Compares two drives by all methods; a drive is read once.
 
     Attributes:
         compared: the comparison by all methods.
+        before: steps whose files the comparison needs.
+        steps: for each method, the file of its outcomes and their inputs. The
+            cost of the search is in a file beside, as it differs from run to
+            run.
     """
 
-    steps: tuple[MakePart, ...]
     compared: PlaceComparison
+    before: tuple[MakePart, ...]
+    steps: tuple[MakePart, ...]
+
+    @property
+    def output(self) -> Path:
+        return self.steps[0].output
+
+    def is_done(self) -> bool:
+        return all(step.is_done() for step in (*self.before, *self.steps))
 
     def run(self, reporter: Reporter) -> None:
+        for step in self.before:
+            if not step.is_done():
+                step.run(reporter)
         left = [k for k, one in enumerate(self.steps) if not one.is_done()]
-        inputs = [self.steps[k].inputs() for k in left]
-        found = measure_places(reporter, self.compared.by_methods(left))
-        for k, made_of in zip(left, inputs, strict=True):
-            method = self.compared.methods[k].key
-            of_method = [one for one in found if one.method == method]
-            self.steps[k].part.write(made_of, of_method)
+        steps = [self.steps[k] for k in left]
+        inputs = [one.inputs() for one in steps]
+        measured = measure_places(reporter, self.compared.by_methods(left))
+        for step, made_of, (found, cost) in zip(
+            steps, inputs, measured, strict=True
+        ):
+            (beside,) = step.figures
+            Part(beside).write(made_of, cost)
+            step.part.write(made_of, found)
 
 
 class PlaceTask(PoseTask):
@@ -171,30 +165,27 @@ class PlaceTask(PoseTask):
 
 
 class CostTask(Task):
-    """Measures what a database costs: its memory, and the time of a query."""
+    """Tells what a search costs: its memory, and the time of a query."""
 
     name = "cost"
     asks = True
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
-        needs: list[str] = []
-        compared = _comparison(pair, jobs, needs, kept=True)
-        part = jobs.files.part("cost", pair.key)
-        cost = _search_cost(pair, jobs, NUM_TRIALS)
-        found = jobs.add(
-            part,
-            measure_costs,
-            (compared,),
-            needs,
-            cost,
-            self.version,
-            pair.title,
-        )
-        return (found,)
+        steps = _steps_by_method(pair, jobs)
+        return tuple(Part(file) for one in steps for file in one.figures)
 
-    def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
-        for method, cost in found.items():
-            yield from numbers_of(self.name, cost, method=method)
+    def found(
+        self, pair: Pair, results: Sequence[Result]
+    ) -> Sequence[SearchCost]:
+        return [part.read() for part in results]
+
+    def numbers(
+        self,
+        found: Sequence[SearchCost],
+        before: Sequence[SearchCost] | None,
+    ) -> Iterator[Number]:
+        for cost in found:
+            yield from numbers_of(self.name, cost, method=cost.method)
 
 
 def _comparison(
@@ -241,30 +232,6 @@ def _search_cost(pair: Pair, jobs: Jobs, num_queries: float) -> float:
     ]
     each = sum(one.query_time + one.place_time * num_places for one in methods)
     return STARTING_COST + num_queries * each
-
-
-def measure_costs(
-    reporter: Reporter, compared: PlaceComparison
-) -> dict[str, QueryCost]:
-    """Returns the cost of searching a database, by the key of each method.
-
-    Args:
-        reporter: reports progress.
-        compared: the drives, which are in files, and the methods to measure.
-    """
-    (_, *database), (_, *query) = compared.stored
-    found = {}
-    methods = compared.methods
-    for k, choice in enumerate(
-        track(methods, "measuring methods", len(methods), "methods")
-    ):
-        method = choice.make()
-        searched = compared.searched(k, database[k], method)
-        asked = query[k].read()
-        found[choice.key] = measure_search(
-            method, searched.described.places, asked
-        )
-    return found
 
 
 def _outcome_of(

@@ -1,4 +1,5 @@
 from dataclasses import replace
+import time
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.measured_pairs import place_outcome, values_of
@@ -10,11 +11,13 @@ from evaluation.drives import cloud_at, open_drive, sample_frames, within_cube
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition import (
     DescribedScans,
+    DescribingCost,
     PlaceOutcome,
     PoseErrors,
     QueryDrive,
     Retrieval,
     RetrievalProtocol,
+    Search,
     compare_at_radii,
     describe_drive,
     joined_scans,
@@ -214,6 +217,28 @@ def test_the_middle_or_the_first_scan_stands_for_a_place(tmp_path):
     assert paper.scans_before(Merging(MethodConfig(place="middle"))) == 2
 
 
+def test_the_cost_of_descriptors(tmp_path, monkeypatch):
+    """By a clock that only the method moves; the first cloud is slow."""
+    spent = []
+    monkeypatch.setattr(time, "process_time_ns", lambda: int(1e9 * sum(spent)))
+    times = iter([100.0, 1.0, 2.0, 3.0, 5.0])
+
+    class Slow(OddOneOut):
+        def describe(self, points):
+            spent.append(next(times))
+            return super().describe(points)
+
+    drive = record_line(tmp_path / "a", np.arange(0.0, 41.0, 10.0))
+    protocol = RetrievalProtocol()
+    costs = []
+    # The queries are known, as the places are the same.
+    further = [(Slow(), {"queries"}, protocol)]
+    describe_drive(
+        drive, [Slow()], {"places"}, protocol, further=further, costs=costs
+    )
+    assert costs == [DescribingCost(scans=1, points=1.0, time=2.5)] * 2
+
+
 def test_metrics_of_a_pair(tmp_path):
     database = record_line(tmp_path / "a", np.arange(0.0, 31.0, 2.5))
     query = record_line(tmp_path / "b", np.arange(3.0, 44.0, 5.0))
@@ -281,7 +306,7 @@ def test_batches_of_queries_give_the_same_as_all_at_once(tmp_path):
     ):
         outcomes = []
         batches = compare_at_radii(
-            method,
+            Search(method, places.places),
             places,
             queries,
             protocol,

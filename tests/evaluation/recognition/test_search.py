@@ -1,6 +1,8 @@
 """Databases in groups of drives, of which one is in memory at a time."""
 
 from dataclasses import replace
+import pickle
+import time
 
 import numpy as np
 import pytest
@@ -105,6 +107,7 @@ def stored(drives, most_bytes, reads):
         ),
         pytest.param("learned", {}, marks=pytest.mark.night),
         ("ring++", {"cells": 20}),
+        ("ring++", {"cells": 44, "candidates": 7}),
         ("scan-context++", {"candidates": 7}),
         ("scan-context++", {"candidates": 7, "variant": "cart"}),
         ("solid", {}),
@@ -122,7 +125,7 @@ def test_groups_give_the_same_as_the_whole(name, settings):
         assert len(places.descriptors) == NUM_DRIVES * NUM_PLACES
         database = DriveDescriptors("places", places, places)
         ((_, batch),) = compare_at_radii(
-            method, database, queries, protocol, [None, 25.0]
+            Search(method, places), database, queries, protocol, [None, 25.0]
         )
         found.append(batch)
     whole, *others = found
@@ -169,6 +172,32 @@ def test_one_group_is_in_memory_at_a_time():
     # The last group is still there.
     search.poses(queries, range(5), [np.array([0, 23])] * 5)
     assert reads == [0, 1, 2, 3, 0, 1, 2, 3, 0, 1]
+
+
+def test_the_cost_of_a_search(monkeypatch):
+    """By a clock that only the method moves; the first query is slow."""
+    spent = []
+    monkeypatch.setattr(time, "process_time_ns", lambda: int(1e9 * sum(spent)))
+    solid = make_method("solid", {})
+
+    class Slow(type(solid)):
+        def build_database(self, places):
+            spent.append(0.5 * len(places))
+            return super().build_database(places)
+
+        def score(self, query, database, *, exhaustive=False):
+            spent.append(next(times))
+            return super().score(query, database, exhaustive=exhaustive)
+
+    places = stored(drives_of(solid), 20, [])
+    search = Search(Slow(), places)
+    # Two groups of places.
+    times = iter([100.0, 1.0, 2.0, 3.0, 5.0] * 2)
+    search.scores(queries_of(solid), range(5), np.ones((5, 24), bool))
+    found = search.cost("solid")
+    assert (found.method, found.places, found.build_time) == ("solid", 24, 12.0)
+    assert found.query_time == 5.0
+    assert found.memory == 24 * len(pickle.dumps(places.descriptors[0], 5))
 
 
 def test_a_large_drive_is_searched_in_shares():

@@ -54,7 +54,7 @@ class Counting(Method):
 
 @pytest.fixture(scope="module", autouse=True)
 def some_methods():
-    """One of each kind; `test_costs` measures all that ship."""
+    """One of each kind."""
     names = ("btc", "layered-overlap", "scan-context++", "solid")
     with pytest.MonkeyPatch.context() as patch:
         studies.ship_methods(patch, *names)
@@ -321,6 +321,31 @@ def test_the_main_protocol_alone_has_the_control(report):
         )
         if last[0].value > 0.0:
             assert kept[0].value == own[0].value / last[0].value
+
+
+def test_costs_are_on_the_page_alone(recordings, tmp_path):
+    """Two runs differ in nothing else, not even in stored outcomes."""
+    found = []
+    for shows in (True, False):
+        folder = tmp_path / f"{shows}"
+        methods = choose_methods(["solid"])
+        studies.report(recordings, folder, methods, with_costs=shows)
+        files = [*folder.glob("*.csv"), *folder.glob("parts/place/*")]
+        found.append({one.name: one.read_bytes() for one in files})
+    assert found[0] == found[1]
+    assert len(found[0]) > 2
+    method, scans, points, *times, places, size = re.findall(
+        "<td.*?>(.*?)</td>", section(tmp_path / "True", "costs")
+    )
+    (of_places, *_) = (
+        Results.read(tmp_path / "True").where(metric="places").rows
+    )
+    assert (method, scans) == ("SOLiD", "1")
+    assert int(places) == of_places.value
+    assert int(points) > 100
+    assert int(size) > 100
+    assert min(map(float, times)) >= 0.0
+    assert 'id="costs"' not in (tmp_path / "False/index.html").read_text()
 
 
 @pytest.mark.night

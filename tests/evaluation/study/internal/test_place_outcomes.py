@@ -10,9 +10,7 @@ from cns_drake.base import Reporter
 from evaluation.drives import open_drive
 from evaluation.recognition import RetrievalProtocol
 from evaluation.study import (
-    MakePart,
     MethodChoice,
-    Part,
     RecordingSource,
     parts,
     place_measurements,
@@ -83,19 +81,6 @@ def described(folder, name, role):
     return (files.scans, *(files.described(one.key) for one in METHODS))
 
 
-def pair(folder, part, **changes):
-    """Two drives, of which the database is described beforehand."""
-    values = {
-        "database": described(folder, "metropolis_01", "places"),
-        "query": Once(folder / "metropolis_04"),
-        "methods": METHODS,
-        "protocol": PROTOCOL,
-        "radii": (PROTOCOL.radius,),
-    }
-    compared = PlaceComparison(**(values | changes))
-    return MakePart(Part(part), measure_places, (compared,))
-
-
 @pytest.mark.slow
 def test_drives_that_are_longer_than_the_memory_give_the_same(
     folder, tmp_path, monkeypatch
@@ -106,12 +91,18 @@ def test_drives_that_are_longer_than_the_memory_give_the_same(
         (stored / name).symlink_to(folder / name)
 
     def compared(root):
-        query = described(root, "metropolis_04", "queries")
-        return pair(root, tmp_path / "pair.data", query=query).arguments[0]
+        return PlaceComparison(
+            described(root, "metropolis_01", "places"),
+            described(root, "metropolis_04", "queries"),
+            METHODS,
+            PROTOCOL,
+            (PROTOCOL.radius,),
+        )
 
     def measured(compared):
         shown = shown_overlaps(Reporter(), ScansOf(compared))
-        return measure_places(Reporter(), compared), shown
+        found = measure_places(Reporter(), compared)
+        return [one for outcomes, _ in found for one in outcomes], shown
 
     expected, expected_shown = measured(compared(folder))
     # Two items a block, and a group of places for every few.
