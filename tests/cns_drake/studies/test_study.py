@@ -410,18 +410,6 @@ def test_scans_are_localised(town, tmp_path, jobs_done):
     assert len(jobs_done[-1]) == 2
 
 
-@pytest.mark.night
-@pytest.mark.slow
-def test_costs_follow_the_number_of_places(town, tmp_path, jobs_done):
-    results = measure(experiment(town, tasks=["cost", "place"]), tmp_path)
-    cost, place = (
-        values(results, task=task, verified=False) for task in ("cost", "place")
-    )
-    assert min(cost["query_time"], cost["build_time"]) > 0
-    (number,) = {r.n for r in results.rows if r.task == "cost"}
-    assert number == place["places"]
-
-
 def test_an_own_method(town, tmp_path, jobs_done, own_methods):
     own = tmp_path / "counting.py"
     own.write_text(COUNTING)
