@@ -6,6 +6,7 @@ A suggested command works on the files that are there when it is suggested.
 from __future__ import annotations
 
 from collections.abc import Sequence
+import contextlib
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,14 +14,11 @@ from typing import TYPE_CHECKING
 from cns_drake.base import InputError, terminal
 
 if TYPE_CHECKING:
-    from cns_drake.drives import Drive
     from cns_drake.scenarios import Scenario
     from evaluation.recognition import RetrievalProtocol
 
 # Folder of recordings in the suggestions.
 _RECORDINGS = Path("drives")
-# The suggested --exclude-recent [s].
-_EXCLUDED = 30
 
 
 def suggest_export(recording: Path, scenario: Scenario) -> None:
@@ -38,47 +36,13 @@ def suggest_export(recording: Path, scenario: Scenario) -> None:
     terminal.next_command("cns-drake", "export", *words, "--output", output)
 
 
-def suggest_evaluation(
-    recording: Path, exported: Path, *, is_plain: bool
-) -> None:
-    """Names a command that evaluates an exported drive.
-
-    This is the measurement of loop closure if the drive returns to a place, and
-    otherwise the comparison of the export with the recording.
-
-    Args:
-        recording: the drive that was exported.
-        exported: the export.
-        is_plain: whether the drive is opened without options.
-    """
+def suggest_evaluation(recording: Path, exported: Path) -> None:
+    """Names the command that compares an export with its recording."""
     from evaluation.drives import open_drive
 
-    try:
-        drive = open_drive(exported)
-    except InputError:  # Such as a recording of a single scan.
-        return
-    if has_loop(drive):
-        words = ("--method", "solid", "--exclude-recent", _EXCLUDED)
-        terminal.next_command("cns-eval", "pr", exported, exported, *words)
-    elif is_plain:
+    with contextlib.suppress(InputError):  # Such as of a single scan.
+        open_drive(exported)
         terminal.next_command("cns-eval", "tcr", recording, exported)
-
-
-def has_loop(drive: Drive) -> bool:
-    """Returns whether loop closure can be measured along a drive.
-
-    It can if some query has a match in the suggested protocol.
-    """
-    from scipy.spatial.distance import cdist
-
-    from evaluation.recognition import RetrievalProtocol, compared_frames
-
-    protocol = RetrievalProtocol(exclude_recent=_EXCLUDED)
-    queries, places = compared_frames(drive, drive, protocol)
-    p_WS, stamps_ns = drive.X_WS[:, :3, 3], drive.stamps_ns
-    is_near = cdist(p_WS[queries], p_WS[places]) <= protocol.radius
-    age_ns = stamps_ns[queries][:, None] - stamps_ns[places][None, :]
-    return bool((is_near & (age_ns >= _EXCLUDED * 1e9)).any())
 
 
 def suggest_recognition(

@@ -120,8 +120,8 @@ def export(
             on_note=note,
         )
     terminal.show({"output": str(path)}, str(path), json=json)
-    if layout != _SESSIONS and find_data_sets(path):
-        suggest_evaluation(Path(drives[0]), path, is_plain=not given)
+    if layout != _SESSIONS and not given and find_data_sets(path):
+        suggest_evaluation(Path(drives[0]), path)
 
 
 # The help lists the formats.

@@ -172,9 +172,9 @@ def _shortcomings(
     ):
         numbers = ", ".join(map(str, report.stages.values()))
         yield (
-            f"{report.dated} of {report.dated + report.undated} buildings have"
-            f" a year, and the stages {numbers} structures; in place of"
-            " --years, --grow samples a change at random"
+            f"{report.dated} buildings have a year, {report.undated} have none,"
+            f" and the stages have {numbers} structures; in place of --years,"
+            " --grow samples a change at random"
         )
 
 

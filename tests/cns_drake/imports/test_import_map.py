@@ -234,7 +234,7 @@ def test_years_that_change_nothing(tmp_path, dates):
     warnings = [line for line in result.stderr.splitlines() if "--grow" in line]
     dated = sum(year is not None for year in dates)
     assert len(warnings) == 1
-    assert f"{dated} of 2 buildings have a year" in warnings[0]
+    assert f"{dated} buildings have a year, {2 - dated} have" in warnings[0]
 
 
 @pytest.mark.usefixtures("overviews")

@@ -57,6 +57,9 @@ def check_printed(found, values, lines, *tasks):
         for name, one in METRICS.items()
         if {*tasks} & {*one.tasks} and not one.is_compared
     }
+    # Times differ from run to run.
+    now = json.loads(json.dumps(found.to_json()))
+    assert {**now, "seconds_mean": 0} == {**values, "seconds_mean": 0}
     for name, value in found.metrics.items():
         assert values[name] == json_values(value), name
         label = METRICS[name].label
@@ -77,11 +80,6 @@ def test_places_are_recognised_as_the_command_does(capsys, towns, mode):
     )
     check_printed(found, values, lines, "place", "pose")
     assert found.metrics["r1"] == values["recall_at_1"]
-    assert values["intervals_95"] == {
-        name: one.to_json()
-        for name, one in found.intervals.items()
-        if not math.isnan(one.low)
-    }
     assert {"f1_max", "r5", "r10", "r25", "r1_percent", "mrr"} < {*values}
     assert {"auc_2.5m", "pose_success", "translation_90"} < {*values}
 
