@@ -561,13 +561,7 @@ def past_structures(
 def _objects_before(
     world: OldWorld, name: str, built: int
 ) -> Iterator[Structure]:
-    """Returns the objects on a lot before its building was built.
-
-    Args:
-        world: the city of today.
-        name: name of the building.
-        built: calendar year in which it was built.
-    """
+    """Returns the objects on a lot before its building was built."""
     lot = world.structure(name)
     rng = np.random.default_rng(built)
     return lot_objects(lot, use_by_size(lot), {"hatchback": 1}, rng)

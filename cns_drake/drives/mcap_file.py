@@ -582,10 +582,6 @@ def _chunk_offsets(body: bytes) -> tuple[int, dict[int, int]]:
 def _read_summary(stream: BinaryIO, path: Path) -> bytes:
     """Returns the summary section; refuses a file that is not whole.
 
-    Args:
-        stream: the file.
-        path: path of the file, for error messages.
-
     Returns:
         The records of the section; empty for a file without this section.
 

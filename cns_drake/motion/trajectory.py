@@ -276,9 +276,6 @@ def _find_speed_profile(
 def _drive_positions(profile: _SpeedProfile) -> np.ndarray:
     """Returns the drive's positions on its path at evenly spaced times.
 
-    Args:
-        profile: speeds of the drive along the path.
-
     Returns:
         (N,) path parameters [m], one for each `_KNOT_PERIOD`, for
         `_make_time_scaling`. The first few and the last few are equal, because

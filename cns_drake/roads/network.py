@@ -301,12 +301,6 @@ def _make_junction(
 ) -> Junction:
     """Returns a junction with its arms.
 
-    Args:
-        path: the file, for error messages.
-        file: content of the file.
-        name: name of the junction.
-        curves: name of a road -> its centreline.
-
     Raises:
         InputError: too few roads end at the junction.
     """

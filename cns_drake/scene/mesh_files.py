@@ -131,10 +131,6 @@ class MeshFiles:
     ) -> tuple[np.ndarray, np.ndarray, float]:
         """Reads a mesh with Open3D.
 
-        Args:
-            path: the file.
-            folder: folder of the files that it names.
-
         Returns:
             Vertices (N, 3), float64 [m], triangles (M, 3), int32, and the step
             between the coordinates that the file can have [m].

@@ -335,11 +335,6 @@ def _mismatch_notes(
     structure. So are structures without a row, in a world without a table of
     its own. Only both together suggest that names do not match.
 
-    Args:
-        table: file of the table.
-        listed: names in the table.
-        found: names in the world.
-
     Returns:
         One note, if rows lack a structure and structures lack a row; otherwise
         none.

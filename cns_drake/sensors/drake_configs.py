@@ -607,10 +607,6 @@ def ApplyOdometryConfig(
 def _checked_section(config: Config, kind: type[Section]) -> Any:
     """Returns the section of a scenario with the fields of a config.
 
-    Args:
-        config: the config.
-        kind: class of the section.
-
     Raises:
         ValueError: a field is out of range.
     """

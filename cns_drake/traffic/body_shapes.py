@@ -121,13 +121,7 @@ def vehicle_limbs(
 def _two_wheeler(
     name: str, paint: Rgb, rng: np.random.Generator
 ) -> tuple[BodyShape, ...]:
-    """Returns a bicycle or a motorcycle with its rider.
-
-    Args:
-        name: `bicycle` or `motorcycle`.
-        paint: colour of the vehicle.
-        rng: random generator for the rider's colours.
-    """
+    """Returns a bicycle or a motorcycle with its rider."""
     coat = _CLOTHES[int(rng.integers(len(_CLOTHES)))]
     heavy = name == "motorcycle"
     radius, width = (0.31, 0.13) if heavy else (0.34, 0.04)

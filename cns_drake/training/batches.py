@@ -172,12 +172,7 @@ class BatchSampler:
     def _targets(
         self, queries: list[int], places: list[int]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns `weights` and `counts` of a `Batch`.
-
-        Args:
-            queries: Q scans.
-            places: P scans.
-        """
+        """Returns `weights` and `counts` of a `Batch`."""
         scans = self._scans
         distance = np.linalg.norm(
             scans.xy[queries][:, None] - scans.xy[places], axis=2

@@ -217,10 +217,6 @@ def _draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
     missing. Objects that stand, grow or park beside a missing building are
     missing, too, unless another building is nearer. Some other trees are also
     missing, and a few buildings and trees are lower than in the last stage.
-
-    Args:
-        city: the city.
-        rng: random generator.
     """
     buildings = [s for s in city.structures if s.semantic_class == "building"]
     trees = [s for s in city.structures if s.kind == "tree"]

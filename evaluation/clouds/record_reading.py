@@ -95,13 +95,7 @@ def content_lines(stream: BinaryIO) -> Iterator[bytes]:
 def _to_records(
     texts: list[bytes], dtype: np.dtype, kind: str, first: int
 ) -> np.ndarray:
-    """Returns (N,) records of a type from rows of numbers.
-
-    Args:
-        texts: N rows.
-        kind: the kind of file, for errors.
-        first: number of rows before these, for errors.
-    """
+    """Returns (N,) records of a type from rows of numbers."""
     names = dtype.names or ()
     # A float64 rounds whole numbers above 2^53.
     exact = [

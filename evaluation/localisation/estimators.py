@@ -77,14 +77,7 @@ def _by_small_gicp(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    """Aligns a scan by small_gicp, once or twice; see `Estimator`.
-
-    Args:
-        kind: small_gicp's name of the algorithm.
-        settings: its settings.
-        surroundings, scan, measured, start: the arguments of any estimator; the
-            scan as measured is not used.
-    """
+    """Aligns a scan by small_gicp, once or twice; see `Estimator`."""
     source = small_gicp.PointCloud(scan)
     surface = surroundings.surface
     X_VW = np.eye(4)
@@ -123,14 +116,7 @@ def _by_robust(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    """Aligns a scan by an estimator with a robust kernel; see `Estimator`.
-
-    Args:
-        kind: `PLANE_ICP` or `GICP`.
-        settings: settings of the estimator.
-        surroundings, scan, measured, start: the arguments of any estimator; the
-            scan as measured is not used.
-    """
+    """Aligns a scan by an estimator with a robust kernel; see `Estimator`."""
     spread = None
     if kind == "GICP":
         source = small_gicp.PointCloud(scan)
@@ -158,15 +144,7 @@ def _by_kiss_matcher(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    """Registers a scan by KISS-Matcher; see `Estimator`.
-
-    Args:
-        package: the package `kiss_matcher`.
-        settings: settings of the estimator.
-        surroundings, scan, measured, start: the arguments of any estimator; the
-            downsampled scan is not used, and of the initial pose only the
-            position.
-    """
+    """Registers a scan by KISS-Matcher; see `Estimator`."""
     # Its numbers are float32: far coordinates would lose decimals.
     p_WS = start[:3, 3]
     target = surroundings.around(p_WS, HALF_EXTENT) - p_WS
@@ -196,12 +174,6 @@ def _by_own(
     start: np.ndarray,
 ) -> Estimate:
     """Registers a scan by a function of the user; see `Estimator`.
-
-    Args:
-        function: the user's function.
-        path: its file, for error messages.
-        surroundings, scan, measured, start: the arguments of any estimator; the
-            downsampled scan is not used.
 
     Raises:
         InputError: the function does not return a pose and a score.

@@ -73,11 +73,6 @@ class Settings:
 def _parse(name: str, kind: Callable, text: Any) -> Any:
     """Returns the value of a setting.
 
-    Args:
-        name: name of the setting.
-        kind: its type, int or float.
-        text: the value, a number or text.
-
     Raises:
         InputError: the value is no number in the range of the setting.
     """

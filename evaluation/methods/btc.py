@@ -495,13 +495,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     def _score(
         self, query: BtcDescription, database: BtcDatabase, limit: int | None
     ) -> np.ndarray:
-        """Returns the scores (D,) of some candidates.
-
-        Args:
-            query: descriptor of the query.
-            database: the places.
-            limit: number of candidates; see `_motions`.
-        """
+        """Returns the scores (D,) of some candidates."""
         scores = np.full(len(database.places), np.nan)
         for place, X_PQ in self._motions(query, database, limit):
             planes = database.places[place].planes

@@ -652,12 +652,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     def _score(
         self, query: LayeredScan, place: LayeredScan, found: _FinePose
     ) -> float:
-        """Returns the score of two scans.
-
-        Args:
-            query, place: the two scans.
-            found: their best pose.
-        """
+        """Returns the score of two scans."""
         config = self.config
         weights = np.array(config.weights)
         common = int(weights @ found.common)

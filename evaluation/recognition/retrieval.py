@@ -244,14 +244,7 @@ def _compare_batch(
     overlaps: np.ndarray | None,
     rows: range,
 ) -> list[Retrieval]:
-    """Returns the retrievals of one batch, see `compare_at_radii`.
-
-    Args:
-        search: search in the database.
-        database, query, protocol, verification_radii, overlaps: see
-            `compare_at_radii`.
-        rows: numbers of the queries of the batch.
-    """
+    """Returns the retrievals of one batch, see `compare_at_radii`."""
     is_known = _known_places(database, query, protocol, rows)
     places = database.places
     queries = query.queries.positions_only.chosen(np.array(rows, np.int64))

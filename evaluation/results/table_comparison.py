@@ -157,10 +157,6 @@ def _tau_interval(
     the queries of a map scatter is part of how maps differ. The interval
     contains each tau that agrees with what is known: it is -1 to 1 if nothing
     is. It is unknown if a table has fewer than eight maps.
-
-    Args:
-        tables: the two tables.
-        families: names of the methods of each family.
     """
     pairs = list(itertools.combinations(range(len(families)), 2))
     if not pairs:
@@ -720,11 +716,6 @@ def _common_conditions(
 
     If the shipped table has none of the conditions that the tables of the user
     have in common, only the user's tables count.
-
-    Args:
-        own: the user's tables.
-        shipped: the shipped table.
-        paths: paths of the user's tables, for errors.
 
     Raises:
         InputError: the tables have no condition in common.

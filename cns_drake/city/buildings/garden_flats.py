@@ -114,15 +114,7 @@ class GardenFlats(Building):
 def _add_house(
     flats: GardenFlats, wing: Wing, boxes: list[Wing], storeys: int, number: int
 ) -> None:
-    """Adds one house of the group.
-
-    Args:
-        flats: the building.
-        wing: the house.
-        boxes: all houses.
-        storeys: number of storeys.
-        number: number of the house, from the left.
-    """
+    """Adds one house of the group."""
     openings = Openings(flats, wing, boxes)
     storey = (wing.wall_top - 0.15 - _FLOOR_M) / storeys
     pitches = (((0, 2), flats.window_pitch), ((1, 3), _SIDE_PITCH_M))

@@ -137,14 +137,7 @@ def _stall_roof(kind: str) -> Roof:
 def _add_stall(
     kiosks: KioskRow, wing: Wing, boxes: list[Wing], number: int
 ) -> None:
-    """Adds a stall: a counter under an awning, or closed shutters.
-
-    Args:
-        kiosks: the building.
-        wing: the stall.
-        boxes: all stalls.
-        number: number of the stall, from the left.
-    """
+    """Adds a stall: a counter under an awning, or closed shutters."""
     openings = Openings(kiosks, wing, boxes)
     wall = wing.wall(0)
     start, end = _JAMB_M, wall.length - _JAMB_M

@@ -111,14 +111,7 @@ def _sidewalks(
     kerbless: BaseGeometry,
     streets: BaseGeometry,
 ) -> MultiPolygon:
-    """Returns the sidewalks, with kerbs where there is no lane for walking.
-
-    Args:
-        areas: areas of the lanes for walking.
-        kerbed: the area along which kerbs stand.
-        kerbless: area without kerbs.
-        streets: area of the carriageway and the medians.
-    """
+    """Returns the sidewalks, with kerbs where there is no lane for walking."""
     walks = _simplified(shapely.union_all(areas))
     # A carriageway without a sidewalk, as in junctions, has a kerb that takes
     # ground, too.

@@ -203,11 +203,6 @@ def _read_road(
 ) -> road_model.ImportedRoad | None:
     """Returns a road of the file; None for a road without course or lanes.
 
-    Args:
-        element: the road in the file.
-        name: unique name of the road.
-        faults: counts what is changed or left out.
-
     Raises:
         ValueError: the road is impossible; the message names the line.
     """

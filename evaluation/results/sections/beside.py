@@ -165,14 +165,7 @@ def _verdict(
     against: Mapping[str, _Against],
     number: int,
 ) -> dict[str, Any]:
-    """Returns a method's rank, and which methods are surely worse or better.
-
-    Args:
-        own: the method.
-        ranked: all methods, the best first.
-        against: the method against each other one.
-        number: number of conditions.
-    """
+    """Returns a method's rank, and which methods are surely worse or better."""
     place = next(k for k, one in enumerate(ranked, 1) if one.method == own)
     return {
         "name": title(own),
