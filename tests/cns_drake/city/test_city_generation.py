@@ -11,7 +11,7 @@ from helpers.city_checks import (
     is_ground,
 )
 from helpers.internal.shipped_cities import (
-    PLANS,
+    LAST_STAGES,
     by_day_or_night,
     city,
     drawn,
@@ -118,7 +118,7 @@ def test_the_list_of_stages_is_complete(name, stages):
         f"stage_{stage}" for stage in stages.stages
     ]
     names = list(stages.stages)
-    assert (names[0], names[-1]) == ("01", PLANS[name].last_stage)
+    assert (names[0], names[-1]) == ("01", LAST_STAGES[name])
     buildings = {
         s.name for s in city(name).structures if s.semantic_class == "building"
     }

@@ -31,44 +31,6 @@ def extension(name, required=True):
     return lambda top: top.update({key: [name] for key in keys})
 
 
-@pytest.mark.parametrize("suffix", [".gltf", ".glb"])
-@pytest.mark.parametrize(
-    ("name", "required"),
-    [
-        ("KHR_draco_mesh_compression", True),
-        ("EXT_meshopt_compression", True),
-        ("KHR_mesh_quantization", True),
-        ("KHR_mesh_quantization", False),
-        ("EXT_mesh_gpu_instancing", False),
-        ("KHR_node_visibility", False),
-        ("ACME_folded_space", True),
-    ],
-)
-def test_extensions_that_change_shapes_are_refused(
-    tmp_path, name, required, suffix
-):
-    path = write(tmp_path, extension(name, required), suffix)
-    with pytest.raises(InputError, match=f"needs the extension {name} of glTF"):
-        notes_of(path)
-
-
-@pytest.mark.parametrize(
-    ("name", "required"),
-    [
-        ("KHR_texture_transform", True),
-        ("KHR_materials_unlit", True),
-        ("KHR_texture_basisu", True),
-        ("KHR_lights_punctual", True),
-        # Shapes are there without it, too.
-        ("KHR_draco_mesh_compression", False),
-        # No shape uses it.
-        ("ACME_folded_space", False),
-    ],
-)
-def test_other_extensions_are_no_matter(tmp_path, name, required):
-    assert notes_of(write(tmp_path, extension(name, required))) == ()
-
-
 @pytest.mark.parametrize(
     ("change", "note"),
     [
@@ -117,23 +79,6 @@ def test_a_world_names_the_file_and_the_extension(tmp_path):
     with pytest.raises(InputError, match="KHR_mesh_quantization") as refusal:
         world_of(path)
     assert str(refusal.value).startswith(str(path))
-
-
-@pytest.mark.parametrize(
-    ("element", "note"),
-    [
-        ("<instance_controller url='#c'/>", "1 skins or morphs of COLLADA"),
-        ("<animation/><animation/>", "2 animations of COLLADA"),
-        ("<lines count='1'/><linestrips/>", "2 lines of COLLADA"),
-        ("<geometry><spline closed='1'/></geometry>", "1 lines of COLLADA"),
-        ("<instance_geometry url='#g'/>", None),
-    ],
-)
-def test_what_is_not_read_of_collada_is_named(tmp_path, element, note):
-    path = tmp_path / "thing.dae"
-    path.write_text(f"<COLLADA>{element}</COLLADA>")
-    expected = () if note is None else (f"{note} ignored",)
-    assert notes_of(path) == expected
 
 
 SQUARE = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"

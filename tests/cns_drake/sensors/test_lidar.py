@@ -10,7 +10,7 @@ from helpers.lidar_stage import (
     positions,
 )
 import numpy as np
-from pydrake.geometry import Box, Cylinder, Role, Sphere
+from pydrake.geometry import Box, Cylinder, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.perception import PointCloud
 import pytest
@@ -129,30 +129,6 @@ def test_follows_moving_geometry():
     assert ahead(stage.eval()) is None
 
 
-def test_never_sees_its_own_body():
-    X_WB = RigidTransform(RollPitchYaw(0.0, 0.0, 0.8), [3.0, 4.0, 0.0])
-    stage = Stage()
-    base = stage.add_frame("base_link", 3, X_WB)
-    wheel = stage.add_frame("wheel", 3, X_WB)
-    stage.add("roof", Box(3.0, 3.0, 1.0), frame=base)
-    stage.add("rim", Sphere(0.5), RigidTransform([5, 0, 0]), frame=wheel)
-    other = stage.add_frame("other", 4, X_WB @ RigidTransform([9.0, 0, 0]))
-    stage.add("bumper", Sphere(1.0), frame=other)
-    stage.finish(base, RigidTransform(), FORWARD)
-    assert ahead(stage.eval()) == pytest.approx(4.5, abs=1e-5)
-
-
-def test_what_it_does_not_see_is_chosen():
-    stage = Stage()
-    base = stage.add_frame("base_link", 3, RigidTransform())
-    wheel = stage.add_frame("wheel", 3, RigidTransform())
-    stage.add("rim", Sphere(1.0), RigidTransform([5, 0, 0]), frame=wheel)
-    pane = stage.add("pane", Box(0.1, 9, 9), RigidTransform([9.05, 0, 0]))
-    stage.add("wall", Box(1, 9, 9), RigidTransform([20.5, 0, 0]))
-    stage.finish(base, RigidTransform(), FORWARD, unseen=[wheel, pane])
-    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
-
-
 def test_labels_and_instances_come_from_the_structure_table():
     stage = Stage()
     stage.add("city::tower_2/door", Box(1, 1, 9), RigidTransform([5, 0, 0]))
@@ -187,31 +163,6 @@ def test_point_cloud_has_the_points_of_the_scan():
     )
 
 
-def test_new_geometry_is_noticed():
-    stage = Stage()
-    frame = stage.add_frame("site", 5, RigidTransform([10.5, 0.0, 0.0]))
-    stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([20.5, 0.0, 0.0]))
-    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
-    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
-    stage.add_to_context(frame, Box(1.0, 9.0, 9.0))
-    assert ahead(stage.eval()) == pytest.approx(10.0, abs=1e-5)
-
-
-def test_a_cloned_context_sees_for_itself():
-    stage = Stage()
-    frame = stage.add_frame("site", 5, RigidTransform([10.5, 0.0, 0.0]))
-    stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([20.5, 0.0, 0.0]))
-    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
-    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
-    original = stage.context
-    stage.context = stage.context.Clone()
-    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
-    stage.add_to_context(frame, Box(1.0, 9.0, 9.0))
-    assert ahead(stage.eval()) == pytest.approx(10.0, abs=1e-5)
-    stage.context = original
-    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
-
-
 def test_a_cloned_context_has_poses_of_its_own():
     stage = Stage()
     stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([20.5, 0.0, 0.0]))
@@ -234,15 +185,6 @@ def test_a_cloned_context_has_poses_of_its_own():
     assert ahead_from(3.0) == pytest.approx(17.0, abs=1e-5)
     stage.context = original
     assert ahead(stage.eval()) == pytest.approx(19.0, abs=1e-5)
-
-
-def test_only_perception_geometry_is_seen():
-    stage = Stage()
-    stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([20.5, 0.0, 0.0]))
-    hidden = stage.add("hidden", Sphere(1.0), RigidTransform([5.0, 0.0, 0.0]))
-    stage.scene_graph.RemoveRole(stage.source, hidden, Role.kPerception)
-    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
-    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
 
 
 def test_a_world_without_geometry_gives_an_empty_scan():

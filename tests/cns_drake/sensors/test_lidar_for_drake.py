@@ -23,7 +23,6 @@ from pydrake.systems.framework import DiagramBuilder
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.scene import CLASS_IDS, StructureEntry, StructureTable, moving_id
 from cns_drake.sensors import DirectionPattern, add_lidar, make_beam_pattern
 
 INERTIA = SpatialInertia.SolidBoxWithMass(1.0, 1.0, 1.0, 1.0)
@@ -147,21 +146,6 @@ def test_namesakes_in_other_scopes_are_models_of_their_own():
     scan = field.finish(both, RigidTransform()).eval()
     assert scan["x"] == pytest.approx([4.5, -4.5])
     assert scan["instance"].tolist() == [1, 2]
-
-
-def test_labels_of_a_table_and_without_one():
-    table = StructureTable([StructureEntry(7, "robot_1", "building")])
-    for structures, expected in ((None, (0, 1)), (table, (50, 7))):
-        field = Field()
-        field.add("ball", Sphere(1.0), model="robot_1")
-        field.finish(structures=structures)
-        field.move(field.plant.GetBodyByName("ball"), RigidTransform([3, 0, 0]))
-        scan = field.eval()
-        assert set(zip(scan["label"], scan["instance"], strict=True)) == {
-            expected
-        }
-    assert CLASS_IDS["outlier"] == 1
-    assert moving_id("unlabeled") == 259
 
 
 def test_rays_of_ones_own():

@@ -247,39 +247,6 @@ def recordings(drives, tmp_path_factory):
     }
 
 
-def test_command_tcr(capsys, recordings, truth):
-    paths = recordings["first"], recordings["second"]
-    status, out, err = run(capsys, "tcr", *paths, "--json")
-    assert status == 0
-    values = json.loads(out)
-    assert values["tcr_sym"] == pytest.approx(truth, abs=0.01)
-    assert values["alignment"]["moved"] == "second"
-    assert values["alignment"]["loops"] >= values["alignment"]["inliers"] >= 15
-    assert values["alignment"]["distance_median"] < 0.05
-    assert "second (poses in 'odom') aligned to first (in 'map'): " in err
-    status, out, err = run(capsys, "tcr", *paths, "--align", "never")
-    assert status == 2
-    fault = err.splitlines()[-1]
-    assert fault.endswith(
-        "second: poses in frame 'odom', those of first in 'map' (recordings"
-        " share a world if their poses are in one frame; --odometry TOPIC and"
-        " --poses FILE choose others)"
-    )
-
-
-@pytest.mark.night
-def test_command_pr(capsys, recordings):
-    paths = recordings["first"], recordings["second"]
-    method = ("--method", "scan-context++", "--json")
-    status, out, err = run(capsys, "pr", *paths, *method)
-    assert status == 0
-    assert json.loads(out)["queries_with_match"] > 5
-    assert "aligned to first" in err
-    status, _, err = run(capsys, "pr", *paths, *method, "--align", "never")
-    assert status == 2
-    assert "poses in frame 'odom'" in err
-
-
 def test_a_control_joins_the_same_world(recordings, drives):
     opened, reports = in_one_world(list(map(open_drive, recordings.values())))
     assert [report.moved for report in reports] == ["second", "third"]

@@ -9,43 +9,24 @@ from pathlib import Path
 import pickle
 from xml.etree import ElementTree
 
-import numpy as np
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
 from cns_drake.base import fingerprint
-from cns_drake.city import City, Structure, make_city, part_mesh
+from cns_drake.city import City, Structure, make_city
 from cns_drake.city.generation import rendering
-from cns_drake.city.ground.coverings import GROUND_TAG
 from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.roads import RoadNetwork, load_road_network
 from cns_drake.scenarios import worlds_folder
 
-
-@dataclass(frozen=True)
-class Plan:
-    """The expected contents of a city; ranges are least and greatest counts.
-
-    Attributes:
-        last_stage: the whole city.
-        buildings, trees, small: numbers of structures.
-        sides: least and greatest length of the world's sides [m].
-    """
-
-    last_stage: str
-    buildings: tuple[int, int]
-    trees: tuple[int, int]
-    small: tuple[int, int]
-    sides: tuple[float, float]
-
-
-PLANS = {
-    "metropolis": Plan("04", (60, 110), (200, 400), (400, 900), (330, 420)),
-    "riverside": Plan("02", (110, 170), (350, 500), (900, 1400), (460, 560)),
-    "downtown": Plan("04", (150, 230), (330, 480), (900, 1500), (490, 510)),
-    "suburbia": Plan("02", (70, 110), (300, 500), (500, 900), (330, 420)),
+# Map -> its last stage, the whole city.
+LAST_STAGES = {
+    "metropolis": "04",
+    "riverside": "02",
+    "downtown": "04",
+    "suburbia": "02",
 }
 
 # To draw one of these takes over ten seconds of processor time.
@@ -57,7 +38,7 @@ def by_day_or_night() -> list:
     night = pytest.mark.night
     return [
         pytest.param(name, marks=night) if name in _BY_NIGHT else name
-        for name in PLANS
+        for name in LAST_STAGES
     ]
 
 
@@ -148,24 +129,6 @@ def drawn(name: str) -> Drawn:
 def network_of(name: str) -> RoadNetwork:
     """Returns the roads of a map."""
     return load_road_network(world_of(name) / "roads.yaml")
-
-
-@cache
-def structures_of(name: str) -> dict[str, Structure]:
-    """Returns the structures of the generated city, by name."""
-    return {structure.name: structure for structure in city(name).structures}
-
-
-@cache
-def ground_triangles(name: str, structure_name: str) -> np.ndarray:
-    """Returns the triangles (N, 3, 3) of a structure of the ground, in W."""
-    structure = structures_of(name)[structure_name]
-    assert GROUND_TAG in structure.tags
-    corners = []
-    for part in structure.model.parts:
-        mesh = part_mesh(part, structure.model.meshes)
-        corners.append(mesh.vertices[mesh.triangles()])
-    return np.concatenate(corners)
 
 
 def stage_files(name: str) -> list[Path]:
