@@ -39,6 +39,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from cns_drake.base import InputError
+from cns_drake.scene.mesh_files import mesh_shape_key
 from cns_drake.scene.model_check import SIZES, lacks_size, read_model
 from cns_drake.scene.model_finder import (
     ModelFinder,
@@ -288,21 +289,21 @@ class _Reader:
         `ray_casting`), so what is beyond the others' places stays. So do meshes
         whose copies share one surface, and what other poses move.
         """
-        paths = {
-            id(visual): str(visual.shape.source().path())
+        copies = Counter(
+            mesh_shape_key(visual.shape)
             for visuals in self._visuals.values()
             for visual in visuals
             if isinstance(visual.shape, Mesh)
-        }
-        copies = Counter(paths.values())
+        )
         unseen = []
         for scope, visuals in self._unmoved():
             far: dict[int, UnseenMesh] = {}
             boxes = []
             for visual in visuals:
-                path = paths.get(id(visual), "")
-                if path and not visual.frame:
-                    found = _box_of_mesh(path, visual, copies[path])
+                if isinstance(visual.shape, Mesh) and not visual.frame:
+                    path = str(visual.shape.source().path())
+                    number = copies[mesh_shape_key(visual.shape)]
+                    found = _box_of_mesh(path, visual, number)
                     if found is not None:
                         name = f"{scope}::{visual.name}"
                         far[id(visual)] = UnseenMesh(name, path, found[1])

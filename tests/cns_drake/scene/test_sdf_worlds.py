@@ -707,11 +707,11 @@ def test_meshes_out_of_sight_are_not_loaded(tmp_path):
     """What is in sight is the same, and so are the table and the notes."""
     folder = write(tmp_path).parent
     visuals = ""
-    # The last two have the same mesh.
+    # The last two have the same mesh, too large to share it at one scale.
     for k in range(6):
-        name = f"house_{min(k, 4)}.obj"
-        (folder / name).write_text(f"{obj_text()}l 1 2\n")
-        mesh = f"<mesh><uri>{name}</uri><scale>2 2 2</scale></mesh>"
+        name, faces = f"house_{min(k, 4)}.obj", "f 1 2 3\n" * (k // 4 << 17)
+        (folder / name).write_text(f"{obj_text()}{faces}l 1 2\n")
+        mesh = f"<mesh><uri>{name}</uri><scale>2 2 {2 + k // 5}</scale></mesh>"
         visuals += (
             f"<visual name='house_{k}/wall'><pose>{100 * k} 0 0 0 0 1</pose>"
             f"<geometry>{mesh}</geometry></visual>"
