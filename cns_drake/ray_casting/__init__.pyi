@@ -1,5 +1,4 @@
 from .embree import load as load
-from .embree_scene import EmbreeScene as EmbreeScene
 from .known_poses import NOTHING_KNOWN as NOTHING_KNOWN
 from .known_poses import KnownPoses as KnownPoses
 from .moving_groups import EVERYWHERE as EVERYWHERE

@@ -22,7 +22,6 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.ray_casting import EmbreeScene
 from cns_drake.scene import geometry_port
 from cns_drake.sensors import Lidar, make_beam_pattern
 
@@ -355,31 +354,3 @@ def compare_with_distances(stage, scan, rng):
     close = np.isclose(expected, measured[some], atol=2e-3)
     assert (close | ~outside).mean() > 0.9
     return int(np.isfinite(measured[some]).sum())
-
-
-def test_what_did_not_change_is_not_built_anew(monkeypatch):
-    """One of many crates changes; the hierarchies of the others stay."""
-    stage = Stage()
-    frames = [
-        stage.add_frame(f"f{k}", k, RigidTransform([10.0, 3.0 * k, 0.0]))
-        for k in range(5)
-    ]
-    crates = [
-        stage.add(f"c{k}", Box(2, 2, 2), frame=f) for k, f in enumerate(frames)
-    ]
-    stage.add("wall", Box(1.0, 90.0, 9.0), RigidTransform([20.5, 0, 0]))
-    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
-    stage.eval()
-    built = []
-    build = EmbreeScene._build_scene
-    monkeypatch.setattr(
-        EmbreeScene,
-        "_build_scene",
-        lambda self, proxies: built.append(proxies) or build(self, proxies),
-    )
-    context = stage.scene_graph.GetMyMutableContextFromRoot(stage.context)
-    stage.scene_graph.ChangeShape(
-        context, stage.source, crates[0], Box(4, 2, 2)
-    )
-    assert ahead(stage.eval()) == pytest.approx(8.0, abs=1e-5)
-    assert [len(proxies.records) for proxies in built] == [12]

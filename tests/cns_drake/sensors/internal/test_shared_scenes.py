@@ -1,11 +1,14 @@
 """What stands still is built once for all LiDARs and Contexts."""
 
+from helpers.lidar_stage import FORWARD, Stage, ahead
 import numpy as np
 from pydrake.geometry import Box, Sphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
+import pytest
 
+from cns_drake.ray_casting.embree_scene import EmbreeScene
 from cns_drake.sensors import add_lidar
 
 
@@ -60,3 +63,31 @@ def test_lidars_and_contexts_share_what_stands_still():
     np.testing.assert_array_equal(still, found[0][0])
     assert still["x"].min() < 4.1 < 7.8 < gone["x"].min()
     assert shared != stills(lidars[0], roots[1])
+
+
+def test_what_did_not_change_is_not_built_anew(monkeypatch):
+    """One of many crates changes; the hierarchies of the others stay."""
+    stage = Stage()
+    frames = [
+        stage.add_frame(f"f{k}", k, RigidTransform([10.0, 3.0 * k, 0.0]))
+        for k in range(5)
+    ]
+    crates = [
+        stage.add(f"c{k}", Box(2, 2, 2), frame=f) for k, f in enumerate(frames)
+    ]
+    stage.add("wall", Box(1.0, 90.0, 9.0), RigidTransform([20.5, 0, 0]))
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
+    stage.eval()
+    built = []
+    build = EmbreeScene._build_scene
+    monkeypatch.setattr(
+        EmbreeScene,
+        "_build_scene",
+        lambda self, proxies: built.append(proxies) or build(self, proxies),
+    )
+    context = stage.scene_graph.GetMyMutableContextFromRoot(stage.context)
+    stage.scene_graph.ChangeShape(
+        context, stage.source, crates[0], Box(4, 2, 2)
+    )
+    assert ahead(stage.eval()) == pytest.approx(8.0, abs=1e-5)
+    assert [len(proxies.records) for proxies in built] == [12]
