@@ -4,55 +4,21 @@ An archetype is a kind of building. `archetypes.yaml` contains the limits of
 size and the colours of each archetype, and a subclass of `Building` samples and
 builds its buildings. The module of this subclass has the archetype's name; only
 landmarks share a module, since their models come from files. To add an
-archetype, write an entry of `archetypes.yaml` and a subclass, and add the
-subclass to `BUILDERS`. `sample` returns one building:
+archetype, write an entry of `archetypes.yaml` and a subclass. `sample` returns
+one building:
 
     footprint = shapely.box(-12, -9, 12, 9)     # front: the edge of least y
     model = sample("brick_block", footprint, 24.0, rng, name="block_003")
 """
 
 from collections.abc import Collection
+import importlib
 from pathlib import Path
 
 import numpy as np
 from shapely.geometry import Polygon
 
 from cns_drake.base import parse_yaml
-from cns_drake.city.buildings import (
-    art_deco_tower,
-    balcony_flats,
-    banded_tower,
-    barn,
-    brick_block,
-    bungalow,
-    chapel,
-    corner_building,
-    corner_store,
-    court_block,
-    detached_house,
-    gallery_flats,
-    garden_flats,
-    gas_station,
-    glass_skyscraper,
-    grid_tower,
-    hotel,
-    kiosk_row,
-    office,
-    park_pavilion,
-    podium_tower,
-    row_house,
-    school,
-    semi_detached,
-    shop_house,
-    shop_strip,
-    slab_tower,
-    sports_hall,
-    supermarket,
-    terrace,
-    unfinished_tower,
-    walk_up,
-    waterfront_hall,
-)
 from cns_drake.city.buildings.landmarks import LANDMARKS, Landmark
 from cns_drake.city.facades.building import Archetype, Building
 from cns_drake.city.facades.site import Site
@@ -67,43 +33,6 @@ ARCHETYPES = {
         Path(__file__).with_name("archetypes.yaml").read_bytes()
     ).items()
     if name != "shared"
-}
-# Name of an archetype -> its class.
-BUILDERS: dict[str, type[Building]] = {
-    "art_deco_tower": art_deco_tower.ArtDecoTower,
-    "balcony_flats": balcony_flats.BalconyFlats,
-    "banded_tower": banded_tower.BandedTower,
-    "barn": barn.Barn,
-    "brick_block": brick_block.BrickBlock,
-    "bungalow": bungalow.Bungalow,
-    "chapel": chapel.Chapel,
-    "corner_building": corner_building.CornerBuilding,
-    "corner_store": corner_store.CornerStore,
-    "court_block": court_block.CourtBlock,
-    "detached_house": detached_house.DetachedHouse,
-    "gallery_flats": gallery_flats.GalleryFlats,
-    "garden_flats": garden_flats.GardenFlats,
-    "gas_station": gas_station.GasStation,
-    "glass_skyscraper": glass_skyscraper.GlassSkyscraper,
-    "grid_tower": grid_tower.GridTower,
-    "hotel": hotel.Hotel,
-    "kiosk_row": kiosk_row.KioskRow,
-    "office": office.Office,
-    "park_pavilion": park_pavilion.ParkPavilion,
-    "podium_tower": podium_tower.PodiumTower,
-    "row_house": row_house.RowHouse,
-    "school": school.School,
-    "semi_detached": semi_detached.SemiDetached,
-    "shop_house": shop_house.ShopHouse,
-    "shop_strip": shop_strip.ShopStrip,
-    "slab_tower": slab_tower.SlabTower,
-    "sports_hall": sports_hall.SportsHall,
-    "supermarket": supermarket.Supermarket,
-    "terrace": terrace.Terrace,
-    "unfinished_tower": unfinished_tower.UnfinishedTower,
-    "walk_up": walk_up.WalkUp,
-    "waterfront_hall": waterfront_hall.WaterfrontHall,
-    **dict.fromkeys(LANDMARKS, Landmark),
 }
 
 
@@ -149,6 +78,14 @@ def sample(
     site = Site(footprint, name, frozenset(blind_edges))
     if not kind.party_walls:
         site = site.detached(kind.overhang)
-    building = BUILDERS[archetype](kind, site, height, rng)
+    building = _class_of(archetype)(kind, site, height, rng)
     building.build()
     return building.to_model(footprint)
+
+
+def _class_of(archetype: str) -> type[Building]:
+    """Returns the class of an archetype, such as `RowHouse` of `row_house`."""
+    if archetype in LANDMARKS:
+        return Landmark
+    module = importlib.import_module(f"{__name__}.{archetype}")
+    return getattr(module, archetype.title().replace("_", ""))

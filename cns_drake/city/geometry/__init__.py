@@ -1,96 +1,46 @@
 """Meshes, polygons, and structures made of meshes."""
 
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes, read_mesh
-from cns_drake.city.geometry.models import (
-    BoxShape,
-    CylinderShape,
-    Finish,
-    MeshShape,
-    Model,
-    Part,
-    Shape,
-    SphereShape,
-    part_mesh,
-    triple,
+from cns_drake.city.geometry.mesh import Mesh as Mesh
+from cns_drake.city.geometry.mesh import merge_meshes as merge_meshes
+from cns_drake.city.geometry.mesh import read_mesh as read_mesh
+from cns_drake.city.geometry.models import BoxShape as BoxShape
+from cns_drake.city.geometry.models import CylinderShape as CylinderShape
+from cns_drake.city.geometry.models import Finish as Finish
+from cns_drake.city.geometry.models import MeshShape as MeshShape
+from cns_drake.city.geometry.models import Model as Model
+from cns_drake.city.geometry.models import Part as Part
+from cns_drake.city.geometry.models import Shape as Shape
+from cns_drake.city.geometry.models import SphereShape as SphereShape
+from cns_drake.city.geometry.models import part_mesh as part_mesh
+from cns_drake.city.geometry.models import triple as triple
+from cns_drake.city.geometry.object_models import OBJECT_MESHES as OBJECT_MESHES
+from cns_drake.city.geometry.object_models import Builder as Builder
+from cns_drake.city.geometry.object_models import assemble as assemble
+from cns_drake.city.geometry.object_models import bar as bar
+from cns_drake.city.geometry.object_models import block as block
+from cns_drake.city.geometry.object_models import in_a_row as in_a_row
+from cns_drake.city.geometry.object_models import mesh_part as mesh_part
+from cns_drake.city.geometry.object_models import object_mesh as object_mesh
+from cns_drake.city.geometry.object_models import pillar as pillar
+from cns_drake.city.geometry.object_models import post as post
+from cns_drake.city.geometry.occupancy import Occupancy as Occupancy
+from cns_drake.city.geometry.polygon_meshes import HeightMap as HeightMap
+from cns_drake.city.geometry.polygon_meshes import surface_mesh as surface_mesh
+from cns_drake.city.geometry.polygon_meshes import wall_mesh as wall_mesh
+from cns_drake.city.geometry.polygons import hull_of as hull_of
+from cns_drake.city.geometry.polygons import placed as placed
+from cns_drake.city.geometry.polygons import polygons_of as polygons_of
+from cns_drake.city.geometry.polygons import snap as snap
+from cns_drake.city.geometry.polygons import tiles as tiles
+from cns_drake.city.geometry.structures import Structure as Structure
+from cns_drake.city.geometry.structures import (
+    ground_triangles as ground_triangles,
 )
-from cns_drake.city.geometry.object_models import (
-    OBJECT_MESHES,
-    Builder,
-    assemble,
-    bar,
-    block,
-    in_a_row,
-    mesh_part,
-    object_mesh,
-    pillar,
-    post,
-)
-from cns_drake.city.geometry.occupancy import Occupancy
-from cns_drake.city.geometry.polygon_meshes import (
-    HeightMap,
-    surface_mesh,
-    wall_mesh,
-)
-from cns_drake.city.geometry.polygons import (
-    hull_of,
-    placed,
-    polygons_of,
-    snap,
-    tiles,
-)
-from cns_drake.city.geometry.structures import Structure, ground_triangles
-from cns_drake.city.geometry.triangles import (
-    from_above,
-    long_normals,
-    looks_up,
-    quartered,
-    turned_up,
-    unit_normals,
-)
-from cns_drake.city.geometry.triangulation import triangulate
-from cns_drake.city.geometry.upper_sides import UpperSides
-
-__all__ = [
-    "OBJECT_MESHES",
-    "BoxShape",
-    "Builder",
-    "CylinderShape",
-    "Finish",
-    "HeightMap",
-    "Mesh",
-    "MeshShape",
-    "Model",
-    "Occupancy",
-    "Part",
-    "Shape",
-    "SphereShape",
-    "Structure",
-    "UpperSides",
-    "assemble",
-    "bar",
-    "block",
-    "from_above",
-    "ground_triangles",
-    "hull_of",
-    "in_a_row",
-    "long_normals",
-    "looks_up",
-    "merge_meshes",
-    "mesh_part",
-    "object_mesh",
-    "part_mesh",
-    "pillar",
-    "placed",
-    "polygons_of",
-    "post",
-    "quartered",
-    "read_mesh",
-    "snap",
-    "surface_mesh",
-    "tiles",
-    "triangulate",
-    "triple",
-    "turned_up",
-    "unit_normals",
-    "wall_mesh",
-]
+from cns_drake.city.geometry.triangles import from_above as from_above
+from cns_drake.city.geometry.triangles import long_normals as long_normals
+from cns_drake.city.geometry.triangles import looks_up as looks_up
+from cns_drake.city.geometry.triangles import quartered as quartered
+from cns_drake.city.geometry.triangles import turned_up as turned_up
+from cns_drake.city.geometry.triangles import unit_normals as unit_normals
+from cns_drake.city.geometry.triangulation import triangulate as triangulate
+from cns_drake.city.geometry.upper_sides import UpperSides as UpperSides
