@@ -4,9 +4,6 @@ Brick rows, houses and the monument stand; along the ring, on the plateau and
 around the southern avenue most lots are open. A drive over the plateau, along
 both avenues and round the south-western blocks; `diagrams/downtown_04.py`
 drives through the finished city.
-
-What is driven is data, `worlds/downtown/sequence_01.yaml`; how it is wired
-is `cns_drake.make_station`.
 """
 
 from cns_drake import run_script

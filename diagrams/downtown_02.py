@@ -3,9 +3,6 @@
 The shopping hall, the gas station and the plateau's station have come, the
 office towers, the hotel and the car park not yet. A drive round the ring and
 over the plateau, through the roundabout and round the south-western blocks.
-
-What is driven is data, `worlds/downtown/sequence_02.yaml`; how it is wired
-is `cns_drake.make_station`.
 """
 
 from cns_drake import run_script

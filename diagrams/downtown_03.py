@@ -3,9 +3,6 @@
 Only the east is open: the building site is a field, and the towers at the
 roundabout and beyond the ring are to come. A drive round the north-east the
 other way than that of `diagrams/downtown_04.py`, which overlaps with it.
-
-What is driven is data, `worlds/downtown/sequence_03.yaml`; how it is wired
-is `cns_drake.make_station`.
 """
 
 from cns_drake import run_script

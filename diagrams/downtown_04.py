@@ -4,9 +4,6 @@ Towers and offices around the roundabout, the plateau with its station, the
 slabs beyond the ring and a tower under construction. A drive down from the
 plateau, round the ring and round the south-western blocks, against which those
 of the three earlier stages are compared.
-
-What is driven is data, `worlds/downtown/sequence_04.yaml`; how it is wired
-is `cns_drake.make_station`.
 """
 
 from cns_drake import run_script

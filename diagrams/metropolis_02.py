@@ -4,9 +4,6 @@ The works and the rows at the edges have been filled in; the lots around the
 first skyscraper, along the boulevard and in the east are still empty. A drive
 once round the ring and twice along the boulevard, the other way round than
 most of `diagrams/metropolis_04.py`, which drives through the finished city.
-
-What is driven is data, `worlds/metropolis/sequence_02.yaml`; how it is wired
-is `cns_drake.make_station`.
 """
 
 from cns_drake import run_script

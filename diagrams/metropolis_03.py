@@ -4,9 +4,6 @@ Little has come since stage 02: an observation tower over the park, and trees
 around the lots of the skyline. A drive round the middle and half the ring;
 `diagrams/metropolis_04.py` drives through the same streets once everything
 is built.
-
-What is driven is data, `worlds/metropolis/sequence_03.yaml`; how it is wired
-is `cns_drake.make_station`.
 """
 
 from cns_drake import run_script

@@ -2,9 +2,6 @@
 
 A small town on both banks of a river with four bridges.
 `diagrams/riverside_02.py` drives along its eastern half when all is built.
-
-What is driven is data, `worlds/riverside/sequence_01.yaml`; how it is wired is
-`cns_drake.simulation.station.make_station`.
 """
 
 from cns_drake import run_script

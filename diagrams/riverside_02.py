@@ -2,9 +2,6 @@
 
 Row houses and shops, flats, a mill and a wharf at the river, gardens and
 woods around. `diagrams/riverside_01.py` drives through its older stage.
-
-What is driven is data, `worlds/riverside/sequence_02.yaml`; how it is wired is
-`cns_drake.simulation.station.make_station`.
 """
 
 from cns_drake import run_script

@@ -525,10 +525,6 @@ def past_structures(
     another use. Trees are smaller. The city must have years of construction, so
     `world.today` is not None.
 
-    Args:
-        world: the city of today.
-        year: the year relative to today, negative.
-
     Returns:
         Name of each structure -> the structure, or None if it is the same as
         today; and the events in order of time.

@@ -139,10 +139,6 @@ def poisson_p(number: int, expected: float) -> float:
     """Returns the two-sided p-value of an observed number of events.
 
     The number is compared with a Poisson distribution.
-
-    Args:
-        number: observed number.
-        expected: mean of the distribution.
     """
     tails = poisson.cdf(number, expected), poisson.sf(number - 1, expected)
     return min(1.0, 2.0 * float(min(tails)))

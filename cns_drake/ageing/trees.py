@@ -75,14 +75,7 @@ class Trees:
         draws: YearlyDraws,
         seed: int,
     ) -> None:
-        """Begins with the trees of today.
-
-        Args:
-            world: the city of today.
-            standing: the ageing city.
-            draws: random numbers of the ageing city.
-            seed: seed of the greatest heights of trees.
-        """
+        """Begins with the trees of today."""
         self._standing = standing
         self._draws = draws
         self._trees = list(_trees_of_today(world, seed))

@@ -504,10 +504,6 @@ class _Contents:
 
         Schemas, channels and statistics of the summary are taken over.
 
-        Args:
-            stream: the file.
-            unpacked: the chunks that were uncompressed so far.
-
         Raises:
             ValueError: the file is damaged, or has fewer messages than its
                 statistics state.

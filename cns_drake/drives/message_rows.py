@@ -141,12 +141,7 @@ class MessageRows:
     """
 
     def __init__(self, message_type: str, count: int):
-        """Prepares an array.
-
-        Args:
-            message_type: the type nav_msgs/msg/Odometry or sensor_msgs/msg/Imu.
-            count: number of messages.
-        """
+        """Prepares an array."""
         self._type = message_type
         self._kind = _KINDS[message_type]
         self._rows = np.zeros(count, self._kind.dtype)

@@ -70,10 +70,6 @@ class Absence:
 
         Points on absent structures get them; all other labels are as recorded.
 
-        Args:
-            scan: scan of the drive.
-            index: its number, for error messages.
-
         Returns:
             A copy of the scan, with the field `label` as uint16.
         """

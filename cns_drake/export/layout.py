@@ -69,10 +69,6 @@ class Layout:
 def checked_name(drive: Drive, text: str) -> str:
     """Returns a name from a recording if it is safe as the name of a folder.
 
-    Args:
-        drive: the recording, for the error message.
-        text: the name.
-
     Raises:
         InputError: if the name could lead to another folder.
     """

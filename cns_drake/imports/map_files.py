@@ -172,15 +172,7 @@ def write_facts(
     comment: str = "# Where this map comes from. A place of the map plus the"
     " origin is one of the\n# source [m].\n",
 ) -> None:
-    """Writes the facts of an import to `import.yaml` in the map's folder.
-
-    Args:
-        draft: folder of the map.
-        source: file that is imported.
-        facts: facts to record, by name.
-        faults: counts of repaired and omitted parts.
-        comment: first lines of the file.
-    """
+    """Writes the facts of an import to `import.yaml` in the map's folder."""
     if "axes" in facts:
         comment += (
             "# Places of the source are brought to metres east, north and up"

@@ -156,11 +156,7 @@ def read_drive_page(path: Path, city: str) -> OtherPage:
 
 
 def make_pair_page(first: OtherPage, second: OtherPage) -> str:
-    """Returns a page of two drives side by side, each at the other's place.
-
-    Args:
-        first, second: pages of drives through the same city.
-    """
+    """Returns a page of two drives side by side, each at the other's place."""
     return fill_template(
         "pair.html",
         titles=(first.title, second.title),

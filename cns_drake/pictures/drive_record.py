@@ -120,11 +120,7 @@ class ScanRecord:
             self.stride *= 2
 
     def within(self, num_bytes: int) -> "ScanRecord":
-        """Returns as many scans as fit, evenly spaced, and at least the first.
-
-        Args:
-            num_bytes: greatest size of all scans, deflated.
-        """
+        """Returns evenly spaced scans: as many as fit deflated, or one."""
         step = 1
         while step < len(self.scans) and num_bytes < sum(
             len(one.data) for one in self.scans[::step]

@@ -132,9 +132,6 @@ def unpacked(archive: Path) -> Path:
     temporary folder and then renames it, so that the folder is always whole,
     and the first process to finish provides it.
 
-    Args:
-        archive: a tar file, compressed by any method.
-
     Raises:
         InputError: if the cache cannot be written.
     """

@@ -35,10 +35,6 @@ class ModelFinder:
         the environment variables name; the world's folder and its subfolder
         `models`; the parent of the world's folder and the parent's subfolder
         `models`.
-
-        Args:
-            world: file of the world.
-            model_paths: folders to search first.
         """
         folder = world.absolute().parent
         named = [

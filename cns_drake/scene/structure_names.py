@@ -28,9 +28,6 @@ def part_name(geometry_name: str) -> str:
 
     A visual named `tower_017/storey_03` is the part `storey_03`; a visual
     without a slash is a part with the visual's name.
-
-    Args:
-        geometry_name: scoped name of the geometry.
     """
     visual = geometry_name.rpartition("::")[2]
     _, slash, part = visual.partition("/")

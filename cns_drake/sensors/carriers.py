@@ -82,11 +82,6 @@ def check_in_diagram(
 ) -> None:
     """Checks that a system has been added to a diagram.
 
-    Args:
-        builder: builder of the diagram.
-        system: the system.
-        argument: text with which an error message begins.
-
     Raises:
         RuntimeError: the builder has no such system.
     """

@@ -506,13 +506,9 @@ def ApplyImuConfig(
 
     Args:
         config: description of the IMU.
-        builder: builder of the diagram.
-        plant: finalized plant; by default the system named `plant`.
         scene_graph: ignored, so that the function has the arguments of Drake's
             `ApplyCameraConfig`.
-        lcm_buses: the available buses; `config.lcm_bus` names one of them.
-        lcm: interface to publish on, instead of a bus. If both `lcm_buses` and
-            `lcm` are None, an interface to the default URL is added.
+        builder, plant, lcm_buses, lcm: see `ApplyLidarConfig`.
 
     Raises:
         InputError: Kalibr's file cannot be used.
@@ -565,13 +561,9 @@ def ApplyOdometryConfig(
 
     Args:
         config: description of the odometry.
-        builder: builder of the diagram.
-        plant: finalized plant; by default the system named `plant`.
         scene_graph: ignored, so that the function has the arguments of Drake's
             `ApplyCameraConfig`.
-        lcm_buses: the available buses; `config.lcm_bus` names one of them.
-        lcm: interface to publish on, instead of a bus. If both `lcm_buses` and
-            `lcm` are None, an interface to the default URL is added.
+        builder, plant, lcm_buses, lcm: see `ApplyLidarConfig`.
 
     Raises:
         RuntimeError: there is no such plant, frame or bus, or the plant is not

@@ -219,51 +219,6 @@ def traffic_structures(plan: TrafficPlan, first: int = 1) -> StructureTable:
     )
 
 
-def make_traffic(
-    scene_graph: SceneGraph,
-    plan: TrafficPlan,
-    *,
-    seed: int = 0,
-    structures: StructureTable | None = None,
-    turn: float = 0.05,
-    name: str = "traffic",
-) -> TrafficMotion:
-    """Adds traffic to a SceneGraph; returns the system that moves it.
-
-    Traffic consists of vehicles and pedestrians. The system is not yet part of
-    a diagram; `cns_drake.add_traffic` also adds the system to a diagram.
-
-    Args:
-        scene_graph: SceneGraph to which the geometry is added, under a source
-            of its own.
-        plan: the traffic.
-        seed: seed of colours and sizes.
-        structures: table with an instance id for each body; by default
-            `traffic_structures` of the plan.
-        turn: time over which the output `body_spatial_velocities` is averaged
-            [s]: the revolution time of a LiDAR with motion distortion.
-        name: name of the geometry source.
-    """
-    if structures is None:
-        structures = traffic_structures(plan)
-    entries = [structures[entry.name] for entry in traffic_structures(plan)]
-    source = scene_graph.RegisterSource(name)
-    bodies = []
-    for k, entry in enumerate(entries):
-        rng = np.random.default_rng([seed, k])
-        if k < len(plan.kinds):
-            limbs = vehicle_limbs(plan.kinds[k], rng)
-        else:
-            limbs = walker_limbs(rng)
-        frames = _register(scene_graph, source, entry.name, limbs)
-        bodies.append(
-            TrafficBody(
-                entry.instance, entry.name, entry.semantic_class, limbs, frames
-            )
-        )
-    return TrafficMotion(plan, bodies, source, turn)
-
-
 def add_traffic(
     builder: DiagramBuilder,
     scene_graph: SceneGraph,
@@ -299,14 +254,24 @@ def add_traffic(
         traffic = add_traffic(builder, scene_graph, plan)
     """
     check_unused_names(builder, name)
-    traffic = make_traffic(
-        scene_graph,
-        plan,
-        seed=seed,
-        structures=structures,
-        turn=turn,
-        name=name,
-    )
+    if structures is None:
+        structures = traffic_structures(plan)
+    entries = [structures[entry.name] for entry in traffic_structures(plan)]
+    source = scene_graph.RegisterSource(name)
+    bodies = []
+    for k, entry in enumerate(entries):
+        rng = np.random.default_rng([seed, k])
+        if k < len(plan.kinds):
+            limbs = vehicle_limbs(plan.kinds[k], rng)
+        else:
+            limbs = walker_limbs(rng)
+        frames = _register(scene_graph, source, entry.name, limbs)
+        bodies.append(
+            TrafficBody(
+                entry.instance, entry.name, entry.semantic_class, limbs, frames
+            )
+        )
+    traffic = TrafficMotion(plan, bodies, source, turn)
     builder.AddNamedSystem(name, traffic)
     builder.Connect(
         traffic.GetOutputPort("geometry_pose"),

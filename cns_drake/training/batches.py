@@ -110,10 +110,6 @@ class BatchSampler:
     def __init__(self, scans: TrainingScans, seed: int):
         """Finds the drives that share a city.
 
-        Args:
-            scans: all scans.
-            seed: seed of the random sampling.
-
         Raises:
             InputError: no city has two drives.
         """
@@ -137,11 +133,7 @@ class BatchSampler:
             raise InputError("training: no city has two drives that meet")
 
     def batch(self, step: int) -> Batch:
-        """Returns the batch of a training step.
-
-        Args:
-            step: number of the step.
-        """
+        """Returns the batch of a training step."""
         rng = np.random.default_rng([self._seed, step])
         queries, places = self._queries_and_places(rng)
         weights, counts = self._targets(queries, places)

@@ -90,11 +90,6 @@ class Bay:
 
         The bay grows by at most 0.5 m in front and behind, and by at most 0.25
         m on each side.
-
-        Args:
-            car: the car in the bay.
-            cars: areas of all parked cars.
-            others: areas of all other objects.
         """
         own = (car.name,)
         box = self.box()

@@ -485,11 +485,7 @@ class TableChanges:
     """New structures, changed parts and causes, for a structure table."""
 
     def __init__(self, table: StructureTable):
-        """Begins without changes.
-
-        Args:
-            table: the structure table before the changes.
-        """
+        """Begins without changes."""
         self._table = table
         # Name -> entry of a new structure, still without an instance id.
         self._added: dict[str, StructureEntry] = {}

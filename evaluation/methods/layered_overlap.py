@@ -82,9 +82,6 @@ _BYTES = np.uint64(0x0101010101010101)
 def turns(number: int) -> np.ndarray:
     """Returns the cosines and sines of H angles that divide 360 deg evenly.
 
-    Args:
-        number: H.
-
     Returns:
         (H, 2) int64, in units of 2^-14.
     """

@@ -76,12 +76,6 @@ def estimated_poses(
 
     The pose is None at a place where the method estimates no pose.
 
-    Args:
-        method: method that estimates the poses.
-        query: descriptor of the query by the method.
-        database: database of places, made by the method.
-        places: places in the database.
-
     Raises:
         InputError: if the method returns something other than poses.
     """

@@ -58,10 +58,6 @@ def table_name(path: Path, paths: Iterable[Path]) -> str:
     """Returns the name of a table: the name of its file or folder.
 
     If several of the tables have this name, the result is the path.
-
-    Args:
-        path: path of the table.
-        paths: paths of all tables.
     """
     names = [
         table_path.stem

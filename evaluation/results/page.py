@@ -315,9 +315,6 @@ def marker_corners(marker: str) -> str:
     """Returns the points of an SVG polygon that shows a marker of a chart.
 
     The polygon is 8 px wide around (18, 6), the middle of a line in a legend.
-
-    Args:
-        marker: the marker, in the terms of Matplotlib.
     """
     style = MarkerStyle(marker)
     path = style.get_path().transformed(style.get_transform())

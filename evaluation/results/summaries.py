@@ -455,10 +455,6 @@ def worths(results: Results, metric: str) -> list[Summary]:
     differences, over all conditions that were measured with the detector,
     without updates and with exact updates. If exact updates change nothing,
     there is no worth.
-
-    Args:
-        results: the table of results.
-        metric: name of a metric.
     """
     groups: dict[tuple, dict[str, tuple[Row, float]]] = {}
     for row in results.where(metric=metric).rows:

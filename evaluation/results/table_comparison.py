@@ -431,10 +431,6 @@ def rows_beside_shipped(results: Results, metric: str) -> tuple[list[Row], str]:
     Only place recognition without geometric verification counts. Controls count
     only if all conditions are controls.
 
-    Args:
-        results: the table of the study.
-        metric: name of the metric.
-
     Returns:
         The rows of all methods that have all common conditions, each with its
         label as `method`; and why there are none, else "". A method whose

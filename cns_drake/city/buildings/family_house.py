@@ -49,13 +49,7 @@ class FamilyHouse(Building):
 
 
 def window_rows(house: FamilyHouse, wing: Wing, storeys: int) -> Openings:
-    """Returns openings of a wing with the windows of all storeys.
-
-    Args:
-        house: the building.
-        wing: the wing.
-        storeys: number of storeys.
-    """
+    """Returns openings of a wing with the windows of all storeys."""
     openings = Openings(house, wing, house.boxes)
     pitches = (
         (_FRONT_AND_BACK, house.window_pitch),

@@ -44,12 +44,7 @@ _REAR_SECTIONS = 3
 
 
 def site_cabin(rng: np.random.Generator, *, storeys: int = 1) -> Model:
-    """Returns site offices along x, one on top of the other.
-
-    Args:
-        rng: random generator for the colour.
-        storeys: number of cabins.
-    """
+    """Returns site offices along x, one on top of the other."""
     paint = Dice(rng).pick(CHOICES["site_cabin"])
     return assemble(
         *(
@@ -126,12 +121,7 @@ def excavator(rng: np.random.Generator) -> Model:
 
 
 def traffic_cones(rng: np.random.Generator, *, count: int = 5) -> Model:
-    """Returns traffic cones in a loose row along x.
-
-    Args:
-        rng: random generator for their places.
-        count: number of cones.
-    """
+    """Returns traffic cones in a loose row along x."""
     dice = Dice(rng)
     return assemble(
         *(

@@ -34,11 +34,6 @@ def write_town(
 ) -> tuple[ImportReport, dict[str, tuple[int, int]]]:
     """Writes all files of a town to a map folder.
 
-    Args:
-        draft: the folder, which has the map's name.
-        source: imported file, named in messages and comments.
-        town: the town.
-
     Returns:
         What was imported, and name of a stage -> counts of its structures and
         of its triangles.

@@ -254,14 +254,12 @@ class Lidar(LeafSystem):
     `X_WS` is the pose of S at the time of the output. `scan_time` is this time
     [s], like RgbdSensor's `image_time`.
 
-    A scan is one revolution of the LiDAR. The revolution starts at the time of
-    the output. With a causal LiDAR, the revolution ends at this time instead,
-    so that a controller may use the scan at once. By default all beams are cast
-    from a single pose of S, the pose at the time of the output (a deskewed
-    scan). This pose follows from the pose of P in the SceneGraph.
+    A scan is one revolution of the LiDAR, which starts at the time of the
+    output or, with a causal LiDAR, ends at this time. By default all beams are
+    cast from the pose of S at the time of the output (a deskewed scan), which
+    follows from the pose of P in the SceneGraph.
 
-    A LiDAR with a `rate` is discrete: it computes a scan once per period and
-    holds it, like Drake's RgbdSensorDiscrete. At time t, all output ports,
+    A LiDAR with a `rate` is discrete. At time t, all output ports,
     `EvalGeometryIds` and `EvalInstances` show the last capture up to t. At the
     time of a capture itself, they show the new scan even before the update of
     the state, so that a message that is published at this time has this scan.
@@ -305,12 +303,11 @@ class Lidar(LeafSystem):
     in one array. Many poses are read faster from this array than from the
     SceneGraph.
 
-    Drake cannot cast rays. The system therefore reads shapes and poses from the
-    QueryObject, casts rays on a hierarchy of its own, and rebuilds the parts of
-    this hierarchy that have changed. `geometry` lists the geometry; the output
-    port of `geometry_port` computes this list only after a change. If
-    `geometry` is not connected, the LiDAR lists all geometry at every scan. In
-    a world of thousands of geometries, this takes longer than the scan.
+    The system casts rays on a hierarchy of its own, of which it rebuilds the
+    parts that have changed. `geometry` lists the geometry; the output port of
+    `geometry_port` computes this list only after a change. If `geometry` is not
+    connected, the LiDAR lists all geometry at every scan, which takes longer
+    than the scan in a world of thousands of geometries.
 
     Attributes:
         parent_frame_id: the frame P that carries the LiDAR.

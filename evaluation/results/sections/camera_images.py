@@ -100,9 +100,6 @@ def nearest_images(
 def open_image(data: bytes) -> Image:
     """Opens an untrusted image, whose pixels are decoded when they are used.
 
-    Args:
-        data: the content of its file.
-
     Returns:
         The image, which is a context manager.
 
