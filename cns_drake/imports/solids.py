@@ -48,6 +48,8 @@ def extruded(
     roof: str = "flat",
     roof_height: float = 0.0,
     ground: float = 0.0,
+    facing_deg: float | None = None,
+    is_across: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the walls and the roof of a solid, as triangles (M, 3, 3) [m].
 
@@ -67,6 +69,11 @@ def extruded(
             footprint with four corners.
         roof_height: height of the roof above the eaves [m].
         ground: height of the ground [m].
+        facing_deg: direction that a slope of a `skillion`, `gabled` or `hipped`
+            roof faces, counter-clockwise from x [deg]; by default that of a
+            longest side.
+        is_across: whether the ridge is along the shorter sides instead. Counts
+            only without `facing_deg`.
     """
     polygon = orient(polygon)
     eaves = high - roof_height
@@ -77,7 +84,10 @@ def extruded(
     corners = level_rings(polygon, eaves)[0]
     pitched = None
     if roof != "flat" and roof_height > 0.0:
-        pitched = _slopes_and_gables(roof, polygon, corners, high, roof_height)
+        eave = _lower_side(corners, facing_deg, is_across)
+        pitched = _slopes_and_gables(
+            roof, polygon, corners, high, roof_height, eave
+        )
         # A slope that looks downwards reaches beyond the footprint.
         if pitched is None or (
             long_normals(np.concatenate(pitched[0]))[:, 2].min() < -LEAST_AREA
@@ -109,6 +119,7 @@ def _slopes_and_gables(
     corners: np.ndarray,
     high: float,
     roof_height: float,
+    eave: int,
 ) -> _Roof | None:
     """Returns the slopes and gables of a roof; None if it cannot be made.
 
@@ -118,6 +129,7 @@ def _slopes_and_gables(
         corners: (N, 3) outline of the footprint at the height of the eaves [m].
         high: height of the highest point [m].
         roof_height: height of the roof above the eaves [m].
+        eave: the side that a slope faces, see `_lower_side`.
     """
     if polygon.interiors:
         return None
@@ -125,14 +137,11 @@ def _slopes_and_gables(
         return _rising_rings(corners, polygon, roof_height, _PROFILES[roof]), []
     if roof == "mansard":
         return _mansard(corners, polygon, roof_height)
+    corners = np.roll(corners, -eave, axis=0)
     if roof == "skillion":
         return _skillion(corners, polygon, roof_height)
     if roof not in ("gabled", "hipped") or len(corners) != 4:
         return None
-    sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
-    # The ridge runs along the two longer sides: from corners 0 and 2.
-    if sides[1] + sides[3] > sides[0] + sides[2]:
-        corners = np.roll(corners, -1, axis=0)
     a, b, c, d = corners
     start, end = (a + d) / 2.0, (b + c) / 2.0
     start[2] = end[2] = high
@@ -208,26 +217,40 @@ def _mansard(
     ], []
 
 
+def _lower_side(
+    corners: np.ndarray, facing_deg: float | None, is_across: bool
+) -> int:
+    """Returns the side of an outline that a slope of its roof faces.
+
+    Of sides that are equally long, or opposite, the first one counts, because
+    this is the same one wherever north is.
+
+    Args:
+        corners: (N, 3) the outline, counter-clockwise [m].
+        facing_deg, is_across: see `extruded`.
+    """
+    sides = np.roll(corners, -1, axis=0)[:, :2] - corners[:, :2]
+    lengths = np.linalg.norm(sides, axis=1)
+    if facing_deg is not None:
+        angle = np.radians(facing_deg)
+        # The outward normals are the sides, turned clockwise.
+        facing = (sides @ [-np.sin(angle), np.cos(angle)]) / lengths
+        return int(facing.argmax())
+    longest = int((lengths > lengths.max() - _SAME_LENGTH).argmax())
+    return longest + 1 if is_across else longest
+
+
 def _skillion(
     corners: np.ndarray, polygon: Polygon, roof_height: float
 ) -> _Roof:
-    """Returns a roof that rises from the longest side, and its gables.
-
-    Of sides that are equally long, the southernmost is the lower one.
-    """
-    sides = np.roll(corners, -1, axis=0) - corners
-    lengths = np.linalg.norm(sides, axis=1)
-    middles = corners + sides / 2.0
-    longest = min(
-        np.flatnonzero(lengths > lengths.max() - _SAME_LENGTH).tolist(),
-        key=lambda k: (middles[k, 1], middles[k, 0]),
-    )
-    inwards = np.array([-sides[longest, 1], sides[longest, 0]])
-    away = (corners[:, :2] - corners[longest, :2]) @ inwards
+    """Returns a roof that rises from the first side, and its gables."""
+    side = corners[1] - corners[0]
+    inwards = np.array([-side[1], side[0]])
+    away = (corners[:, :2] - corners[0, :2]) @ inwards
     low, high = away.min(), away.max()
 
     def raised(points: np.ndarray) -> np.ndarray:
-        share = (points[..., :2] - corners[longest, :2]) @ inwards
+        share = (points[..., :2] - corners[0, :2]) @ inwards
         found = points.copy()
         found[..., 2] += roof_height * (share - low) / (high - low)
         return found

@@ -217,7 +217,11 @@ def _draw_mesh(
     colours: Rgba | np.ndarray,
 ) -> None:
     """Draws a mesh with one colour, or with sRGB colours (N, 3) of vertices."""
-    vertices = _columns(_on_grid(surface.p_GVset))
+    # Browsers have vertices in single precision, but not transforms.
+    p_GO = np.round(surface.p_GVset[:1], -5).sum(axis=0)
+    if p_GO.any():
+        meshcat.SetTransform(path, RigidTransform(p_GO))
+    vertices = _columns(_on_grid(surface.p_GVset - p_GO))
     triangles = _columns(surface.triangles, np.int32)
     if isinstance(colours, Rgba):
         meshcat.SetTriangleMesh(path, vertices, triangles, colours)

@@ -13,6 +13,7 @@ from cns_drake.base import (
     InputError,
     arctan2,
     cos,
+    poses,
     read_rows,
     repeated,
     sin,
@@ -294,8 +295,6 @@ def _loop_corners_at(
 _GROUND_SPACING = 2.0
 # Least limit of speed [m/s].
 _SLOWEST = 0.5
-# A greater coordinate is a mistake, not a place [m].
-_FARTHEST = 1_000_000.0
 
 
 class Waypoints(NamedTuple):
@@ -349,9 +348,9 @@ def read_waypoints(path: Path | str) -> Waypoints:
                 raise InputError(f"{where}: {value!r} is not a finite number")
             if name == "velocity" and float(value) < 0.0:
                 raise InputError(f"{where}: velocity: {value} m/s is below 0")
-            if abs(float(value)) > _FARTHEST:
+            if abs(float(value)) > poses.FARTHEST:
                 raise InputError(
-                    f"{where}: {value} m are more than {_FARTHEST:.0f} m"
+                    f"{where}: {value} m are more than {poses.FARTHEST:.0f} m"
                 )
             row[name] = float(value)
         rows.append([*row.values()])

@@ -101,8 +101,8 @@ def plain_collada(path: Path) -> tuple[bytes, np.ndarray]:
 
     Returns:
         The file, and (3,) what was taken from the place of all meshes, along
-        the axes that Open3D gives them [m]. Files with skins or morphs, whose
-        meshes name others, and files that show nothing stay as they are.
+        the axes that Open3D gives them [m]. Files that show nothing stay as
+        they are.
 
     Raises:
         ValueError: an element has not the numbers that it needs.
@@ -110,7 +110,7 @@ def plain_collada(path: Path) -> tuple[bytes, np.ndarray]:
     """
     root = read_elements(path)
     shown = list(_placed_meshes(root))
-    if not shown or next(root.iter("controller"), None) is not None:
+    if not shown:
         return read_bytes(path), np.zeros(3)
     starts = {
         one.get("id"): _begin_at_origin(cast(Element, one))
@@ -124,6 +124,8 @@ def plain_collada(path: Path) -> tuple[bytes, np.ndarray]:
     scene = _shown_scene(root)
     assert scene is not None  # It shows a mesh.
     scene[:] = []
+    for one in [*root.all("library_controllers")]:
+        root.remove(one)  # They may be incomplete.
     for X, (one, _) in zip(X_meshes, shown, strict=True):
         matrix = Element("matrix")
         matrix.text = " ".join(map(repr, X.ravel().tolist()))
@@ -147,18 +149,31 @@ def _shown_scene(root: Element) -> Element | None:
 def _placed_meshes(root: Element) -> Iterator[tuple[Element, np.ndarray]]:
     """Yields each `instance_geometry` that a file shows, and its place (4, 4).
 
+    Skins and morphs are shown as their meshes were modelled.
+
     Raises:
         ValueError: a node shows itself, or has other numbers than it needs.
     """
     scene = _shown_scene(root)
     waiting = [] if scene is None else [(scene, np.eye(4), 0)]
     named = {one.get("id"): cast(Element, one) for one in root.iter("node")}
+    sources = {
+        f"#{one.get('id')}": inner.get("source", "")
+        for one in root.iter("controller")
+        for inner in one
+        if inner.tag in ("skin", "morph")
+    }
     while waiting:
         parent, X, depth = waiting.pop()
         if depth > _DEEPEST:
             raise ValueError("has a node of COLLADA that shows itself")
         X = X @ _own_place(parent)
         yield from ((one, X) for one in parent.all("instance_geometry"))
+        for one in parent.all("instance_controller"):
+            url = one.get("url", "")
+            for _ in sources:  # A skin may name a morph.
+                url = sources.get(url, url)
+            yield Element("instance_geometry", url=url), X
         inner = [*parent.all("node")]
         for one in parent.all("instance_node"):
             if (found := named.get(one.get("url", "")[1:])) is not None:

@@ -98,6 +98,8 @@ def _point_type(header: dict[str, list[str]]) -> np.dtype:
         size = sizes[position]
         kind = kinds[position]
         count = counts[position]
+        if count == 0:  # PCL writes padding of no bytes.
+            continue
         if size not in _PCD_SIZES.get(kind, ()) or count < 1:
             raise ValueError(
                 f"PCD header: {name}: no type {header['TYPE'][position]} of"
@@ -109,7 +111,7 @@ def _point_type(header: dict[str, list[str]]) -> np.dtype:
         fields.append((unique, f"<{kind}{size}", shape))
     dtype = record_type(fields, "PCD header: field")
     for name in "xyz":
-        if name not in names or dtype[name].kind != "f":
+        if name not in (dtype.names or ()) or dtype[name].kind != "f":
             raise ValueError(f"PCD header: no field {name} of type F")
     return dtype
 
@@ -165,7 +167,9 @@ def _read_compressed(
         packed = np.frombuffer(stream.read(num_packed), dtype=np.uint8)
     plain = np.empty(num_plain, dtype=np.uint8)
     if not _decompress_lzf(packed, plain):
-        raise ValueError("PCD: the compressed data is damaged")
+        if num_packed != num_plain:
+            raise ValueError("PCD: the compressed data is damaged")
+        plain = packed  # pypcd4 writes what does not shrink as it is.
     for start in range(0, max(count, 1), block):
         yield _interleaved(plain, dtype, count, slice(start, start + block))
 

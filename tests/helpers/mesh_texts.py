@@ -51,8 +51,16 @@ def ply_text(vertices=L_VERTICES, kind="float"):
     ) + "".join(f"{row}\n" for row in rows)
 
 
-def collada_text(vertices=L_VERTICES, place=""):
+# A skin that moves its mesh by a matrix, which is left out. Joints and weights
+# do not matter, because the mesh is shown as it was modelled.
+SKIN = """<library_controllers><controller id="c"><skin source="#g">
+<bind_shape_matrix>{}</bind_shape_matrix></skin></controller>
+</library_controllers>"""
+
+
+def collada_text(vertices=L_VERTICES, place="", skin=""):
     """The prism, its z up, at a place: elements of its node."""
+    shown = "controller" if skin else "geometry"
     numbers = " ".join(map(str, vertices.ravel()))
     corners = " ".join(map(str, L_TRIANGLES.ravel()))
     return f"""<COLLADA version="1.4.1"
@@ -66,9 +74,9 @@ xmlns="http://www.collada.org/2005/11/COLLADASchema">
 <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
 <triangles count="{len(L_TRIANGLES)}">
 <input semantic="VERTEX" source="#v" offset="0"/><p>{corners}</p></triangles>
-</mesh></geometry></library_geometries>
+</mesh></geometry></library_geometries>{skin}
 <library_visual_scenes><visual_scene id="s"><node>{place}
-<instance_geometry url="#g"/>
+<instance_{shown} url="#{shown[0]}"/>
 </node></visual_scene></library_visual_scenes>
 <scene><instance_visual_scene url="#s"/></scene></COLLADA>
 """

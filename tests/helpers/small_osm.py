@@ -6,6 +6,14 @@ import math
 # Origin of the maps [deg].
 LAT = 52.0
 LON = 13.0
+# The lengths of a degree east and north there, by the series for WGS 84.
+_PHI = math.radians(LAT)
+METRES_PER_DEGREE = (
+    111412.84 * math.cos(_PHI)
+    - 93.5 * math.cos(3 * _PHI)
+    + 0.118 * math.cos(5 * _PHI),
+    111132.954 - 559.822 * math.cos(2 * _PHI) + 1.175 * math.cos(4 * _PHI),
+)
 
 
 class OsmWriter:
@@ -24,17 +32,12 @@ class OsmWriter:
 
     def node(self, x, y, **tags):
         place = complex(x, y) * self._turn + self._move
-        x, y = place.real, place.imag
-        # The lengths of a degree, by the series for WGS 84.
-        phi = math.radians(LAT)
-        lat = 111132.954 - 559.822 * math.cos(2 * phi)
-        lat += 1.175 * math.cos(4 * phi)
-        lon = 111412.84 * math.cos(phi) - 93.5 * math.cos(3 * phi)
-        lon += 0.118 * math.cos(5 * phi)
+        east, north = METRES_PER_DEGREE
+        lat, lon = LAT + place.imag / north, LON + place.real / east
         number = self._number()
         self.rows.append(
-            f'<node id="{number}" version="1" lat="{LAT + y / lat:.9f}"'
-            f' lon="{LON + x / lon:.9f}">{_tags(tags)}</node>'
+            f'<node id="{number}" version="1" lat="{lat:.9f}"'
+            f' lon="{lon:.9f}">{_tags(tags)}</node>'
         )
         return number
 

@@ -1,11 +1,11 @@
 """Searches two drives through a city that share a part of their paths.
 
 The first drive is approximately the longest of the shortest paths between any
-two places. The second drive shares the middle part of the first drive, but has
-a beginning and an end of its own, which are called arms. A path is a sequence
-of pieces, such as lanes of streets or cells of free space. A `WayGraph` says
-which piece can follow which piece; a sequence of pieces in this graph is called
-a way.
+two places, of the few longest the first one that has a second drive. This
+shares the middle part of the first drive, but has a beginning and an end of its
+own, which are called arms. A path is a sequence of pieces, such as lanes of
+streets or cells of free space. A `WayGraph` says which piece can follow which
+piece; a sequence of pieces in this graph is called a way.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,11 +33,11 @@ _MOST_PLACES = 12
 _APART = 10.0
 # Greatest number of ways that are tried as first drive, and as second drive.
 _MOST_TRIES = 30
+# Greatest number of first drives for which a second drive is searched.
+_MOST_FIRST = 4
 # Greatest number of ends that are tried to find a way that passes no place
 # twice.
 _MOST_ENDS = 20
-# Lengths that differ by less than this are equal [m].
-_ROUNDING = 1e-6
 # Greatest number of pieces from which ways are searched.
 _MOST_STARTS = 200
 # In large graphs, ways are searched from fewer pieces, so that this number of
@@ -68,27 +68,32 @@ def find_drives(graph: WayGraph) -> list[WaypointRoute]:
     the list is empty.
     """
     for _ in range(_MOST_TRIES):
-        way = _longest_way(graph)
-        if graph.length(way) < SHORTEST:
+        ways = _long_ways(graph)
+        if not ways or graph.length(ways[0]) < SHORTEST:
             return []
-        first = graph.drive(way)
+        first = graph.drive(ways[0])
         if isinstance(first, WaypointRoute):
             break
-        graph.is_open[graph.blocked(way, first)] = False
+        graph.is_open[graph.blocked(ways[0], first)] = False
     else:
         return []
-    for candidate in islice(_second_ways(graph, way), _MOST_TRIES):
-        second = graph.drive(candidate)
-        if isinstance(second, WaypointRoute):
-            return [first, second]
+    for way in ways[:_MOST_FIRST]:
+        one = graph.drive(way)
+        if isinstance(one, WaypointRoute):
+            for candidate in islice(_second_ways(graph, way), _MOST_TRIES):
+                second = graph.drive(candidate)
+                if isinstance(second, WaypointRoute):
+                    return [one, second]
     return [first]
 
 
-def _longest_way(graph: WayGraph) -> list[int]:
-    """Returns approximately the longest of all shortest ways; [] if none."""
+def _long_ways(graph: WayGraph) -> list[list[int]]:
+    """Returns long ways of all shortest ones, about the longest first."""
     pieces = np.flatnonzero(graph.is_open)
     if len(pieces) == 0:
         return []
+    # In no order that depends on the file.
+    pieces = pieces[np.argsort(graph.lengths[pieces], kind="stable")]
     links = graph.links()
     _, part = connected_components(links, directed=False)
     largest = np.bincount(part[pieces], graph.lengths[pieces]).argmax()
@@ -98,17 +103,13 @@ def _longest_way(graph: WayGraph) -> list[int]:
         *range(0, len(pieces), -(-len(pieces) // number))[1:],
     ]
     into = links.T.tocsr()
-    best: list[int] = []
     begins: dict[int, None] = {}
     for start in (int(pieces[k]) for k in starts):
         begins[start] = None
         begins[_longest_way_from(graph, into, start)[-1]] = None
-    for begin in begins:
-        way = _longest_way_from(graph, links, begin)
-        # Of ways that are equally long except for rounding, the first counts.
-        if graph.length(way) > graph.length(best) + _ROUNDING:
-            best = way
-    return best
+    ways = [_longest_way_from(graph, links, begin) for begin in begins]
+    # Micrometres are rounding errors.
+    return sorted(ways, key=lambda way: -round(graph.length(way), 6))
 
 
 def _longest_way_from(

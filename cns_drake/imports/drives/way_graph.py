@@ -8,6 +8,44 @@ from scipy.sparse import coo_array, csr_array
 
 from cns_drake.imports.drives.steerable_drives import Obstacle, WaypointRoute
 
+# Greatest share by which lengths are made unequal.
+_UNEQUAL = 0.02
+# A turn from the directions of a grid to one that none of its streets has, and
+# that is not in the middle between two [rad].
+_ASIDE = 0.4
+
+
+def unequal_lengths(lengths: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Returns lengths (N,) by which no two ways through a grid are equal [m].
+
+    A grid of streets has many ways of one length, between which the last bit of
+    coordinates would decide. Lengths therefore grow with the place where a
+    piece begins, in directions that depend only on the form of the network: not
+    on its place, its turn, or the order of its pieces. A network that looks the
+    same when it is turned has several such directions; its ways are the same in
+    each of them, turned.
+
+    Args:
+        lengths: (N,) lengths of pieces [m].
+        ends: (N, 2, 2) where each piece begins, and ends [m].
+    """
+    if not len(lengths):
+        return lengths
+    begins, ends = np.moveaxis(ends[:, :, 0] + 1j * ends[:, :, 1], 1, 0)
+    places = begins - np.average(begins, weights=lengths)
+    steps = ends - begins
+    # The same for a street, its opposite direction, and its cross streets.
+    grid = np.sum(np.abs(steps) * np.exp(4j * np.angle(steps)))
+    places *= np.exp(-0.25j * np.angle(grid)) / max(np.abs(places).max(), 1.0)
+    aside = np.exp(-1j * _ASIDE)
+    view = max(
+        (places * 1j**quarters for quarters in range(4)),
+        key=lambda z: float((lengths @ (z**2 + z**3) * aside).real),
+    )
+    # The square is there for streets that enclose equal areas.
+    growth = (view * aside + 0.1 * view**2 * aside**3).real
+    return lengths * (1.0 + _UNEQUAL * (0.5 + growth / 2.2))
+
 
 class WayGraph(ABC):
     """A graph of N pieces, from which the paths of a car can be built.

@@ -35,6 +35,7 @@ from cns_drake.imports.openstreetmap.passages import Passage, Passages
 from cns_drake.imports.openstreetmap.tags import (
     TABLES,
     has_tag,
+    heading_deg,
     length,
     tag_value,
 )
@@ -178,6 +179,8 @@ def make_buildings(
                 faults,
                 block.tags.get("roof:shape", "flat"),
                 block.roof,
+                facing_deg=_roof_heading(block, faults),
+                is_across=block.tags.get("roof:orientation") == "across",
             )
             walls.append(wall)
             roofs.append(roof)
@@ -198,6 +201,17 @@ def make_buildings(
             kind=building_kind(whole.tags),
         )
         yield replace(made, is_gone=True) if is_gone(whole.tags) else made
+
+
+def _roof_heading(block: _Block, faults: ImportFaults) -> float | None:
+    """Returns the direction that a roof faces; None if no tag states it [deg].
+
+    It counts counter-clockwise from east.
+    """
+    where = (block.name, faults)
+    return tag_value(
+        block.tags, "roof:direction", heading_deg, 90.0, where, -270.0
+    )
 
 
 def _outlines_and_parts(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-import re
+import math
 
 import numpy as np
 import shapely
@@ -15,17 +15,13 @@ from cns_drake.imports.openstreetmap.features import OsmFeatures, Tags
 from cns_drake.imports.openstreetmap.tags import (
     TABLES,
     has_tag,
+    heading_deg,
     is_inside,
     length,
     tag_value,
 )
 from cns_drake.scene import LocalMetres
 
-# Names of directions, clockwise from north.
-_COMPASS = (
-    "N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE",
-    "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW",
-)  # fmt: skip
 # Values of the tags `lamp_mount` and `support` for an object that stands on a
 # post of its own. With other values, such as `wall_mounted`, another structure
 # carries the object.
@@ -97,11 +93,5 @@ def tree_height(name: str, tags: Tags, faults: ImportFaults) -> float | None:
 
 def _heading(tags: Tags) -> float | None:
     """Returns the heading in an object's tags [rad]; None if there is none."""
-    text = tags.get("direction", "")
-    if text.upper() in _COMPASS:
-        text = str(360.0 / len(_COMPASS) * _COMPASS.index(text.upper()))
-    if not re.fullmatch(r"\d{1,3}(\.\d+)?", text):
-        return None
-    # The file counts directions clockwise from north, a heading is counted
-    # counter-clockwise from east.
-    return float(np.radians(90.0 - float(text)))
+    found = heading_deg(tags.get("direction"))
+    return None if found is None else math.radians(found)

@@ -26,6 +26,11 @@ _FEET_AND_INCHES = re.compile(
 # Separators in lists and in ranges.
 _BETWEEN = re.compile(r"\s*;\s*|(?<=[^\s;])\s*(?:-|–|\bto\b)\s*(?=[\d.,])")
 _ABOUT = re.compile(r"^\s*(?:~|≈|ca\.?|about|approx\.?)\s*")
+# Names of directions, clockwise from north.
+_COMPASS = (
+    "n", "nne", "ne", "ene", "e", "ese", "se", "sse",
+    "s", "ssw", "sw", "wsw", "w", "wnw", "nw", "nnw",
+)  # fmt: skip
 _QUOTES = str.maketrans({"’": "'", "′": "'", "”": '"', "″": '"'})
 
 
@@ -46,6 +51,19 @@ def count(text: str | None) -> float | None:
     return _greatest_value(
         text, lambda part: _decimal(part) if _COUNT.fullmatch(part) else None
     )
+
+
+def heading_deg(text: str | None) -> float | None:
+    """Returns the direction that a text states, such as `NW` or `315`, or None.
+
+    The text counts clockwise from north; the result, from -270 to 90, counts
+    counter-clockwise from east [deg].
+    """
+    name = (text or "").lower()
+    if name in _COMPASS:
+        return 90.0 - 360.0 / len(_COMPASS) * _COMPASS.index(name)
+    number = _decimal(name) if _COUNT.fullmatch(name) else 361.0
+    return 90.0 - number if number <= 360.0 else None
 
 
 def _greatest_value(

@@ -12,6 +12,7 @@ from cns_drake.base import (
     Section,
     did_you_mean,
     errors_at,
+    poses,
     read_records,
     validated,
     value_errors,
@@ -363,8 +364,6 @@ class DriveChanger:
 # Classes of structures that can be missing; streets, ground and street
 # furniture always stay.
 _REMOVABLE = ("building", "vegetation")
-# Farther than any city reaches [m].
-_FARTHEST = 1e6
 # The key of `scattered` that is no class.
 _SEED = "seed"
 
@@ -509,7 +508,7 @@ def _removal_order(
         raise InputError(f"{table}: none of its structures can be missing")
     try:
         xy = np.array([(float(row["x"]), float(row["y"])) for row in rows])
-        if not (np.abs(xy) <= _FARTHEST).all():  # NaN fails, too.
+        if not (np.abs(xy) <= poses.FARTHEST).all():  # NaN fails, too.
             raise ValueError
     except (KeyError, ValueError):
         raise InputError(

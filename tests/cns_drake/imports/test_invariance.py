@@ -1,15 +1,17 @@
 """A city that is moved, turned or written in another order is the same."""
 
 import csv
+import itertools
 import re
 
 from helpers.imported_cities import read_city
 from helpers.small_cityjson import CityWriter
 from helpers.small_opendrive import cubic, straight, write_roads
-from helpers.small_osm import OsmWriter
+from helpers.small_osm import LAT, LON, METRES_PER_DEGREE, OsmWriter
 import numpy as np
 import pytest
-from shapely import MultiPoint
+from shapely import LineString, MultiPoint
+from shapely.affinity import rotate
 import yaml
 
 from cns_drake.imports import (
@@ -90,7 +92,7 @@ def osm_corners(path, order=1, **change):
     osm.way_of(middle, **street)
     osm.way_of([osm.node(-10, -90), middle[1], osm.node(-30, 110)], **street)
     osm.way([(50, -60), (60, 70)], highway="primary", bridge="yes")
-    for k, shape in enumerate(["flat", "gabled", "hipped", "mansard"]):
+    for k, shape in enumerate(["skillion", "gabled", "hipped", "mansard"]):
         tags = {"height": str(8 + k), "roof__shape": shape}
         osm.box(-120 + 60 * k, 20, 14, 11 + k, building="yes", **tags)
     osm.box(-80, -60, 40, 25, natural="water")
@@ -112,7 +114,7 @@ def osm_corners(path, order=1, **change):
 
 @pytest.mark.parametrize(
     "change",
-    [{"move": (10_000, 0)}, {"turn_deg": 37.0}, {"order": -1}],
+    [{"move": (10_000, 0)}, {"turn_deg": 217.0}, {"order": -1}],
     ids=str,
 )
 def test_streets_and_houses_that_are_moved_are_the_same(tmp_path, change):
@@ -125,6 +127,70 @@ def test_streets_and_houses_that_are_moved_are_the_same(tmp_path, change):
         assert hulls[0].hausdorff_distance(hulls[1]) < 0.15, name
         for one in (np.min, np.max):
             assert abs(one(found[name][:, 2]) - one(points[:, 2])) < 0.01
+
+
+def street_network(path, seed, order=1, **change):
+    """A grid of streets, with random gaps and distances if there is a seed."""
+    osm = OsmWriter(**change)
+    rng = np.random.default_rng(seed)
+    spread = 0.0 if seed is None else 20.0
+    x, y = (
+        90.0 * (np.arange(n) - (n - 1) / 2) + rng.uniform(-spread, spread, n)
+        for n in (5, 4)
+    )
+    node = {(k, m): osm.node(x[k], y[m]) for k in range(5) for m in range(4)}
+    lines = [[(k, m) for m in range(4)] for k in range(5)]
+    lines += [[(k, m) for k in range(5)] for m in range(4)]
+    for line in lines:
+        for ends in itertools.pairwise(line):
+            if seed is None or rng.random() < 0.85:
+                nodes = [node[end] for end in ends]
+                osm.way_of(nodes, highway="residential", width="8")
+    osm.box(x[0] + 20, y[0] + 20, 20, 15, building="yes")
+    osm.rows = osm.rows[::order]
+    return osm.write(path)
+
+
+def proposed_drives(tmp_path, name, seed, **change):
+    """Returns the lines of the drives, moved and turned back [m]."""
+    source = street_network(tmp_path / f"{name}.osm", seed, **change)
+    folder = tmp_path / name
+    import_city(source, folder, ImportOptions(dressed=False))
+    facts = yaml.safe_load((folder / "import.yaml").read_text())
+    lat, lon = facts["origin"]
+    turn = np.radians(-change.get("turn_deg", 0.0))
+    R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    origin = np.multiply([lon - LON, lat - LAT], METRES_PER_DEGREE)
+    origin -= change.get("move", (0, 0))
+    return [
+        LineString(
+            (np.loadtxt(table, delimiter=",", skiprows=1)[:, :2] + origin) @ R.T
+        )
+        for table in sorted(folder.glob("route_*.csv"))
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [None, 1, 2, 3])
+def test_streets_that_are_moved_have_the_same_drives(tmp_path, seed):
+    wanted = proposed_drives(tmp_path, "plain", seed)
+    assert len(wanted) == 2
+    # A regular grid is the same when turned by 180 degrees, and so are drives.
+    turns = (0, 180) if seed is None else (0,)
+    for name, change in {
+        "far": {"move": (10_000, 0)},
+        "turned": {"turn_deg": 37.0},
+        "reordered": {"order": -1},
+    }.items():
+        found = proposed_drives(tmp_path, name, seed, **change)
+        apart = [
+            max(
+                rotate(a, turn, origin=(0, 0)).hausdorff_distance(b)
+                for a, b in zip(wanted, found, strict=True)
+            )
+            for turn in turns
+        ]
+        assert min(apart) < 2.0, (name, apart)
 
 
 @pytest.mark.night

@@ -332,15 +332,14 @@ def test_what_has_no_place_in_the_city_is_counted(tmp_path):
 
 def test_tags_that_are_not_read_are_counted(tmp_path):
     osm = OsmWriter()
-    osm.box(0, 0, 10, 10, building="yes", roof__orientation="across")
-    osm.box(30, 0, 10, 10, building="yes", roof__orientation="along")
+    osm.box(0, 0, 10, 10, building="yes", roof__angle="40")
     osm.way([(0, 30), (60, 30)], highway="residential", placement="right_of:1")
     osm.way([(0, 60), (60, 60)], highway="residential", oneway="reversible")
     osm.way([(0, 90), (60, 90)], highway="residential", oneway="-1")
     osm.node(5, 40, natural="tree", diameter_crown="9")
     city, _ = import_osm(osm.write(tmp_path / "a.osm"))
     assert {kind: number for kind, number, _ in city.faults.rows()} == {
-        "tag roof:orientation of building, not read": 1,
+        "tag roof:angle of building, not read": 1,
         "tag placement of street, not read": 1,
         "tag oneway of street, not read": 1,
         "tag diameter_crown of tree, not read": 1,

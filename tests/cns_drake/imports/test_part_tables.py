@@ -177,7 +177,7 @@ def test_trees_of_a_row_have_its_height(tmp_path):
 @pytest.mark.parametrize(
     ("element", "key"),
     [
-        ("building", "roof:direction"),
+        ("building", "roof:angle"),
         ("building", "placement"),
         ("street", "cycleway"),
         ("street", "height"),

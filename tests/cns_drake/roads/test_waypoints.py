@@ -126,7 +126,7 @@ def test_ways_to_write_the_same(load, text):
         ("x,y\n0,0\n1_0,0\n", "line 3: '1_0' is not a finite number"),
         ("lat,lon\n1,2\n", r"line 1: neither numbers nor the names"),
         ("0,0\n12,0\n", r"drive\.csv: 12\.0 m long; a drive needs at least 20"),
-        ("0,0\n30,0\n1e7,0\n", r"line 3: 1e7 m are more than 1000000 m"),
+        ("0,0\n30,0\n1e9,0\n", r"line 3: 1e9 m are more than 100000000 m"),
         (
             "0,0\n9e5,0\n",
             r"drive\.csv: 900000 m long; a drive can have at most",

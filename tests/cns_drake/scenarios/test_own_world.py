@@ -3,6 +3,7 @@
 import shutil
 
 from helpers.bag_recordings import contents
+from helpers.meshcat_pages import objects, read_commands, vertices
 from helpers.small_map import box_visual, world_text
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import yaml
 from cns_drake.base import InputError
 from cns_drake.scenarios import load_scenario, plan_drive
 from cns_drake.simulation import simulate
+from evaluation.drives import open_drive
 
 SPEEDS = {
     "cruise": 6.0,
@@ -80,6 +82,31 @@ def test_nothing_depends_on_the_folder(yard, tmp_path):
     )
     for data in first.values():
         assert str(tmp_path).encode() not in data
+
+
+def test_a_drive_in_survey_coordinates_is_the_same(yard, tmp_path):
+    """World, waypoints and drive are moved together, as far as UTM has them."""
+    far = np.array([350_000.0, 4_020_000.0, 500.0])
+    scenario = load_scenario(yard / "yard_01.yaml")
+    near = open_drive(simulate(scenario, tmp_path / "near").folder)
+    world = (yard / "yard.sdf").read_text()
+    pose = "<pose>350000 4020000 500 0 0 0</pose><link"
+    (yard / "yard.sdf").write_text(world.replace("<link", pose))
+    waypoints = np.array([[-10, 5], [40, 5], [40, 60]]) + far[:2]
+    np.savetxt(yard / "tour.csv", waypoints, delimiter=",")
+    page = tmp_path / "page.html"
+    run = simulate(scenario, tmp_path / "far", page_file=page)
+    moved = open_drive(run.folder)
+    expected = near.X_WS.copy()
+    expected[:, :3, 3] += far
+    np.testing.assert_allclose(moved.X_WS, expected, rtol=0, atol=1e-8)
+    for a, b in zip(near, moved, strict=True):
+        np.testing.assert_array_equal(a, b)
+    drawn = objects(read_commands(page.read_text()))
+    assert len(drawn) > 3
+    for one in drawn.values():
+        if one["type"] == "BufferGeometry":
+            assert np.abs(vertices(one)).max() < 60_000.0
 
 
 def test_waypoints_lead_through_a_map_as_well(yard, small_map):

@@ -6,6 +6,7 @@ import json
 from helpers.mesh_texts import (
     L_TRIANGLES,
     L_VERTICES,
+    SKIN,
     collada_text,
     gltf_text,
     obj_text,
@@ -34,12 +35,21 @@ def gltf_far(place):
     return gltf_text([outer, {"translation": [u, w, -v], "mesh": 0}])[0]
 
 
-def collada_far(place):
+def collada_far(place, skin=""):
     x, y, z = place
     return collada_text(
         L_VERTICES + TURN.inv().apply(place),
         f"<translate>{x} {y} {z}</translate><rotate>0 0 1 37</rotate>",
+        skin,
     )
+
+
+def skin_far(place):
+    """A skin of a morph, which names the mesh."""
+    skin = SKIN.format("1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1")
+    morph = '<controller id="m"><morph source="#g"/></controller><controller'
+    skin = skin.replace("#g", "#m").replace("<controller", morph)
+    return collada_far(place, skin)
 
 
 # Name of a file -> its text with the mesh at a place, how often it is moved to
@@ -50,6 +60,7 @@ KINDS = {
     "a.stl": (lambda place: stl_text(L_VERTICES + place), 1, False),
     "a.gltf": (gltf_far, 2, True),
     "a.dae": (collada_far, 2, True),
+    "skin.dae": (skin_far, 2, True),
 }
 
 

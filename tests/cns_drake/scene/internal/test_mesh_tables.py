@@ -5,7 +5,13 @@ import json
 from pathlib import Path
 import re
 
-from helpers.mesh_texts import L_TRIANGLES, L_VERTICES, gltf_text, obj_text
+from helpers.mesh_texts import (
+    L_TRIANGLES,
+    L_VERTICES,
+    SKIN,
+    gltf_text,
+    obj_text,
+)
 from helpers.mesh_worlds import notes_of
 import numpy as np
 from pydrake.geometry import Mesh
@@ -127,24 +133,6 @@ IN_NODE = {
     "instance_light": "<instance_light url='#c'/>",
     "extra": "<extra><technique profile='X'><mesh/></technique></extra>",
 }
-SKIN = """<library_controllers><controller id='c'><skin source='#g'>
-<bind_shape_matrix>{}</bind_shape_matrix>
-<source id='j'><Name_array id='ja' count='1'>bone</Name_array>
-<technique_common><accessor source='#ja' count='1' stride='1'>
-<param name='JOINT' type='name'/></accessor></technique_common></source>
-<source id='b'><float_array id='ba' count='16'>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1
-</float_array><technique_common><accessor source='#ba' count='1' stride='16'>
-<param name='TRANSFORM' type='float4x4'/></accessor></technique_common>
-</source><source id='w'><float_array id='wa' count='1'>1</float_array>
-<technique_common><accessor source='#wa' count='1' stride='1'>
-<param name='WEIGHT' type='float'/></accessor></technique_common></source>
-<joints><input semantic='JOINT' source='#j'/>
-<input semantic='INV_BIND_MATRIX' source='#b'/></joints>
-<vertex_weights count='12'><input semantic='JOINT' source='#j' offset='0'/>
-<input semantic='WEIGHT' source='#w' offset='1'/>
-<vcount>1 1 1 1 1 1 1 1 1 1 1 1</vcount>
-<v>0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0</v></vertex_weights>
-</skin></controller></library_controllers>"""
 EYE = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
 
 
@@ -154,16 +142,11 @@ def collada_with(tag):
     primitive = (
         f"<triangles count='{NUMBER}'>{INPUT}<p>{CORNERS}</p></triangles>"
     )
-    bones = ""
     if tag in PRIMITIVES:
         primitive = PRIMITIVES[tag]
     elif tag in ("instance_controller", "bind_shape_matrix"):
         library = SKIN.format(EYE if tag[0] == "i" else EYE.replace("1", "2"))
-        bones = "<node id='bone' sid='bone' type='JOINT'/>"
-        show = (
-            "<instance_controller url='#c'><skeleton>#bone</skeleton>"
-            "</instance_controller>"
-        )
+        show = "<instance_controller url='#c'/>"
     elif tag == "instance_node":
         library = f"<library_nodes><node id='k'>{show}</node></library_nodes>"
         show = "<instance_node url='#k'/>"
@@ -195,7 +178,7 @@ version="1.4.1"><asset>{asset}<unit meter="1"/><up_axis>Z_UP</up_axis></asset>
 <param name="Z" type="float"/></accessor></technique_common></source>
 <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
 {primitive}{mesh}</mesh></geometry>{geometries}</library_geometries>
-<library_visual_scenes><visual_scene id="s">{bones}<node>{node}{show}</node>
+<library_visual_scenes><visual_scene id="s"><node>{node}{show}</node>
 </visual_scene></library_visual_scenes><scene>
 <instance_visual_scene url="#s"/></scene></COLLADA>"""
 
