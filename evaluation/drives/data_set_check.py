@@ -211,6 +211,12 @@ def check_motion(drive: Drive) -> Iterator[str]:
             f"poses: the LiDAR moves at {speed:.0f} m/s; are positions in"
             " metres, and times in nanoseconds?"
         )
+    jump = int(steps.argmax())
+    if steps[jump] > _FASTEST * _LONGEST_STEP:
+        yield (
+            f"poses: scan {jump + 1} lies {steps[jump]:.0f} m from scan {jump};"
+            " leave out the scan with the wrong pose"
+        )
     if float(np.median(drive.X_WS[:, 2, 2])) < 0.0:
         yield "poses: the LiDAR's z axis points down; it must point up"
 

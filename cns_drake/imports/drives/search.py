@@ -10,7 +10,6 @@ piece; a sequence of pieces in this graph is called a way.
 
 from collections.abc import Iterator, Sequence
 from itertools import islice
-from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -45,20 +44,9 @@ _MOST_STARTS = 200
 _MOST_REACHED = 400_000
 
 
-class _JoiningShares(NamedTuple):
-    """Where the second drive joins and leaves the first drive.
-
-    The drive joins between low and middle, and leaves between 1 - middle and
-    high. All three are shares of the first drive's length.
-    """
-
-    low: float
-    middle: float
-    high: float
-
-
-# The shares of each of two trials.
-_TRIALS = (_JoiningShares(0.25, 0.5, 0.75), _JoiningShares(0.0, 0.7, 1.0))
+# The second drive joins the first one between low and middle, and leaves it
+# between 1 - middle and high: shares of the first drive's length in two trials.
+_TRIALS = ((0.25, 0.5, 0.75), (0.0, 0.7, 1.0))
 
 
 def find_drives(graph: WayGraph) -> list[WaypointRoute]:
@@ -147,18 +135,22 @@ def _second_ways(graph: WayGraph, first: list[int]) -> Iterator[list[int]]:
     along = np.concatenate([[0.0], graph.along(first)])
     part = along / along[-1]
     every = np.arange(len(first))
+
+    def nearest(shares: np.ndarray, wanted: float) -> int:
+        return int(np.abs(shares - wanted).argmin())
+
     for low, middle, high in _TRIALS:
         begins = every[(part[:-1] >= low) & (part[:-1] <= middle)]
         ends = every[(part[1:] >= 1.0 - middle) & (part[1:] <= high)][::-1]
         for begin in (*_spaced_places(begins, along), None):
-            start = _nearest_index(part[:-1], low) if begin is None else begin
+            start = nearest(part[:-1], low) if begin is None else begin
             head: list[int] = []
             if begin is not None:
                 head = _longest_arm(graph, first, first[begin], backwards=True)
                 if not head:
                     continue
             for end in (*_spaced_places(ends, along), None):
-                stop = _nearest_index(part[1:], high) if end is None else end
+                stop = nearest(part[1:], high) if end is None else end
                 if begin is None and end is None:
                     continue
                 if part[stop + 1] - part[start] < _LEAST_SHARED:
@@ -172,11 +164,6 @@ def _second_ways(graph: WayGraph, first: list[int]) -> Iterator[list[int]]:
                 way = graph.cut(way, LONGEST)
                 if graph.is_simple(way):
                     yield way
-
-
-def _nearest_index(values: np.ndarray, wanted: float) -> int:
-    """Returns the index of the value that is nearest to a wanted value."""
-    return int(np.abs(values - wanted).argmin())
 
 
 def _spaced_places(places: np.ndarray, along: np.ndarray) -> list[int]:

@@ -119,13 +119,11 @@ def test_terrain_is_cut(tmp_path):
             20.0,
             "--within: nothing stands within 20 m",
         ),
-        ([(0, 0), (30, 0), (0, 1)], None, r"way\.csv: line 3: turns by 178"),
         (
             [(0, 0), (30, 0), (30, 1), (0, 1)],
             None,
             r"way\.csv: a bend at 2\d\.\d, .* radius of \d\.\d\d m.* 4\.11 m",
         ),
-        ([(0, 0)], 9.0, "way.csv: fewer than two"),
     ],
 )
 def test_faults_of_drives_of_ones_own(tmp_path, points, within, fault):

@@ -174,27 +174,6 @@ def test_trees_of_a_row_have_its_height(tmp_path):
         assert {one.height for one in trees} == {expected}
 
 
-@pytest.mark.parametrize(
-    ("element", "key"),
-    [
-        ("building", "roof:angle"),
-        ("building", "placement"),
-        ("street", "cycleway"),
-        ("street", "height"),
-        ("path", "incline"),
-        ("ground", "height"),
-        ("barrier", "fence_type"),
-        ("tree", "diameter_crown"),
-    ],
-)
-def test_what_is_not_read_is_counted_for_its_element(tmp_path, element, key):
-    path = tmp_path / "a.osm"
-    write_elements(path, {key: KEYS[key]})
-    city, _ = triangles_by_element(path)
-    kinds = {fault.kind for fault in city.faults.rows()}
-    assert f"tag {key} of {element}, not read" in kinds
-
-
 def test_barriers_are_as_thick_and_high_as_their_tags_say(tmp_path):
     osm = OsmWriter()
     osm.box(-50, -50, 9, 9, building="yes")

@@ -117,21 +117,9 @@ VERTICES = "".join(f"v {row}\n" for row in SQUARE.splitlines())
     ("name", "text", "fault"),
     [
         (
-            "strip.ply",
-            ply(
-                BY_INDEX + "element tristrips 1\n" + LIST, "3 0 1 2\n3 0 2 3\n"
-            ),
-            "surfaces in the element tristrips of PLY",
-        ),
-        (
             "polygon.ply",
             ply("element polygon 1\n" + LIST + BY_INDEX, "3 0 1 2\n3 0 2 3\n"),
             "surfaces in the element polygon of PLY",
-        ),
-        (
-            "again.ply",
-            ply(2 * BY_INDEX, "3 0 1 2\n3 0 2 3\n"),
-            "the element face of PLY twice",
         ),
         (
             "lists.ply",
@@ -141,12 +129,6 @@ VERTICES = "".join(f"v {row}\n" for row in SQUARE.splitlines())
         ("quad.stl", stl((A, B, C), (A, B, C, D)), "7 vertices in 2 facets"),
         ("torn.stl", stl((A, B, C))[:-11], "ends within a solid of STL"),
         ("TORN.STL", stl((A, B, C), (A, C, D))[:-40].upper(), "ends within"),
-        ("brep.dae", "<COLLADA><brep/></COLLADA>", "has <brep> of COLLADA"),
-        (
-            "hull.dae",
-            "<COLLADA><convex_mesh/></COLLADA>",
-            "has <convex_mesh> of COLLADA",
-        ),
     ],
 )
 def test_surfaces_that_would_be_missing_are_refused(
@@ -247,27 +229,6 @@ def test_a_mode_that_is_none_of_gltf_is_refused(tmp_path):
 
     with pytest.raises(InputError, match="mode is none of glTF"):
         notes_of(write(tmp_path, change))
-
-
-@pytest.mark.parametrize(
-    ("lines", "fault"),
-    [
-        ("fo 1 2 3 4\n", "statement 'fo' of OBJ"),
-        ("cstype bezier\ndeg 1 1\n  surf 0 1 0 1 1 2 4 3\nend", "'cstype'"),
-        ("call other.obj\n", "statement 'call'"),
-        ("f 1 2 \\\n3 4\n", "line 6: a face that goes on"),
-    ],
-)
-def test_surfaces_of_obj_that_would_be_missing_are_refused(
-    tmp_path, lines, fault
-):
-    path = tmp_path / "thing.obj"
-    path.write_text(f"{VERTICES}f 1 2 3\n{lines}")
-    with pytest.raises(InputError, match=fault):
-        read_mesh(path)
-    # Lines and points have no surface, and names are no statements.
-    path.write_text(f"{VERTICES}o surf\ng call me\nf 1 2 3\nl 1 2\np 1\n")
-    read_mesh(path)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ import json
 
 from helpers.mesh_texts import (
     L_TRIANGLES,
-    L_VERTICES,
     collada_text,
     gltf_text,
     obj_text,
@@ -16,7 +15,6 @@ import pytest
 
 from cns_drake.base import InputError
 
-FAR = (350_000.0, 4_020_000.0, 60.0)
 GLTF = gltf_text()[0]
 
 
@@ -115,23 +113,3 @@ def test_what_a_message_asks_for_is_read(tmp_path, said, name, bad, good):
         good = good[1]
     path.write_text(good)
     assert len(read_mesh(path).triangles) == len(L_TRIANGLES)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("near.ply", ply_text()),
-        ("far.obj", obj_text(L_VERTICES + FAR)),
-        ("far.ply", ply_text(L_VERTICES + FAR, "double")),
-    ],
-)
-def test_coarse_coordinates_are_cured(tmp_path, capsys, name, text):
-    coarse = tmp_path / "coarse.ply"
-    coarse.write_text(ply_text((L_VERTICES + FAR).astype("f4")))
-    read_mesh(coarse)
-    said = "export it again with vertices near the origin, or as OBJ or PLY"
-    assert said in capsys.readouterr().err
-    (tmp_path / name).write_text(text)
-    read_mesh(tmp_path / name)
-    assert "coarse" not in capsys.readouterr().err

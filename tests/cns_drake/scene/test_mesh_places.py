@@ -114,7 +114,11 @@ def test_coarse_coordinates_of_a_file_are_told(tmp_path, name, capsys):
     path = tmp_path / name
     path.write_bytes(single(name))
     read_mesh(path)
-    assert "steps of 0.25 m; export it again" in capsys.readouterr().err
+    said = "steps of 0.25 m; export it again with vertices near the origin"
+    assert said in capsys.readouterr().err
+    path.write_text(KINDS[name][0](np.zeros(3)))
+    read_mesh(path)
+    assert "coarse" not in capsys.readouterr().err
 
 
 @pytest.mark.slow

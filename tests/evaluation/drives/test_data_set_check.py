@@ -238,6 +238,18 @@ def test_beams_without_a_return_are_left_out(tmp_path):
     check_data_set(tmp_path / "00")
 
 
+def test_a_scan_with_a_wrong_pose_is_left_out(tmp_path):
+    folder = tmp_path / "00"
+    X_WS = X_WB.copy()
+    X_WS[5, :2, 3] += [4.6e6, -1e6]
+    kitti(folder, SCANS, X_WS)
+    said = r"scan 5 lies 47\d{5} m from scan 4; leave out the scan"
+    with pytest.raises(InputError, match=said):
+        check_data_set(folder)
+    (folder / "velodyne" / "000005.bin").unlink()
+    check_data_set(folder)
+
+
 def test_poses_that_hang_down(tmp_path):
     """KITTI's frame is that of the first scan, so another layout shows it."""
     folder = tmp_path / "drive"

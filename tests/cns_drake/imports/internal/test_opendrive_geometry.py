@@ -18,7 +18,7 @@ import shapely
 from shapely.geometry import LineString
 
 from cns_drake.imports.faults import ImportFaults
-from cns_drake.imports.opendrive.curves import Arc, Cubic, Spiral
+from cns_drake.imports.opendrive.curves import Spiral
 from cns_drake.imports.opendrive.lanes import lane_bands
 from cns_drake.imports.opendrive.road_reader import read_roads
 
@@ -142,32 +142,6 @@ def test_spirals_against_fresnel_s_integrals(start, end, length):
     atol = 1e-9 if abs(growth) > 1e-6 else 1e-3
     np.testing.assert_allclose(found[:, :2], expected, atol=atol)
     np.testing.assert_allclose(found[:, 2], heading - first, atol=1e-9)
-
-
-def test_arcs_and_lines_in_closed_form():
-    s = np.array([0.0, 1.0, math.pi * 5, math.pi * 10])
-    found = Arc(0.1).evaluate(s)
-    np.testing.assert_allclose(found[:, 0], 10 * np.sin(s / 10), atol=1e-12)
-    np.testing.assert_allclose(
-        found[:, 1], 10 * (1 - np.cos(s / 10)), atol=1e-12
-    )
-    np.testing.assert_array_equal(
-        Arc(0.0).evaluate(s), np.stack([s, 0 * s, 0 * s], axis=1)
-    )
-
-
-def test_cubic_curves_run_at_the_speed_of_the_road():
-    # A straight line with an uneven parameter.
-    uneven = Cubic((0, 1, 1, 1), (0, 0, 0, 0), 1.0, 3.0)
-    s = np.linspace(0.0, 3.0, 31)
-    found = uneven.evaluate(s)
-    np.testing.assert_allclose(found, np.stack([s, 0 * s, 0 * s], 1), atol=1e-9)
-    # A parabola with a length in closed form: v = u^2 / 20.
-    parabola = Cubic((0, 1, 0, 0), (0, 0, 0.05, 0), 30.0, 30.0, stretched=False)
-    u = parabola.evaluate(np.array([17.0]))[0, 0]
-    assert 5 * (
-        u / 10 * math.sqrt(1 + (u / 10) ** 2) + math.asinh(u / 10)
-    ) == pytest.approx(17.0, abs=1e-9)
 
 
 def test_borders_in_place_of_widths(tmp_path):

@@ -9,6 +9,7 @@ from helpers.mesh_texts import (
     L_TRIANGLES,
     L_VERTICES,
     SKIN,
+    collada_text,
     gltf_text,
     obj_text,
 )
@@ -133,54 +134,48 @@ IN_NODE = {
     "instance_light": "<instance_light url='#c'/>",
     "extra": "<extra><technique profile='X'><mesh/></technique></extra>",
 }
-EYE = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
 
 
 def collada_with(tag):
-    show = "<instance_geometry url='#g'/>"
-    library, node, mesh, geometries, asset = "", "", "", "", ""
-    primitive = (
-        f"<triangles count='{NUMBER}'>{INPUT}<p>{CORNERS}</p></triangles>"
-    )
+    text = collada_text()
+    show = '<instance_geometry url="#g"/>'
+    # What is put before an element, or in its place.
+    before = {}
     if tag in PRIMITIVES:
-        primitive = PRIMITIVES[tag]
-    elif tag in ("instance_controller", "bind_shape_matrix"):
-        library = SKIN.format(EYE if tag[0] == "i" else EYE.replace("1", "2"))
-        show = "<instance_controller url='#c'/>"
-    elif tag == "instance_node":
-        library = f"<library_nodes><node id='k'>{show}</node></library_nodes>"
-        show = "<instance_node url='#k'/>"
-    elif tag == "bind_material":
-        show = (
-            "<instance_geometry url='#g'><bind_material><technique_common/>"
-            "</bind_material></instance_geometry>"
+        return re.sub(
+            "<triangles.*</triangles>", PRIMITIVES[tag], text, flags=re.DOTALL
         )
+    if tag in ("instance_controller", "bind_shape_matrix"):
+        eye = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
+        return collada_text(
+            skin=SKIN.format(eye if tag[0] == "i" else eye.replace("1", "2"))
+        )
+    if tag == "instance_node":
+        library = f"<library_nodes><node id='k'>{show}</node></library_nodes>"
+        text = text.replace(show, "<instance_node url='#k'/>")
+        before["<library_visual_scenes>"] = library
+    elif tag == "bind_material":
+        bound = "<bind_material><technique_common/></bind_material>"
+        text = text.replace(show, f"{show[:-2]}>{bound}</instance_geometry>")
     elif tag in IN_NODE:
-        node = IN_NODE[tag]
+        before[show] = IN_NODE[tag]
     elif tag in ("lines", "linestrips"):
-        mesh = f"<{tag} count='1'>{INPUT}<p>0 1</p></{tag}>"
+        before["</mesh>"] = f"<{tag} count='1'>{INPUT}<p>0 1</p></{tag}>"
     elif tag == "ph":
-        mesh = f"<polygons count='1'>{INPUT}<ph/></polygons>"
+        before["</mesh>"] = f"<polygons count='1'>{INPUT}<ph/></polygons>"
     elif tag in ("brep", "convex_mesh", "spline"):
-        geometries = f"<geometry id='h'><{tag}/></geometry>"
+        geometry = f"<geometry id='h'><{tag}/></geometry>"
+        before["</library_geometries>"] = geometry
     elif tag == "animation":
         library = "<library_animations><animation/></library_animations>"
+        before["<library_geometries>"] = library
     elif tag.startswith("library_"):
-        library = f"<{tag}/>"
+        before["<library_geometries>"] = f"<{tag}/>"
     elif tag == "contributor":
-        asset = "<contributor/>"
-    return f"""<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"
-version="1.4.1"><asset>{asset}<unit meter="1"/><up_axis>Z_UP</up_axis></asset>
-{library}<library_geometries><geometry id="g"><mesh><source id="p">
-<float_array id="pa" count="36">{" ".join(map(str, L_VERTICES.ravel()))}
-</float_array><technique_common><accessor source="#pa" count="12" stride="3">
-<param name="X" type="float"/><param name="Y" type="float"/>
-<param name="Z" type="float"/></accessor></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-{primitive}{mesh}</mesh></geometry>{geometries}</library_geometries>
-<library_visual_scenes><visual_scene id="s"><node>{node}{show}</node>
-</visual_scene></library_visual_scenes><scene>
-<instance_visual_scene url="#s"/></scene></COLLADA>"""
+        before["<unit"] = "<contributor/>"
+    for place, more in before.items():
+        text = text.replace(place, more + place)
+    return text
 
 
 def ply_with(tag):
