@@ -1,7 +1,6 @@
 """Walls of the file get details from tags and at random."""
 
 import csv
-import hashlib
 import re
 
 from helpers.small_osm import OsmWriter
@@ -11,10 +10,6 @@ import yaml
 
 from cns_drake.command_line import app
 from cns_drake.scenarios import write_table
-
-# The digest of an import as it was before dressing existed, but for a count of
-# what is left out, and for the ground, which now looks upwards.
-PLAIN = "58fcd1221eec5099"
 
 
 def write_quarter(folder):
@@ -36,29 +31,6 @@ def run_import(folder, *options):
     )
     assert result.exit_code == 0, result.output
     return output
-
-
-def digest(folder):
-    names = ("stage_*.sdf", "structures.csv", "meshes/*", "import.yaml",
-             "*.csv", "sequence_*.yaml")  # fmt: skip
-    paths = sorted({path for name in names for path in folder.glob(name)})
-    whole = hashlib.sha256()
-    for path in paths:
-        content = path.read_bytes()
-        if path.name == "structures.csv":
-            # The columns `material` and `kind`, the last ones, came later.
-            lines = content.decode().splitlines()
-            later = {"material", "kind"}.intersection(lines[0].split(","))
-            kept = (line.rsplit(",", len(later))[0] + "\n" for line in lines)
-            content = "".join(kept).encode()
-        whole.update(str(path.relative_to(folder)).encode())
-        whole.update(content)
-    return whole.hexdigest()[:16]
-
-
-@pytest.mark.slow
-def test_plain_is_what_an_import_gave_before_there_was_dressing(tmp_path):
-    assert digest(run_import(tmp_path, "--plain")) == PLAIN
 
 
 @pytest.mark.night

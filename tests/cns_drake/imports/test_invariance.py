@@ -28,11 +28,13 @@ BOXES = [
 ]
 
 
+def rotation(angle_deg):
+    turn = np.exp(1j * np.radians(angle_deg))
+    return np.array([[turn.real, -turn.imag], [turn.imag, turn.real]])
+
+
 def write(path, move=(0, 0, 0), turn_deg=0.0, order=1, scale=1.0):
-    angle = np.radians(turn_deg)
-    R = np.array(
-        [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    )
+    R = rotation(turn_deg)
     city = CityWriter(origin=(85000.0, 446000.0, 3.0))
     plain = city.vertex
 
@@ -49,10 +51,7 @@ def write(path, move=(0, 0, 0), turn_deg=0.0, order=1, scale=1.0):
 
 def corners(path, move=(0, 0, 0), turn_deg=0.0):
     """Returns name -> sorted corners, moved and turned back."""
-    angle = np.radians(-turn_deg)
-    R = np.array(
-        [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    )
+    R = rotation(-turn_deg)
     city = read_city(path)
     found = {}
     for one in city.objects:
@@ -101,8 +100,7 @@ def osm_corners(path, order=1, **change):
     osm.node(-60, -10, natural="tree", height="7")
     osm.rows = osm.rows[::order]
     city = read_city(osm.write(path), dressed=True)
-    turn = np.radians(-change.get("turn_deg", 0.0))
-    R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    R = rotation(-change.get("turn_deg", 0.0))
     found = {one.structure.name: one.triangles for one in city.objects}
     middle = found["road_w5"][:, :, :2].reshape(-1, 2) @ R.T
     for name, triangles in found.items():
@@ -158,8 +156,7 @@ def proposed_drives(tmp_path, name, seed, **change):
     import_city(source, folder, ImportOptions(dressed=False))
     facts = yaml.safe_load((folder / "import.yaml").read_text())
     lat, lon = facts["origin"]
-    turn = np.radians(-change.get("turn_deg", 0.0))
-    R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    R = rotation(-change.get("turn_deg", 0.0))
     origin = np.multiply([lon - LON, lat - LAT], METRES_PER_DEGREE)
     origin -= change.get("move", (0, 0))
     return [

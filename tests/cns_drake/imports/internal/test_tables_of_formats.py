@@ -53,6 +53,23 @@ dynamic="no"/></signals></road><junction id="7" name="j"><connection id="0"
 incomingRoad="1" connectingRoad="1" contactPoint="start"/></junction>"""
 
 
+def table(source):
+    page = Path(source.__file__).with_name("parts.yaml")
+    return yaml.safe_load(page.read_text("utf-8"))["elements"]
+
+
+def check_accounted(faults, element, keys):
+    told = {fault.kind for fault in faults.rows()}
+    lines = {
+        word
+        for line in faults.parts()
+        if line.startswith(f"{element}: ")
+        for word in line.split(": ")[-1].split()
+    }
+    for key in keys:
+        assert key in lines or f"{key} of {element}, not read" in told, key
+
+
 @pytest.mark.parametrize(
     "tag",
     sorted({e.tag for e in ElementTree.fromstring(f"<a>{OF_ALL}</a>").iter()}
@@ -61,7 +78,7 @@ incomingRoad="1" connectingRoad="1" contactPoint="start"/></junction>"""
 def test_each_attribute_of_each_element_of_opendrive_is_accounted_for(
     tmp_path, tag
 ):
-    read = opendrive_table()[tag].get("read", [])
+    read = table(opendrive)[tag].get("read", [])
     more = [
         key for key in ATTRIBUTES.split() if key not in " ".join(read).split()
     ]
@@ -74,20 +91,7 @@ def test_each_attribute_of_each_element_of_opendrive_is_accounted_for(
     path.write_text(ElementTree.tostring(root, "unicode"))
     faults = ImportFaults()
     read_roads(path, faults)
-    told = {fault.kind for fault in faults.rows()}
-    lines = {
-        word
-        for line in faults.parts()
-        if line.startswith(f"{tag}: ")
-        for word in line.split(": ")[-1].split()
-    }
-    for key in more:
-        assert key in lines or f"{key} of {tag}, not read" in told, key
-
-
-def opendrive_table():
-    page = Path(opendrive.__file__).with_name("parts.yaml")
-    return yaml.safe_load(page.read_text("utf-8"))["elements"]
+    check_accounted(faults, tag, more)
 
 
 # Names that files of CityJSON use on things of any kind, and some of none.
@@ -127,7 +131,7 @@ def test_each_member_of_each_thing_of_cityjson_is_accounted_for(
         "semantics": semantics,
         "surface": semantics["surfaces"][0],
     }[element]
-    read = set(cityjson_table()[element]["read"])
+    read = set(table(cityjson)[element]["read"])
     more = [key for key in MEMBERS.split() if key not in read | set(thing)]
     for key in more:
         thing[key] = "1.5"
@@ -135,17 +139,4 @@ def test_each_member_of_each_thing_of_cityjson_is_accounted_for(
     path.write_text(json.dumps(document))
     city = read_city(path)
     assert len(city.objects) == 1
-    told = {fault.kind for fault in city.faults.rows()}
-    lines = {
-        word
-        for line in city.faults.parts()
-        if line.startswith(f"{element}: ")
-        for word in line.split(": ")[-1].split()
-    }
-    for key in more:
-        assert key in lines or f"{key} of {element}, not read" in told, key
-
-
-def cityjson_table():
-    page = Path(cityjson.__file__).with_name("parts.yaml")
-    return yaml.safe_load(page.read_text("utf-8"))["elements"]
+    check_accounted(city.faults, element, more)
