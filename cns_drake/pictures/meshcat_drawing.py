@@ -59,7 +59,13 @@ _SKYLIGHT = 2.6
 def draw_parts(
     meshcat: Meshcat, path: str, parts: Iterable[ColouredPart]
 ) -> None:
-    """Draws parts of a city as one mesh per class, named `<path>/<class>`."""
+    """Draws parts of a city as one mesh per class, named `<path>/<class>`.
+
+    Args:
+        meshcat: Meshcat's server.
+        path: path in Meshcat.
+        parts: the parts.
+    """
     by_class: dict[str, list[ColouredPart]] = {}
     for part in parts:
         by_class.setdefault(part.semantic_class, []).append(part)
