@@ -117,19 +117,15 @@ def _leads_on(lane: StreetLane, after: StreetLane) -> bool:
     return bool(abs(np.degrees(np.arctan2(cross, dot))) <= _SHARPEST_TURN_DEG)
 
 
-def lane_path(lanes: Sequence[StreetLane], spacing: float) -> np.ndarray:
+def lane_path(lanes: Sequence[StreetLane]) -> np.ndarray:
     """Returns a line (N, 3) along lanes: x, y and lateral offset [m].
 
     x and y are in the middle of the street; the offset is the `aside` of the
-    lane.
-
-    Args:
-        lanes: lanes; each lane leads into the next.
-        spacing: approximate distance between points [m].
+    lane. Each lane leads into the next.
     """
     parts = []
     for lane in lanes:
-        line = evenly_spaced(lane.line, spacing)
+        line = evenly_spaced(lane.line, _LANE_SPACING)
         parts.append(np.column_stack([line, np.full(len(line), lane.aside)]))
     rows = np.concatenate(parts)
     steps = step_lengths(rows[:, :2])
@@ -175,7 +171,7 @@ class StreetGraph(WayGraph):
         return len(set(passed)) == len(passed)
 
     def drive(self, way: Sequence[int]) -> WaypointRoute | Obstacle:
-        rows = lane_path([self.lanes[k] for k in way], _LANE_SPACING)
+        rows = lane_path([self.lanes[k] for k in way])
         middle = uniform_filter1d(
             rows[:, :2], _CORNER_WINDOW, axis=0, mode="nearest"
         )
@@ -201,7 +197,7 @@ class StreetGraph(WayGraph):
         return drive
 
     def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
-        lines = [lane_path([self.lanes[k]], _LANE_SPACING) for k in way]
+        lines = [lane_path([self.lanes[k]]) for k in way]
         distances = [
             np.linalg.norm(line[:, :2] - place, axis=1).min() for line in lines
         ]

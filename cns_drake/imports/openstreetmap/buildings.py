@@ -171,16 +171,20 @@ def make_buildings(
     for whole, blocks in _grouped_by_building(outlines, parts, faults):
         walls, roofs = [], []
         for block in _solids_with_openings(blocks, through, faults):
+            tags, where = block.tags, (block.name, faults)
+            facing_deg = tag_value(
+                tags, "roof:direction", heading_deg, 90.0, where, -270.0
+            )
             wall, roof = extruded(
                 block.polygon,
                 block.low,
                 block.high,
                 whole.name,
                 faults,
-                block.tags.get("roof:shape", "flat"),
+                tags.get("roof:shape", "flat"),
                 block.roof,
-                facing_deg=_roof_heading(block, faults),
-                is_across=block.tags.get("roof:orientation") == "across",
+                facing_deg=facing_deg,
+                is_across=tags.get("roof:orientation") == "across",
             )
             walls.append(wall)
             roofs.append(roof)
@@ -201,17 +205,6 @@ def make_buildings(
             kind=building_kind(whole.tags),
         )
         yield replace(made, is_gone=True) if is_gone(whole.tags) else made
-
-
-def _roof_heading(block: _Block, faults: ImportFaults) -> float | None:
-    """Returns the direction that a roof faces; None if no tag states it [deg].
-
-    It counts counter-clockwise from east.
-    """
-    where = (block.name, faults)
-    return tag_value(
-        block.tags, "roof:direction", heading_deg, 90.0, where, -270.0
-    )
 
 
 def _outlines_and_parts(

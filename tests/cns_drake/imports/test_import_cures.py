@@ -42,6 +42,7 @@ def test_an_option_that_a_refusal_names_helps(tmp_path, said, options, cure):
 
 
 def test_a_piece_of_a_file_that_is_too_wide_is_read(tmp_path):
-    with pytest.raises(InputError, match="cut out a piece of at most 20 km"):
+    said = "25 km across; cut out a piece of at most 20 km"
+    with pytest.raises(InputError, match=said):
         import_city(houses(tmp_path, 0, 25_000), tmp_path / "map", PLAIN)
     import_city(houses(tmp_path, 0), tmp_path / "map", PLAIN)

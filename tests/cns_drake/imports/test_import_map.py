@@ -143,18 +143,6 @@ def test_points_have_their_building(blocks, tmp_path):
     assert len(seen) > 4
 
 
-@pytest.mark.usefixtures("overviews")
-def test_the_same_file_gives_the_same_map(blocks, tmp_path):
-    folder, _ = blocks
-    source = folder.parent / "blocks.json"
-    again = tmp_path / "blocks"
-    import_city(source, again, ImportOptions(years=YEARS))
-    for path in folder.rglob("*"):
-        if path.is_file():
-            twin = again / path.relative_to(folder)
-            assert twin.read_bytes() == path.read_bytes(), path
-
-
 @pytest.mark.night
 def test_the_command_from_end_to_end(tmp_path):
     source = write_blocks(tmp_path / "blocks.json")

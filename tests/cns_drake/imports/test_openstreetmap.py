@@ -178,14 +178,6 @@ def test_why_no_building_is_usable_is_said(tmp_path, text, fault):
     assert message.endswith(", left out: 1, such as w9")
 
 
-def test_half_a_country_is_refused(tmp_path):
-    osm = OsmWriter()
-    osm.box(0, 0, 10, 10, building="yes")
-    osm.box(30_000, 0, 10, 10, building="yes")
-    with pytest.raises(InputError, match="30 km across"):
-        read_city(osm.write(tmp_path / "city.osm"))
-
-
 @pytest.mark.parametrize(
     "houses",
     [[(179.999, -16.8), (-179.999, -16.8)], [(13.0, 52.0), (13.002, 52.0)]],
