@@ -14,10 +14,7 @@ from shapely import LineString, MultiPoint
 from shapely.affinity import rotate
 import yaml
 
-from cns_drake.imports import (
-    ImportOptions,
-    import_city,
-)
+from cns_drake.imports import ImportOptions, import_city
 
 # Boxes: place, size, height of the foot.
 BOXES = [

@@ -82,8 +82,7 @@ def test_structures_near_the_proposed_drives(tmp_path):
 def test_terrain_is_cut(tmp_path):
     city = CityWriter()
     city.box("house", 0.0, 5.0, (10.0, 10.0, 6.0))
-    far = city.box("far", 300.0, 5.0, (10.0, 10.0, 6.0))
-    assert far is None
+    city.box("far", 300.0, 5.0, (10.0, 10.0, 6.0))
     triangles = []
     for x in range(-100, 400, 20):
         for y in range(-60, 60, 20):
