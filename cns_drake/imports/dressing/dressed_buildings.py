@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 import math
 
@@ -118,8 +119,8 @@ def dress_buildings(
     streets: Sequence[Street],
     ground: Ground,
     seed: int,
-    always: Collection[ImportedObject] | None = None,
-    paving: np.ndarray = _NO_TRIANGLES,
+    always: AbstractSet[ImportedObject],
+    paving: np.ndarray,
 ) -> DressedBuildings:
     """Returns the buildings of a city, with added windows, doors and shops.
 
@@ -133,9 +134,8 @@ def dress_buildings(
         streets: the streets that doors and shops face.
         ground: the ground on which buildings stand.
         seed: seed of all random draws.
-        always: objects that exist in all stages; None if all objects do.
-            A wall gets no details if buildings that exist in all stages occlude
-            it from the drives.
+        always: objects that exist in all stages. A wall gets no details if
+            such buildings occlude it from the drives.
         paving: triangles (M, 3, 3) of terrain, streets and sidewalks, on which
             doors stand [m].
     """
@@ -143,8 +143,7 @@ def dress_buildings(
     bare = _split_buildings(buildings, ground, seed)
     walls: Mapping[int, list[FacadePlan]] = {}
     if drives and bare:
-        lasting = set(buildings if always is None else always)
-        hiding = [b.triangles for b in buildings if b in lasting]
+        hiding = [b.triangles for b in buildings if b in always]
         views = _DriveViews(drives, ground, joined_triangles(hiding))
         upper = UpperSides(turned_up(paving))
         walls = _plan_facades(bare, drives, streets, ground, views, upper)

@@ -25,8 +25,6 @@ from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.named_randomness import random_generator
 from cns_drake.imports.streets import Street
 
-# Objects farther than this from all drives are left out [m].
-_OBJECTS_WITHIN = 100.0
 # Distance between random lamps, and from them to those of the file [m].
 _LAMP_EVERY = 27.0
 # Mean distance between random small objects [m].
@@ -40,7 +38,7 @@ _FIRST_OBJECT = (3.0, 12.0)
 # far inside it, or this far from the middle of the street [m].
 _LAMP_INSIDE = 0.4
 _LAMP_FROM_MIDDLE = 2.3
-# Cars farther than this from all drives are left out [m].
+# Nothing is added along streets farther than this from all drives [m].
 _ROWS_WITHIN = 70.0
 # Least and greatest distance between cars that are parked along a street [m].
 _CAR_EVERY = (5.8, 7.2)
@@ -106,14 +104,14 @@ def dress_streets(
     if not drives:
         return PlacedObjects()
     room = StreetRoom(objects, drives, ground, guessed_ground)
-    near = [s for s in streets if room.is_near(s.line, _OBJECTS_WITHIN)]
+    near = [s for s in streets if room.is_near(s.line)]
     courses = [LineString(street.line) for street in near]
     lines = MultiLineString(courses)
     for imported in objects:
         if imported.object_type == "Tree":
             room.keep_tree(_off_carriageway(room, imported, near, courses))
     for number, small in enumerate(small_objects):
-        if room.is_near(np.array([small.xy] * 2), _OBJECTS_WITHIN):
+        if room.is_near(np.array([small.xy] * 2)):
             _place_from_file(room, small, number, near, courses, seed)
     for imported in objects:
         if imported.object_type == "Parking":
@@ -281,7 +279,7 @@ def _off_carriageway(
     """
     structure = tree.structure
     xy = np.array(structure.xyz[:2])
-    if not streets or not room.is_near(np.array([xy] * 2), _OBJECTS_WITHIN):
+    if not streets or not room.is_near(np.array([xy] * 2)):
         return tree
     beside, _ = _beside_street(xy, streets, courses)
     if np.array_equal(beside, xy) or not room.has_tree_pit(beside):

@@ -31,6 +31,8 @@ from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.ground import Ground
 from cns_drake.imports.imported_objects import ImportedObject
 
+# Objects farther than this from all drives are left out [m].
+_OBJECTS_WITHIN = 100.0
 # Least distance of objects from the middle of a drive [m].
 _FROM_DRIVE = 1.7
 # Least distance of objects from walls [m].
@@ -133,7 +135,9 @@ class StreetRoom:
         self._names = {one.structure.name for one in objects}
         self.lamps: list[tuple[float, float]] = []
 
-    def is_near(self, line: np.ndarray, distance: float) -> bool:
+    def is_near(
+        self, line: np.ndarray, distance: float = _OBJECTS_WITHIN
+    ) -> bool:
         """Returns whether a line (N, 2) is within a distance of a drive [m]."""
         return bool(shapely.dwithin(LineString(line), self.paths, distance))
 
@@ -168,7 +172,7 @@ class StreetRoom:
         """Places an object if there is room; returns whether there was room.
 
         The object stands at the height of the lowest ground below it. Only cars
-        are placed on carriageways.
+        are placed on carriageways, and nothing far from all drives.
 
         Args:
             name: name of the new structure.
@@ -183,7 +187,9 @@ class StreetRoom:
         builder = OBJECTS[kind]
         at = np.array([xy])
         is_car = kind in PARKED_CARS
-        if not is_car and np.isfinite(self._roads.heights(at)[0]):
+        if not self.is_near(np.repeat(at, 2, axis=0)) or (
+            not is_car and np.isfinite(self._roads.heights(at)[0])
+        ):
             return False
         given = {} if height is None else {"height": height}
         model = without_curves(builder.build(rng, **given))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+import itertools
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -98,8 +99,7 @@ def is_upright(triangles: np.ndarray) -> np.ndarray:
 
 
 def find_panels(
-    walls: Sequence[np.ndarray],
-    is_wanted: Callable[[np.ndarray], np.ndarray] | None = None,
+    walls: Sequence[np.ndarray], is_wanted: Callable[[np.ndarray], np.ndarray]
 ) -> list[Panel]:
     """Returns the walls of buildings as panels, several for a bent wall.
 
@@ -108,7 +108,7 @@ def find_panels(
             outwards [m].
         is_wanted: function that selects walls. The function takes the least and
             the greatest x and y of N walls, (N, 2, 2) [m], and returns (N,)
-            bool. None for all walls.
+            bool.
     """
     triangles = joined_triangles(walls)
     building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])
@@ -119,21 +119,15 @@ def find_panels(
     order = np.argsort(component, kind="stable")
     begins = np.flatnonzero(np.diff(component[order], prepend=-1))
     groups = np.split(order, begins[1:])
-    if is_wanted is not None:
-        xy = triangles[order, :, :2]
-        limits = np.stack(
-            [
-                np.minimum.reduceat(xy.min(axis=1), begins),
-                np.maximum.reduceat(xy.max(axis=1), begins),
-            ],
-            axis=1,
-        )
-        wanted = is_wanted(limits)
-        groups = [
-            members
-            for members, is_used in zip(groups, wanted, strict=True)
-            if is_used
-        ]
+    xy = triangles[order, :, :2]
+    limits = np.stack(
+        [
+            np.minimum.reduceat(xy.min(axis=1), begins),
+            np.maximum.reduceat(xy.max(axis=1), begins),
+        ],
+        axis=1,
+    )
+    groups = list(itertools.compress(groups, is_wanted(limits)))
     normals = long_normals(triangles) / 2.0
     areas = np.linalg.norm(normals, axis=1)
     panels = []

@@ -12,25 +12,36 @@ from cns_drake.command_line import app
 from cns_drake.scenarios import write_table
 
 
-def write_quarter(folder):
+def write_quarter(folder, end=180):
     osm = OsmWriter()
     for k in range(4):
         for y in (8, -20):
             osm.box(40 * k, y, 30, 12, building="yes", height=str(9 + k))
-    ends = [osm.node(-20, 0), osm.node(180, 0)]
+    ends = [osm.node(-20, 0), osm.node(end, 0)]
     osm.way_of(ends, highway="residential", width="8", sidewalk="both")
     osm.node(30, 5.5, natural="tree")
     return osm.write(folder / "quarter.osm")
 
 
-def run_import(folder, *options):
-    source = write_quarter(folder)
+def run_import(folder, *options, **quarter):
+    source = write_quarter(folder, **quarter)
     output = folder / "quarter"
     result = CliRunner().invoke(
         app, ["import", str(source), "--output", str(output), *options]
     )
     assert result.exit_code == 0, result.output
     return output
+
+
+@pytest.mark.slow
+def test_nothing_is_added_far_from_a_drive(tmp_path):
+    """Along a street that goes on for 360 m behind it."""
+    path = tmp_path / "path.csv"
+    path.write_text("x,y\n" + "".join(f"{x},1.8\n" for x in range(-80, 61, 10)))
+    folder = run_import(tmp_path, "--along", str(path), end=500)
+    with (folder / "structures.csv").open() as stream:
+        rows = [r for r in csv.DictReader(stream) if r["origin"] == "lot"]
+    assert 120.0 < max(float(row["x"]) for row in rows) <= 160.0
 
 
 @pytest.mark.night
