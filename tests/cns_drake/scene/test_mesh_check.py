@@ -32,6 +32,29 @@ def extension(name, required=True):
 
 
 @pytest.mark.parametrize(
+    ("name", "required", "is_read"),
+    [
+        ("KHR_mesh_quantization", False, False),
+        ("ACME_folded_space", True, False),
+        ("KHR_texture_transform", True, True),
+        # Shapes are there without it, too.
+        ("KHR_draco_mesh_compression", False, True),
+        # No shape uses it.
+        ("ACME_folded_space", False, True),
+    ],
+)
+def test_extensions_that_change_shapes_are_refused(
+    tmp_path, name, required, is_read
+):
+    path = write(tmp_path, extension(name, required))
+    if is_read:
+        assert notes_of(path) == ()
+        return
+    with pytest.raises(InputError, match=f"needs the extension {name} of glTF"):
+        notes_of(path)
+
+
+@pytest.mark.parametrize(
     ("change", "note"),
     [
         (lambda top: top["nodes"][0].update(skin=0), "1 skins of"),
