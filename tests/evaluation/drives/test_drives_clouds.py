@@ -282,6 +282,20 @@ def test_damaged_npy_headers(tmp_path, old, new):
         read_cloud(path)
 
 
+@pytest.mark.parametrize("digits", [9, 15])
+def test_a_number_of_points_that_numpy_cannot_count(tmp_path, digits):
+    """It is refused without a warning beside the error."""
+    path = tmp_path / "map.npy"
+    header = "{'descr': '<f8', 'fortran_order': False, 'shape': "
+    header += f"({10**digits}, {10**digits})}}".ljust(245 - len(header)) + "\n"
+    path.write_bytes(b"\x93NUMPY\x01\x00\xf6\x00" + header.encode())
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        with pytest.raises(InputError, match=r"map\.npy: "):
+            read_cloud(path)
+    assert not told
+
+
 def test_archives_and_records_of_no_numbers(tmp_path):
     np.savez(tmp_path / "a.npz", POINTS)
     (tmp_path / "a.npz").rename(tmp_path / "a.npy")
