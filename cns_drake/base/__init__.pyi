@@ -71,14 +71,14 @@ from .input_models import Section as Section
 from .interrupts import ended_by_interrupts as ended_by_interrupts
 from .interrupts import interrupts_wait as interrupts_wait
 from .interrupts import uninterrupted as uninterrupted
-from .jobs.forecast import Space as Space
-from .jobs.forecast import forecast as forecast
 from .jobs.processes import JobError as JobError
 from .jobs.processes import ProcessDiedError as ProcessDiedError
 from .jobs.processes import run_process as run_process
 from .jobs.running import Cluster as Cluster
 from .jobs.running import Job as Job
+from .jobs.running import Space as Space
 from .jobs.running import choose_cluster as choose_cluster
+from .jobs.running import forecast as forecast
 from .jobs.running import run_jobs as run_jobs
 from .jobs.step import Reporter as Reporter
 from .jobs.step import Step as Step

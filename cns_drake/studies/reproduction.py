@@ -26,7 +26,7 @@ from cns_drake.scenarios import (
 )
 from cns_drake.scene import MapFolder
 from cns_drake.simulation import SimulationSource
-from cns_drake.studies.drives.control_drives import control_drive
+from cns_drake.studies.drives.changed_drives import control_drive
 from cns_drake.studies.recording import (
     is_recorded,
     plan_recordings,
@@ -170,12 +170,9 @@ def _recordable_drives(folder: Path) -> list[Scenario]:
 
 
 def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
-    """Returns the control drives of a map's drives.
+    """Returns the control of each of a map's drives but that of the last stage.
 
-    The last drive is the drive in the last stage. Each other drive has a
-    control drive, which follows the same route, but through the last stage. The
-    control drive and the last drive see the same city, so a comparison of these
-    two drives shows only the effect of the route.
+    The controls go through the last stage.
     """
     last = max(drives, key=lambda drive: natural_key(drive.stage or ""))
     return [

@@ -46,7 +46,6 @@ from evaluation.study import (
     CostTask,
     Experiment,
     LocaliseTask,
-    MapDrives,
     Pair,
     PlaceTask,
     PoseTask,
@@ -196,7 +195,20 @@ def plan_study(study: Study, maps: Sequence[str] = ()) -> list[ShownCity]:
         if some.city is None:
             pairs = [simulated_pair(study, some, one) for one in simulations]
         else:
-            pairs = list(_recorded_pairs(study, some.city))
+            conditions = [
+                (one, condition_protocol(one, study.source))
+                for one in experiment.conditions
+            ]
+            pairs = list(
+                recorded_pairs(
+                    some.city,
+                    conditions,
+                    experiment.seeds[0],
+                    study.source,
+                    study.on_note,
+                    both_ways=experiment.drives == "both-ways",
+                )
+            )
         if not pairs:
             study.on_note(f"{some.map_name}: no two drives to compare")
         others = [
@@ -241,26 +253,25 @@ def study_drives(study: Study, maps: Sequence[str] = ()) -> list[Scenario]:
     return list(drives.values())
 
 
-def _recorded_pairs(study: Study, city: MapDrives) -> Iterator[Pair]:
-    """Returns the pairs of recordings in all conditions."""
-    experiment = study.experiment
-    return recorded_pairs(
-        city,
-        [
-            (one, condition_protocol(one, study.source))
-            for one in experiment.conditions
-        ],
-        experiment.seeds[0],
-        study.source,
-        study.on_note,
-        both_ways=experiment.drives == "both-ways",
-    )
+# Number of drives after which a note reports the search for places elsewhere.
+_NOTED_DRIVES = 20
 
 
 def _distractors(
     study: Study, some: MapPairs, found: Iterable[Pair]
 ) -> list[Scenario]:
-    """Returns the drives whose places are added to databases."""
+    """Returns the drives through other cities that the pairs of a map need.
+
+    Adding the places of these drives to a database makes recognition harder.
+    The drives come in this order, until they have about as many places as a
+    pair adds at most: the shipped drives of other maps, each through its own
+    stage; if the map is shipped, drives along its streets between other
+    buildings; the drives of other maps through their other stages; and drives
+    along the streets of other maps, between other buildings.
+
+    Raises:
+        InputError: a shipped map cannot be used.
+    """
     most = max((one.distractors for one in found), default=0)
     if not most:
         return []
@@ -268,14 +279,24 @@ def _distractors(
     database, _ = some.pairs[0]
     if study.experiment.drives == "same-route":
         database = with_lidars_beside(database, *VIEWPOINTS["near"])
-    return distracting_drives(
-        database,
-        most,
-        study.protocols[0].place_spacing,
-        study.output / "cities",
-        study.cluster,
-        study.on_note,
-    )
+    study.on_note(f"{database.name}: looking for {most} places elsewhere")
+    spacing = study.protocols[0].place_spacing
+    drives: list[Scenario] = []
+    number = 0
+    for drive in _drives_elsewhere(
+        database, study.output / "cities", study.cluster
+    ):
+        if number >= most:
+            break
+        drive = drive.replaced(lidars=database.lidars)
+        drives.append(drive)
+        trajectory = plan_drive(drive)
+        frames = np.arange(count_frames(drive, trajectory))
+        _, p_WB = trajectory.poses(drive.frame_period * frames)
+        number += len(sample_frames(p_WB, spacing))
+        if len(drives) % _NOTED_DRIVES == 0:
+            study.on_note(f"{database.name}: found {number} places elsewhere")
+    return drives
 
 
 def _check_drives_are_frozen(
@@ -374,65 +395,10 @@ def check_frozen(
             )
 
 
-# Number of drives after which a note reports the search for places elsewhere.
-_NOTED_DRIVES = 20
-
-
-def distracting_drives(
-    query: Scenario,
-    number: int,
-    spacing: float,
-    output: Path,
-    cluster: Cluster,
-    on_note: Callable[[str], None] = lambda text: None,
-) -> list[Scenario]:
-    """Returns drives through cities other than the query's city.
-
-    Adding the places of these drives to a database makes recognition harder.
-    The drives come in this order, until they have about the wanted number of
-    places: the shipped drives of other maps, each through its own stage; if the
-    query's map is shipped, drives along its streets between other buildings;
-    the drives of other maps through their other stages; and drives along the
-    streets of other maps, between other buildings.
-
-    Args:
-        query: the query drive. The returned drives have the LiDARs of the query
-            drive, and do not go through its city.
-        number: approximate number of places.
-        spacing: distance between two places [m].
-        output: folder for the newly generated cities, with other buildings.
-        cluster: runs the jobs.
-        on_note: is called with each note for the user.
-
-    Raises:
-        InputError: a shipped map cannot be used.
-    """
-    drives: list[Scenario] = []
-    found = 0
-    if number:
-        on_note(f"{query.name}: looking for {number} places elsewhere")
-    for drive in _drives_elsewhere(query, output, cluster):
-        if found >= number:
-            break
-        drive = drive.replaced(lidars=query.lidars)
-        drives.append(drive)
-        found += _num_places(drive, spacing)
-        if len(drives) % _NOTED_DRIVES == 0:
-            on_note(f"{query.name}: found {found} places elsewhere")
-    return drives
-
-
-def _num_places(scenario: Scenario, spacing: float) -> int:
-    trajectory = plan_drive(scenario)
-    frames = count_frames(scenario, trajectory)
-    _, p_WB = trajectory.poses(scenario.frame_period * np.arange(frames))
-    return len(sample_frames(p_WB, spacing))
-
-
 def _drives_elsewhere(
     query: Scenario, output: Path, cluster: Cluster
 ) -> Iterator[Scenario]:
-    """Yields drives without end, in the order of `distracting_drives`."""
+    """Yields drives without end, in the order of `_distractors`."""
     maps = {name: MapFolder(path) for name, path in shipped_cities().items()}
     drives = {
         name: [load_scenario(path) for path in folder.recordable_drives()]

@@ -10,14 +10,14 @@ of two drives gives a TCR_sym of about 0.2 in a city that has not changed.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.base import InputError
-from cns_drake.drives import check_same_world
-from evaluation.change.drive_maps import DriveMap
+from cns_drake.drives import Drive, check_same_world
 from evaluation.change.tcr import (
     COVERAGE_RADIUS,
     GRIDS,
@@ -27,7 +27,14 @@ from evaluation.change.tcr import (
     covered,
     temporal_change,
 )
-from evaluation.maps import VOXEL_SIZE
+from evaluation.clouds import read_blocks
+from evaluation.maps import (
+    CELL_SIZE,
+    VOXEL_SIZE,
+    VoxelAccumulator,
+    VoxelMap,
+    map_drive,
+)
 
 if TYPE_CHECKING:
     from evaluation.alignment import AlignmentReport
@@ -40,6 +47,47 @@ _SAME_ROUTE = 1.0
 _LEAST_STRUCTURE = 0.3
 # If registration lowers TCR_sym by more than this, the frames differ.
 _EXPLAINED = 0.02
+
+
+@dataclass(frozen=True)
+class DriveMap:
+    """A map, with the drive that made it.
+
+    Attributes:
+        name: name of the drive or file.
+        voxels: the map in voxels of 1 m, from which the larger voxels of the
+            TCR are made.
+        positions: (N, 3) positions of the sensor [m]; None for a map file.
+        drive: the drive, if it is open; None for a map file.
+        notes: notes on how the file was read.
+    """
+
+    name: str
+    voxels: VoxelMap
+    positions: np.ndarray | None = None
+    drive: Drive | None = None
+    notes: tuple[str, ...] = ()
+
+
+def map_source(source: Drive | Path, columns: int | None = None) -> DriveMap:
+    """Returns the voxel map of a drive or of a cloud's file.
+
+    Args:
+        source: the drive, or the path of the file.
+        columns: number of columns of a `.bin` file, see `read_cloud`.
+
+    Raises:
+        InputError: a scan or the file cannot be read.
+    """
+    if isinstance(source, Drive):
+        voxels = map_drive(source, CELL_SIZE)
+        positions = source.X_WS[:, :3, 3]
+        return DriveMap(source.name, voxels, positions, source)
+    accumulator = VoxelAccumulator(CELL_SIZE)
+    notes: list[str] = []
+    for points in read_blocks(source, columns, notes.append):
+        accumulator.add(points)
+    return DriveMap(source.name, accumulator.to_map(), notes=tuple(notes))
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from .describing import describe_drive as describe_drive
 from .descriptors import DescribedScans as DescribedScans
 from .descriptors import DriveDescriptors as DriveDescriptors
 from .descriptors import joined_scans as joined_scans
-from .faults import FAULTS as FAULTS
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .metrics import Mode as Mode
@@ -40,6 +39,7 @@ from .protocol import ProtocolFieldError as ProtocolFieldError
 from .protocol import RetrievalProtocol as RetrievalProtocol
 from .protocol_options import with_protocol as with_protocol
 from .protocol_options import with_protocols as with_protocols
+from .query_outcomes import FAULTS as FAULTS
 from .query_outcomes import PoseErrors as PoseErrors
 from .query_outcomes import QueryOutcomes as QueryOutcomes
 from .query_outcomes import auroc as auroc

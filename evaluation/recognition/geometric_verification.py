@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from evaluation.methods import Method, check_number, checked_pose
-from evaluation.recognition.ranking import ranked_places
+from evaluation.recognition.query_outcomes import ranked_places
 
 # Number of places with the best scores that are tested. This value and the next
 # were chosen on development worlds, see docs/notes/cities.md.

@@ -20,12 +20,11 @@ import numpy as np
 
 from cns_drake.base import Family, InputError, did_you_mean, errors_at
 from evaluation.methods import as_users_code, run_module
-from evaluation.recognition.faults import FAULTS
 from evaluation.recognition.precision_recall import (
     WeightedMetrics,
     weighted_metrics,
 )
-from evaluation.recognition.query_outcomes import QueryOutcomes
+from evaluation.recognition.query_outcomes import FAULTS, QueryOutcomes
 from evaluation.recognition.sign_flips import (
     UNKNOWN,
     Interval,

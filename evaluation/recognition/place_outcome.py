@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 import math
 from typing import NamedTuple
@@ -11,11 +11,14 @@ import numpy as np
 
 from cns_drake.base import InputError
 from evaluation.methods import Method
-from evaluation.recognition.faults import faults
 from evaluation.recognition.metrics import Mode, Number, numbers_of
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.query_outcomes import QueryOutcomes, judge
-from evaluation.recognition.ranking import ranked_places
+from evaluation.recognition.query_outcomes import (
+    QueryOutcomes,
+    faults,
+    judge,
+    ranked_places,
+)
 from evaluation.recognition.retrieval import Retrieval
 
 # Number of top-ranked places that are kept for each query.
@@ -160,25 +163,6 @@ class PlaceOutcome:
             ),
         )
 
-    @property
-    def is_verified(self) -> bool:
-        """Whether geometric verification was used.
-
-        Geometric verification rejects places that lie too far away according to
-        the method's own pose estimate.
-        """
-        return self.protocol.verified
-
-    @property
-    def radius(self) -> float:
-        """Greatest distance between a query and its match [m]."""
-        return self.protocol.radius
-
-    @property
-    def columns(self) -> Mapping[str, np.ndarray]:
-        """The columns of `queries.csv`."""
-        return self.outcomes.columns
-
     def numbers(
         self,
         task: str = "place",
@@ -198,7 +182,7 @@ class PlaceOutcome:
             self.outcomes,
             None if before is None else before.outcomes,
             method=self.method,
-            verified=self.is_verified,
+            verified=self.protocol.verified,
             mode=mode,
         )
 
@@ -256,7 +240,7 @@ def check_has_match(outcome: PlaceOutcome) -> None:
             f"{outcome.query}: no place of {database} shows"
             f" {protocol.overlap:.0%} of a query's scan"
         )
-    nearest = outcome.columns["nearest"].min()
+    nearest = outcome.outcomes.columns["nearest"].min()
     raise InputError(
         f"{outcome.query}: no query lies within {protocol.radius:g} m of a"
         f" place of {database} (the nearest at {nearest:.1f} m)"

@@ -12,13 +12,17 @@ import numpy as np
 from cns_drake.base import poses, read_only
 from evaluation.recognition.precision_recall import PrCurve, pr_curve
 
-# Greatest errors of a localised query's pose.
-SUCCESS_TRANSLATION = 2.0
-SUCCESS_ROTATION_DEG = 5.0
-
-
+# With fewer places, sorting all of them is as quick.
+_MANY = 2000
 # Overlap below which two scans show different surroundings.
 _ENOUGH_OVERLAP = 0.5
+# Greatest errors of a localised query's pose [m], [deg].
+_SUCCESS = 2.0, 5.0
+# Reasons for wrong top-ranked places, in order of precedence.
+FAULTS = ("no_place", "no_candidate", "other_city", "near_miss", "elsewhere")
+# Up to this multiple of the radius, a wrong place is `near_miss`; beyond it,
+# `elsewhere`.
+_NEARLY = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,10 +269,47 @@ class QueryOutcomes:
         """
         if not self._estimates_poses:
             return None
-        is_near = (self.columns["translation_error"] <= SUCCESS_TRANSLATION) & (
-            self.columns["rotation_error_deg"] <= SUCCESS_ROTATION_DEG
+        far, turned = _SUCCESS
+        is_near = (self.columns["translation_error"] <= far) & (
+            self.columns["rotation_error_deg"] <= turned
         )
         return _mean_or_nan(is_near[self.has_match])
+
+
+def faults(
+    outcomes: QueryOutcomes,
+    match_frames: np.ndarray,
+    distances: np.ndarray,
+    radius: float,
+) -> np.ndarray:
+    """Returns, for each query, why its top-ranked place is wrong.
+
+    The top-ranked place is the place that the method ranks first.
+
+    Args:
+        outcomes: outcomes of Q queries.
+        match_frames: (Q,) frame of the top-ranked place; -1 without a
+            candidate.
+        distances: (Q,) distance to the top-ranked place [m]; NaN if this place
+            is in another city.
+        radius: radius of a match [m].
+
+    Returns:
+        (Q,) "" if the top-ranked place is a match, and otherwise the first
+        reason that applies: `no_place` if the query has no match;
+        `no_candidate` if the method finds no place, or rejects all places;
+        `other_city` if the top-ranked place is in another city; `near_miss` if
+        the top-ranked place is at most twice the radius away; `elsewhere` if no
+        other reason applies.
+    """
+    wrong = [
+        ~outcomes.has_match,
+        match_frames < 0,
+        np.isnan(distances),
+        distances <= _NEARLY * radius,
+    ]
+    kinds = np.select(wrong, FAULTS[:-1], FAULTS[-1])
+    return np.where(outcomes.is_right, "", kinds)
 
 
 def common_blocks(outcomes: Sequence[QueryOutcomes]) -> np.ndarray:
@@ -289,6 +330,35 @@ def common_blocks(outcomes: Sequence[QueryOutcomes]) -> np.ndarray:
         if not np.array_equal(one.own_blocks, known[0].own_blocks):
             raise ValueError("other blocks of the route")
     return (known or outcomes)[0].own_blocks
+
+
+def ranked_places(scores: np.ndarray, most: int) -> np.ndarray:
+    """Returns the best places, from the best on.
+
+    Of places with equal scores, the first in the database is ranked higher.
+    Places that are no candidates (NaN) come last.
+
+    Args:
+        scores: (..., D), higher is more similar; NaN is no candidate.
+        most: greatest number K of places.
+
+    Returns:
+        (..., min(K, D)) indices of places.
+    """
+    # NumPy sorts NaN last.
+    worst_last = -scores
+    number = scores.shape[-1]
+    if number < _MANY or most >= number:
+        order = np.argsort(worst_last, axis=-1, kind="stable")
+        return order[..., :most]
+    rows = worst_last.reshape(-1, number)
+    found = np.empty((len(rows), most), np.int64)
+    for k, row in enumerate(rows):
+        limit = np.partition(row, most - 1)[most - 1]
+        # NaN is a limit if there are fewer candidates.
+        near = np.flatnonzero((row <= limit) | np.isnan(limit))
+        found[k] = near[np.argsort(row[near], kind="stable")[:most]]
+    return found.reshape(*scores.shape[:-1], most)
 
 
 def judge(

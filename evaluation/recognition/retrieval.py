@@ -4,6 +4,8 @@ The distance of a query from a place is the distance between the positions of
 the sensor in three dimensions.
 """
 
+from __future__ import annotations
+
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
@@ -19,8 +21,11 @@ from evaluation.recognition.geometric_verification import (
 )
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
-from evaluation.recognition.query_outcomes import PoseErrors, pose_error
-from evaluation.recognition.ranking import ranked_places
+from evaluation.recognition.query_outcomes import (
+    PoseErrors,
+    pose_error,
+    ranked_places,
+)
 from evaluation.recognition.search import Search
 
 # Greatest number of pairs of a query and a place in one batch. An array of

@@ -8,7 +8,7 @@ import numpy as np
 from cns_drake.base import InputError, read_only
 from evaluation.methods import Method, checked_scores
 from evaluation.recognition.geometric_verification import verified_scores
-from evaluation.recognition.ranking import ranked_places
+from evaluation.recognition.query_outcomes import ranked_places
 
 
 def score_places(

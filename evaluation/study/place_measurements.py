@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cache, partial
 import math
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -62,86 +62,6 @@ class _Searched(NamedTuple):
     drives: list[str]
     num_here: int
     rows: np.ndarray
-
-
-def _searched_database(
-    database: DriveDescriptors | Part,
-    distractors: Sequence[Part],
-    num_distractors: int,
-    beside: Sequence[Part] = (),
-    keep: str | int = KEEP_ALL,
-    cell: float = math.inf,
-    *,
-    divides: bool = False,
-) -> _Searched:
-    """Returns a database of one drive, with the places of other drives.
-
-    The drives through other cities are moved so far away that none of their
-    places is a match. The first `num_distractors` places of these drives are
-    appended, or all places if there are fewer.
-
-    Args:
-        database: a drive with a method's descriptors of its places, or the file
-            that contains this drive.
-        distractors: for each drive through another city, the file with the
-            same method's descriptors of its places.
-        num_distractors: number of places to append.
-        beside: files with the same method's descriptors of further drives in
-            the same world, from older to newer. All of their places come before
-            the places of other cities.
-        keep: which places in this world are kept, see `kept_places`.
-        cell: side of the cells by which places are kept [m].
-        divides: whether descriptors are read while they are searched, if they
-            are too large for the memory; see `Method.divides`.
-    """
-    parts = [database, *beside, *distractors]
-    store = StoredDrives(
-        [partial(_descriptors_of, one) for one in parts],
-        [_size_of(one) for one in parts],
-        MOST_BYTES if divides else math.inf,
-    )
-    num_near = 1 + len(beside)
-    near = [store.undescribed(k) for k in range(num_near)]
-    here = joined_scans(near, [0] * num_near)
-    lengths = [len(one.frames) for one in near]
-    drive_of = np.repeat(np.arange(num_near), lengths)
-    own_row = np.concatenate([np.arange(length) for length in lengths])
-    rows = np.flatnonzero(kept_places(here.p_WSs, drive_of, keep, cell))
-    every = [here if len(rows) == len(drive_of) else here.chosen(rows)]
-    stored = [drive_of[rows]]
-    stored_rows = [own_row[rows]]
-    most = len(rows) + num_distractors
-    for k in range(num_near, len(parts)):
-        if sum(map(len, stored)) >= most:
-            break
-        every.append(store.undescribed(k))
-        stored_rows.append(np.arange(len(every[-1].frames)))
-        stored.append(np.full(len(stored_rows[-1]), k))
-    places = joined_scans(every, range(len(every)), most)
-    of = np.concatenate(stored)[:most]
-    return _Searched(
-        DriveDescriptors(
-            store.name(0),
-            store.described(places, of, np.concatenate(stored_rows)[:most]),
-            here.chosen(np.arange(0)),
-        ),
-        [store.name(k) for k in of.tolist()],
-        len(rows),
-        rows,
-    )
-
-
-def _size_of(source: DriveDescriptors | Part) -> int:
-    """Returns the size of descriptors that are in a file [bytes]."""
-    if isinstance(source, Part):
-        return source.size()
-    kept = source.places.descriptors
-    return kept.num_bytes if isinstance(kept, LongList) else 0
-
-
-def _descriptors_of(source: DriveDescriptors | Part) -> DriveDescriptors:
-    """Returns descriptors, which may be in a file."""
-    return source.read() if isinstance(source, Part) else source
 
 
 class PlaceComparison(NamedTuple):
@@ -218,19 +138,60 @@ class PlaceComparison(NamedTuple):
     ) -> _Searched:
         """Returns the database that a method searches.
 
+        The places of further drives in the same world follow those of
+        `database`. The drives through other cities come last. They are moved so
+        far away that none of their places is a match; the first
+        `num_distractors` of their places are added, or all if there are fewer.
+
         Args:
             number: number of the method.
             database: the method's descriptors of the drive of the places.
-            method: the method.
+            method: the method. If it `divides`, descriptors that are too large
+                for the memory are read while they are searched.
         """
-        return _searched_database(
-            database,
-            [parts[number] for parts in self.distractors],
-            self.num_distractors,
-            [parts[1 + number] for parts in self.beside],
-            self.keep,
-            self.protocol.place_spacing,
-            divides=method.divides,
+        further = [parts[1 + number] for parts in self.beside]
+        num_near = 1 + len(further)
+        further += [parts[number] for parts in self.distractors]
+        if isinstance(database, Part):
+            reader, size = database.read, database.size()
+        else:
+            reader = partial(replace, database)
+            size = getattr(database.places.descriptors, "num_bytes", 0)
+        store = StoredDrives(
+            [reader, *(one.read for one in further)],
+            [size, *(one.size() for one in further)],
+            MOST_BYTES if method.divides else math.inf,
+        )
+        near = [store.undescribed(k) for k in range(num_near)]
+        here = joined_scans(near, [0] * num_near)
+        lengths = [len(one.frames) for one in near]
+        drive_of = np.repeat(np.arange(num_near), lengths)
+        own_row = np.concatenate([np.arange(length) for length in lengths])
+        cell = self.protocol.place_spacing
+        rows = np.flatnonzero(
+            kept_places(here.p_WSs, drive_of, self.keep, cell)
+        )
+        every = [here if len(rows) == len(drive_of) else here.chosen(rows)]
+        stored = [drive_of[rows]]
+        stored_rows = [own_row[rows]]
+        most = len(rows) + self.num_distractors
+        for k in range(num_near, 1 + len(further)):
+            if sum(map(len, stored)) >= most:
+                break
+            every.append(store.undescribed(k))
+            stored_rows.append(np.arange(len(every[-1].frames)))
+            stored.append(np.full(len(stored_rows[-1]), k))
+        places = joined_scans(every, range(len(every)), most)
+        of = np.concatenate(stored)[:most]
+        return _Searched(
+            DriveDescriptors(
+                store.name(0),
+                store.described(places, of, np.concatenate(stored_rows)[:most]),
+                here.chosen(np.arange(0)),
+            ),
+            [store.name(k) for k in of.tolist()],
+            len(rows),
+            rows,
         )
 
 
@@ -352,83 +313,55 @@ def measure_places(
             a method returns an invalid result.
     """
     methods, protocol = compared.methods, compared.protocol
-    places = _described_drive(compared.database, "places", methods, protocol)
-    queries = _described_drive(compared.query, "queries", methods, protocol)
-    overlaps: dict[tuple[float, range], np.ndarray] = {}
+    scans, places = _described_drive(
+        compared.database, "places", methods, protocol
+    )
+    asked_scans, queries = _described_drive(
+        compared.query, "queries", methods, protocol
+    )
     known: Mapping[float, np.ndarray] = {}
     if compared.overlaps is not None:
         known = compared.overlaps.read()
+    # Matches follow from the positions of the scans, and not from a method, so
+    # that overlaps are computed once for all methods.
+    overlaps: dict[tuple[float, range], np.ndarray] = {}
+
+    def shown(
+        radius: float,
+        rows: range,
+        matches: np.ndarray,
+        X_WP: np.ndarray,
+        X_WQ: np.ndarray,
+    ) -> np.ndarray:
+        batch = slice(rows.start, rows.stop)
+        if radius in known:
+            return known[radius][batch]
+        if (radius, rows) not in overlaps:
+            number = len(scans())
+            (overlaps[radius, rows],) = overlaps_with_best_match(
+                scans(),
+                X_WP[:number],
+                asked_scans()[batch],
+                X_WQ[batch],
+                matches[None, :, :number],
+            )
+        return overlaps[radius, rows]
+
     for k, choice in enumerate(
         track(methods, "comparing", len(methods), "methods")
     ):
         # The method comes first, because it registers the type of its
         # descriptors.
         method = choice.make()
-        mapped, asked = places.take(k), queries.take(k)
+        mapped, asked = places.pop(0), queries.pop(0)
         if isinstance(asked, Part):
             asked = asked.read()
         searched = compared.searched(k, mapped, method)
         search = Search(method, searched.described.places)
         outcomes = _method_outcomes(
-            choice,
-            search,
-            searched,
-            asked,
-            compared,
-            partial(
-                _overlaps_of_matches,
-                known,
-                overlaps,
-                places,
-                queries,
-                searched.described,
-                asked,
-            ),
-            reporter,
+            choice, search, searched, asked, compared, shown, reporter
         )
         yield outcomes, search.cost(choice.key) if compared.in_study else None
-
-
-def _overlaps_of_matches(
-    known: Mapping[float, np.ndarray],
-    overlaps: dict[tuple[float, range], np.ndarray],
-    places: "_DescribedDrive",
-    queries: "_DescribedDrive",
-    database: DriveDescriptors,
-    query: DriveDescriptors,
-    radius: float,
-    rows: range,
-    matches: np.ndarray,
-) -> np.ndarray:
-    """Returns how much of some queries' scans their best matches show, (R,).
-
-    Matches follow from the positions of the scans, and not from a method. The
-    overlaps of a radius are therefore computed once for all methods.
-
-    Args:
-        known: radius -> (Q,) overlaps that were computed before.
-        overlaps: radius and queries -> overlaps; new overlaps are added here.
-        places: the drive of the places, which come first in the database.
-        queries: the drive of the queries.
-        database: the described places.
-        query: the described queries.
-        radius: radius of a match [m].
-        rows: numbers of R queries.
-        matches: (R, D) which places match the queries within the radius.
-    """
-    batch = slice(rows.start, rows.stop)
-    if radius in known:
-        return known[radius][batch]
-    if (radius, rows) not in overlaps:
-        scans = places.scans
-        (overlaps[radius, rows],) = overlaps_with_best_match(
-            scans,
-            database.places.X_WS[: len(scans)],
-            queries.scans[batch],
-            query.queries.X_WS[batch],
-            matches[None, :, : len(scans)],
-        )
-    return overlaps[radius, rows]
 
 
 def _method_outcomes(
@@ -437,7 +370,7 @@ def _method_outcomes(
     database: _Searched,
     query: DriveDescriptors,
     compared: PlaceComparison,
-    shown: Callable[[float, range, np.ndarray], np.ndarray],
+    shown: Callable[..., np.ndarray],
     reporter: Reporter,
 ) -> list[PlaceOutcome]:
     """Returns a method's outcomes; none if the method would take too long.
@@ -448,9 +381,10 @@ def _method_outcomes(
         database: the places that are searched.
         query: the described queries.
         compared: the comparison.
-        shown: function that takes a radius, the numbers of R queries, and
-            their matches (R, D) within this radius, and returns the overlaps
-            (R,) of the queries.
+        shown: function that takes a radius, the numbers of R queries, their
+            matches (R, D) within this radius, and the poses of all places and
+            queries, and returns how much of each query's scan its best match
+            shows (R,).
         reporter: reports notes.
     """
     searched, drives, num_here, _ = database
@@ -488,7 +422,13 @@ def _method_outcomes(
             matches = plain.matches
             if truth is None:
                 matches = (plain.distances <= radius) & plain.is_known
-            overlaps = shown(radius, rows, matches)
+            overlaps = shown(
+                radius,
+                rows,
+                matches,
+                searched.places.X_WS,
+                query.queries.X_WS,
+            )
             for is_verified, found in enumerate((plain, verified)):
                 outcomes[2 * k + is_verified].append(
                     PlaceOutcome.of(
@@ -517,85 +457,21 @@ def _takes_long(
     return number * search.query_time > _LONGEST
 
 
-class _DescribedDrive(Protocol):
-    """The scans of a drive's places or queries, and their descriptors.
-
-    Attributes:
-        scans: the scans, in the order of the places or queries.
-    """
-
-    @property
-    def scans(self) -> Sequence[np.ndarray]: ...
-
-    def take(self, number: int) -> DriveDescriptors | Part:
-        """Returns the descriptors by one method, and keeps no copy of them.
-
-        If they are in a file, the result is the file.
-
-        Only the descriptors of a method that is compared should be in memory.
-        Call this function only once for each method.
-
-        Args:
-            number: number of the method.
-        """
-
-
-class _StoredDrive:
-    """A drive whose scans and descriptors are in files."""
-
-    def __init__(self, scans: Part, *described: Part):
-        """Reads nothing yet.
-
-        Args:
-            scans: file with the scans.
-            described: for each method, the file with its descriptors.
-        """
-        self._scans = scans
-        self._described = described
-
-    @cached_property
-    def scans(self) -> Sequence[np.ndarray]:
-        return self._scans.read()
-
-    def take(self, number: int) -> Part:
-        return self._described[number]
-
-
-class _ReadDrive:
-    """A drive whose scans are read and described at once."""
-
-    def __init__(
-        self,
-        source: Callable[[], Drive],
-        role: Role,
-        methods: tuple[MethodChoice, ...],
-        protocol: RetrievalProtocol,
-    ):
-        """Reads and describes the scans.
-
-        Args:
-            source: opens the drive.
-            role: role of the scans.
-            methods: the methods that describe the scans.
-            protocol: the protocol of the comparison.
-        """
-        asked = {one.key: (one.make(), {role}, protocol) for one in methods}
-        found = describe_recording(source(), {role}, asked, protocol)
-        self.scans: Sequence[np.ndarray] = found.shown_scans
-        self._described = found.described
-        self._methods = methods
-
-    def take(self, number: int) -> DriveDescriptors:
-        return self._described.pop(self._methods[number].key)
-
-
 def _described_drive(
     drive: DescribedSource,
     role: Role,
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
-) -> _DescribedDrive:
-    """Returns a drive's scans and descriptors, from files if there are any."""
+) -> tuple[Callable[[], Sequence[np.ndarray]], list[DriveDescriptors | Part]]:
+    """Returns a drive's scans, and each method's descriptors or their file.
+
+    Scans in a file are read when they are asked for. Only the descriptors of a
+    method that is compared should be in memory: take them out of the list.
+    """
     if isinstance(drive, tuple):
-        return _StoredDrive(*drive)
-    return _ReadDrive(drive, role, methods, protocol)
+        scans, *files = drive
+        return cache(scans.read), [*files]
+    asked = {one.key: (one.make(), {role}, protocol) for one in methods}
+    found = describe_recording(drive(), {role}, asked, protocol)
+    shown = found.shown_scans
+    return lambda: shown, [*found.described.values()]

@@ -68,7 +68,7 @@ class ShownCity:
                 one
                 for part in parts
                 for one in part.read()
-                if not one.is_verified and one.outcomes.has_match.any()
+                if not one.protocol.verified and one.outcomes.has_match.any()
             ]
             if of_pair:
                 found.append(of_pair)

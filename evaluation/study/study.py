@@ -134,7 +134,9 @@ class Study:
         else:
             with errors_at(f"{self.source}: methods", "--method: "):
                 self.methods = _chosen_methods(self.experiment)
-        baselines = _method_baselines(self.methods, self._baseline)
+        baselines = _method_baselines(
+            self.methods, baseline_values(self.experiment)
+        )
         for task in self.tasks.values():
             if isinstance(task, PoseTask):
                 task.baselines = baselines
@@ -151,11 +153,6 @@ class Study:
                 for one in self.experiment.conditions
             )
         )
-
-    @property
-    def _baseline(self) -> dict[str, Any]:
-        """The values of factors that the experiment names for its baselines."""
-        return baseline_values(self.experiment)
 
     def _wanted_tasks(self) -> Mapping[str, Mapping[str, Any]]:
         """Returns the experiment's tasks with their settings.
@@ -355,7 +352,8 @@ class Study:
         answers: list[Answers] = []
         by_condition = self._pairs_by_condition()
         baselines: dict[tuple[Pair, str], Any] = {}
-        baseline = "; ".join(f"{n}={v}" for n, v in self._baseline.items())
+        named = baseline_values(self.experiment)
+        baseline = "; ".join(f"{n}={v}" for n, v in named.items())
         for one, parts in self.results.items():
             alike = {}
             if one.baseline is not None:

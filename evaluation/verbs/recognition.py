@@ -207,7 +207,7 @@ def recognise(
     )
     outcomes = [replace(one, method=choice.name) for one in outcomes]
     (outcome,) = (
-        one for one in outcomes if one.is_verified == protocol.verified
+        one for one in outcomes if one.protocol.verified == protocol.verified
     )
     check_has_match(outcome)
     for text in (*_notes(made, drives), *_easy(outcome, drives, protocol)):
@@ -247,8 +247,8 @@ def recognise(
             Answers(
                 **key["place"],
                 method=one.method,
-                verified=one.is_verified,
-                columns=one.columns,
+                verified=one.protocol.verified,
+                columns=one.outcomes.columns,
             )
             for one in outcomes
         ),
@@ -338,7 +338,7 @@ def _easy(
     protocol: RetrievalProtocol,
 ) -> list[str]:
     """Returns a note if every answer is right."""
-    frames = outcome.place_frames, outcome.columns["query_frame"]
+    frames = outcome.place_frames, outcome.outcomes.columns["query_frame"]
     p, q = (one.X_WS[of, :3, 3] for one, of in zip(drives, frames, strict=True))
     if protocol.overlap is not None or cdist(p, q).max() > protocol.radius:
         return []

@@ -113,7 +113,7 @@ def tables(outcomes):
                 task="place",
                 method=one.method,
                 verified=False,
-                columns=one.columns,
+                columns=one.outcomes.columns,
             )
         )
     return Results.of(rows), QueryRows.of(answers)

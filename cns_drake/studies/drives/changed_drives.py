@@ -1,12 +1,14 @@
 """Drives of a map with the changes that a condition of an experiment makes."""
 
 from collections.abc import Callable, Mapping, Set
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
+from cns_drake.ageing import LAST_YEAR
 from cns_drake.base import (
     InputError,
     Section,
@@ -30,16 +32,33 @@ from cns_drake.sensors import WeatherConfig
 from cns_drake.simulation import recorded_traffic
 from cns_drake.studies.drives.named_stages import find_stage
 from cns_drake.studies.drives.sampled_drives import DrawnRoute
-from cns_drake.studies.drives.side_fields import QUERY_FIELDS
 from cns_drake.studies.drives.viewpoints import (
     checked_viewpoint,
     with_lidars_beside,
     with_lidars_moved,
 )
 from cns_drake.units import check_preset, is_sheet_file
+from evaluation.map_update import MAINTAINERS, NOT_MAINTAINED
 from evaluation.results import LAST, OWN
-from evaluation.study import Changes
+from evaluation.study import FLEET, SESSIONS, Changes
 
+# Fields that only the query can have: they change its scans.
+QUERY_FIELDS = ("turn_queries", "tilt_queries", "hide_sector")
+# Fields that only the database can have.
+DATABASE_FIELDS = (
+    FLEET,
+    "distractors",
+    "lateral",
+    SESSIONS,
+    "keep",
+    "maintain",
+)
+# Field -> type or types of its value, and the greatest value.
+_LIMITS: Mapping[str, tuple[tuple[type, ...], int]] = {
+    "distractors": ((int,), 100_000),
+    "lateral": ((int, float), 100),
+    "years": ((int,), LAST_YEAR),
+}
 # Fields of a drive that do not change the drive itself.
 _UNUSED_FIELDS = (*QUERY_FIELDS, "distractors", "years", "rates")
 # Sections whose random numbers depend on the seed of the condition.
@@ -59,6 +78,66 @@ class Ageing(NamedTuple):
 
     years: int
     rates: Any
+
+
+def check_side(place: str, changes: Changes, source: str) -> None:
+    """Checks the fields of a drive that no scenario has.
+
+    Args:
+        place: path of the drive in the file: `database`, `query` or, for one of
+            several drives, a path such as `database.sessions.2`.
+        changes: fields of the drive.
+        source: file of the experiment, for errors.
+
+    Raises:
+        InputError: a field belongs elsewhere, or is out of range.
+    """
+    if isinstance(changes.get("redraw"), Mapping):
+        raise InputError(
+            f"{source}: {place}.redraw: give a number, or frozen: it is a field"
+            " of both, and of no case"
+        )
+    is_query = place == "query"
+    right = "database" if is_query else "query"
+    for name in DATABASE_FIELDS if is_query else QUERY_FIELDS:
+        if name in changes:
+            raise InputError(
+                f"{source}: {place}.{name}: it is a field of {right}"
+            )
+    for name, (kinds, most) in _LIMITS.items():
+        value = changes.get(name, 0)
+        if type(value) not in kinds or not 0 <= value <= most:
+            raise InputError(
+                f"{source}: {place}.{name}: {value!r} is not from 0 to {most}"
+            )
+
+
+def checked_maintainer(value: Any, num_drives: int, where: str) -> str:
+    """Returns what updates the maps of a database: its field `maintain`.
+
+    Args:
+        value: one of `NOT_MAINTAINED` and `MAINTAINERS`.
+        num_drives: number of drives of the database.
+        where: file and field, for errors.
+
+    Raises:
+        InputError: the value is anything else, there is nothing to update, or a
+            package is missing.
+    """
+    known = (NOT_MAINTAINED, *MAINTAINERS)
+    if value not in known:
+        raise InputError(f"{where}: {value!r} is none of {', '.join(known)}")
+    if value != NOT_MAINTAINED and num_drives == 1:
+        raise InputError(
+            f"{where}: {value}: no later drive updates the map of a single"
+            " one; give several sessions"
+        )
+    if value == "m3c2" and find_spec("py4dgeo") is None:
+        raise InputError(
+            f"{where}: m3c2 needs the extra map-update (pip install"
+            " 'cns-drake[map-update]')"
+        )
+    return str(value)
 
 
 class DriveChanger:
@@ -553,3 +632,32 @@ def _scattered_losses(
         order = rng.permutation(len(names))
         missing.update(names[k] for k in order[: round(share * len(names))])
     return frozenset(missing)
+
+
+def control_drive(drive: Scenario, stage: str) -> Scenario:
+    """Returns a copy of a drive that goes through another stage of the map.
+
+    Route and driver stay the same. The copy and the usual drive of the other
+    stage go through the same city, so a comparison of these two drives shows
+    only the effect of the route.
+
+    Args:
+        drive: the drive.
+        stage: the other stage of its map.
+    """
+    return with_fixed_driver(drive).replaced(
+        name=f"{drive.name}_stage_{stage}",
+        stage=stage,
+        title=f"Control: the route of {drive.name} in stage {stage}",
+    )
+
+
+def with_fixed_driver(drive: Scenario) -> Scenario:
+    """Returns a drive whose driver stays the same if the drive is renamed.
+
+    A driver without a seed is sampled by the name of the drive.
+    """
+    driver = drive.driver
+    if driver.departs and driver.seed is None:
+        return drive.replaced(driver=driver.replaced(seed=drive.name))
+    return drive

@@ -16,23 +16,19 @@ from cns_drake.base import (
 )
 from cns_drake.scenarios import Scenario
 from cns_drake.studies.drives.changed_drives import (
+    DATABASE_FIELDS,
+    QUERY_FIELDS,
     Age,
     Ageing,
     DriveChanger,
     Redraw,
-)
-from cns_drake.studies.drives.control_drives import (
+    check_side,
+    checked_maintainer,
     control_drive,
     with_fixed_driver,
 )
 from cns_drake.studies.drives.named_stages import MissingError, find_stage
 from cns_drake.studies.drives.sampled_drives import Fleet
-from cns_drake.studies.drives.side_fields import (
-    DATABASE_FIELDS,
-    QUERY_FIELDS,
-    check_side,
-    checked_maintainer,
-)
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
 from evaluation.map_update import NOT_MAINTAINED
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
@@ -47,6 +43,8 @@ from evaluation.study import (
     protocol_from_fields,
 )
 
+# Mean speed of the shipped drives [m/s].
+_USUAL_SPEED = 10.0
 # Greatest length of a value in the name of a drive, which names its folder.
 _LONGEST_LABEL = 48
 
@@ -56,7 +54,7 @@ class DatedDrive(NamedTuple):
 
     Attributes:
         years: the years by which its city has aged.
-        length: its approximate length in full [m].
+        length: its approximate length [m].
         drive: the drive.
         title: what drive it is, in words.
     """
@@ -239,7 +237,7 @@ class PairMaker:
         )
         asked_drive = DatedDrive(
             years,
-            _drive_length(query),
+            _drive_length(query, query_drive),
             query_drive,
             self._names["query"].title(query_drive),
         )
@@ -430,7 +428,7 @@ class PairMaker:
         return [
             DatedDrive(
                 time[0],
-                _drive_length(sessions[place]),
+                _drive_length(sessions[place], drive),
                 drive,
                 self._names["database"].title(drive),
             )
@@ -458,12 +456,15 @@ class PairMaker:
         return protocol
 
 
-def _drive_length(changes: Changes) -> float:
-    """Returns the approximate length of a drive with changes [m]."""
+def _drive_length(changes: Changes, drive: Scenario) -> float:
+    """Returns the approximate length of a drive, given its changes [m]."""
     route = changes.get("route")
+    length = USUAL_LENGTH
     if isinstance(route, Mapping):
-        return float(route["length"])
-    return USUAL_LENGTH
+        length = float(route["length"])
+    if drive.frames is None:
+        return length
+    return min(length, _USUAL_SPEED * drive.frames * drive.frame_period)
 
 
 # Fields that all drives of a database share.

@@ -20,6 +20,7 @@ from evaluation.map_update import NOT_MAINTAINED
 from evaluation.results import CAUSE
 from evaluation.study import (
     OPENING_COST,
+    ChangeTask,
     MakePart,
     NamedDrive,
     Pair,
@@ -30,8 +31,6 @@ from evaluation.study import (
     job_name,
 )
 
-# Mean speed of the shipped drives [m/s].
-_USUAL_SPEED = 10.0
 # Expected time to update a map by a usual drive, once it is open [s].
 _UPKEEP_COST = 60.0
 
@@ -113,7 +112,7 @@ def simulated_pair(study: Study, some: MapPairs, one: ChangedPair) -> Pair:
     *drives, asked = (
         replace(
             simulated_drive(study, dated.drive),
-            length=_driven_length(dated.drive, dated.length),
+            length=dated.length,
             title=dated.title,
             # Without a later year, the city of the query has not aged.
             years=dated.years if one.dated[-1].years else None,
@@ -121,27 +120,13 @@ def simulated_pair(study: Study, some: MapPairs, one: ChangedPair) -> Pair:
         for dated in one.dated
     )
     database, *beside = with_upkept_maps(study, drives, one.maintain)
-    first, *_, last = one.drives
-    query, way = one.unchanged, None
-    if study.experiment.drives == "same-route":
-        city = {
-            name: getattr(first, name)
-            for name in ("map", "stage", "without", "transient")
-        }
-        drive = last.replaced(**city, name=query.name)
-        if drive.replaced(name=asked.name) == last:
-            drive = last
-        elif drive != query:
-            content = fingerprint(drive.model_dump(mode="json"))[:8]
-            drive = drive.replaced(name=f"{query.name}_way_{content}")
-        way = replace(simulated_drive(study, drive), length=asked.length)
     asked_how = {
         "compared": one.fingerprint(),
         **one.protocol.to_json(),
         "radius": None,  # Queries are scored once for all radii.
     }
     digest = fingerprint(asked_how)[:8]
-    return Pair(
+    pair = Pair(
         map_name=some.map_name,
         names=one.names,
         factors={**some.factors, **one.condition.factors},
@@ -156,8 +141,28 @@ def simulated_pair(study: Study, some: MapPairs, one: ChangedPair) -> Pair:
         beside=tuple(beside),
         keep=one.keep,
         may_repeat=bool(one.asked or one.distractors),
-        way=way,
     )
+    task = study.tasks.get(ChangeTask.name)
+    if isinstance(task, ChangeTask) and study.experiment.drives == "same-route":
+        way = simulated_drive(study, _way_through_older_city(one))
+        task.ways[pair] = replace(way, length=asked.length)
+    return pair
+
+
+def _way_through_older_city(pair: ChangedPair) -> Scenario:
+    """Returns the query's drive, but through the city of the database."""
+    first, *_, last = pair.drives
+    query = pair.unchanged
+    city = ("map", "stage", "without", "transient")
+    drive = last.replaced(
+        **{name: getattr(first, name) for name in city}, name=query.name
+    )
+    if drive.replaced(name=last.name) == last:
+        return last
+    if drive == query:
+        return query
+    content = fingerprint(drive.model_dump(mode="json"))[:8]
+    return drive.replaced(name=f"{query.name}_way_{content}")
 
 
 def with_upkept_maps(
@@ -196,10 +201,3 @@ def simulated_drive(study: Study, drive: Scenario) -> NamedDrive:
             drive.name, RecordingSource(study.output / drive.name)
         )
     return NamedDrive(drive.name, SimulationSource(drive))
-
-
-def _driven_length(drive: Scenario, length: float) -> float:
-    """Returns about how long a drive is [m], given its length in full [m]."""
-    if drive.frames is None:
-        return length
-    return min(length, _USUAL_SPEED * drive.frames * drive.frame_period)

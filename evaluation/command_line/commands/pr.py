@@ -139,7 +139,7 @@ def pr(
             },
         )
     if overlaps is not None and found.overlaps is not None:
-        frames = found.outcome.columns["query_frame"]
+        frames = found.outcome.outcomes.columns["query_frame"]
         places = found.outcome.place_frames
         write_overlaps(overlaps, frames, places, found.overlaps)
         terminal.note(f"wrote {overlaps}")

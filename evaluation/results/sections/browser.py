@@ -130,7 +130,7 @@ def _pair_data(
         "query": first.query,
         "places": np.searchsorted(database.frames, first.place_frames).tolist(),
         "queries": np.searchsorted(
-            query.frames, first.columns["query_frame"]
+            query.frames, first.outcomes.columns["query_frame"]
         ).tolist(),
         "matches": [
             places[rows == row].tolist() for row in range(len(first.outcomes))
@@ -156,6 +156,6 @@ def _method_data(result: PlaceOutcome) -> dict:
         "best": best,
         "scores": values,
         "ranks": result.outcomes.known_ranks,
-        "why": result.columns["why"].tolist(),
+        "why": result.outcomes.columns["why"].tolist(),
         "auc": round(result.outcomes.curve.auc, 4),
     }

@@ -7,7 +7,7 @@ from cns_drake.base import Reporter
 from evaluation.change import ChangeReport, change_of_maps
 from evaluation.study.features import DriveSummary
 from evaluation.study.tasks.jobs import Jobs
-from evaluation.study.tasks.pair import Pair, Result
+from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 from evaluation.study.tasks.task import Task, check_positive
 
 # Expected time to compare two maps [s].
@@ -20,10 +20,18 @@ class ChangeTask(Task):
     The query drive is compared with a drive on the same route through the
     database's city, so that only the city differs. If there is no such drive,
     the query drive is compared with the database drive.
+
+    Attributes:
+        ways: pair -> the drive on the query's route through the database's
+            city, if it is another than the database drive.
     """
 
     name = "change"
     defaults: ClassVar[Mapping[str, Any]] = {"spacing": None}
+
+    def __init__(self, settings: Mapping[str, Any], source: str):
+        super().__init__(settings, source)
+        self.ways: dict[Pair, NamedDrive] = {}
 
     def check(self, name: str, value: Any, where: str) -> None:
         if value is not None:
@@ -32,7 +40,7 @@ class ChangeTask(Task):
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         if pair.closes_loops or pair.is_composed:
             return ()
-        way = pair.way or pair.database
+        way = self.ways.get(pair, pair.database)
         needs: list[str] = []
         maps = tuple(
             jobs.mapped(drive, self.settings["spacing"], needs)

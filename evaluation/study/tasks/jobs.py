@@ -156,11 +156,17 @@ class Jobs:
             part, map_source, arguments, drive.needs, cost, title=title
         )
 
-    def beside(self, pair: Pair, needs: list[str]) -> list[tuple[Part, ...]]:
-        """Returns the files of a pair's further drives in the same world.
+    def further_places(
+        self,
+        drives: Iterable[NamedDrive],
+        protocol: RetrievalProtocol,
+        needs: list[str],
+    ) -> tuple[tuple[Part, ...], ...]:
+        """Returns the files of places of further drives in a database.
 
         Args:
-            pair: the pair.
+            drives: the drives.
+            protocol: protocol of the pair.
             needs: list to which the names of the jobs that write the files are
                 appended.
 
@@ -168,41 +174,11 @@ class Jobs:
             For each drive, the file with the scans of its places, and one file
             per method with the descriptors of these places.
         """
-        found = []
-        for drive in pair.beside:
-            parts = self.described(
-                drive, "places", pair.protocol, needs, kept=True
-            )
-            assert isinstance(parts, tuple)
-            found.append(parts)
-        return found
-
-    def distractor_places(
-        self, pair: Pair, needs: list[str]
-    ) -> tuple[tuple[Part, ...], ...]:
-        """Returns descriptors of drives through other cities, for a pair.
-
-        Places of these drives are distractors: they enlarge the database.
-
-        Args:
-            pair: the pair; without distractors, the result is empty.
-            needs: list to which the names of the jobs that describe these
-                drives are appended.
-
-        Returns:
-            For each drive through another city, one file per method with the
-            descriptors of its places.
-        """
-        if not pair.distractors:
-            return ()
-        found = []
-        for drive in self.distractors:
-            parts = self.described(
-                drive, "places", pair.protocol, needs, kept=True
-            )
-            assert isinstance(parts, tuple)
-            found.append(parts[1:])
-        return tuple(found)
+        found = (
+            self.described(one, "places", protocol, needs, kept=True)
+            for one in drives
+        )
+        return tuple(parts for parts in found if isinstance(parts, tuple))
 
     def add(
         self,

@@ -87,9 +87,6 @@ class Pair:
             drives then skips the pair if it has measured these drives before.
         methods: names of the methods that are measured; None for all methods
             of the study.
-        way: drive along the query's route through the database's city, with
-            which the task `change` compares the query drive; None for the
-            database drive.
     """
 
     map_name: str
@@ -107,7 +104,6 @@ class Pair:
     keep: str | int = KEEP_ALL
     may_repeat: bool = False
     methods: Collection[str] | None = None
-    way: NamedDrive | None = None
 
     def has_method(self, name: str) -> bool:
         """Returns whether a method of the study is measured, by its name."""

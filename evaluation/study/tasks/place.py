@@ -52,7 +52,7 @@ class PoseTask(Task):
             one
             for part in results
             for one in part.read()
-            if one.radius == radius
+            if one.protocol.radius == radius
         ]
 
     def numbers(
@@ -60,7 +60,15 @@ class PoseTask(Task):
     ) -> Iterator[Number]:
         for now in found:
             method = self.baselines.get(now.method, now.method)
-            then = _outcome_of(before, method, now.is_verified)
+            verified = now.protocol.verified
+            then = next(
+                (
+                    one
+                    for one in before or ()
+                    if (one.method, one.protocol.verified) == (method, verified)
+                ),
+                None,
+            )
             yield from now.numbers(self.name, then)
 
 
@@ -161,7 +169,7 @@ class PlaceTask(PoseTask):
 
     def answers(self, found: Outcomes) -> Iterator[Answered]:
         for now in found:
-            yield now.method, now.is_verified, now.columns
+            yield now.method, now.protocol.verified, now.outcomes.columns
 
 
 class CostTask(Task):
@@ -210,9 +218,16 @@ def _comparison(
         jobs.methods,
         replace(pair.protocol, radius=radii[0]),
         radii,
-        jobs.distractor_places(pair, needs),
+        tuple(
+            tuple(described)
+            for _, *described in jobs.further_places(
+                jobs.distractors if pair.distractors else (),
+                pair.protocol,
+                needs,
+            )
+        ),
         pair.distractors,
-        tuple(jobs.beside(pair, needs)),
+        jobs.further_places(pair.beside, pair.protocol, needs),
         pair.keep,
     )
     return by_all.by_methods(
@@ -232,13 +247,3 @@ def _search_cost(pair: Pair, jobs: Jobs, num_queries: float) -> float:
     ]
     each = sum(one.query_time + one.place_time * num_places for one in methods)
     return STARTING_COST + num_queries * each
-
-
-def _outcome_of(
-    before: Outcomes | None, method: str, is_verified: bool
-) -> PlaceOutcome | None:
-    """Returns the outcome of a method, with or without verification."""
-    for one in before or ():
-        if (one.method, one.is_verified) == (method, is_verified):
-            return one
-    return None

@@ -42,7 +42,7 @@ def test_columns_hold_all_that_numbers_follow_from(blocks):
         ["town_01"] * 6 + ["town_02"] * 3,
         np.linspace(0.2, 0.8, 8),
     )
-    found = one.columns
+    found = one.outcomes.columns
     assert {len(column) for column in found.values()} == {8}
     assert found["query_y"].tolist() == [1 + 3 * k for k in range(8)]
     assert found["match_frame"].tolist() == [7 * k for k in range(8)]
@@ -55,7 +55,7 @@ def test_columns_hold_all_that_numbers_follow_from(blocks):
     )
     np.testing.assert_allclose(found["overlap"] + found["visible_change"], 1.0)
     assert (one.method, one.database) == ("solid rings=8", "town_01")
-    assert (one.query, one.is_verified, one.radius) == ("town_03", True, 7.5)
+    assert (one.query, one.protocol.verified) == ("town_03", True)
     assert one.protocol.scans_per_place == 1
     # Each query has one candidate.
     assert one.best_places.tolist() == [[k, -1, -1, -1, -1] for k in range(8)]

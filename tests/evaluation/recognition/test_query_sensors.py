@@ -73,8 +73,8 @@ def test_poses_are_judged_against_the_turned_sensor(drives):
     )
     for found in (plain, turned):
         assert values_of(found, "pose")["pose_success"] == 1.0
-        assert found.columns["translation_error"].max() < 1e-4
-        assert found.columns["rotation_error_deg"].max() < 1e-4
+        assert found.outcomes.columns["translation_error"].max() < 1e-4
+        assert found.outcomes.columns["rotation_error_deg"].max() < 1e-4
     plain, turned = (
         retrieve(*drives, Corresponding(), protocol)
         for protocol in (RetrievalProtocol(), TURNED)

@@ -326,9 +326,10 @@ def test_batches_of_queries_give_the_same_as_all_at_once(tmp_path):
     assert found[0].outcomes.is_right.any()
     for one in found[1:]:
         assert repr([*one.numbers()]) == repr([*found[0].numbers()])
-        assert one.columns.keys() == found[0].columns.keys()
-        for name, column in found[0].columns.items():
-            np.testing.assert_array_equal(one.columns[name], column)
+        columns = one.outcomes.columns
+        assert columns.keys() == found[0].outcomes.columns.keys()
+        for name, column in found[0].outcomes.columns.items():
+            np.testing.assert_array_equal(columns[name], column)
         for name in ("best_places", "best_scores", "matches"):
             np.testing.assert_array_equal(
                 getattr(one, name), getattr(found[0], name)

@@ -13,7 +13,7 @@ from evaluation.recognition import (
     jackknife_interval,
     numbers_of,
 )
-from evaluation.recognition.faults import faults
+from evaluation.recognition.query_outcomes import faults
 
 
 def answered(is_right, scores=None, blocks=None):

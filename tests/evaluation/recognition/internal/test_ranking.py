@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from evaluation.recognition.ranking import ranked_places
+from evaluation.recognition.query_outcomes import ranked_places
 
 NAN = np.nan
 

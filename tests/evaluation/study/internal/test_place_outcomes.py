@@ -118,6 +118,7 @@ def test_drives_that_are_longer_than_the_memory_give_the_same(
     )
     assert len(found) == len(expected) > 0
     for one, other in zip(found, expected, strict=True):
-        assert one.columns.keys() == other.columns.keys()
-        for name, column in one.columns.items():
-            np.testing.assert_array_equal(column, other.columns[name])
+        columns = other.outcomes.columns
+        assert one.outcomes.columns.keys() == columns.keys()
+        for name, column in one.outcomes.columns.items():
+            np.testing.assert_array_equal(column, columns[name])
