@@ -114,6 +114,10 @@ class PlaceOutcome:
             num_here = sum(name == drives[0] for name in drives)
         if overlaps is None:
             overlaps = np.full(len(outcomes), math.nan)
+        best = retrieval.best_places
+        distances = retrieval.best_distances
+        distances[best >= num_here] = math.nan
+        frames = retrieval.best_frames
         columns = {
             "query_frame": retrieval.query_frames,
             "query_stamp_ns": query.stamps_ns,
@@ -121,9 +125,18 @@ class PlaceOutcome:
             "query_y": query.positions[:, 1],
             "query_z": query.positions[:, 2],
             "block": outcomes.own_blocks,
-            **_columns_of_answers(
-                retrieval, outcomes, drives, num_here, protocol.radius
+            "correct": outcomes.is_right,
+            "has_match": outcomes.has_match,
+            "score": outcomes.best_scores,
+            "first_right_rank": outcomes.first_right_ranks,
+            "why": faults(outcomes, frames, distances, protocol.radius),
+            "match_drive": np.array(
+                [drives[k] if k >= 0 else "" for k in best.tolist()]
             ),
+            "match_frame": frames,
+            "distance": distances,
+            "translation_error": retrieval.pose_errors.translation,
+            "rotation_error_deg": retrieval.pose_errors.rotation_deg,
             "overlap": overlaps,
             "visible_change": 1.0 - overlaps,
             "nearest": np.where(
@@ -185,40 +198,6 @@ class PlaceOutcome:
             verified=self.protocol.verified,
             mode=mode,
         )
-
-
-def _columns_of_answers(
-    retrieval: Retrieval,
-    outcomes: QueryOutcomes,
-    drives: Sequence[str],
-    num_here: int,
-    radius: float,
-) -> dict[str, np.ndarray]:
-    """Returns the columns of `queries.csv` on the top-ranked places.
-
-    Args:
-        retrieval: see `PlaceOutcome.of`.
-        outcomes: outcomes of the queries.
-        drives: see `PlaceOutcome.of`.
-        num_here: see `PlaceOutcome.of`.
-        radius: radius of a match [m].
-    """
-    best = retrieval.best_places
-    distances = retrieval.best_distances
-    distances[best >= num_here] = math.nan
-    names = [drives[k] if k >= 0 else "" for k in best.tolist()]
-    return {
-        "correct": outcomes.is_right,
-        "has_match": outcomes.has_match,
-        "score": outcomes.best_scores,
-        "first_right_rank": outcomes.first_right_ranks,
-        "why": faults(outcomes, retrieval.best_frames, distances, radius),
-        "match_drive": np.array(names),
-        "match_frame": retrieval.best_frames,
-        "distance": distances,
-        "translation_error": retrieval.pose_errors.translation,
-        "rotation_error_deg": retrieval.pose_errors.rotation_deg,
-    }
 
 
 def check_has_match(outcome: PlaceOutcome) -> None:

@@ -266,7 +266,11 @@ def _compare_batch(
     poses = search.poses(query, rows, tested)
     distances = _distances(database, query, rows)
     shown = None if overlaps is None else overlaps[rows.start : rows.stop]
-    matches = _near_enough(distances, shown, protocol) & is_known
+    if protocol.overlap is None:
+        matches = (distances <= protocol.radius) & is_known
+    else:
+        assert shown is not None
+        matches = (shown >= protocol.overlap) & is_known
     return [
         Retrieval(
             query_frames=queries.frames,
@@ -361,27 +365,6 @@ def _distances(
     for k, row in enumerate(rows):
         distances[k] = np.linalg.norm(p_WQs[row] - p_WPs, axis=1)
     return distances
-
-
-def _near_enough(
-    distances: np.ndarray,
-    overlaps: np.ndarray | None,
-    protocol: RetrievalProtocol,
-) -> np.ndarray:
-    """Returns which places match each query by the protocol, (Q, D) bool.
-
-    The result includes places that the protocol does not allow as answers.
-
-    Args:
-        distances: (Q, D) distances between query and place [m].
-        overlaps: (Q, D) share of each query's scan that each place's scan
-            shows; needed for matches by overlap.
-        protocol: protocol of the comparison.
-    """
-    if protocol.overlap is None:
-        return distances <= protocol.radius
-    assert overlaps is not None
-    return overlaps >= protocol.overlap
 
 
 def _known_places(

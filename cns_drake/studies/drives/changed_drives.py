@@ -217,7 +217,14 @@ class DriveChanger:
         for name in _SEEDED:
             if isinstance(left.get(name), dict):
                 left[name] = {"seed": seed, **left[name]}
-        self._fit_driver(drive, left)
+        driver = left.get("driver")
+        if (
+            drive.waypoints
+            and isinstance(driver, Mapping)
+            and driver.get("lane_changes")
+        ):
+            self._on_note("waypoints have no lanes to change")
+            left["driver"] = {**driver, "lane_changes": 0.0}
         return self._with_scenario_fields(drive, place, left)
 
     def _with_sensors(
@@ -367,17 +374,6 @@ class DriveChanger:
         if roads not in self._networks:
             self._networks[roads] = load_road_network(roads)
         return self._networks[roads]
-
-    def _fit_driver(self, drive: Scenario, left: dict[str, Any]) -> None:
-        """Drops impossible lane changes from the fields `left` of a drive."""
-        driver = left.get("driver")
-        if (
-            isinstance(driver, Mapping)
-            and driver.get("lane_changes")
-            and drive.waypoints
-        ):
-            self._on_note("waypoints have no lanes to change")
-            left["driver"] = {**driver, "lane_changes": 0.0}
 
     def _with_scenario_fields(
         self, drive: Scenario, place: str, left: Changes

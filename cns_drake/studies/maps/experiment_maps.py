@@ -44,13 +44,6 @@ class MapPairs:
     pairs: Sequence[tuple[Scenario, Scenario]] = ()
     city: MapDrives | None = None
 
-    @property
-    def drive_names(self) -> set[str]:
-        """The names of all drives."""
-        recordings = self.city.recordings if self.city is not None else ()
-        names = {one.name for one in recordings}
-        return names | {one.name for pair in self.pairs for one in pair}
-
 
 def pairs_by_map(study: Study, maps: Sequence[str]) -> Iterator[MapPairs]:
     """Yields the pairs of all maps; makes aged and imported maps.
@@ -87,9 +80,11 @@ def pairs_by_map(study: Study, maps: Sequence[str]) -> Iterator[MapPairs]:
                 recordable_map(one)
     for one in wanted:
         for some in _pairs_of(study, one, place):
-            names = {some.map_name, *some.drive_names}
-            if some.factors:
-                names.remove(some.map_name)
+            names = {one.name for pair in some.pairs for one in pair}
+            if some.city is not None:
+                names = {one.name for one in some.city.recordings}
+            if not some.factors:
+                names.add(some.map_name)
             for name in sorted(names & known):
                 raise InputError(
                     f"{getattr(one, 'name', one)}: another map, or a drive"

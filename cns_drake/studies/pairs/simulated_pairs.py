@@ -145,7 +145,8 @@ def simulated_pair(study: Study, some: MapPairs, one: ChangedPair) -> Pair:
     task = study.tasks.get(ChangeTask.name)
     if isinstance(task, ChangeTask) and study.experiment.drives == "same-route":
         way = simulated_drive(study, _way_through_older_city(one))
-        task.ways[pair] = replace(way, length=asked.length)
+        way = replace(way, length=asked.length)
+        task.ways = {**task.ways, pair: way}
     return pair
 
 

@@ -26,19 +26,20 @@ class ChangeTask(Task):
             city, if it is another than the database drive.
     """
 
+    ways: Mapping[Pair, NamedDrive] = {}
     name = "change"
     defaults: ClassVar[Mapping[str, Any]] = {"spacing": None}
-
-    def __init__(self, settings: Mapping[str, Any], source: str):
-        super().__init__(settings, source)
-        self.ways: dict[Pair, NamedDrive] = {}
 
     def check(self, name: str, value: Any, where: str) -> None:
         if value is not None:
             check_positive(value, where)
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
-        if pair.closes_loops or pair.is_composed:
+        closes_loops = (
+            pair.database == pair.query
+            and pair.protocol.exclude_recent is not None
+        )
+        if closes_loops or pair.is_composed:
             return ()
         way = self.ways.get(pair, pair.database)
         needs: list[str] = []

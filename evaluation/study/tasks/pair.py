@@ -116,12 +116,6 @@ class Pair:
         return factors_in_words(drives, self.factors.items())
 
     @property
-    def closes_loops(self) -> bool:
-        """Whether a drive is compared with places that it passed before."""
-        is_itself = self.database == self.query
-        return is_itself and self.protocol.exclude_recent is not None
-
-    @property
     def roles(self) -> tuple[tuple[NamedDrive, Role], ...]:
         """Both drives, each with its role: `places` or `queries`."""
         return (self.database, "places"), (self.query, "queries")
