@@ -36,9 +36,6 @@ _LEAST_SHARE = 0.1
 # No estimate is made before this time [s]: the first scans also load programs
 # and cities.
 _LEAST_TIME = 3.0
-# A job that takes less than this share of its expected time was done before. It
-# is left out of the pace.
-_REAL_SHARE = 0.05
 # Work that is older than this share of all work hardly counts in the pace of
 # jobs, which follows the load of the machine.
 _MEMORY = 0.15
@@ -47,38 +44,13 @@ _MEMORY = 0.15
 _BORROWED = 0.02
 
 
-@dataclass
-class _Job:
-    """What is known of one job.
-
-    Attributes:
-        cost: expected time [s].
-        since: when the job was started [s]; None if the job does not run.
-        has_begun: whether it has told what it does.
-        first: share that an earlier run had done; None until the job says how
-            far it is.
-        taken: time that the job took [s]; None until it has ended.
-    """
-
-    cost: float
-    since: float | None = None
-    has_begun: bool = False
-    first: float | None = None
-    taken: float | None = None
-
-    @property
-    def expected(self) -> float:
-        """Expected time of what was not done before [s]."""
-        return self.cost * (1.0 - (self.first or 0.0))
-
-
 class TimeLeft:
     """Estimates the time left for jobs from the jobs that have ended.
 
     The time that these jobs took, divided by their expected time, is the pace
     of the jobs that are left. Jobs of the same kind, and jobs that ended
     lately, count most, because machines differ in how fast they do one kind of
-    work.
+    work, and their load changes.
 
     The methods take the present time `now` [s], always of the same clock.
     """
@@ -89,17 +61,20 @@ class TimeLeft:
         Args:
             costs: name of each job -> expected time on one core [s].
         """
-        self._jobs = {name: _Job(cost) for name, cost in costs.items()}
-        self._most_running = 1
+        self._left = dict(costs)
         self._total = sum(costs.values())
-        # Jobs that give a pace, in the order in which they ended.
-        self._measured: list[tuple[str, float, float]] = []
+        # Name of each running job -> when it started, or has begun.
+        self._since: dict[str, float] = {}
+        self._begun: set[str] = set()
+        self._most_running = 1
+        # Kind, expected and real time, in the order in which jobs ended.
+        self._ended: list[tuple[str, float, float]] = []
 
     def start(self, name: str, now: float) -> None:
         """Records that a job starts, or is started again."""
-        self._jobs[name] = _Job(self._jobs[name].cost, since=now)
-        running = sum(one.since is not None for one in self._jobs.values())
-        self._most_running = max(self._most_running, running)
+        self._since[name] = now
+        self._begun.discard(name)
+        self._most_running = max(self._most_running, len(self._since))
 
     def begin(self, name: str, now: float) -> None:
         """Records that a job tells what it does.
@@ -107,64 +82,48 @@ class TimeLeft:
         Until then, the first job of a process loads the program, as no later
         job does.
         """
-        job = self._jobs[name]
-        if not job.has_begun:
-            job.has_begun, job.since = True, now
-
-    def record_done_before(self, name: str, share: float) -> None:
-        """Records which share of a job was done before its start, 0 to 1."""
-        if self._jobs[name].first is None:
-            self._jobs[name].first = share
+        if name not in self._begun:
+            self._begun.add(name)
+            self._since[name] = now
 
     def end(self, name: str, now: float) -> None:
-        """Records that a job has ended."""
-        job = self._jobs[name]
-        job.taken = 0.0 if job.since is None else now - job.since
-        job.since = None
-        if job.taken >= _REAL_SHARE * job.cost:
-            self._measured.append((_kind(name), job.expected, job.taken))
+        """Records that a job has ended, perhaps without having started."""
+        cost = self._left.pop(name)
+        if name in self._since:
+            taken = now - self._since.pop(name)
+            self._ended.append((_kind(name), cost, taken))
 
     def share(self) -> float:
         """Returns the share of all work that has ended, 0 to 1."""
-        ended = sum(
-            one.cost for one in self._jobs.values() if one.taken is not None
-        )
-        return ended / max(self._total, 1e-9)
+        return 1.0 - sum(self._left.values()) / max(self._total, 1e-9)
 
     def seconds(self, now: float) -> float | None:
         """Returns the time left [s]; None while it cannot be estimated."""
-        left = [
-            (_kind(name), one)
-            for name, one in self._jobs.items()
-            if one.taken is None
-        ]
-        if not left or not self._measured:
-            return None if left else 0.0
+        if not self._left or not self._ended:
+            return None if self._left else 0.0
         # A job that takes longer than expected counts as if it ended now, since
         # the machine may have become slower.
-        measured = list(self._measured)
-        for kind, one in left:
-            if one.since is not None:
-                taken = now - one.since
-                if taken > one.expected * self._pace(self._measured, kind):
-                    measured.append((kind, one.expected, taken))
+        measured = list(self._ended)
+        for name, since in self._since.items():
+            cost, taken = self._left[name], now - since
+            if taken > cost * self._pace(self._ended, _kind(name)):
+                measured.append((_kind(name), cost, taken))
+        known = self._total - sum(self._left.values())
         times, running = [], []
-        known = sum(expected for _, expected, _ in self._measured)
-        for kind, one in left:
-            needed = one.cost * self._pace(measured, kind)
-            if one.since is not None:
-                taken = now - one.since
-                known += one.cost * min(taken / needed, 1.0)
-                spent = taken + needed * (one.first or 0.0)
+        for name, cost in self._left.items():
+            needed = cost * self._pace(measured, _kind(name))
+            if name in self._since:
+                taken = now - self._since[name]
+                known += cost * min(taken / needed, 1.0)
                 # One that takes longer than expected soon ends, perhaps.
-                needed = max(needed - spent, 0.1 * needed)
+                needed = needed - taken if taken < needed else 0.1 * needed
                 running.append(needed)
             times.append(needed)
         if known < _LEAST_SHARE * self._total:
             return None
         # As many jobs run side by side as before, and the longest job bounds
         # the time.
-        side_by_side = min(self._most_running, len(left))
+        side_by_side = min(self._most_running, len(times))
         return max(sum(times) / side_by_side, *running, 0.0)
 
     def _pace(
@@ -437,10 +396,8 @@ class _JobsDisplay(JobsListener):
         unit: str = "",
     ) -> None:
         if name in self._tasks:
-            self._left.begin(name, self._now())
-            if total:
-                self._left.record_done_before(name, done / total)
             now = self._now()
+            self._left.begin(name, now)
             self._tasks[name].update(activity, done, total, unit, now)
 
     def end(self, name: str, fault: bool = False) -> None:

@@ -32,9 +32,9 @@ from cns_drake.simulation import simulate
 from evaluation.study import Part
 
 # Expected time to load a stage [s].
-_LOADING = 12.0
+_LOADING = 4.0
 # Expected time to simulate a frame with the default LiDAR [s].
-_FRAME = 0.021
+_FRAME = 0.011
 # Assumed number of frames of a drive that states none.
 _USUAL_FRAMES = 3000
 

@@ -207,7 +207,7 @@ def recording_info(
 
 
 # Expected time to draw a stage [s].
-_STAGE_COST = 10.0
+_STAGE_COST = 5.0
 
 
 @dataclass(frozen=True)

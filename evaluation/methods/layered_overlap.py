@@ -527,9 +527,9 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     style = ("#E69F00", "-", "v")
     standard = True
     order = 5
-    describe_time = 0.01
-    query_time = 0.08
-    place_time = 4.5e-5
+    describe_time = 0.0015
+    query_time = 0.018
+    place_time = 4e-5
     Config = LayeredOverlapConfig
     skips_places = True
     config: LayeredOverlapConfig

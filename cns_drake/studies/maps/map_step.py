@@ -23,7 +23,7 @@ from evaluation.study import Part
 # The file in its folder with the fingerprint of a map.
 _PART = "drawn.data"
 # Expected seconds to make a map.
-_COST = 15.0
+_COST = 7.0
 
 
 @dataclass(frozen=True)

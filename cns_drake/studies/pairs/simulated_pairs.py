@@ -32,7 +32,7 @@ from evaluation.study import (
 )
 
 # Expected time to update a map by a usual drive, once it is open [s].
-_UPKEEP_COST = 60.0
+_UPKEEP_COST = 20.0
 
 
 def changed_pairs(

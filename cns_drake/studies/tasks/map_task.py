@@ -19,7 +19,7 @@ from evaluation.study import (
     score_methods,
 )
 
-_COST = 60.0
+_COST = 25.0
 
 
 class DrivenMapTask(MapTask):

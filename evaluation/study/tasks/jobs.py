@@ -15,13 +15,13 @@ from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 # Expected time to start a job [s].
 STARTING_COST = 0.2
 # Expected time to start a job and to open a drive [s].
-OPENING_COST = 12.0
+OPENING_COST = 4.0
 # Expected time to read a scan [s].
-SCAN_COST = 0.011
+SCAN_COST = 0.006
 # Expected time to map an open drive with each of its scans [s].
-_MAP_COST = 50.0
+_MAP_COST = 14.0
 # Expected time of other work [s].
-_OTHER_COST = 20.0
+_OTHER_COST = 5.0
 
 
 @dataclass
@@ -149,7 +149,7 @@ class Jobs:
         part = self.files.part("mapped", name)
         needs.append(job_name(part))
         cost = OPENING_COST
-        cost += _MAP_COST * drive.share if spacing is None else 8.0
+        cost += _MAP_COST * drive.share if spacing is None else 2.5
         arguments = (drive.source, spacing)
         title = f"{drive.title or drive.name}, map"
         return self.add(

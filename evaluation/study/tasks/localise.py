@@ -48,9 +48,9 @@ from evaluation.study.tasks.task import Answered, Task, check_positive
 # The methods that need no optional package.
 SHIPPED = tuple(name for name in METHODS if name != KISS_MATCHER)
 # Expected time to localise the queries of a usual drive [s].
-_QUERIES_COST = 10.0
+_QUERIES_COST = 5.0
 # Expected time to add a usual drive to the map [s].
-_MAP_COST = 50.0
+_MAP_COST = 15.0
 # The end of a note on a drive without a query near the map.
 NOT_LOCALISED = ": not localised"
 

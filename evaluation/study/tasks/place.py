@@ -24,7 +24,7 @@ from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Answered, Task
 
 # Expected time to find what the matches of a query show [s].
-_OVERLAP_COST = 0.2
+_OVERLAP_COST = 0.007
 
 Outcomes = Sequence[PlaceOutcome]
 
