@@ -1,6 +1,6 @@
 """The tests that `pytest --affected` runs."""
 
-from helpers.affected import concerns
+from helpers.affected import ROOT, concerns
 import pytest
 
 
@@ -20,6 +20,8 @@ import pytest
         # Members of families, which nothing imports.
         ("cns_drake/transient/test_snow.py", "transient/snow.py", True),
         ("cns_drake/roads/test_towns.py", "transient/snow.py", False),
+        # One in a folder without tests of its own.
+        ("cns_drake/city/test_buildings.py", "city/buildings/barn.py", True),
     ],
 )
 def test_a_change_concerns_what_imports_it(test, file, expected):
@@ -29,3 +31,16 @@ def test_a_change_concerns_what_imports_it(test, file, expected):
 def test_pages_concern_the_tests_of_documents():
     assert concerns("tests/documents/test_links.py", ["docs/city.md"])
     assert not concerns("tests/cns_drake/roads/test_towns.py", ["docs/city.md"])
+
+
+@pytest.mark.slow
+def test_every_module_concerns_a_test():
+    tests = [
+        str(path.relative_to(ROOT))
+        for path in (ROOT / "tests").rglob("test_*.py")
+    ]
+    for package in ("cns_drake", "evaluation"):
+        for path in (ROOT / package).rglob("*.py"):
+            if path.name != "__init__.py":
+                file = str(path.relative_to(ROOT))
+                assert any(concerns(test, [file]) for test in tests), file

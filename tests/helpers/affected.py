@@ -3,7 +3,8 @@
 A test file is concerned if it changed, or if it reaches a changed module: by
 any number of imports in the folder of the tests of the module's package,
 elsewhere by two at most. A member of a family, which nothing imports, concerns
-that whole folder, a page `tests/documents`, and other files what names them.
+that whole folder, and so does what its tests reach through members alone. A
+page concerns `tests/documents`, and other files what names them.
 """
 
 import ast
@@ -37,7 +38,6 @@ def concerns(test: str, changed: Iterable[str]) -> bool:
     """Returns whether a change of files concerns a test file."""
     modules, near = set(), set()
     for file in changed:
-        folder = f"{Path('tests', file).parent}/"
         if file.endswith(".md") and test.startswith("tests/documents/"):
             return True
         if not file.endswith((".py", ".pyi", ".md")):
@@ -45,19 +45,42 @@ def concerns(test: str, changed: Iterable[str]) -> bool:
                 return True
         elif file.endswith(".py"):
             modules.add(file)
+            folder = _folder_of_tests(file)
             if test.startswith(folder):
                 near.add(file)
-                if file not in _imported_anywhere():
+                if file not in _imported_anywhere() & _reached_from(folder):
                     return True
-    reached = layer = {test}
-    for steps in itertools.count():
-        if layer & (modules if steps <= _FAR else near):
-            return True
-        layer = set().union(*map(imported_files, layer)) - reached
-        reached = reached | layer
-        if not layer:
-            return False
-    raise AssertionError
+    return any(
+        layer & (modules if steps <= _FAR else near)
+        for steps, layer in enumerate(_layers(test))
+    )
+
+
+@functools.cache
+def _layers(test: str) -> list[set[str]]:
+    """Returns the files that a test reaches by 0, 1, 2, ... imports."""
+    layers = [{test}]
+    while layers[-1]:
+        found = set().union(*map(imported_files, layers[-1]))
+        layers.append(found.difference(*layers))
+    return layers
+
+
+@functools.cache
+def _reached_from(folder: str) -> frozenset[str]:
+    """Returns the files that the tests in a folder reach."""
+    tests = (ROOT / folder).rglob("test_*.py")
+    reached = (_layers(str(test.relative_to(ROOT))) for test in tests)
+    return frozenset().union(*itertools.chain.from_iterable(reached))
+
+
+@functools.cache
+def _folder_of_tests(file: str) -> str:
+    """Returns the folder of the tests of a module, or of its outer package."""
+    folder = Path("tests", file).parent
+    while not (ROOT / folder).is_dir():
+        folder = folder.parent
+    return f"{folder}/"
 
 
 @functools.cache
@@ -79,11 +102,16 @@ def imported_files(file: str) -> frozenset[str]:
         if isinstance(node, ast.Import):
             found |= {_file_of(one.name) for one in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
-            doors = _doors(node.module)
             for one in node.names:
                 found.add(_file_of(f"{node.module}.{one.name}"))
-                found.add(_file_of(doors.get(one.name, node.module)))
+                found.add(_file_of(_home(node.module, one.name)))
     return frozenset(found - {""})
+
+
+def _home(module: str, name: str) -> str:
+    """Returns the module that a name comes from, through doors of doors."""
+    doors = _doors(module)
+    return _home(doors[name], name) if name in doors else module
 
 
 @functools.cache
