@@ -45,12 +45,12 @@ _BORROWED = 0.02
 
 
 class TimeLeft:
-    """Estimates the time left for jobs from the jobs that have ended.
+    """Estimates the time left for jobs from the time that others take.
 
-    The time that these jobs took, divided by their expected time, is the pace
-    of the jobs that are left. Jobs of the same kind, and jobs that ended
-    lately, count most, because machines differ in how fast they do one kind of
-    work, and their load changes.
+    The time of the jobs that have ended, or count how far they are, divided by
+    their expected time, is the pace of the jobs that are left. Jobs of the same
+    kind, and late jobs, count most, because machines differ in how fast they do
+    one kind of work, and their load changes.
 
     The methods take the present time `now` [s], always of the same clock.
     """
@@ -97,34 +97,50 @@ class TimeLeft:
         """Returns the share of all work that has ended, 0 to 1."""
         return 1.0 - sum(self._left.values()) / max(self._total, 1e-9)
 
-    def seconds(self, now: float) -> float | None:
-        """Returns the time left [s]; None while it cannot be estimated."""
-        if not self._left or not self._ended:
-            return None if self._left else 0.0
+    def seconds(
+        self, now: float, counted: Mapping[str, float | None]
+    ) -> float | None:
+        """Returns the time left [s]; None while it cannot be estimated.
+
+        Args:
+            now: the present time [s].
+            counted: name of each running job -> its time left as it counts [s];
+                None if it does not.
+        """
+        # Other threads may start and end jobs meanwhile.
+        left, running = dict(self._left), dict(self._since)
+        if not left:
+            return 0.0
         # A job that takes longer than expected counts as if it ended now, since
         # the machine may have become slower.
-        measured = list(self._ended)
-        for name, since in self._since.items():
-            cost, taken = self._left[name], now - since
-            if taken > cost * self._pace(self._ended, _kind(name)):
-                measured.append((_kind(name), cost, taken))
-        known = self._total - sum(self._left.values())
-        times, running = [], []
-        for name, cost in self._left.items():
+        ended = list(self._ended)
+        measured = list(ended)
+        for name, since in running.items():
+            cost, kind, rest = left.get(name), _kind(name), counted.get(name)
+            if cost is None:
+                continue
+            taken = now - since + (rest or 0.0)
+            if taken > cost * self._pace(ended, kind) if ended else rest:
+                measured.append((kind, cost, taken))
+        if not measured:
+            return None
+        known = self._total - sum(left.values())
+        times, longest = [], 0.0
+        for name, cost in left.items():
             needed = cost * self._pace(measured, _kind(name))
-            if name in self._since:
-                taken = now - self._since[name]
+            if name in running:
+                taken = now - running[name]
                 known += cost * min(taken / needed, 1.0)
                 # One that takes longer than expected soon ends, perhaps.
                 needed = needed - taken if taken < needed else 0.1 * needed
-                running.append(needed)
+                longest = max(longest, needed)
             times.append(needed)
         if known < _LEAST_SHARE * self._total:
             return None
         # As many jobs run side by side as before, and the longest job bounds
         # the time.
         side_by_side = min(self._most_running, len(times))
-        return max(sum(times) / side_by_side, *running, 0.0)
+        return max(sum(times) / side_by_side, longest)
 
     def _pace(
         self, measured: list[tuple[str, float, float]], kind: str
@@ -410,11 +426,14 @@ class _JobsDisplay(JobsListener):
 
         With each line comes the share that is done, if it is known.
         """
-        times = shown_times(now - self._start, self._left.seconds(now))
-        done = f"{self._num_ended} of {self._num_jobs} {self._unit} done"
         # Other threads may start and end jobs meanwhile.
-        tasks = list(self._tasks.values())
+        tasks = dict(self._tasks)
+        left = self._left.seconds(
+            now, {name: one.left(now) for name, one in tasks.items()}
+        )
+        times = shown_times(now - self._start, left)
+        done = f"{self._num_ended} of {self._num_jobs} {self._unit} done"
         return [
             (f"{done}, {times}", self._left.share()),
-            *((one.text(), one.share()) for one in tasks),
+            *((one.text(), one.share()) for one in tasks.values()),
         ]

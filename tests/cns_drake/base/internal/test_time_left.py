@@ -24,10 +24,10 @@ def replay(jobs, num_workers):
             left.start(name, now)
             heapq.heappush(running, (now + seconds, name))
         while now < running[0][0]:
-            told.append((now, left.seconds(now)))
+            told.append((now, left.seconds(now, {})))
             now = min(now + 1.0, running[0][0])
         left.end(heapq.heappop(running)[1], now)
-    assert left.seconds(now) == 0.0
+    assert left.seconds(now, {}) == 0.0
     return [
         (at / now, seconds / (now - at))
         for at, seconds in told
@@ -96,7 +96,15 @@ def test_loading_the_program_is_no_work():
     left.begin("a", 30.0)
     left.begin("a", 35.0)
     left.end("a", 40.0)
-    assert left.seconds(40.0) == pytest.approx(30.0)
+    assert left.seconds(40.0, {}) == pytest.approx(30.0)
+
+
+def test_a_job_that_counts_is_told_before_one_has_ended():
+    left = TimeLeft({"a 1": 10.0, "a 2": 10.0, "b 1": 30.0})
+    left.start("a 1", 0.0)
+    assert left.seconds(6.0, {"a 1": None}) is None
+    # It will take 20 s, twice its expected time.
+    assert left.seconds(15.0, {"a 1": 5.0}) == pytest.approx(5.0 + 20.0 + 60.0)
 
 
 def test_the_load_of_the_machine_halves():
