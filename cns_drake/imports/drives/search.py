@@ -77,11 +77,9 @@ def find_drives(graph: WayGraph) -> list[WaypointRoute]:
 
 def _long_ways(graph: WayGraph) -> list[list[int]]:
     """Returns long ways of all shortest ones, about the longest first."""
-    pieces = np.flatnonzero(graph.is_open)
+    pieces = graph.order[graph.is_open[graph.order]]
     if len(pieces) == 0:
         return []
-    # In no order that depends on the file.
-    pieces = pieces[np.argsort(graph.lengths[pieces], kind="stable")]
     links = graph.links()
     _, part = connected_components(links, directed=False)
     largest = np.bincount(part[pieces], graph.lengths[pieces]).argmax()

@@ -17,7 +17,7 @@ from cns_drake.imports.drives.steerable_drives import (
     evenly_spaced,
     simplified_drive,
 )
-from cns_drake.imports.drives.way_graph import WayGraph, unequal_lengths
+from cns_drake.imports.drives.way_graph import WayGraph
 from cns_drake.imports.options import DriveOn
 from cns_drake.imports.streets import Street, cut_at_nodes
 
@@ -156,9 +156,7 @@ class StreetGraph(WayGraph):
         self._side = 1.0 if drive_on == "right" else -1.0
         lengths = np.array([lane.length for lane in self.lanes])
         ends = np.array([lane.line[[0, -1]] for lane in self.lanes])
-        super().__init__(
-            unequal_lengths(lengths, ends), *lane_links(self.lanes)
-        )
+        super().__init__(lengths, *lane_links(self.lanes), ends=ends)
 
     def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
         closed = np.isin(self._ways, self._ways[pieces])

@@ -56,10 +56,7 @@ class BandGraph(way_graph.WayGraph):
         # road.
         self._roads = np.array([band.road.name for band in self.bands])
         ends = np.array([line[[0, -1], :2] for line in self.lines])
-        super().__init__(
-            way_graph.unequal_lengths(np.array(lengths), ends),
-            *self._followers(),
-        )
+        super().__init__(np.array(lengths), *self._followers(), ends=ends)
 
     def _followers(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns pairs of lanes, where the second lane follows the first.

@@ -124,18 +124,19 @@ def test_streets_and_houses_that_are_moved_are_the_same(tmp_path, change):
             assert abs(one(found[name][:, 2]) - one(points[:, 2])) < 0.01
 
 
-def street_network(path, seed, order=1, **change):
+def street_network(path, seed, order=1, size=(5, 4), **change):
     """A grid of streets, with random gaps and distances if there is a seed."""
     osm = OsmWriter(**change)
     rng = np.random.default_rng(seed)
     spread = 0.0 if seed is None else 20.0
     x, y = (
         90.0 * (np.arange(n) - (n - 1) / 2) + rng.uniform(-spread, spread, n)
-        for n in (5, 4)
+        for n in size
     )
-    node = {(k, m): osm.node(x[k], y[m]) for k in range(5) for m in range(4)}
-    lines = [[(k, m) for m in range(4)] for k in range(5)]
-    lines += [[(k, m) for k in range(5)] for m in range(4)]
+    across, up = map(range, size)
+    node = {(k, m): osm.node(x[k], y[m]) for k in across for m in up}
+    lines = [[(k, m) for m in up] for k in across]
+    lines += [[(k, m) for k in across] for m in up]
     for line in lines:
         for ends in itertools.pairwise(line):
             if seed is None or rng.random() < 0.85:
@@ -165,9 +166,11 @@ def proposed_drives(tmp_path, name, seed, **change):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [None, 1, 2, 3])
-def test_streets_that_are_moved_have_the_same_drives(tmp_path, seed):
-    wanted = proposed_drives(tmp_path, "plain", seed)
+@pytest.mark.parametrize(
+    ("seed", "size"), [(None, (5, 4)), (1, (5, 4)), (2, (5, 4)), (3, (9, 8))]
+)
+def test_streets_that_are_moved_have_the_same_drives(tmp_path, seed, size):
+    wanted = proposed_drives(tmp_path, "plain", seed, size=size)
     assert len(wanted) == 2
     # A regular grid is the same when turned by 180 degrees, and so are drives.
     turns = (0, 180) if seed is None else (0,)
@@ -176,7 +179,7 @@ def test_streets_that_are_moved_have_the_same_drives(tmp_path, seed):
         "turned": {"turn_deg": 37.0},
         "reordered": {"order": -1},
     }.items():
-        found = proposed_drives(tmp_path, name, seed, **change)
+        found = proposed_drives(tmp_path, name, seed, size=size, **change)
         apart = [
             max(
                 rotate(a, turn, origin=(0, 0)).hausdorff_distance(b)

@@ -97,13 +97,6 @@ def test_files_that_are_no_gltf(tmp_path, text):
         notes_of(path)
 
 
-def test_a_world_names_the_file_and_the_extension(tmp_path):
-    path = write(tmp_path, extension("KHR_mesh_quantization"))
-    with pytest.raises(InputError, match="KHR_mesh_quantization") as refusal:
-        world_of(path)
-    assert str(refusal.value).startswith(str(path))
-
-
 SQUARE = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
 FACES = "element face 1\nproperty list uchar int {}\n"
 LIST = "property list int int vertex_indices\n"
