@@ -477,7 +477,8 @@ def _mark_near(
             y = _coordinate(shapes.numbers, k, 4, p_x, p_y, p_z)
             z = abs(_coordinate(shapes.numbers, k, 8, p_x, p_y, p_z))
             # Distance to the nearest place on the axis.
-            z = max(z - shapes.numbers[k, 12], 0.0)
+            z -= shapes.numbers[k, 12]
+            z = z if z > 0.0 else 0.0
             result[i] = x * x + y * y + z * z <= shapes.numbers[k, 15] ** 2
 
 

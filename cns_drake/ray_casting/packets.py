@@ -163,11 +163,12 @@ def _cast_packets(
     context = states + _STATE * lanes
     arguments = context + 64
     # RTCRayQueryContext, and what `_collect` reads beyond it.
-    tables, places = targets.tables.ctypes.data, targets.places.ctypes.data
     write_int64(context, -1)
     write_int64(context + 8, states)
-    write_int64(context + 16, tables)
-    write_int64(context + 24, places)
+    write_int64(context + 16, targets.tables.ctypes.data)
+    write_int64(context + 24, targets.places.ctypes.data)
+    # Read as `_collect` does: for another type, `_settle` is compiled again.
+    tables, places = read_int64(context + 16), read_int64(context + 24)
     # RTCIntersectArguments.
     write_int32(arguments, COHERENT_RAYS | FILTERED_RAYS)
     write_int32(arguments + 4, -1)

@@ -21,62 +21,29 @@ import sys
 import tempfile
 import time
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from helpers.small_osm import OsmWriter
+
 # Distance of neighbouring houses, and houses of a block in each direction.
 SPACING = 24.0
 BLOCK = 5
-# Where the first house stands [deg].
-LATITUDE = 52.0
-LONGITUDE = 13.0
-METRES_PER_DEG = 111_195.0
 
 
-class OsmFile:
-    """The elements of an OpenStreetMap file."""
-
-    def __init__(self) -> None:
-        self.nodes: list[str] = []
-        self.ways: list[str] = []
-
-    def add_node(self, x: float, y: float) -> int:
-        """Adds a place, east and north of the first house [m]."""
-        latitude = LATITUDE + y / METRES_PER_DEG
-        east = METRES_PER_DEG * math.cos(math.radians(LATITUDE))
-        number = len(self.nodes) + 1
-        self.nodes.append(
-            f'<node id="{number}" version="1" lat="{latitude:.8f}"'
-            f' lon="{LONGITUDE + x / east:.8f}"/>'
-        )
-        return number
-
-    def add_way(self, nodes: list[int], **tags: str) -> None:
-        parts = [f'<nd ref="{node}"/>' for node in nodes]
-        parts += [f'<tag k="{k}" v="{v}"/>' for k, v in tags.items()]
-        number = len(self.ways) + 1
-        self.ways.append(f'<way id="{number}">{"".join(parts)}</way>')
-
-    def write(self, path: Path) -> None:
-        body = "\n".join(self.nodes + self.ways)
-        path.write_text(f'<osm version="0.6">{body}</osm>')
-
-
-def draw_town(houses: int) -> OsmFile:
+def draw_town(houses: int) -> OsmWriter:
     """Returns houses at random, and the streets between their blocks."""
-    town = OsmFile()
+    town = OsmWriter()
     lot = random.Random(1)
     side = math.ceil(math.sqrt(houses))
     for number in range(houses):
         x, y = (SPACING * place for place in divmod(number, side))
         width, depth = lot.uniform(8.0, 14.0), lot.uniform(8.0, 13.0)
-        corners = [
-            town.add_node(x + width * right, y + depth * up)
-            for right, up in ((0, 0), (1, 0), (1, 1), (0, 1))
-        ]
-        levels = {"building:levels": str(lot.randint(1, 3))}
-        town.add_way([*corners, corners[0]], building="house", **levels)
+        levels = str(lot.randint(1, 3))
+        tags = {"building": "house", "building:levels": levels}
+        town.box(x, y, width, depth, **tags)
     lines = [SPACING * place - 5.0 for place in range(0, side + 1, BLOCK)]
-    crossings = [[town.add_node(x, y) for y in lines] for x in lines]
+    crossings = [[town.node(x, y) for y in lines] for x in lines]
     for street in [*crossings, *map(list, zip(*crossings, strict=True))]:
-        town.add_way(street, highway="residential")
+        town.way_of(street, highway="residential")
     return town
 
 
