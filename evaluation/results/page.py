@@ -296,7 +296,9 @@ def _wide_table(results: Results) -> dict[str, Any]:
     ]
     columns = [
         [
-            f"{v:{form}}" if form and _is_finite(v) else value_text(v)
+            f"{v:{form}}"
+            if form and isinstance(v, float) and math.isfinite(v)
+            else value_text(v)
             for v in column
         ]
         for form, column in zip(forms, zip(*cells, strict=True), strict=True)
@@ -305,10 +307,6 @@ def _wide_table(results: Results) -> dict[str, Any]:
         "header": list(zip(names, is_text, strict=True)),
         "rows": list(zip(*columns, strict=True)),
     }
-
-
-def _is_finite(value: object) -> bool:
-    return isinstance(value, float) and math.isfinite(value)
 
 
 def marker_corners(marker: str) -> str:

@@ -350,7 +350,11 @@ class Study:
         """
         rows: list[Row] = []
         answers: list[Answers] = []
-        by_condition = self._pairs_by_condition()
+        # The pairs by map, drives and factors, each by its seed.
+        by_condition: dict[tuple, dict[int, Pair]] = {}
+        for one in self.results:
+            condition = _condition(one, one.factors)
+            by_condition.setdefault(condition, {})[one.seed] = one
         baselines: dict[tuple[Pair, str], Any] = {}
         named = baseline_values(self.experiment)
         baseline = "; ".join(f"{n}={v}" for n, v in named.items())
@@ -376,13 +380,6 @@ class Study:
                     key = self._key(one, name, method, verified)
                     answers.append(Answers(**key, columns=columns))
         return Results.of(rows), QueryRows.of(answers)
-
-    def _pairs_by_condition(self) -> dict[tuple, dict[int, Pair]]:
-        """Returns the pairs by map, drives and factors, each by its seed."""
-        found: dict[tuple, dict[int, Pair]] = {}
-        for one in self.results:
-            found.setdefault(_condition(one, one.factors), {})[one.seed] = one
-        return found
 
     def _key(
         self, one: Pair, task: str, method: str, verified: bool
