@@ -56,7 +56,7 @@ class CityFile:
         system: reference system of the coordinates.
         faults: counts of faulty parts.
         order_is_open: whether the places of the vertices leave open which of
-            the first two coordinates is east (see `axes.settle_axes`).
+            the first two coordinates is east.
     """
 
     objects: dict[str, CityObject] = field(default_factory=dict)
