@@ -558,10 +558,6 @@ RECIPES = {
         prints=("ladder/index.html",),
         makes=("ladder/results.csv",),
     ),
-    "crossed causes": Recipe(
-        "about: Do snow and another lane",
-        file="crossed.yaml",
-    ),
     "age": Recipe(
         ".venv/bin/cns-drake age suburbia",
         changes=(
