@@ -1,5 +1,7 @@
 """Ctrl-C and SIGTERM: when they can interrupt, and how they end a process."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 import contextlib
 import os
@@ -21,14 +23,13 @@ _Handler = Callable[[int, FrameType | None], object]
 def interrupt_on_termination(once: bool = False) -> Callable[[], bool]:
     """Makes SIGTERM raise KeyboardInterrupt, so that open files are closed.
 
-    SIGINT raises it anyway, unless the process was started to ignore SIGINT.
+    SIGINT raises it anyway, unless the process was started to ignore SIGINT. An
+    interrupt that a destructor swallows is raised again.
 
     Args:
-        once: whether further SIGTERM signals are ignored after the first. With
-            `once`, only SIGKILL can end a process that hangs, so set `once`
-            only if a parent process can send SIGKILL. By default, a second
-            SIGTERM also raises KeyboardInterrupt, and so interrupts the closing
-            of files.
+        once: whether further SIGTERM signals are ignored after the first, and
+            cannot interrupt the closing of files. Then only SIGKILL, sent by a
+            parent process, can end a process that hangs.
 
     Returns:
         A function that returns whether a signal has raised KeyboardInterrupt. A
@@ -45,7 +46,16 @@ def interrupt_on_termination(once: bool = False) -> Callable[[], bool]:
     signal.signal(signal.SIGTERM, interrupt)
     if callable(signal.getsignal(signal.SIGINT)):
         signal.signal(signal.SIGINT, interrupt)
+    sys.unraisablehook = _repeat_interrupt
     return lambda: bool(raised)
+
+
+def _repeat_interrupt(lost: sys.UnraisableHookArgs) -> None:
+    if lost.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(lost)
+        return
+    # What is raised here would be swallowed, too.
+    threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGTERM)).start()
 
 
 @contextlib.contextmanager

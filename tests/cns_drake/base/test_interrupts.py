@@ -16,18 +16,14 @@ def handlers():
         yield
 
 
-def interrupt_and_go_on(number, done):
-    with uninterrupted():
-        os.kill(os.getpid(), number)
-        done.append("all of it")
-
-
 def test_interrupts_wait_for_the_outermost_block(handlers):
     done = []
 
     def interrupt_within():
         with uninterrupted():
-            interrupt_and_go_on(signal.SIGINT, done)
+            with uninterrupted():
+                os.kill(os.getpid(), signal.SIGINT)
+                done.append("all of it")
             done.append("the rest")
 
     with pytest.raises(KeyboardInterrupt):

@@ -1,4 +1,4 @@
-"""What happens to both programs while they are being imported."""
+"""What happens to both programs while they are imported, and run."""
 
 import signal
 import subprocess
@@ -7,13 +7,21 @@ import sys
 import pytest
 
 SCRIPT = """
-import signal, sys
+import signal, sys, threading
 from cns_drake.base import start
+
+class Fleeting:
+    def __del__(self):
+        signal.raise_signal(int(sys.argv[1]))
+
+def run():
+    Fleeting()
+    threading.Event().wait(60)
+    print("run", flush=True)
 
 def load():
     print("loading", flush=True)
-    signal.raise_signal(int(sys.argv[1]))
-    print("loaded", flush=True)
+    return run if sys.argv[2] == "run" else run()
 
 start("program", load)
 """
@@ -21,9 +29,10 @@ start("program", load)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupt_during_imports_ends_the_program(number):
+@pytest.mark.parametrize("when", ["load", "run"])
+def test_an_interrupt_in_a_destructor_ends_the_program(number, when):
     ended = subprocess.run(
-        [sys.executable, "-c", SCRIPT, str(int(number))],
+        [sys.executable, "-c", SCRIPT, str(int(number)), when],
         capture_output=True, text=True,
     )  # fmt: skip
     assert ended.returncode == 130
