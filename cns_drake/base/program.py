@@ -220,19 +220,6 @@ def _run_commands(
     return status or 0
 
 
-def _name_nearest_options(error: Any) -> None:
-    """Keeps of the options that an error suggests those with a longer name.
-
-    The others are only somewhat similar. If no name continues the unknown one,
-    all are kept.
-    """
-    name = getattr(error, "option_name", None)
-    possible = getattr(error, "possibilities", None) or ()
-    longer = [one for one in possible if name and one.startswith(name)]
-    if longer:
-        error.possibilities = longer
-
-
 def _failure_of(error: BaseException) -> tuple[str | None, int] | None:
     """Returns message and exit status after an error of the command line.
 
@@ -240,7 +227,13 @@ def _failure_of(error: BaseException) -> tuple[str | None, int] | None:
     fault of this program.
     """
     if isinstance(error, _UsageError):
-        _name_nearest_options(error)
+        # Only the suggested options that continue the given name are named, if
+        # there are such options; the others are somewhat similar.
+        usage: Any = error
+        name = getattr(usage, "option_name", None)
+        possible = getattr(usage, "possibilities", None) or ()
+        if longer := [one for one in possible if name and one.startswith(name)]:
+            usage.possibilities = longer
         return f"error: {error.format_message()}", 2
     if isinstance(error, InputError):
         return f"error: {error}", error.exit_status
