@@ -234,7 +234,9 @@ def _failure_of(error: BaseException) -> tuple[str | None, int] | None:
         possible = getattr(usage, "possibilities", None) or ()
         if longer := [one for one in possible if name and one.startswith(name)]:
             usage.possibilities = longer
-        return f"error: {error.format_message()}", 2
+        # Typer shows pydantic's words for a value that an Enum lacks.
+        message = usage.format_message().replace(": Value error, ", ": ")
+        return f"error: {message}", 2
     if isinstance(error, InputError):
         return f"error: {error}", error.exit_status
     if isinstance(error, KeyboardInterrupt | typer.Abort):

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from cns_drake.base import (
     Family,
     InputError,
+    describe_validation_error,
     did_you_mean,
     errors_at,
     import_modules,
@@ -138,6 +139,5 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
         try:
             return method(method.Config(**parameters))
         except ValidationError as error:
-            fault = error.errors()[0]
-            field = ".".join(str(part) for part in fault["loc"])
-            raise InputError(f"{name}: {field}: {fault['msg']}") from error
+            fault = describe_validation_error(name, error, method.Config)
+            raise InputError(fault) from error
