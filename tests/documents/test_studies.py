@@ -70,7 +70,6 @@ def test_columns_of_the_table_of_results_are_listed():
         ("docs/studies.md", "name: how-many-drives", 4),
         ("docs/studies.md", "name: fleet", 3),
         ("docs/studies.md", "name: my-sessions", 6),
-        ("docs/ladder.md", "about: Do snow", 4),
         ("docs/tutorial.md", "maps: riverside", 3),
     ],
 )
