@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from cns_drake.base import InputError
 from evaluation.recognition import metric_named
@@ -57,9 +58,14 @@ def _checked_number(row: Row, column: str) -> float:
 
 
 def _spread_axis(axes: Axes, at: Sequence[float]) -> None:
-    """Makes the x axis logarithmic if its values span a wide range."""
+    """Makes the x axis logarithmic if its values span a wide range.
+
+    On a linear axis of whole numbers, such as levels, ticks are whole, too.
+    """
     above = [value for value in at if value > 0.0]
     if min(at) >= 0.0 and above and max(above) / min(above) > _WIDE_RANGE:
         axes.set_xscale("symlog", linthresh=min(above))
         axes.set_xticks(list(at), [f"{value:g}" for value in at])
         axes.minorticks_off()
+    elif all(value == round(value) for value in at):
+        axes.xaxis.set_major_locator(MaxNLocator("auto", integer=True))

@@ -118,6 +118,17 @@ def test_a_wide_range_is_logarithmic():
     assert axes.get_xscale() == "linear"
 
 
+@pytest.mark.parametrize(("last", "whole"), [(3, True), (2.5, False)])
+def test_ticks_of_whole_numbers_are_whole(last, whole):
+    rows = [row(0.9, {"level": level}) for level in (0, 1, 2, last)]
+    chart = {"kind": "lines", "over": "level", "metric": "auc"}
+    (axes,) = draw_chart(chart, Results.of(rows)).figure.axes
+    low, high = axes.get_xlim()
+    ticks = [tick for tick in axes.get_xticks() if low <= tick <= high]
+    assert len(ticks) >= 3
+    assert all(tick == round(tick) for tick in ticks) is whole
+
+
 def test_a_matrix_has_strips_and_the_last_number():
     chart = {
         "kind": "matrix",
