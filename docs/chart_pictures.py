@@ -433,8 +433,8 @@ def upkeep(
 
 def ladder(path: Path) -> None:
     """Draws the ladder of Suburbia, what costs most on top."""
-    results = Results.read(ROOT / "docs/notes/ladder_suburbia.csv")
-    rows = results.where(metric="relative_auc", verified=False).rows
+    results = Results.read(ROOT / "docs/notes/ladder.csv")
+    rows = results.where(map="suburbia", metric="relative_auc").rows
     shares: dict[object, list[float]] = {}
     for row in rows:
         shares.setdefault(row["cause"], []).append(row.value)

@@ -5,7 +5,7 @@
 A comment names a file of `docs/notes` (or, with a slash, of the repository) and
 the rows that count, and lists numbers; in the text, a mark follows each:
 
-    <!-- numbers of ladder_suburbia.csv metric=relative_auc verified=0
+    <!-- numbers of ladder.csv map=suburbia metric=relative_auc verified=0
     fog {value cause=weather method=layered-overlap:.0%}
     -->
     Fog leaves layered overlap 86<!--fog--> % of its AUC.
