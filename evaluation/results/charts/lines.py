@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from cns_drake.base import InputError
 from evaluation.recognition import metric_named
@@ -68,4 +67,4 @@ def _spread_axis(axes: Axes, at: Sequence[float]) -> None:
         axes.set_xticks(list(at), [f"{value:g}" for value in at])
         axes.minorticks_off()
     elif all(value == round(value) for value in at):
-        axes.xaxis.set_major_locator(MaxNLocator("auto", integer=True))
+        axes.locator_params(axis="x", integer=True)
