@@ -602,20 +602,6 @@ RECIPES = {
         after=("own city",),
         all_methods=True,
     ),
-    "cleared city": Recipe(
-        ".venv/bin/cns-drake generate worlds/metropolis/cleared_01.yaml",
-        changes=(
-            (
-                "worlds/metropolis/cleared_01.yaml metropolis_04",
-                "town/sequence_01.yaml town/sequence_02.yaml --frames 40",
-            ),
-            ("cleared_01", "town_01"),
-            ("metropolis_04", "town_02"),
-            ("ring++", "solid"),
-        ),
-        after=("start a city",),
-        prints=("stress/town_01", "AUC"),
-    ),
     "redrawn cities": Recipe(
         "both: {redraw: [1, 2, 3]}\nmaps: riverside",
         changes=(("riverside", "town"), ("1, 2, 3", "1")),
@@ -956,8 +942,6 @@ NOT_RUN = {
     "cns-drake truth": "the recipe map truth runs it",
     ".venv/bin/cns-drake truth suburbia_01": "drives through a shipped city, "
     "for minutes",
-    ".venv/bin/cns-drake truth aged/sequence_01.yaml": "needs a city that has "
-    "aged, and minutes; the recipe map truth has a small one",
     ".venv/bin/cns-drake study docs/examples/anchor": "ages a shipped city and "
     "drives through it, for minutes",
     ".venv/bin/cns-drake study docs/examples/new_plans": "needs maps that "
