@@ -395,9 +395,8 @@ _NO_CLIMBS = np.zeros((0, 7), np.int32)
 class LayeredOverlapConfig(MethodConfig):
     """Settings of layered overlap.
 
-    All values were chosen by trials on development worlds. The reported results
-    come from other worlds. The method finds the top-ranked place in four
-    successive searches, from coarse to fine maps.
+    All values were chosen by trials on development worlds. The method finds the
+    top-ranked place in four successive searches, from coarse to fine maps.
 
     Attributes:
         cell: side of a cell of the finest maps [m]. These maps have 256 x 256
