@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from cns_drake.base import (
+    InputError,
     example,
     program,
     show_progress,
@@ -73,6 +74,8 @@ def run_drive(
 
     with uninterrupted():
         simulate = import_simulation()
+    if recording is not None and Path(recording).suffix != ".html":
+        raise InputError(f"--recording: {recording} does not end in .html")
     scenario = changed(load_scenario(name_or_file), changes)
     with show_progress():
         run = simulate(

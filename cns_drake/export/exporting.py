@@ -108,9 +108,10 @@ def export_drive(
     }
     claim_folder(output, format_name, layout.explained)
     if folder.exists():
+        another = "folder or --sequence" if layout.numbered else "folder"
         raise InputError(
-            f"{folder}: this drive is there already; remove it or give another "
-            "folder"
+            f"{folder}: a drive is there already; remove it or give another"
+            f" {another}"
         )
     if layout.shared_outer_files:
         _check_shared_files(outer)
@@ -206,7 +207,9 @@ def claim_folder(
                 )
             check_folder_writable(output)
             return
-        if output.exists() and (not output.is_dir() or any(output.iterdir())):
+        if output.exists() and not output.is_dir():
+            raise InputError(f"{output}: not a folder")
+        if output.exists() and any(output.iterdir()):
             raise InputError(
                 f"{output}: the folder holds other files; give a new or an "
                 "empty one"

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 import shapely
 from shapely import STRtree
 
-from cns_drake.base import InputError
+from cns_drake.base import InputError, errors_at_option
 from cns_drake.motion import (
     Suspension,
     Trajectory,
@@ -377,11 +377,12 @@ def _scene_of(scenario: Scenario) -> RayCastingScene:
     Raises:
         InputError: the world cannot be loaded.
     """
-    world = load_world(
-        scenario.world_file,
-        without=scenario.without,
-        model_paths=scenario.model_paths,
-    )
+    with errors_at_option(f"{scenario.source}: without", "without"):
+        world = load_world(
+            scenario.world_file,
+            without=scenario.without,
+            model_paths=scenario.model_paths,
+        )
     context = world.plant.CreateDefaultContext()
     inspector = world.scene_graph.model_inspector()
     bodies = {

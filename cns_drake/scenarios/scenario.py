@@ -606,10 +606,15 @@ class Scenario(Section):
         return scenario
 
     def with_traffic(self, number: int) -> Scenario:
-        """Returns the scenario with this number of vehicles and of walkers."""
+        """Returns the scenario with this number of vehicles and of walkers.
+
+        Raises:
+            InputError: there cannot be so many.
+        """
         seed = self.traffic.seed
+        values = {"vehicles": number, "walkers": number, "seed": seed}
         return self.replaced(
-            traffic=TrafficConfig(vehicles=number, walkers=number, seed=seed)
+            traffic=validated(TrafficConfig, values, f"{self.source}: traffic")
         )
 
     def with_transient(self, **changes: float | str) -> Scenario:

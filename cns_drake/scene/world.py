@@ -262,7 +262,7 @@ def _leave_out(
             missing.discard(structure_name(name))
             scene_graph.RemoveGeometry(source, geometry_id)
     if missing:
-        raise InputError(f"{sdf}: without: no structure {min(missing)}")
+        raise InputError(f"without: no structure {min(missing)!r} in {sdf}")
 
 
 def _read_names(scene_graph: SceneGraph, sdf: Path) -> dict[GeometryId, str]:

@@ -40,7 +40,7 @@ def scan(
     weather: WeatherConfig | None = None,
     seed: int = 0,
     model_paths: Iterable[Path] = (),
-    output: Path | None = None,
+    output: Path | str | None = None,
     on_note: Callable[[str], None] = lambda note: None,
 ) -> np.ndarray:
     """Takes one LiDAR scan of an SDF world, as `cns-drake scan`.
@@ -61,6 +61,7 @@ def scan(
 
     Raises:
         InputError: the world cannot be read, or the file cannot be written.
+        ValueError: the pose is not finite.
 
     Example:
         from pydrake.math import RigidTransform
@@ -70,6 +71,7 @@ def scan(
         points = scan("hall.sdf", RigidTransform([0.0, 0.0, 1.6]))
     """
     if output is not None:
+        output = Path(output)
         check_ending(output)
         check_writable(output)
     world = Path(world)
@@ -128,6 +130,8 @@ def _stationary_lidar(
     pattern: BeamPattern,
     **options: Any,
 ) -> tuple[Lidar, Context]:
+    if not np.isfinite(X_WS.GetAsMatrix34()).all():
+        raise ValueError("X_WS: not finite")
     """Returns a LiDAR at a fixed pose in a world, and its Context."""
     lidar = Lidar(
         world.scene_graph.world_frame_id(),

@@ -1,6 +1,8 @@
 """Recording the sensors of any diagram."""
 
 from collections.abc import Collection, Iterable, Mapping
+import math
+import numbers
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +35,9 @@ from cns_drake.sensors import (
     OdometrySensor,
     check_unused_names,
 )
+
+# Time stamps of ROS 2 have an int32 number of seconds.
+_END_NS = 2**31 * 10**9
 
 
 def add_mcap_recorder(
@@ -86,7 +91,8 @@ def add_mcap_recorder(
     Raises:
         InputError: the folder contains a finished recording or other files.
         ValueError: `rates` names an unknown sensor, neither a period nor a
-            LiDAR is given, a LiDAR is causal (its scan covers the revolution
+            LiDAR is given, `period` or `start_ns` is out of range, a LiDAR is
+            causal (its scan covers the revolution
             before its time stamp), scans or poses are recorded between the
             scans of a discrete LiDAR, or names of sensors are not unique or
             cannot be parts of ROS 2 topics.
@@ -100,6 +106,11 @@ def add_mcap_recorder(
             simulator.AdvanceTo(10.0)
     """
     cameras = cameras or {}
+    if not (isinstance(start_ns, numbers.Integral) and 0 <= start_ns < _END_NS):
+        raise ValueError(
+            f"start_ns: {start_ns!r} is not an integer from 0 on, below"
+            f" {_END_NS}"
+        )
     check_unused_names(builder, name)
     _check_sensors(lidars, cameras)
     periods = _message_periods(period, rates or {}, lidars, cameras, imu)
@@ -249,7 +260,12 @@ def _message_periods(
     revolutions = {lidar.get_name(): lidar.pattern.period for lidar in lidars}
     if period is None and not revolutions:
         raise ValueError("period: a recording without a LiDAR needs one")
-    usual = period or next(iter(revolutions.values()))
+    if period is not None and not 1.0 / HIGHEST_RATE <= period < math.inf:
+        raise ValueError(
+            f"period: {period!r} is not a number of seconds from"
+            f" {1.0 / HIGHEST_RATE:g} on"
+        )
+    usual = next(iter(revolutions.values())) if period is None else period
     periods = dict.fromkeys((*revolutions, *cameras, "imu", "odometry"), usual)
     if period is None:
         periods |= revolutions

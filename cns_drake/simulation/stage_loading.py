@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base import doing
+from cns_drake.base import doing, errors_at_option
 from cns_drake.scenarios import (
     DrivePlan,
     count_frames,
@@ -83,13 +83,14 @@ def load_stage(
     """
     scenario = plan.scenario
     doing("reading the stage")
-    world = load_world(
-        scenario.world_file,
-        vehicle=vehicle_file() if with_vehicle else None,
-        without=(*scenario.without, *without),
-        model_paths=scenario.model_paths,
-        in_sight=in_sight,
-    )
+    with errors_at_option(f"{scenario.source}: without", "without"):
+        world = load_world(
+            scenario.world_file,
+            vehicle=vehicle_file() if with_vehicle else None,
+            without=(*scenario.without, *without),
+            model_paths=scenario.model_paths,
+            in_sight=in_sight,
+        )
     if scenario.world is not None:
         notes = ground_notes(scenario, plan.trajectory)
         world = replace(world, notes=(*world.notes, *notes))

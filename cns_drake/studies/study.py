@@ -9,6 +9,7 @@ import numpy as np
 from cns_drake.base import (
     Cluster,
     InputError,
+    check_folder_writable,
     doing,
     errors_at,
     fingerprint,
@@ -180,6 +181,7 @@ def plan_study(study: Study, maps: Sequence[str] = ()) -> list[ShownCity]:
             used, there is nothing to measure, or a drive differs from the
             frozen drive.
     """
+    check_folder_writable(study.output)
     experiment = study.experiment
     study.choose(TASKS)
     known = causes()

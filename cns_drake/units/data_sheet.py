@@ -210,7 +210,7 @@ class ReturnsSheet(_Part):
             squares of both fractions add up to 1.
         response: how the unit converts energy to intensity.
         head: positions of the lasers.
-        unknown: names of the fields that the data sheet does not state.
+        unknown: what the data sheet does not state, in words.
     """
 
     rows: tuple[SheetRow, ...] = Field(min_length=1, max_length=2)

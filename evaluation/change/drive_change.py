@@ -156,7 +156,11 @@ class ChangeReport:
     def note(self) -> str | None:
         """What to know of the frames of A and B; None if they agree."""
         one = self.registered
-        if one is None or self.change.symmetric - one.symmetric <= _EXPLAINED:
+        # The difference is NaN if nothing could be compared.
+        if (
+            one is None
+            or not self.change.symmetric - one.symmetric > _EXPLAINED
+        ):
             return None
         x, y, z = one.offset
         return (

@@ -143,7 +143,9 @@ def bin_dtype(path: Path, columns: int | None = None) -> np.dtype:
     usual = len(_COLUMNS)
     if path.name.lower().endswith(_NUSCENES):
         usual = _NUSCENES_COLUMNS
-    number = columns or usual
+    number = usual if columns is None else columns
+    if number < 3:
+        raise ValueError(f"columns: {number} is less than 3")
     more = [f"column_{k + 1}" for k in range(len(_COLUMNS), number)]
     names = [*_COLUMNS[:number], *more]
     dtype = np.dtype([(name, "<f4") for name in names])

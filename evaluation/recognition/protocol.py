@@ -134,6 +134,9 @@ class RetrievalProtocol:
             "not from 0 to below 360 deg",
         )
         self._check("seed", self.seed >= 0, "negative")
+        for name in ("verified", "turn_queries"):
+            is_bool = getattr(self, name) in (True, False)
+            self._check(name, is_bool, "neither True nor False")
 
     def _check(self, name: str, is_valid: bool, fault: str) -> None:
         """Refuses a value that is out of range.

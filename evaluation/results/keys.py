@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import Any
 
-from cns_drake.base import InputError, __version__
+from cns_drake.base import InputError, __version__, did_you_mean
 from evaluation.recognition import Metric, RetrievalProtocol
 
 # The beginning of a factor that is a setting of a method.
@@ -68,6 +68,27 @@ def check_metric_names(
 def key_columns(factors: Iterable[str]) -> tuple[str, ...]:
     """Returns all columns of a key in the order of tables."""
     return (*_BEFORE_FACTORS, *factors, *_AFTER_FACTORS, *OPTIONAL_KEYS)
+
+
+def check_columns(
+    names: Iterable[str], rows: Iterable[Key], factors: Iterable[str] = ()
+) -> None:
+    """Checks that rows can have columns with given names.
+
+    A factor with a dot in its name can be missing, and then counts as None.
+
+    Args:
+        names: the names.
+        rows: rows of a table.
+        factors: factors that the table is known to have.
+
+    Raises:
+        InputError: there is no such column.
+    """
+    known = RESERVED.union((CAUSE, LEVEL), factors, *(r.factors for r in rows))
+    for name in names:
+        if name not in known and "." not in name:
+            raise InputError(f"no column {name!r}{did_you_mean(name, known)}")
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,13 @@ from evaluation.recognition import (
     pr_curve,
     weighted_metrics,
 )
-from evaluation.results.keys import CAUSE, LEVEL, NO_CAUSE, Key
+from evaluation.results.keys import (
+    CAUSE,
+    LEVEL,
+    NO_CAUSE,
+    Key,
+    check_columns,
+)
 from evaluation.results.table import Answers, QueryRows, Results, Row
 
 # Factor: what updates the map of several drives.
@@ -65,6 +71,9 @@ def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
     Each mean also has the least and the greatest of its values, for example
     over the seeds.
 
+    Raises:
+        InputError: there is no such column.
+
     Example:
         from evaluation import Results, means
 
@@ -72,6 +81,9 @@ def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
         for mean in means(rows, "method", "verified"):
             print(mean.key, mean.value)
     """
+    rows = list(rows)
+    if rows:
+        check_columns(columns, rows)
     groups: dict[tuple, list[float]] = {}
     for row in rows:
         group = groups.setdefault(tuple(row[name] for name in columns), [])

@@ -51,6 +51,7 @@ from evaluation.results.keys import (
     OPTIONAL_KEYS,
     RESERVED,
     Key,
+    check_columns,
     key_columns,
 )
 
@@ -250,10 +251,16 @@ class Results:
             columns: name of a column -> value, or a tuple, list or set of
                 possible values. Use this argument for names that contain dots.
             named: further columns, as keyword arguments.
+
+        Raises:
+            InputError: there is no such column.
         """
+        columns = {**(columns or {}), **named}
+        if self.rows:
+            check_columns(columns, self.rows, self.factors)
         wanted = {
             name: value if isinstance(value, tuple | list | set) else (value,)
-            for name, value in {**(columns or {}), **named}.items()
+            for name, value in columns.items()
         }
         return Results(
             self.factors,

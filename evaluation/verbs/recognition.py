@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from scipy.spatial.distance import cdist
@@ -172,6 +172,7 @@ def recognise(
         print(found.metrics["auc"], found.intervals["auc"])
     """
     protocol = replace(_protocol(protocol), **fields)
+    _check_known("mode", mode, get_args(Mode))
     if exact_overlaps is not None:
         if protocol.overlap is None:
             raise InputError("--exact-overlaps: add --truth overlap:PART")
@@ -262,12 +263,16 @@ def recognise(
 def _protocol(protocol: RetrievalProtocol | str) -> RetrievalProtocol:
     if isinstance(protocol, RetrievalProtocol):
         return protocol
-    if protocol not in PROTOCOLS:
-        raise InputError(
-            f"protocol: {protocol!r} is none of {', '.join(PROTOCOLS)}"
-            f"{did_you_mean(protocol, PROTOCOLS)}"
-        )
+    _check_known("protocol", protocol, PROTOCOLS)
     return PROTOCOLS[protocol]
+
+
+def _check_known(argument: str, value: object, known: Collection[str]) -> None:
+    if value not in known:
+        raise InputError(
+            f"{argument}: {value!r} is none of {', '.join(known)}"
+            f"{did_you_mean(value, known)}"
+        )
 
 
 def _choice(

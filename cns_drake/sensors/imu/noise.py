@@ -1,7 +1,9 @@
 """The errors of an IMU, as functions of the sample number."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
+import numbers
+import sys
 
 import numpy as np
 
@@ -44,6 +46,10 @@ class ImuNoise:
         sensor_name: distinguishes the errors of several IMUs. `add_imu`
             replaces the default by its own `name`.
 
+    Raises:
+        ValueError: a value is negative or not a number, or a density, random
+            walk or bias is infinite.
+
     Example:
         from cns_drake import ImuNoise
 
@@ -60,6 +66,27 @@ class ImuNoise:
     gyroscope_range: float = np.inf
     seed: int = 0
     sensor_name: str = "imu"
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name == "seed":
+                if not isinstance(value, numbers.Integral) or value < 0:
+                    raise ValueError(
+                        f"seed: {value!r} is not an integer from 0 on"
+                    )
+            elif field.name != "sensor_name":
+                most = (
+                    np.inf
+                    if field.name.endswith("_range")
+                    else sys.float_info.max
+                )
+                if not (
+                    isinstance(value, numbers.Real) and 0.0 <= value <= most
+                ):
+                    raise ValueError(
+                        f"{field.name}: {value!r} is not a number from 0 on"
+                    )
 
     def variances(self, rate: float) -> tuple[float, float]:
         """Returns the variances of the white noise at a sample rate.

@@ -340,12 +340,14 @@ class Lidar(LeafSystem):
 
         Raises:
             TypeError: there is no such option, or its value is of another type.
-            ValueError: limits or period of the pattern are impossible, or an
-                option is out of range.
+            ValueError: limits or period of the pattern are impossible, the pose
+                is not finite, or an option is out of range.
         """
         super().__init__()
         given = LidarOptions(**options)
         pattern.check()
+        if not np.isfinite(X_PB.GetAsMatrix34()).all():
+            raise ValueError("X_PB: not finite")
         self.parent_frame_id = parent_frame_id
         self.X_PB = RigidTransform(X_PB)
         self.pattern = pattern

@@ -427,7 +427,7 @@ class DriveChanger:
                 count_frames(drive, plan_drive(drive))
         world = drive.world_file, drive.without
         if "without" in given and world not in self._loaded:
-            with errors_at(f"{where}.without"):
+            with errors_at(f"{where}.without", "without: "):
                 load_world(
                     world[0],
                     without=drive.without,
@@ -525,9 +525,9 @@ def _lacking_in(
     Raises:
         InputError: a stage does not exist, or the other stage lacks nothing.
     """
-    difference = _structures_of(base, stage, source) - _structures_of(
-        base, other, source
-    )
+    with errors_at(f"{source}: towards", f"{source}: "):
+        there = _structures_of(base, other, source)
+    difference = _structures_of(base, stage, source) - there
     if not difference:
         raise InputError(
             f"{source}: towards: stage {other} lacks nothing of stage {stage}"

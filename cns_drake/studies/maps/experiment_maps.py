@@ -101,7 +101,8 @@ def _pairs_of(
     kind = study.experiment.drives
     if isinstance(one, MadeMap):
         folder = study.output / "cities" / one.name
-        step = made_map_step(one, study.experiment, folder, shipped_maps())
+        with errors_at(f"{study.source}: maps"):
+            step = made_map_step(one, study.experiment, folder, shipped_maps())
         make_maps([step], folder.parent, study.cluster)
         yield MapPairs(one.name, {}, _drive_pairs(folder, kind))
         return

@@ -232,10 +232,7 @@ def made_map_step(
         assert made.years is not None
         path = Path(shipped.get(made.age, made.age))
         if not MapFolder(path).recordable_drives():
-            raise InputError(
-                f"{experiment.name}: maps: {made.name}: no map {made.age!r}"
-                " with drives"
-            )
+            raise InputError(f"{made.name}: no map {made.age!r} with drives")
         rates = tuple(sorted(DEFAULT_RATES.items()))
         return AgeCity(folder, path.resolve(), (made.years,), made.seed, rates)
     assert made.import_file is not None

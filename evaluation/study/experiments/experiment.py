@@ -187,9 +187,10 @@ class Experiment(Section):
             these values, and its own values of all other factors. By default,
             it is the one with the first value of each factor, and without a
             cause of change.
-        frozen: table with a fingerprint of each level's drives. The table
-            protects a benchmark from changes: if a drive no longer has its
-            fingerprint, the study stops with an error.
+        frozen: table of the shipped worlds, such as `levels.csv`, with a
+            fingerprint of each level's drives. The table protects a benchmark
+            from changes: if a drive no longer has its fingerprint, the study
+            stops with an error.
         charts: charts to show on the page of the experiment.
         quick: fields to replace if `--quick` is given. `tasks`, `methods` and
             lists are replaced as a whole; in other mappings, only the fields

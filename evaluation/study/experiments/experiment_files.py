@@ -146,7 +146,7 @@ def _checked(
     values: Changes,
     written: Changes,
     path: Path,
-    overrides: Iterable[str | tuple[str, Any]],
+    overrides: Sequence[str | tuple[str, Any]],
     chosen: Mapping[str, Sequence[str]],
 ) -> Experiment:
     """Returns an experiment whose conditions are known to be usable.
@@ -159,6 +159,14 @@ def _checked(
         overrides: see `load_experiment`.
         chosen: names of tasks and methods that replace those of the experiment.
     """
+    place: Path | str = path
+    if overrides:
+        file_alone = {**values}
+        file_alone.pop("causes", None)
+        with contextlib.suppress(InputError):
+            validated(Experiment, file_alone, path)
+            # A fault that is still found is in what replaces its fields.
+            place = "--set"
     for one in overrides:
         values = _overridden(values, one)
     values = in_long_form(dict(values))
@@ -168,8 +176,8 @@ def _checked(
             given = values.get(field)
             given = given if isinstance(given, dict) else {}
             values[field] = {name: given.get(name, {}) for name in names}
-    experiment = validated(Experiment, values, path)
-    with value_errors(path):
+    experiment = validated(Experiment, values, place)
+    with value_errors(place):
         if only is not None:
             experiment = _with_causes(experiment, only)
         known = _Measured.of(experiment)

@@ -227,6 +227,10 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
             ["scan", "{files}/good.sdf", "--pose", *"00000", "nan"],
             "--pose: not finite",
         ),
+        (
+            ["simulate", "{files}/drive.yaml", "--recording", "page.txt"],
+            "--recording: page.txt does not end in .html",
+        ),
         (["reproduce", "atlantis"], "unknown map 'atlantis'"),
         (["study"], "study: give an experiment, or --list"),
         (["study", "war"], "war: neither an experiment of this package"),
@@ -234,6 +238,10 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
         (["study", "levels", "--quick"], "levels.yaml: quick: missing"),
         (["study", "ladder", "--task", "dance"], "ladder: tasks: no task 'dan"),
         (["study", "ladder", "--method", "bow"], "ladder: methods: no method"),
+        (
+            ["study", "ladder", "--set", "foo=3"],
+            "^cns-drake: error: --set: foo: E",
+        ),
         (["study", "ladder", "--set", "levels"], "'levels' is not FIELD=VALUE"),
         (
             ["reproduce", "--no-recordings", "--pages"],

@@ -318,8 +318,8 @@ def test_command(drive, tmp_path, capsys):
     status, out, err = run_program(capsys, "cns-drake", main, *words)
     assert (status, out) == (2, "")
     assert err.splitlines()[-1] == (
-        f"cns-drake: error: {output / 'sequences/07'}: this drive is"
-        " there already; remove it or give another folder"
+        f"cns-drake: error: {output / 'sequences/07'}: a drive is"
+        " there already; remove it or give another folder or --sequence"
     )
 
 
@@ -339,7 +339,7 @@ def test_a_drive_is_not_replaced(drive, tmp_path):
     drive_folder = export_drive(open_drive(drive), "kitti", tmp_path / "output")
     (drive_folder / "times.txt").write_text("mine")
     with pytest.raises(
-        InputError, match="sequences/07: this drive is there already"
+        InputError, match="sequences/07: a drive is there already"
     ):
         export_drive(open_drive(drive), "kitti", tmp_path / "output")
     assert (drive_folder / "times.txt").read_text() == "mine"
@@ -361,7 +361,7 @@ def test_foreign_folders_are_left_alone(drive, tmp_path, format_name):
     )
     before = sorted(tmp_path.rglob("*"))
     for folder, fault in (
-        ("file", "holds other files"),
+        ("file", "file: not a folder"),
         ("photos", "holds other files"),
         ("marked", "export.yaml: not readable as YAML"),
         ("foreign", "export.yaml: not written by an export"),

@@ -68,6 +68,11 @@ class Site:
         ({"body": "wall"}, TypeError, r"plant.GetBodyByName\('wall'\)"),
         ({"body": 3}, TypeError, "body: 3 is not a RigidBody"),
         ({"pose": [0, 0, 1]}, TypeError, "X_PB: .* is not a RigidTransform"),
+        (
+            {"pose": RigidTransform([np.nan, 0, 0])},
+            ValueError,
+            "X_PB: not finite",
+        ),
         ({"pattern": 16}, TypeError, "pattern: 16 is neither a BeamPattern"),
         ({"pattern": "vlp-61"}, ValueError, "unknown preset 'vlp-61'"),
         (

@@ -37,7 +37,7 @@ def test_the_usual_lidar_is_exact(world, scan, tmp_path):
     pattern = make_beam_pattern("cns", 0.05)
     exact = scan_world(load_world(world), X_WS, pattern)
     np.testing.assert_array_equal(scan, exact)
-    take_scan(world, X_WS, output=tmp_path / "scan.npy")
+    take_scan(world, X_WS, output=str(tmp_path / "scan.npy"))
     np.testing.assert_array_equal(
         np.load(tmp_path / "scan.npy"), expected(exact)
     )
@@ -87,6 +87,11 @@ def test_empty_scans_can_be_saved(world, tmp_path):
 def test_unknown_ending(world, tmp_path):
     with pytest.raises(InputError, match=r"scan\.txt: unknown ending '.txt'"):
         take_scan(world, X_WS, output=tmp_path / "scan.txt")
+
+
+def test_a_pose_that_is_not_finite(world):
+    with pytest.raises(ValueError, match="X_WS: not finite"):
+        take_scan(world, RigidTransform([0.0, np.nan, 1.0]))
 
 
 def test_nothing_is_left_where_it_cannot_be_written(world, tmp_path):

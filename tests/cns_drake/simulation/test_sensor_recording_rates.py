@@ -151,6 +151,24 @@ def test_what_makes_no_sense_is_refused(tmp_path):
     for rate in (-1, 0.0, math.nan, True, 1000.1):
         with pytest.raises(ValueError, match=f"fast: {rate} is not a positive"):
             Falling().record(tmp_path / "two", 0.1, rates={"fast": rate})
+    for period in (-1.0, 0.0, math.nan, math.inf, 0.0009):
+        with pytest.raises(ValueError, match=f"period: {period} is not a num"):
+            add_mcap_recorder(DiagramBuilder(), tmp_path / "two", period=period)
+    for start_ns in (-5, 1.5, 2**31 * 10**9):
+        with pytest.raises(ValueError, match=f"start_ns: {start_ns} is not"):
+            add_mcap_recorder(
+                DiagramBuilder(), tmp_path / "two", start_ns=start_ns
+            )
+    for name, value in (
+        ("gyroscope_random_walk", math.nan),
+        ("accelerometer_noise_density", -1.0),
+        ("accelerometer_noise_density", math.inf),
+        ("gyroscope_range", -1.0),
+        ("seed", -1),
+        ("seed", 0.5),
+    ):
+        with pytest.raises(ValueError, match=f"{name}: {value} is not a"):
+            ImuNoise(**{name: value})
     with pytest.raises(ValueError, match="needs one"):
         add_mcap_recorder(DiagramBuilder(), tmp_path / "three")
     causal = Falling()

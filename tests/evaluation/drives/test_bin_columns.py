@@ -44,6 +44,13 @@ def test_a_size_that_does_not_fit(tmp_path, name, given, number):
     assert "\n" not in str(error.value)
 
 
+def test_a_point_has_three_coordinates(tmp_path):
+    NUMBERS.tofile(tmp_path / "a.bin")
+    for columns in (0, 2, -4):
+        with pytest.raises(InputError, match=f"columns: {columns} is less"):
+            read_cloud(tmp_path / "a.bin", columns)
+
+
 def write_kitti(folder, scenario):
     (folder / "velodyne").mkdir(parents=True)
     NUMBERS[:, :6].tofile(folder / "velodyne" / "000000.bin")

@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.results import Answers, Key, QueryRows, Results, Row, as_factor
+from evaluation.results import (
+    Answers,
+    Key,
+    QueryRows,
+    Results,
+    Row,
+    as_factor,
+    means,
+)
 
 FACTOR = "query.transient.snow"
 HEADER = (
@@ -253,6 +261,16 @@ def test_tables_with_other_columns(tmp_path, header, words):
     with pytest.raises(InputError, match=words) as raised:
         Results.read(path)
     assert str(raised.value).startswith(f"{path}: ")
+
+
+def test_columns_that_are_not_there(tmp_path):
+    table = Results.read(write(tmp_path / "results.csv", HEADER, LINE))
+    with pytest.raises(InputError, match=r"no column 'metho'.*mean method"):
+        table.where(metho="solid")
+    with pytest.raises(InputError, match=r"no column 'metho'.*mean method"):
+        means(table.rows, "metho")
+    # Some tables lack a factor, where it has no value.
+    assert not table.where({"both.stage": "own"}).rows
 
 
 def test_files_that_are_no_table(tmp_path):

@@ -106,6 +106,10 @@ def test_a_path_and_an_object_give_the_same(towns, tmp_path):
 def test_what_cannot_be_recognised(towns):
     with pytest.raises(InputError, match="protocol: 'fair' is none of"):
         recognise(*both(towns), "solid", protocol="fair")
+    with pytest.raises(InputError, match=r"mode: 'Filtered' is none .*mean f"):
+        recognise(*both(towns), "solid", mode="Filtered")
+    with pytest.raises(InputError, match="yes is neither True nor False"):
+        recognise(*both(towns), "solid", verified="yes")
     with pytest.raises(TypeError, match="raduis"):
         recognise(*both(towns), "solid", raduis=5.0)
     with pytest.raises(InputError, match="drive against itself"):

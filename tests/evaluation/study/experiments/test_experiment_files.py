@@ -113,7 +113,7 @@ def test_some_of_the_causes(tmp_path, quick):
     ],
 )
 def test_causes_that_cannot_be_chosen(override, fault):
-    with pytest.raises(InputError, match=f"ladder.yaml: {fault}"):
+    with pytest.raises(InputError, match=f"^--set: {fault}"):
         load_experiment("ladder", [override])
 
 
