@@ -793,9 +793,9 @@ RECIPES = {
         prints=("mean IoU", "by structure"),
     ),
     "map sessions": Recipe(
-        ".venv/bin/cns-drake export drives/metropolis_01 "
-        "drives/metropolis_04 --format map-sessions",
-        changes=(_FIRST, _LAST, ("drives/", "output/")),
+        ".venv/bin/cns-drake export output/metropolis_01 "
+        "output/metropolis_04 --format map-sessions",
+        changes=(_FIRST, _LAST),
         after=("own city",),
         prints=("two_sessions",),
         makes=("two_sessions/A/map.ply",),
