@@ -296,7 +296,7 @@ RECIPES = {
         prints=("the nearest 7.90 m ahead",),
     ),
     "exports": Recipe(
-        ".venv/bin/cns-drake export output/",
+        ".venv/bin/cns-drake export output/metropolis_04 --format cns",
         changes=(_FIRST, _LAST),
         after=("own city",),
         makes=(
