@@ -180,6 +180,13 @@ def test_files_that_are_no_scenario(tmp_path, text, fault):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("number", [-1, 2.5])
+def test_traffic_that_cannot_be(small_map, number):
+    scenario = make_scenario(scenario_values(small_map), "drive.yaml")
+    with pytest.raises(InputError, match="_04: traffic: vehicles: Input"):
+        scenario.with_traffic(number)
+
+
 def test_unknown_drive_names_the_known_ones():
     with pytest.raises(
         InputError, match=r"'metropolis_99'; .*did you mean metropolis_0\d\?"
