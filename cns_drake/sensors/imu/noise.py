@@ -82,7 +82,8 @@ class ImuNoise:
                     else sys.float_info.max
                 )
                 if not (
-                    isinstance(value, numbers.Real) and 0.0 <= value <= most
+                    isinstance(value, numbers.Real)
+                    and 0.0 <= float(value) <= most
                 ):
                     raise ValueError(
                         f"{field.name}: {value!r} is not a number from 0 on"
