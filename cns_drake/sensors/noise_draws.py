@@ -1,6 +1,18 @@
 """Random numbers that depend only on a seed and on what they are used for."""
 
+import numbers
+
 import numpy as np
+
+
+def check_seed(seed: object) -> None:
+    """Checks that a value can be the seed of a sensor's noise.
+
+    Raises:
+        ValueError: it is no integer, or negative.
+    """
+    if not isinstance(seed, numbers.Integral) or seed < 0:
+        raise ValueError(f"seed: {seed!r} is not an integer from 0 on")
 
 
 def noise_generator(

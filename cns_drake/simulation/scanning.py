@@ -130,9 +130,9 @@ def _stationary_lidar(
     pattern: BeamPattern,
     **options: Any,
 ) -> tuple[Lidar, Context]:
+    """Returns a LiDAR at a fixed pose in a world, and its Context."""
     if not np.isfinite(X_WS.GetAsMatrix34()).all():
         raise ValueError("X_WS: not finite")
-    """Returns a LiDAR at a fixed pose in a world, and its Context."""
     lidar = Lidar(
         world.scene_graph.world_frame_id(),
         X_WS,

@@ -92,10 +92,9 @@ def add_mcap_recorder(
         InputError: the folder contains a finished recording or other files.
         ValueError: `rates` names an unknown sensor, neither a period nor a
             LiDAR is given, `period` or `start_ns` is out of range, a LiDAR is
-            causal (its scan covers the revolution
-            before its time stamp), scans or poses are recorded between the
-            scans of a discrete LiDAR, or names of sensors are not unique or
-            cannot be parts of ROS 2 topics.
+            causal (its scan covers the revolution before its time stamp), scans
+            or poses are recorded between the scans of a discrete LiDAR, or
+            names of sensors are not unique or cannot be parts of ROS 2 topics.
 
     Example:
         from cns_drake import add_mcap_recorder

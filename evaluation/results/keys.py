@@ -9,7 +9,7 @@ a cell is empty where a factor does not apply.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import Any
@@ -71,7 +71,7 @@ def key_columns(factors: Iterable[str]) -> tuple[str, ...]:
 
 
 def check_columns(
-    names: Iterable[str], rows: Iterable[Key], factors: Iterable[str] = ()
+    names: Iterable[str], rows: Sequence[Key], factors: Iterable[str] = ()
 ) -> None:
     """Checks that rows can have columns with given names.
 
@@ -79,15 +79,18 @@ def check_columns(
 
     Args:
         names: the names.
-        rows: rows of a table.
+        rows: rows of a table; if there are none, it can have any column. They
+            are looked at only for names that not every table has.
         factors: factors that the table is known to have.
 
     Raises:
         InputError: there is no such column.
     """
-    known = RESERVED.union((CAUSE, LEVEL), factors, *(r.factors for r in rows))
+    known = RESERVED.union((CAUSE, LEVEL), factors)
     for name in names:
-        if name not in known and "." not in name:
+        if name in known or "." in name or not rows:
+            continue
+        if not any(name in row.factors for row in rows):
             raise InputError(f"no column {name!r}{did_you_mean(name, known)}")
 
 

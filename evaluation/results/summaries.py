@@ -82,8 +82,7 @@ def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
             print(mean.key, mean.value)
     """
     rows = list(rows)
-    if rows:
-        check_columns(columns, rows)
+    check_columns(columns, rows)
     groups: dict[tuple, list[float]] = {}
     for row in rows:
         group = groups.setdefault(tuple(row[name] for name in columns), [])

@@ -256,8 +256,7 @@ class Results:
             InputError: there is no such column.
         """
         columns = {**(columns or {}), **named}
-        if self.rows:
-            check_columns(columns, self.rows, self.factors)
+        check_columns(columns, self.rows, self.factors)
         wanted = {
             name: value if isinstance(value, tuple | list | set) else (value,)
             for name, value in columns.items()

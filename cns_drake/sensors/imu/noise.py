@@ -1,13 +1,13 @@
 """The errors of an IMU, as functions of the sample number."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import lru_cache
 import numbers
 import sys
 
 import numpy as np
 
-from cns_drake.sensors.noise_draws import noise_generator
+from cns_drake.sensors.noise_draws import check_seed, noise_generator
 
 # Purposes of random numbers. They differ from a LiDAR's purposes, since an IMU
 # and a LiDAR in a user's diagram may have the same name.
@@ -68,26 +68,14 @@ class ImuNoise:
     sensor_name: str = "imu"
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if field.name == "seed":
-                if not isinstance(value, numbers.Integral) or value < 0:
-                    raise ValueError(
-                        f"seed: {value!r} is not an integer from 0 on"
-                    )
-            elif field.name != "sensor_name":
-                most = (
-                    np.inf
-                    if field.name.endswith("_range")
-                    else sys.float_info.max
-                )
-                if not (
-                    isinstance(value, numbers.Real)
-                    and 0.0 <= float(value) <= most
-                ):
-                    raise ValueError(
-                        f"{field.name}: {value!r} is not a number from 0 on"
-                    )
+        check_seed(self.seed)
+        for name, value in vars(self).items():
+            if name in ("seed", "sensor_name"):
+                continue
+            most = np.inf if name.endswith("_range") else sys.float_info.max
+            is_number = isinstance(value, numbers.Real)
+            if not (is_number and 0.0 <= float(value) <= most):
+                raise ValueError(f"{name}: {value!r} is not a number from 0 on")
 
     def variances(self, rate: float) -> tuple[float, float]:
         """Returns the variances of the white noise at a sample rate.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.sensors.noise_draws import noise_generator
+from cns_drake.sensors.noise_draws import check_seed, noise_generator
 
 # Intensity falls with distance as in CARLA's ray-cast LiDAR with its default
 # atmosphere: exp(-a d), a = 0.004 / m (docs/ref_sensors of CARLA).
@@ -102,8 +102,7 @@ class MeasurementModel:
                 isinstance(value, numbers.Real) and 0.0 <= float(value) <= most
             ):
                 raise ValueError(f"{name}: {value!r} is not a {kind}")
-        if not isinstance(self.seed, numbers.Integral) or self.seed < 0:
-            raise ValueError(f"seed: {self.seed!r} is not an integer from 0 on")
+        check_seed(self.seed)
 
     @property
     def is_random(self) -> bool:

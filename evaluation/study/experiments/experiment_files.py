@@ -161,8 +161,7 @@ def _checked(
     """
     place: Path | str = path
     if overrides:
-        file_alone = {**values}
-        file_alone.pop("causes", None)
+        file_alone = _without_causes(values)
         with contextlib.suppress(InputError):
             validated(Experiment, file_alone, path)
             # A fault that is still found is in what replaces its fields.
@@ -181,7 +180,7 @@ def _checked(
         if only is not None:
             experiment = _with_causes(experiment, only)
         known = _Measured.of(experiment)
-    written = {name: one for name, one in written.items() if name != "causes"}
+    written = _without_causes(written)
     if values != written or only is not None:
         # What an option has left out is still known.
         with contextlib.suppress(InputError, ValueError):
@@ -190,6 +189,10 @@ def _checked(
             )
     _check_charts(experiment, known, path)
     return experiment
+
+
+def _without_causes(values: Changes) -> dict[str, Any]:
+    return {name: one for name, one in values.items() if name != "causes"}
 
 
 def _with_causes(experiment: Experiment, asked: Any) -> Experiment:
