@@ -148,3 +148,10 @@ def test_a_note_says_when_frames_would_explain_change():
     # Below the limit, nothing is said.
     same = replace(found, symmetric=change.symmetric - 0.0199)
     assert replace(report, registered=same).note is None
+    # Nor if nothing can be compared.
+    no_points = [
+        np.zeros(len(one.voxels.merged().centroids_W), bool) for one in (a, b)
+    ]
+    report = replace(report, change=change.restricted(*no_points))
+    assert np.isnan(report.change.symmetric)
+    assert report.note is None
