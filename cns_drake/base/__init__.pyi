@@ -41,6 +41,7 @@ from .errors import describe_validation_error as describe_validation_error
 from .errors import did_you_mean as did_you_mean
 from .errors import errors_at as errors_at
 from .errors import errors_at_option as errors_at_option
+from .errors import no_such as no_such
 from .errors import one_line as one_line
 from .errors import validated as validated
 from .errors import value_errors as value_errors

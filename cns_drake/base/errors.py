@@ -9,7 +9,13 @@ import typing
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import (
+        Collection,
+        Iterable,
+        Iterator,
+        Mapping,
+        Sequence,
+    )
 
     from pydantic import BaseModel, ValidationError
 
@@ -215,6 +221,20 @@ def _advice(fault: Mapping[str, Any], model: type[BaseModel] | None) -> str:
     if fault["type"] == "string_type" and is_number and place:
         return f'; quote it: {place[-1]}: "{given}"'
     return ""
+
+
+def no_such(noun: str, given: object, names: Collection[str]) -> str:
+    """Returns the fault of an unknown name: "no <noun> <given> (there are: …)".
+
+    Args:
+        noun: what the names are of, such as "method".
+        given: the unknown name.
+        names: the known names. A similar one is suggested.
+    """
+    there = ", ".join(names) or "none"
+    return (
+        f"no {noun} {given!r} (there are: {there}){did_you_mean(given, names)}"
+    )
 
 
 def did_you_mean(given: object, names: Iterable[str]) -> str:

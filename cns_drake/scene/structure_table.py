@@ -10,7 +10,13 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 
-from cns_drake.base import InputError, read_records, to_number, whole_number
+from cns_drake.base import (
+    InputError,
+    no_such,
+    read_records,
+    to_number,
+    whole_number,
+)
 from cns_drake.scene.labels import MAX_INSTANCE, Labels, check_count
 from cns_drake.scene.materials import MATERIALS, USUAL_MATERIALS, Material
 from cns_drake.scene.semantics import CLASS_IDS, moving_id
@@ -164,10 +170,8 @@ def load_structure_table(path: Path) -> StructureTable:
                 f"1 to {MAX_INSTANCE}"
             )
         if semantic_class not in CLASS_IDS:
-            raise InputError(
-                f"{where}: class: '{semantic_class}' is none of "
-                f"{', '.join(CLASS_IDS)}"
-            )
+            fault = no_such("class", semantic_class, CLASS_IDS)
+            raise InputError(f"{where}: class: {fault}")
         if not name or name in entries:
             raise InputError(f"{where}: name: '{name}' is not a new name")
         instances.add(instance)
@@ -258,9 +262,7 @@ def read_materials(text: str) -> dict[str, str]:
         name, _, material = word.rpartition("=")
         part = unquote(name)
         if material not in MATERIALS:
-            raise ValueError(
-                f"{material!r} is none of {', '.join(sorted(MATERIALS))}"
-            )
+            raise ValueError(no_such("material", material, sorted(MATERIALS)))
         if part in found:
             raise ValueError(f"{word!r}: a second material")
         found[part] = material

@@ -20,7 +20,7 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base import InputError, InputModel, read_yaml, validated
+from cns_drake.base import InputError, InputModel, no_such, read_yaml, validated
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -592,9 +592,8 @@ def make_sheet(values: object, source: object) -> LidarSheet:
     pattern = values.get("pattern", "spinning")
     kind = _KINDS.get(pattern) if isinstance(pattern, str) else None
     if kind is None:
-        raise InputError(
-            f"{source}: pattern: {pattern!r} is none of {', '.join(_KINDS)}"
-        )
+        fault = no_such("kind", pattern, _KINDS)
+        raise InputError(f"{source}: pattern: {fault}")
     return validated(kind, values, source)
 
 

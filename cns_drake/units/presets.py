@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cns_drake.base import did_you_mean
+from cns_drake.base import no_such
 
 if TYPE_CHECKING:
     from cns_drake.units.data_sheet import LidarSheet
@@ -59,10 +59,7 @@ def check_preset(name: str) -> None:
         ValueError: there is no such preset; the message lists all presets.
     """
     if name not in LIDAR_PRESETS:
-        raise ValueError(
-            f"unknown preset '{name}'; known: {', '.join(LIDAR_PRESETS)}"
-            f"{did_you_mean(name, LIDAR_PRESETS)}"
-        )
+        raise ValueError(no_such("preset", name, LIDAR_PRESETS))
 
 
 def check_one_unit(preset: object, unit: object) -> None:

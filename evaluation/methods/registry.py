@@ -15,9 +15,9 @@ from cns_drake.base import (
     Family,
     InputError,
     describe_validation_error,
-    did_you_mean,
     errors_at,
     import_modules,
+    no_such,
 )
 from evaluation.methods.method import Method, check_class
 from evaluation.methods.own_files import users_code
@@ -105,11 +105,7 @@ def find_method(name: str) -> type[Method]:
     """
     if name in METHODS:
         return METHODS[name]
-    known = known_methods()
-    raise InputError(
-        f"name: no method {name!r} (known: {', '.join(known)})"
-        f"{did_you_mean(name, known)}"
-    )
+    raise InputError(f"name: {no_such('method', name, known_methods())}")
 
 
 def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
@@ -127,11 +123,8 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
     method = find_method(name)
     for key in parameters:
         if key not in method.Config.model_fields:
-            fields = list(method.Config.model_fields)
-            raise InputError(
-                f"{name}: no parameter {key!r} (known: {', '.join(fields)})"
-                f"{did_you_mean(key, fields)}"
-            )
+            fault = no_such("parameter", key, method.Config.model_fields)
+            raise InputError(f"{name}: {fault}")
     naming = (
         users_code(method._file) if method._file else contextlib.nullcontext()
     )

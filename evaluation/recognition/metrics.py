@@ -18,7 +18,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from cns_drake.base import Family, InputError, did_you_mean, errors_at
+from cns_drake.base import Family, InputError, errors_at, no_such
 from evaluation.methods import as_users_code, run_module
 from evaluation.recognition.precision_recall import (
     WeightedMetrics,
@@ -913,10 +913,7 @@ def choose_metrics(names: Iterable[str]) -> list[Metric]:
         elif name in METRICS:
             found.append(METRICS[name])
         else:
-            raise InputError(
-                f"no metric {name!r} (there are: {', '.join(METRICS)})"
-                f"{did_you_mean(name, METRICS)}"
-            )
+            raise InputError(no_such("metric", name, METRICS))
     return found
 
 

@@ -23,6 +23,7 @@ from cns_drake.base import (
     check_separator,
     csv_text,
     errors_at,
+    no_such,
     read_bytes,
     repeated,
     unquoted_cell,
@@ -595,11 +596,10 @@ class TableLine:
         values["factors"] = {n: v for n, v in known.items() if v is not None}
         if not values["method"] and values["task"] not in _OF_DRIVES:
             raise self.fault("method", "empty")
-        names = (*PROTOCOL_NAMES, "")
-        if values["protocol"] not in names:
+        if values["protocol"] not in (*PROTOCOL_NAMES, ""):
             raise self.fault(
                 "protocol",
-                f"{values['protocol']!r} is none of {', '.join(names[:-1])}",
+                no_such("protocol", values["protocol"], PROTOCOL_NAMES),
             )
         return values
 

@@ -12,7 +12,7 @@ import zlib
 
 import numpy as np
 
-from cns_drake.base import InputError, doing, json_values, value_errors
+from cns_drake.base import InputError, doing, json_values, no_such, value_errors
 from evaluation.recognition import (
     LEAST_CITIES,
     METRICS,
@@ -354,8 +354,8 @@ def compare_tables(
             the answers beside it, or the tables have no condition in common.
     """
     if protocol not in (None, *PROTOCOL_NAMES):
-        names = ", ".join(PROTOCOL_NAMES)
-        raise InputError(f"--protocol: {protocol!r} is none of {names}")
+        fault = no_such("protocol", protocol, PROTOCOL_NAMES)
+        raise InputError(f"--protocol: {fault}")
     notes: list[str] = []
     if metric.endswith(".py"):
         metric = _only_metric(Path(metric)).name

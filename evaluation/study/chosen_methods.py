@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 
-from cns_drake.base import InputError, did_you_mean, repeated
+from cns_drake.base import InputError, did_you_mean, no_such, repeated
 from evaluation.methods import (
     Method,
     MethodConfig,
@@ -180,10 +180,7 @@ def method_settings(
                 raise InputError(f"--set: {text!r} is not {_FORM}")
             method = names[0]
         if method not in found:
-            raise InputError(
-                f"--set: no method {method!r} (known: {', '.join(found)})"
-                f"{did_you_mean(method, found)}"
-            )
+            raise InputError(f"--set: {no_such('method', method, found)}")
         found[method][name] = value
     return found
 

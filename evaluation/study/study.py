@@ -10,10 +10,10 @@ from cns_drake.base import (
     InputError,
     Job,
     Space,
-    did_you_mean,
     doing,
     errors_at,
     forecast,
+    no_such,
     run_jobs,
 )
 from evaluation.methods import known_methods, optional_methods
@@ -125,8 +125,7 @@ class Study:
         for name, settings in self._wanted_tasks().items():
             if name not in known:
                 raise InputError(
-                    f"{self.source}: tasks: no task {name!r} (there are:"
-                    f" {', '.join(known)}){did_you_mean(name, known)}"
+                    f"{self.source}: tasks: {no_such('task', name, known)}"
                 )
             self.tasks[name] = known[name](settings, self.source)
         if methods is not None:
@@ -452,10 +451,7 @@ def _chosen_methods(
             path = Path(name).absolute()
             name = next(n for n, one in known.items() if one.file == path)
         if name not in known:
-            raise InputError(
-                f"no method {name!r} (known: {', '.join(known)})"
-                f"{did_you_mean(name, known)}"
-            )
+            raise InputError(no_such("method", name, known))
         choice = replace(known[name], settings=settings)
         choice.make()  # A wrong setting is found before anything slow.
         columns = {

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import InputError, Reporter, json_values, one_line
+from cns_drake.base import InputError, Reporter, json_values, no_such, one_line
 from evaluation.map_update import BASELINES, PairLabels, read_pair
 from evaluation.recognition import numbers_of
 from evaluation.results import QueryRows, Results
@@ -60,9 +60,8 @@ def update_map(
         print(update_map("maps", baseline="distance").metrics["miou"])
     """
     if baseline not in BASELINES:
-        raise InputError(
-            f"baseline: {baseline!r} is none of {', '.join(BASELINES)}"
-        )
+        fault = no_such("baseline", baseline, BASELINES)
+        raise InputError(f"baseline: {fault}")
     folder = Path(folder)
     sessions = read_pair(folder)
     method = baseline if labels is None else GIVEN

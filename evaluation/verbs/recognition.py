@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
@@ -11,13 +11,7 @@ from typing import Any, get_args
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from cns_drake.base import (
-    InputError,
-    check_regular,
-    did_you_mean,
-    json_values,
-    note,
-)
+from cns_drake.base import InputError, check_regular, json_values, no_such, note
 from cns_drake.drives import Drive
 from evaluation.alignment import When, open_in_one_world
 from evaluation.drives import NOT_FINITE, CountedDrive, Reading
@@ -172,7 +166,9 @@ def recognise(
         print(found.metrics["auc"], found.intervals["auc"])
     """
     protocol = replace(_protocol(protocol), **fields)
-    _check_known("mode", mode, get_args(Mode))
+    if mode not in get_args(Mode):
+        raise InputError(f"mode: {no_such('mode', mode, get_args(Mode))}")
+
     if exact_overlaps is not None:
         if protocol.overlap is None:
             raise InputError("--exact-overlaps: add --truth overlap:PART")
@@ -263,16 +259,10 @@ def recognise(
 def _protocol(protocol: RetrievalProtocol | str) -> RetrievalProtocol:
     if isinstance(protocol, RetrievalProtocol):
         return protocol
-    _check_known("protocol", protocol, PROTOCOLS)
+    if protocol not in PROTOCOLS:
+        fault = no_such("protocol", protocol, PROTOCOLS)
+        raise InputError(f"protocol: {fault}")
     return PROTOCOLS[protocol]
-
-
-def _check_known(argument: str, value: object, known: Collection[str]) -> None:
-    if value not in known:
-        raise InputError(
-            f"{argument}: {value!r} is none of {', '.join(known)}"
-            f"{did_you_mean(value, known)}"
-        )
 
 
 def _choice(

@@ -11,8 +11,8 @@ import typer
 from cns_drake.base import (
     InputError,
     commands,
-    did_you_mean,
     ended_by_interrupts,
+    no_such,
     note,
     shared_options,
     terminal,
@@ -137,10 +137,7 @@ def _check_format(layout: str) -> None:
             f" {_MOVED[layout]}"
         )
     if layout not in _FORMATS:
-        raise InputError(
-            f"--format: no format {layout!r} (known: {', '.join(_FORMATS)})"
-            f"{did_you_mean(layout, _FORMATS)}"
-        )
+        raise InputError(f"--format: {no_such('format', layout, _FORMATS)}")
 
 
 def _check_options(names: Iterable[str], layout: str) -> None:

@@ -14,6 +14,7 @@ from cns_drake.base import (
     Section,
     did_you_mean,
     errors_at,
+    no_such,
     poses,
     read_records,
     validated,
@@ -126,7 +127,7 @@ def checked_maintainer(value: Any, num_drives: int, where: str) -> str:
     """
     known = (NOT_MAINTAINED, *MAINTAINERS)
     if value not in known:
-        raise InputError(f"{where}: {value!r} is none of {', '.join(known)}")
+        raise InputError(f"{where}: {no_such('maintainer', value, known)}")
     if value != NOT_MAINTAINED and num_drives == 1:
         raise InputError(
             f"{where}: {value}: no later drive updates the map of a single"

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cns_drake.base import InputError, did_you_mean, figure_style
+from cns_drake.base import InputError, figure_style, no_such
 from evaluation.recognition import METRICS, metric_named
 from evaluation.results.charts.chart import ROW, WIDE, Chart, PrintStyle
 from evaluation.results.charts.curves import draw_curves
@@ -266,10 +266,8 @@ def check_factors(
     """
     for name in names:
         if name not in factors:
-            there = ", ".join(factors) or "none"
             raise InputError(
-                f"charts: {chart['kind']}: no factor {name!r} (there are:"
-                f" {there}){did_you_mean(name, factors)}"
+                f"charts: {chart['kind']}: {no_such('factor', name, factors)}"
             )
 
 
@@ -284,9 +282,8 @@ def check_chart(chart: Mapping[str, Any]) -> dict[str, str]:
     """
     kind = chart.get("kind")
     if not isinstance(kind, str) or kind not in _KINDS:
-        raise InputError(
-            f"charts: kind: {kind!r} is none of {', '.join(_KINDS)}"
-        )
+        fault = no_such("kind", kind, _KINDS)
+        raise InputError(f"charts: kind: {fault}")
     _, needed, optional = _KINDS[kind]
     keys = {n: chart[n] for n in (*needed, *optional) if n in chart}
     for name in (*needed, *keys):

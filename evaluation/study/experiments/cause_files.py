@@ -23,6 +23,7 @@ from cns_drake.base import (
     Section,
     did_you_mean,
     merged,
+    no_such,
     read_yaml,
     validated,
     value_errors,
@@ -178,11 +179,8 @@ def with_cases(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
     chosen = {key: one for key, one in known.items() if name in one.strengths}
     if not chosen:
         strengths = {key for one in known.values() for key in one.strengths}
-        raise InputError(
-            f"{path}: causes.{form}: no strengths {name!r} (known:"
-            f" {', '.join(sorted(strengths))})"
-            f"{did_you_mean(str(name), strengths)}"
-        )
+        fault = no_such("strengths", name, sorted(strengths))
+        raise InputError(f"{path}: causes.{form}: {fault}")
     combined = [one.name for one in chosen.values() if one.combined]
     cases: dict[str, Any]
     if form == "each":

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_type_hints
 
 from pydantic import ConfigDict, create_model
 
-from cns_drake.base import InputError, merged, nested, validated
+from cns_drake.base import InputError, merged, nested, no_such, validated
 from evaluation.recognition import (
     PROTOCOLS,
     ProtocolFieldError,
@@ -381,10 +381,8 @@ def protocol_from_fields(
     values = dict(fields)
     base = values.pop("base", "random-yaw")
     if not isinstance(base, str) or base not in PROTOCOLS:
-        raise InputError(
-            f"{source}: {place}.base: {base!r} is none of"
-            f" {', '.join(PROTOCOLS)}"
-        )
+        fault = no_such("protocol", base, PROTOCOLS)
+        raise InputError(f"{source}: {place}.base: {fault}")
     validated(_ProtocolFields, values, f"{source}: {place}")
     try:
         return replace(PROTOCOLS[base], **values)

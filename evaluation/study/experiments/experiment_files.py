@@ -16,6 +16,7 @@ from cns_drake.base import (
     errors_at,
     merged,
     nested,
+    no_such,
     parse_changes,
     read_yaml,
     validated,
@@ -214,10 +215,7 @@ def _with_causes(experiment: Experiment, asked: Any) -> Experiment:
     known = [name for name in experiment.cases if name != ALL]
     for name in names:
         if name not in known:
-            raise ValueError(
-                f"causes.only: no case {name!r}; known: {', '.join(known)}"
-                f"{did_you_mean(name, known)}"
-            )
+            raise ValueError(f"causes.only: {no_such('case', name, known)}")
     cases = {name: experiment.cases[name] for name in known if name in names}
     combined = experiment.cases.get(ALL, ())
     together = tuple(name for name in combined if name in names)

@@ -5,9 +5,9 @@ from typing import Any
 
 from cns_drake.base import (
     InputError,
-    did_you_mean,
     fingerprint,
     natural_key,
+    no_such,
     repeated,
 )
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
@@ -157,10 +157,8 @@ def _chosen_recordings(
     placed = query.source()
     for name in names:
         if name not in known:
-            raise InputError(
-                f"{where}: {city.name} has no recording {name!r} (there are:"
-                f" {', '.join(sorted(known))}){did_you_mean(name, known)}"
-            )
+            fault = no_such("recording", name, sorted(known))
+            raise InputError(f"{where}: {city.name}: {fault}")
         if name == query.name:
             raise InputError(f"{where}: {name}: this drive is the query")
         recording = known[name].source()

@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from cns_drake.base import InputError, Reporter
+from cns_drake.base import InputError, Reporter, no_such
 from evaluation.map_update import (
     BASELINES,
     Label,
@@ -68,9 +68,7 @@ class MapTask(Task):
         known = (TRUTH, *BASELINES)
         for one in value:
             if one not in known:
-                raise InputError(
-                    f"{where}: {one!r} is none of {', '.join(known)}"
-                )
+                raise InputError(f"{where}: {no_such('method', one, known)}")
 
     def numbers(
         self, found: Mapping[str, MapScores], before: Any | None

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from cns_drake.base import InputError, did_you_mean, repeated
+from cns_drake.base import InputError, no_such, repeated
 from evaluation.recognition import Number, numbers_of
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import Pair, Result
@@ -52,11 +52,8 @@ class Task(abc.ABC):
         for name, value in settings.items():
             where = f"{source}: tasks.{self.name}.{name}"
             if name not in self.defaults:
-                known = ", ".join(self.defaults) or "none"
-                raise InputError(
-                    f"{where}: no such setting (there are: {known})"
-                    f"{did_you_mean(name, self.defaults)}"
-                )
+                fault = no_such("setting", name, self.defaults)
+                raise InputError(f"{where}: {fault}")
             if name == "methods":
                 value = self.settings[name] = _method_names(value, where)
             self.check(name, value, where)

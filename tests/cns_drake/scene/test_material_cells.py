@@ -47,8 +47,8 @@ def test_a_cell_is_written_as_it_was_read(cell):
 @pytest.mark.parametrize(
     ("cell", "fault"),
     [
-        ("gold", "'gold' is none of asphalt,"),
-        ("wall=", "'' is none of"),
+        ("gold", r"no material 'gold' \(there are: asphalt,"),
+        ("wall=", "no material '' .there are"),
         ("wall=brick wall=glass", "'wall=glass': a second material"),
         ("brick plaster", "'plaster': a second material"),
     ],

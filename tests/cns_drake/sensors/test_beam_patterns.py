@@ -90,7 +90,7 @@ def test_elevations_of_data_sheets(preset, top, bottom, finest):
 
 
 def test_no_preset_of_that_name():
-    with pytest.raises(ValueError, match="unknown preset 'os1-65'"):
+    with pytest.raises(ValueError, match="no preset 'os1-65'"):
         make_beam_pattern("os1-65")
     with pytest.raises(ValueError, match="'rosette' has none"):
         make_beam_pattern("avia", num_columns=100)

@@ -365,7 +365,7 @@ def test_buses_by_name():
 @pytest.mark.parametrize(
     ("change", "fault"),
     [
-        ({"preset": "vlp16"}, "roof: preset: unknown preset 'vlp16'"),
+        ({"preset": "vlp16"}, "roof: preset: no preset 'vlp16'"),
         ({"rate": 0}, "roof: rate: 0.0 is not .*, at least 0.25 and"),
         ({"rate": 0.001}, "roof: rate: 0.001 is not .*, at least 0.25 and"),
         ({"rate": -7}, "roof: rate: "),

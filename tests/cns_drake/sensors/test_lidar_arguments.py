@@ -74,7 +74,7 @@ class Site:
             "X_PB: not finite",
         ),
         ({"pattern": 16}, TypeError, "pattern: 16 is neither a BeamPattern"),
-        ({"pattern": "vlp-61"}, ValueError, "unknown preset 'vlp-61'"),
+        ({"pattern": "vlp-61"}, ValueError, "no preset 'vlp-61'"),
         (
             {"range_noise": -0.1},
             ValueError,

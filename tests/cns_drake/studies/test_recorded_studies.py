@@ -251,7 +251,7 @@ def test_several_recordings_are_a_database(folder, tmp_path):
     ("sessions", "fault"),
     [
         (["metropolis_01", "metropolis_01"], "metropolis_01: the same drive"),
-        (["metropolis_4"], "metropolis has no recording 'metropolis_4'"),
+        (["metropolis_4"], "metropolis: no recording 'metropolis_4'"),
         (["metropolis_04"], "metropolis_04: this drive is the query"),
         ([[]], "a list without a value"),
         ([{"years": 3}], "not a list of names of recordings"),

@@ -425,7 +425,7 @@ def test_an_own_method(town, tmp_path, jobs_done, own_methods):
     ("fields", "fault"),
     [
         ({"tasks": ["dance"]}, "tasks: no task 'dance' .*place, pose"),
-        ({"tasks": {"place": {"x": 1}}}, "tasks.place.x: no such setting"),
+        ({"tasks": {"place": {"x": 1}}}, "tasks.place.x: no setting 'x'"),
         ({"tasks": {"change": {"spacing": 0}}}, "tasks.change.spacing: 0 is"),
         (
             {"tasks": {"change": {"spacing": [1, 2]}}},
@@ -433,7 +433,7 @@ def test_an_own_method(town, tmp_path, jobs_done, own_methods):
         ),
         (
             {"tasks": {"map": {"methods": "guess"}}},
-            "tasks.map.methods: 'guess'",
+            "tasks.map.methods: no method 'guess'",
         ),
         ({"tasks": {"map": {"methods": []}}}, r"tasks.map.methods: \[\] is no"),
         ({"tasks": {"map": {"spacing": True}}}, "tasks.map.spacing: True is"),
@@ -455,7 +455,7 @@ def test_an_own_method(town, tmp_path, jobs_done, own_methods):
             {"tasks": {"localise": {"starts": [[1, 5], [1, 9]]}}},
             "tasks.localise.starts: two starts at one distance",
         ),
-        ({"methods": ["bow"]}, "methods: no method 'bow' .known: btc"),
+        ({"methods": ["bow"]}, "methods: no method 'bow' .there are: btc"),
         ({"methods": ["bevplace"]}, "methods: bevplace: weights: Field"),
         ({"methods": ["none.py"]}, "methods: .*none.py: no such file"),
         ({"methods": {"solid": {"x": 1}}}, "methods: solid: no parameter 'x'"),
@@ -463,9 +463,9 @@ def test_an_own_method(town, tmp_path, jobs_done, own_methods):
             {"methods": {"solid": {"ranges": [20, "far"]}}},
             "methods: solid: ranges: ",
         ),
-        ({"protocol": {"base": "best"}}, "protocol.base: 'best' is none of"),
+        ({"protocol": {"base": "best"}}, "protocol.base: no protocol 'best'"),
         ({"frozen": "no.csv"}, "frozen: .*no.csv: No such file"),
-        ({"charts": [{"kind": "pie"}]}, "charts: kind: 'pie' is none of"),
+        ({"charts": [{"kind": "pie"}]}, "charts: kind: no kind 'pie'"),
         ({"charts": [{"kind": "matrix"}]}, "charts: matrix: .*a name is"),
         (
             {"charts": [{"kind": "lines", "over": "map", "metric": "acu"}]},

@@ -263,7 +263,7 @@ FAULTS = [
     ("database: {viewpoint: [1]}", r"database.viewpoint: \[1\] is neither"),
     ("database: {viewpoint: [101, 0]}", r"database.viewpoint: \[101, 0\] is"),
     ("database: {viewpoint: [0, 361]}", r"database.viewpoint: \[0, 361\] is"),
-    ("query: {lidar: sonar}", "query.lidar: .*unknown preset 'sonar'"),
+    ("query: {lidar: sonar}", "query.lidar: .*no preset 'sonar'"),
     ("query: {lidar: {unit: {ranges: [1, 9]}}}", "query.lidar: .*in lidars"),
     ("query: {returns: shiny}", "query.returns: 'shiny' is neither ideal nor"),
     (
@@ -284,7 +284,10 @@ FAULTS = [
     ("query: {turn_queries: 1}", "query: turn_queries: "),
     ("database: {missing: 1.1}", "database: missing: "),
     ("database: {missing: much}", "database: missing: "),
-    ("protocol: quick", "protocol.base: 'quick' is none of random-yaw, paper"),
+    (
+        "protocol: quick",
+        "protocol.base: no protocol 'quick' .*random-yaw, paper",
+    ),
     ("protocol: {radius: -1}", "protocol.radius: -1 is not positive"),
     ("protocol: {radius: true}", "protocol: radius: "),
     ("protocol: {radius: [5, far]}", "protocol: radius: "),
@@ -355,7 +358,7 @@ SESSION_FAULTS = [
     ({"keep": "newest"}, r"database\.keep: 'newest' is neither"),
     (
         {"sessions": [{}, {"years": 2}], "maintain": "magic"},
-        r"database\.maintain: 'magic' is none of none, free-space, distance",
+        r"database\.maintain: no maintainer 'magic' .*none, free-space",
     ),
     (
         {"sessions": [{"years": 2}], "maintain": "truth"},

@@ -80,7 +80,7 @@ FAULTS = [
     ({"colums": 3}, "colums: Extra .* did you mean columns"),
     ({"source": ""}, "source: "),
     ({"source": 3}, "source: "),
-    ({"pattern": "laser"}, "pattern: 'laser' is none of spinning, rosette"),
+    ({"pattern": "laser"}, "pattern: no kind 'laser' .*spinning, rosette"),
     ({"pattern": ["spinning"]}, "pattern: "),
     ({"returns": 3}, "returns: "),
     ({"returns": {"rows": []}}, "returns.rows: "),

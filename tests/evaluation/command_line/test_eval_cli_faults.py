@@ -15,7 +15,7 @@ def test_bad_usage(capsys, towns):
     assert_refused(capsys, ["tcr", town, town, "--colour"], "--colour")
     assert_refused(capsys, ["pr", town, town], "Missing option '--method'")
     pr = ["pr", town, town, "--method"]
-    fault = "--method: no method 'bow' (known: "
+    fault = "--method: no method 'bow' (there are: "
     assert_refused(capsys, [*pr, "bow"], fault, "scan-context++")
     pr.append("scan-context++")
     assert_refused(capsys, [*pr, "--mode", "some"], ": 'some' is not")
@@ -34,7 +34,7 @@ def test_bad_settings(capsys, towns, tmp_path):
     for text, fault in (
         ("rings=3", "'rings=3' is not METHOD.NAME=VALUE"),
         ("solid.rings", "'solid.rings' is not METHOD.NAME=VALUE"),
-        ("bow.rings=3", "no method 'bow' (known: btc, "),
+        ("bow.rings=3", "no method 'bow' (there are: btc, "),
         ("solid.x=1", "solid: no parameter 'x'"),
         ("solid.sensor_height=high", "solid: sensor_height"),
     ):

@@ -198,7 +198,9 @@ def test_candidates_are_counted_in_places():
 def test_parameters():
     assert NAME in known_methods()
     assert make_method(NAME, {"candidates": "7"}).config.candidates == 7
-    with pytest.raises(InputError, match=r"no method 'x' \(known: .*scan-con"):
+    with pytest.raises(
+        InputError, match=r"no method 'x' \(there are: .*scan-con"
+    ):
         make_method("x", {})
     with pytest.raises(InputError, match=r"no parameter 'x'.*variant"):
         make_method(NAME, {"x": 1})

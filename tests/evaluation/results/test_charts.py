@@ -452,8 +452,8 @@ def test_the_task_is_place_or_the_first_with_the_metric(tasks, share):
 @pytest.mark.parametrize(
     ("chart", "words"),
     [
-        ({"kind": "pie"}, "kind: 'pie' is none of curves, dumbbell"),
-        ({"metric": "auc"}, "kind: None"),
+        ({"kind": "pie"}, "charts: kind: no kind 'pie' (there are: curves"),
+        ({"metric": "auc"}, "kind: no kind None"),
         ({"kind": "lines", "metric": "auc"}, "lines: over: a name"),
         ({"kind": "lines", "over": 3, "metric": "auc"}, "lines: over"),
         (

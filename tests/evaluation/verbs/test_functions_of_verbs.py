@@ -104,9 +104,9 @@ def test_a_path_and_an_object_give_the_same(towns, tmp_path):
 
 
 def test_what_cannot_be_recognised(towns):
-    with pytest.raises(InputError, match="protocol: 'fair' is none of"):
+    with pytest.raises(InputError, match="protocol: no protocol 'fair'"):
         recognise(*both(towns), "solid", protocol="fair")
-    with pytest.raises(InputError, match=r"mode: 'Filtered' is none .*mean f"):
+    with pytest.raises(InputError, match=r"mode: no mode 'Filtered' .*mean f"):
         recognise(*both(towns), "solid", mode="Filtered")
     with pytest.raises(InputError, match="yes is neither True nor False"):
         recognise(*both(towns), "solid", verified="yes")
@@ -213,5 +213,5 @@ def test_a_map_update_is_what_the_command_prints(capsys, tmp_path):
     values, lines = printed(capsys, *words)
     found = update_map(tmp_path, baseline="distance")
     check_printed(found, values, lines, "map")
-    with pytest.raises(InputError, match="'near' is none of free-space"):
+    with pytest.raises(InputError, match="no baseline 'near'"):
         update_map(tmp_path, baseline="near")

@@ -25,7 +25,7 @@ def test_shipped_causes_can_be_used():
         ({"transient": {"snwo": [0.1]}}, "transient.snwo: "),
         ({"transient": {"snow": [0.1, -1.0]}}, "transient.snow: "),
         ({"wheatherr": {"rain": [1]}}, "wheatherr: "),
-        ({"lidar": ["cns", "vlp-99"]}, "lidar: unknown preset 'vlp-99'"),
+        ({"lidar": ["cns", "vlp-99"]}, "lidar: no preset 'vlp-99'"),
         ({"hide_sector": [1000]}, "hide_sector: 1000 is not from 0"),
         ({"distractors": [3]}, "distractors: it is a field of database"),
     ],
