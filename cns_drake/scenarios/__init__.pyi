@@ -5,6 +5,7 @@ from .drive_table import write_table as write_table
 from .planning import DrivePlan as DrivePlan
 from .planning import count_frames as count_frames
 from .planning import ground_notes as ground_notes
+from .planning import load_scenario_world as load_scenario_world
 from .planning import plan_drive as plan_drive
 from .provenance import INPUTS_KEY as INPUTS_KEY
 from .provenance import SIMULATION_VERSION as SIMULATION_VERSION

@@ -202,17 +202,10 @@ def _measured_row(
 
 def _stage_size(scenario: Scenario) -> tuple[int, int]:
     """Returns the numbers of structures and triangles of a stage."""
-    from cns_drake.scene import (
-        TriangleSurface,
-        load_world,
-        read_perception_geometry,
-    )
+    from cns_drake.scenarios.planning import load_scenario_world
+    from cns_drake.scene import TriangleSurface, read_perception_geometry
 
-    world = load_world(
-        scenario.world_file,
-        without=scenario.without,
-        model_paths=scenario.model_paths,
-    )
+    world = load_scenario_world(scenario)
     geometries = read_perception_geometry(world.scene_graph.model_inspector())
     return len({geometry.structure for geometry in geometries}), sum(
         len(geometry.surface.triangles)

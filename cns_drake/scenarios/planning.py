@@ -1,8 +1,10 @@
 """Plans the drive of a scenario."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 import math
+from pathlib import Path
 
 import numpy as np
 from pydrake.geometry import FrameId
@@ -36,7 +38,12 @@ from cns_drake.roads import (
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
-from cns_drake.scene import load_world, read_perception_geometry
+from cns_drake.scene import (
+    InSight,
+    World,
+    load_world,
+    read_perception_geometry,
+)
 
 # Heights above the path at which rays look for obstacles, from below the top of
 # a kerb up to the car's roof [m].
@@ -371,18 +378,41 @@ def _usable_levels(scene: RayCastingScene, xy: np.ndarray) -> list[list[float]]:
     return usable
 
 
+def load_scenario_world(
+    scenario: Scenario,
+    without: Collection[str] = (),
+    vehicle: Path | None = None,
+    in_sight: InSight | None = None,
+) -> World:
+    """Loads the world of a scenario's stage, without its temporary changes.
+
+    Args:
+        scenario: the scenario.
+        without: names of structures that are left out, besides those of the
+            scenario.
+        vehicle: see `cns_drake.scene.load_world`.
+        in_sight: see `cns_drake.scene.load_world`.
+
+    Raises:
+        InputError: the world cannot be loaded.
+    """
+    with errors_at_option(f"{scenario.source}: without", "without"):
+        return load_world(
+            scenario.world_file,
+            vehicle=vehicle,
+            without=(*scenario.without, *without),
+            model_paths=scenario.model_paths,
+            in_sight=in_sight,
+        )
+
+
 def _scene_of(scenario: Scenario) -> RayCastingScene:
     """Returns the geometry of a scenario's world, for rays.
 
     Raises:
         InputError: the world cannot be loaded.
     """
-    with errors_at_option(f"{scenario.source}: without", "without"):
-        world = load_world(
-            scenario.world_file,
-            without=scenario.without,
-            model_paths=scenario.model_paths,
-        )
+    world = load_scenario_world(scenario)
     context = world.plant.CreateDefaultContext()
     inspector = world.scene_graph.model_inspector()
     bodies = {

@@ -7,14 +7,15 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base import doing, errors_at_option
+from cns_drake.base import doing
 from cns_drake.scenarios import (
     DrivePlan,
     count_frames,
     ground_notes,
+    load_scenario_world,
     vehicle_file,
 )
-from cns_drake.scene import InSight, World, load_world
+from cns_drake.scene import InSight, World
 from cns_drake.sensors import make_lidar_model
 from cns_drake.transient import change_world
 
@@ -83,14 +84,12 @@ def load_stage(
     """
     scenario = plan.scenario
     doing("reading the stage")
-    with errors_at_option(f"{scenario.source}: without", "without"):
-        world = load_world(
-            scenario.world_file,
-            vehicle=vehicle_file() if with_vehicle else None,
-            without=(*scenario.without, *without),
-            model_paths=scenario.model_paths,
-            in_sight=in_sight,
-        )
+    world = load_scenario_world(
+        scenario,
+        without,
+        vehicle=vehicle_file() if with_vehicle else None,
+        in_sight=in_sight,
+    )
     if scenario.world is not None:
         notes = ground_notes(scenario, plan.trajectory)
         world = replace(world, notes=(*world.notes, *notes))

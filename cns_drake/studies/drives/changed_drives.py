@@ -25,10 +25,11 @@ from cns_drake.scenarios import (
     Scenario,
     check_files,
     count_frames,
+    load_scenario_world,
     make_paths_absolute,
     plan_drive,
 )
-from cns_drake.scene import load_world, structures_in
+from cns_drake.scene import structures_in
 from cns_drake.sensors import WeatherConfig
 from cns_drake.simulation import recorded_traffic
 from cns_drake.studies.drives.named_stages import find_stage
@@ -428,12 +429,8 @@ class DriveChanger:
                 count_frames(drive, plan_drive(drive))
         world = drive.world_file, drive.without
         if "without" in given and world not in self._loaded:
-            with errors_at(f"{where}.without", "without: "):
-                load_world(
-                    world[0],
-                    without=drive.without,
-                    model_paths=drive.model_paths,
-                )
+            with errors_at(f"{where}.without", f"{drive.source}: without: "):
+                load_scenario_world(drive)
             self._loaded.add(world)
 
 
@@ -547,11 +544,9 @@ def _structures_of(base: Scenario, stage: str, source: str) -> set[str]:
     Raises:
         InputError: the stage does not exist.
     """
-    scenario = base.replaced(stage=stage)
+    scenario = base.replaced(stage=stage, without=())
     check_files(scenario, source)
-    return structures_in(
-        load_world(scenario.world_file, model_paths=scenario.model_paths)
-    )
+    return structures_in(load_scenario_world(scenario))
 
 
 def _removal_order(

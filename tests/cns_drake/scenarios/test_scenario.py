@@ -126,7 +126,7 @@ def test_returns_and_weather_are_replaced(small_map):
             r"cameras: 'lidar' is the name of another",
         ),
         ({"cameras": {"a": {"width": 1, "height": 480}}}, r"a.width: .*equal"),
-        ({"lidars": {"a": {"preset": "x"}}}, r"lidars.a.preset: unknown"),
+        ({"lidars": {"a": {"preset": "x"}}}, r"lidars.a.preset: no preset"),
         ({"lidars": {"a": {"range_noise": float("nan")}}}, r"a.range_noise: "),
         ({"lidars": {"a": {"returns": "real"}}}, r"a.returns: .*'calibrated'"),
         ({"lidars": {"a": {"echoes": "dual"}}}, r"echoes: only calibrated"),
