@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+import re
 import zlib
 
 import numpy as np
@@ -47,12 +48,13 @@ _REACH = 6.0
 _TIME_TOLERANCE = 2e-3
 # A person this close to a vehicle's front is in the vehicle [m].
 _RIDING = 0.1
-# Part of the name of a type -> kind; the first one that matches applies.
+# End of a word in the name of a type -> kind; the first that matches applies.
 _KINDS_BY_WORD = (
+    ("motorcycle", "motorcycle"),
+    ("motorbike", "motorcycle"),
+    ("moped", "motorcycle"),
     ("bicycle", "bicycle"),
     ("bike", "bicycle"),
-    ("motorcycle", "motorcycle"),
-    ("moped", "motorcycle"),
     ("bus", "bus"),
     ("coach", "bus"),
     ("truck", "box_truck"),
@@ -450,10 +452,11 @@ def _kind_name(vehicle: TracedObject) -> str:
 
     The result is one of `KINDS`.
     """
-    text = vehicle.type_name.lower().replace("default_biketype", "bicycle")
     for word, name in _KINDS_BY_WORD:
-        if word in text:
+        # "vanLarge" and "minivans" are vans; "advanced" is none.
+        if re.search(f"(?i:{word}(type|s)?)(?![a-z])", vehicle.type_name):
             return name
+    text = vehicle.type_name.lower()
     return text if text in {kind.name for kind in KINDS} else ""
 
 

@@ -147,7 +147,7 @@ class KittiDrive(BinDrive):
                 f" {times_path}"
             )
         if poses is not None:
-            trajectory = read_trajectory(poses, stamps_ns)
+            trajectory = read_trajectory(poses, stamps_ns, numbers)
             files, stamps_ns, X_WS, told = posed(files, stamps_ns, trajectory)
             notes += told
             world_frame = f"poses{poses.resolve()}"

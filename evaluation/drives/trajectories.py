@@ -1,5 +1,6 @@
 """Trajectories and poses from tables of text."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -71,7 +72,9 @@ def _turned_poses(
     return _increasing_poses(path, stamps_ns, poses.make_pose(R, values[:, :3]))
 
 
-def read_trajectory(path: Path, stamps_ns: np.ndarray) -> StampedPoses:
+def read_trajectory(
+    path: Path, stamps_ns: np.ndarray, scans: Sequence[int] | None = None
+) -> StampedPoses:
     """Returns the poses of a file in the form of TUM or of KITTI.
 
     Args:
@@ -81,9 +84,12 @@ def read_trajectory(path: Path, stamps_ns: np.ndarray) -> StampedPoses:
             the number of the scan (KITTI-360). Commas may separate columns.
             Rows with NaN are left out, and noted.
         stamps_ns: (N,) stamps of the scans [ns].
+        scans: (N,) numbers of the scans, ascending; by default 0 to N - 1.
+            Rows with other numbers are left out.
 
     Raises:
-        InputError: the file has neither form, or another number of matrices.
+        InputError: the file has neither form, another number of matrices, or no
+            row has the number of a scan.
     """
     separator, columns, is_named = form_of(path)
     if is_named or columns == len(_COLUMNS):
@@ -100,8 +106,13 @@ def read_trajectory(path: Path, stamps_ns: np.ndarray) -> StampedPoses:
         return replace(found, num_unknown=len(rows) - len(known))
     if columns == 13:
         own_ns, values = read_stamped_rows(path, 12, separator)
-        if ((own_ns >= 0) & (own_ns < len(stamps_ns))).all():
-            own_ns = stamps_ns[own_ns]  # Numbers of scans.
+        of_scans = np.arange(len(stamps_ns)) if scans is None else scans
+        if ((own_ns >= 0) & (own_ns <= of_scans[-1])).all():
+            has_scan = np.isin(own_ns, of_scans)
+            if not has_scan.any():
+                raise InputError(f"{path}: no row has the number of a scan")
+            own_ns, values = own_ns[has_scan], values[has_scan]
+            own_ns = stamps_ns[np.searchsorted(of_scans, own_ns)]
         return _increasing_poses(path, own_ns, pose_matrices(path, values))
     if columns != 12:
         raise InputError(

@@ -120,7 +120,10 @@ class Localised:
         """Number of queries; each is where the map is."""
         return len(self)
 
-    num_poses = num_matched
+    @property
+    def num_poses(self) -> int:
+        """Number of queries with a pose."""
+        return len(self) - self.without_pose
 
     def pose_error(self, name: str, part: float) -> float:
         """Returns a quantile of the absolute values of a field.

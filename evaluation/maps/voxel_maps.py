@@ -234,7 +234,12 @@ class VoxelAccumulator:
 def voxelise(
     points: np.ndarray, voxel_size: float = VOXEL_SIZE
 ) -> tuple[VoxelMap, int]:
-    """Returns the voxel map of a cloud (N, 3) in the world frame [m].
+    """Returns the voxel map of a cloud in the world frame.
+
+    Args:
+        points: structured array (N,) with the fields x, y and z [m], as a drive
+            has them; `evaluation.from_xyz` makes one of an array (N, 3).
+        voxel_size: length of a voxel's side [m].
 
     Returns:
         The map, and the number of points left out because they are not finite.

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
+from dataclasses import fields as fields_of
 import inspect
 import math
 from operator import methodcaller
@@ -215,6 +216,8 @@ class Metric:
         every = np.arange(len(outcomes))
         values = [
             self._computed(outcomes.subset(np.repeat(every, n)))
+            if n.any()
+            else math.nan
             for n in weights.astype(np.int64)
         ]
         return np.array(values, dtype=float)  # None becomes NaN.
@@ -452,6 +455,7 @@ _RESAMPLED: dict[str, Any] = {"by_mode": True, "has_interval": True}
 _BY_MODE: dict[str, Any] = {"by_mode": True}
 _POSE: dict[str, Any] = {"tasks": ("pose",), "number": "num_poses"}
 _LOCALISE: dict[str, Any] = {"tasks": ("localise",)}
+_LOCALISED: dict[str, Any] = {"tasks": ("localise",), "number": "num_poses"}
 _MAP: dict[str, Any] = {"tasks": ("map",), "number": "num_changed"}
 _CHANGE: dict[str, Any] = {"tasks": ("change",), "better": ""}
 
@@ -581,7 +585,7 @@ def _of_poses() -> Iterator[Metric]:
             main_in=() if end else ("pose",), **_POSE | {"tasks": both})
         for part, of, over in (
             (90, _POSE, "right answers that F1max counts"),
-            (95, _LOCALISE, "poses"),
+            (95, _LOCALISED, "poses"),
         ):
             yield _amount(
                 f"{kind}_{part}{end}", f"{part} % quantile of the {title}",
@@ -600,7 +604,8 @@ def _of_localisation() -> Iterator[Metric]:
         ):
             yield _amount(
                 f"{column}_median", title, "median over the poses", _NO_POSE,
-                methodcaller("pose_error", column, 0.5), unit="m", **_LOCALISE)
+                methodcaller("pose_error", column, 0.5), unit="m",
+                **_LOCALISED)
     for name, title in (
         ("own_score", "the estimator's score"), ("fit", "the fit"),
         ("residual", "the residual"), ("hessian", "the stated deviation"),
@@ -819,13 +824,17 @@ def register_metric(
         and name.strip() == name != ""
     ):
         raise ValueError(f"{name!r} is no name of a metric")
+    known = {one.name for one in fields_of(Metric)} - {"compute", "file"}
+    for field in fields:
+        if field not in known:
+            raise ValueError(f"{name}: {no_such('field', field, known)}")
     better = fields.get("better", "")
     if better not in ("more", "less", ""):
         raise ValueError(f"{name}: better: {better!r} is no direction")
 
     def enter(compute: Callable[[QueryOutcomes], float]) -> Metric:
         file = Path(inspect.getfile(compute))
-        metric = _metric(
+        metric = Metric(
             name,
             title or name.replace("_", " "),
             unit,

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 import math
 from typing import TYPE_CHECKING, Any
 
-from cns_drake.base import InputError
+from cns_drake.base import InputError, no_such
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,7 +24,6 @@ _POSITIVE = (
     "half_extent",
     "scans_per_place",
     "exclude_recent",
-    "overlap",
 )
 # Number of hexadecimal digits of a protocol's digest.
 _DIGEST_LENGTH = 12
@@ -118,6 +117,12 @@ class RetrievalProtocol:
             value = getattr(self, name)
             self._check(
                 name, value is None or 0.0 < value < math.inf, "not positive"
+            )
+        is_part = self.overlap is None or 0.0 < self.overlap <= 1.0
+        self._check("overlap", is_part, "not above 0 and up to 1")
+        if self.place not in (None, "middle", "first"):
+            raise ProtocolFieldError(
+                "place", no_such("place", self.place, ("middle", "first"))
             )
         if self.scans_per_place == 1:
             # A single scan is the first and the middle one. Protocols that

@@ -371,7 +371,7 @@ def growths(results: Results, over: str, metric: str) -> list[Summary]:
     geometric verification, form a curve of the metric. For each two
     neighbouring points of a curve, the value of a summary is an exponent: 1 if
     the metric grows in proportion to `over` between these points, 2 if the
-    metric grows with the square of `over`.
+    metric grows with the square of `over`. Points with a value of 0 have none.
 
     Args:
         results: the table of results.
@@ -386,7 +386,7 @@ def growths(results: Results, over: str, metric: str) -> list[Summary]:
     for curve in groups.values():
         curve.sort(key=itemgetter(0))
         for (less, before), (at, row) in itertools.pairwise(curve):
-            if 0.0 < less < at:
+            if 0.0 < less < at and before.value > 0.0 < row.value:
                 grown = math.log(row.value / before.value)
                 what = f"exponent of {metric} over {over}, at {at:g}"
                 exponent = grown / math.log(at / less)

@@ -275,6 +275,11 @@ def _choice(
     The height of the sensor is in the digest of the protocol, and no column.
     """
     if isinstance(method, Method):
+        if settings:
+            raise InputError(
+                "settings: this method was made with settings; make it with"
+                f" {', '.join(settings)}, too"
+            )
         changed = method.config.model_dump(exclude_defaults=True)
         given: MethodChoice = _MadeChoice(
             method.name, settings=tuple(changed.items()), made=method

@@ -252,6 +252,8 @@ def write_moves(path, tag, kind, dt, xs):
     [
         ("vehicle", "passenger", 80.0),
         ("vehicle", "DEFAULT_BIKETYPE", 20.0),
+        ("vehicle", "bikeFast", 20.0),
+        ("vehicle", "motorbike", 80.0),
         ("vehicle", "city_bus", 80.0),
         ("person", "DEFAULT_PEDTYPE", 12.0),
     ],

@@ -317,3 +317,20 @@ def test_poses_of_a_file_replace_those_that_are_missing(tmp_path):
     assert drive.stamps_ns.tolist() == [100_000_000, 200_000_000]
     np.testing.assert_allclose(drive.X_WS[:, 0, 3], [1.5, 2.5])
     assert tum in drive.files
+
+
+def test_rows_with_numbers_of_scans_are_poses_of_these_scans(tmp_path):
+    folder = tmp_path / "sequences" / "11"
+    for k in (1, 2, 4, 5):
+        points = make_points(5, seed=k)
+        write_bytes(folder / "velodyne" / f"{k:06d}.bin", xyzi(points))
+    (folder / "times.txt").write_text("0\n0.1\n0.2\n0.3\n0.4\n0.5\n")
+    path = tmp_path / "poses.txt"
+    rows = [f"{k} 1 0 0 {10 * k} 0 1 0 0 0 0 1 0" for k in range(6)]
+    path.write_text("\n".join(row for row in rows if row[0] != "2"))
+    drive = open_drive(folder, poses=path)
+    # Scan 2 is between scans 1 and 4 in time.
+    np.testing.assert_allclose(drive.X_WS[:, 0, 3], [10, 20, 40, 50])
+    path.write_text(rows[3])
+    with pytest.raises(InputError, match=r"poses\.txt: no row has the number"):
+        open_drive(folder, poses=path)

@@ -379,6 +379,9 @@ def test_a_scan_of_few_points_is_a_failure(number, is_sparse):
     assert values["success_03m_1deg"] == (0.5 if is_sparse else 1.0)
     assert values["without_pose"] == int(is_sparse) == len(notes)
     assert values["unmapped_mean"] == 0.0
+    counts = {n.metric: n.n for n in numbers_of("localise", Localised(rows))}
+    assert counts["success_03m_1deg"] == 2
+    assert counts["translation_95"] == counts["up_median"] == 2 - is_sparse
     assert notes == [] or notes[0].startswith("town: 1 of 2 scans")
 
 

@@ -242,8 +242,20 @@ def test_a_value_that_is_undefined_later_names_the_file(tmp_path):
     assert math.isnan(own.of(none))
 
 
+def test_a_metric_of_a_user_has_its_unit_and_an_interval():
+    @register_metric("far", "score", "m", least=0.0, greatest=1.0)
+    def mean_score(outcomes):
+        return float(outcomes.best_scores.mean())
+
+    assert mean_score.label == "score [m]"
+    found = mean_score.interval(outcomes())
+    assert 0.0 < found.low < mean_score.of(outcomes()) < found.high < 1.0
+
+
 def test_an_unknown_metric_is_refused_with_all_names():
     with pytest.raises(InputError, match=r"no metric 'acu'.*auc_strict"):
         choose_metrics(["r1", "acu"])
     with pytest.raises(ValueError, match="no name"):
         register_metric(" ")
+    with pytest.raises(ValueError, match=r"far: no field 'last'.*mean least"):
+        register_metric("far", last=0.0)

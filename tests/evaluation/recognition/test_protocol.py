@@ -145,6 +145,19 @@ def test_what_is_not_positive_is_refused(name, value):
         RetrievalProtocol(**{name: value})
 
 
+@pytest.mark.parametrize(
+    ("fields", "fault"),
+    [
+        ({"overlap": 70.0}, "--overlap: 70.0 is not above 0 and up to 1"),
+        ({"overlap": 0.0}, "--overlap: 0.0 is not above 0"),
+        ({"place": "midle"}, "--place: no place 'midle' .*mean middle"),
+    ],
+)
+def test_what_no_match_could_have_is_refused(fields, fault):
+    with pytest.raises(InputError, match=fault):
+        RetrievalProtocol(**fields)
+
+
 def test_an_error_says_which_field_is_wrong_also_in_another_process():
     with pytest.raises(ProtocolFieldError) as raised:
         RetrievalProtocol(query_spacing=-1)

@@ -112,6 +112,10 @@ def test_what_cannot_be_recognised(towns):
         recognise(*both(towns), "solid", verified="yes")
     with pytest.raises(TypeError, match="raduis"):
         recognise(*both(towns), "solid", raduis=5.0)
+    with pytest.raises(InputError, match="settings: this method was made"):
+        recognise(
+            *both(towns), make_method("solid", {}), settings={"ranges": 9}
+        )
     with pytest.raises(InputError, match="drive against itself"):
         recognise(*both(towns), "solid", exclude_recent=30.0)
 
