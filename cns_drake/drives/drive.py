@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from cns_drake.base import InputError
+from cns_drake.drives.drive_scenario import driven_way
 from cns_drake.drives.lidar_fields import LidarField, lidar_field
 from cns_drake.units import DEFAULT_PRESET
 
@@ -275,7 +276,8 @@ class Drive(abc.ABC):
     def lidar_field(self) -> LidarField | None:
         """Rings and field of view of the LiDAR; None for an unknown model."""
         section = self.lidar_section
-        if self.scenario and "lidars" not in self.scenario:
+        scenario = self.scenario
+        if driven_way(scenario) and "lidars" not in (scenario or {}):
             section = {"preset": DEFAULT_PRESET}
         unit = section.get("unit") or section.get("preset")
         return lidar_field(unit, section.get("rings"))

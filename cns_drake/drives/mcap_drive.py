@@ -14,6 +14,7 @@ from cns_drake.base import (
     FARTHEST_RETURN,
     InputError,
     check_range,
+    is_there,
     listed,
     parse_json,
     poses,
@@ -28,6 +29,7 @@ from cns_drake.drives.drive import (
     as_given,
     index_instances,
 )
+from cns_drake.drives.drive_scenario import SCENARIO, read_scenario
 from cns_drake.drives.mcap_file import LOCATION, McapFile
 from cns_drake.drives.mcap_messages import (
     StaticTransforms,
@@ -151,7 +153,8 @@ class McapDrive(Drive):
         """Opens a recording.
 
         Args:
-            path: the bag: a file, or the folder that holds it.
+            path: the bag: a file, or the folder that holds it. A folder can
+                also hold the scenario, see `read_scenario`.
             lidar: name of the LiDAR, whose scans are on the topic
                 /<lidar>/points; or a topic of scans, with any name.
             odometry: topic of the poses.
@@ -165,7 +168,8 @@ class McapDrive(Drive):
         self._topics = _Topics(Path(path))
         self._file = self._topics.file
         self._path = self._topics.path
-        self.name = _drive_name(Path(path))
+        self._folder = Path(path)
+        self.name = _drive_name(self._folder)
         self._lidar_topic = self._topics.choose(_CLOUDS, lidar)
         self._given = poses
         self._pose_topic = None
@@ -235,7 +239,11 @@ class McapDrive(Drive):
     @cached_property
     def lidar_section(self) -> Mapping:
         lidars = (self.scenario or {}).get("lidars")
-        section = lidars.get(self.lidar_name) if isinstance(lidars, dict) else 0
+        if not isinstance(lidars, dict):
+            return {}
+        section = lidars.get(self.lidar_name)
+        if section is None and len(lidars) == len(self.lidar_names) == 1:
+            (section,) = lidars.values()  # A user's file; topics have any name.
         return section if isinstance(section, dict) else {}
 
     @property
@@ -270,8 +278,9 @@ class McapDrive(Drive):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        given = () if self._given is None else (self._posed_by.source,)
-        return (*self._file.files, *map(Path, map(str, given)))
+        given = None if self._given is None else self._posed_by.source
+        beside = [one for one in (given, self._scenario_beside) if one]
+        return (*self._file.files, *map(Path, map(str, beside)))
 
     @property
     def distortion_note(self) -> str | None:
@@ -285,11 +294,20 @@ class McapDrive(Drive):
     @property
     def scenario(self) -> Mapping | None:
         scenario = self._topics.json("scenario.json")
-        if scenario is not None and not isinstance(scenario, dict):
+        if scenario is None:
+            return read_scenario(self._folder)
+        if not isinstance(scenario, dict):
             raise InputError(
                 f"{self._path}: attachment scenario.json: not a JSON object"
             )
         return scenario
+
+    @property
+    def _scenario_beside(self) -> Path | None:
+        """The file with the scenario of a bag that holds none."""
+        path = self._folder / SCENARIO
+        is_read = self._topics.json("scenario.json") is None and is_there(path)
+        return path if is_read else None
 
     @property
     def inputs(self) -> Any:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.drives import as_given
+from cns_drake.drives import SCENARIO, as_given, read_scenario
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     FileDrive,
@@ -73,7 +73,8 @@ class BoreasDrive(FileDrive):
             stamps_ns=stamps_ns,
             X_WS=X_WS,
             read=_read_scan,
-            tables=[poses_path],
+            tables=[poses_path, path / SCENARIO],
+            scenario=read_scenario(path),
             notes=unknown + notes,
             unit="alpha-prime",
         )

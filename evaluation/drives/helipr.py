@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base import InputError
-from cns_drake.drives import LidarField, as_given
+from cns_drake.drives import SCENARIO, LidarField, as_given, read_scenario
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     FileDrive,
@@ -119,7 +119,8 @@ class HeliprDrive(FileDrive):
             stamps_ns=stamps_ns,
             X_WS=X_WS,
             read=partial(_read_scan, lidar),
-            tables=[poses_path],
+            tables=[poses_path, drive / SCENARIO],
+            scenario=read_scenario(drive),
             notes=chosen + notes,
             datum=DATUM if in_utm else None,
             unit=_UNITS.get(lidar),

@@ -76,7 +76,6 @@ class MulranDrive(BinDrive):
                 f" frame of {name} alone",
             )
         X_WB = X_UB if local else to_world(X_UB, poses_path)
-        scenario = read_scenario(path)  # cns-drake exports one.
         super().__init__(
             columns,
             name=name,
@@ -87,8 +86,8 @@ class MulranDrive(BinDrive):
             tables=[poses_path, path / SCENARIO],
             notes=notes,
             datum=None if local else DATUM,
-            scenario=scenario,
-            unit="os1-64-33" if scenario is None else None,
+            scenario=read_scenario(path),  # cns-drake exports one.
+            unit="os1-64-33",
         )
 
     def _read_bin(self, path: Path, stamp_ns: int) -> np.ndarray:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base import InputError, poses
-from cns_drake.drives import as_given
+from cns_drake.drives import SCENARIO, as_given, read_scenario
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     FileDrive,
@@ -91,7 +91,8 @@ class NcltDrive(FileDrive):
             stamps_ns=stamps_ns,
             X_WS=_X_WN @ X_NB @ _X_BS,
             read=lambda path, stamp_ns: _read_scan(path),
-            tables=[poses_path],
+            tables=[poses_path, path / SCENARIO],
+            scenario=read_scenario(path),
             notes=(*chosen, *unknown, *notes),
             unit="hdl-32e-upside-down",
         )

@@ -247,6 +247,28 @@ def test_poses_from_a_file(tmp_path):
         np.testing.assert_allclose(seen, p_WP, atol=1e-4)
 
 
+def test_a_scenario_beside_a_bag_states_map_stage_and_lidar(tmp_path):
+    """A robot's bag does not say where it was recorded, and by what."""
+    entries, *_ = BAGS["LIO-SAM"]
+    path = write(tmp_path, entries)
+    options = {"odometry": "lio_sam/mapping/path"}
+    drive = open_drive(path, **options)
+    assert drive.scenario is None
+    assert drive.lidar_field is None
+    beside = path / "scenario.yaml"
+    beside.write_text("map: campus\nstage: '2021'\n")
+    drive = open_drive(path, **options)
+    assert drive.scenario["map"] == "campus"
+    assert beside in drive.files
+    # A drive that was not simulated has no default LiDAR.
+    assert drive.lidar_field is None
+    beside.write_text("lidars: {lidar: {preset: vlp-16}}\n")
+    assert open_drive(path, **options).lidar_field.rings == 16
+    beside.write_text("[]")
+    with pytest.raises(InputError, match=r"scenario\.yaml: not a mapping"):
+        open_drive(path, **options).lidar_field  # noqa: B018  # Reads it.
+
+
 @pytest.mark.parametrize(
     ("header", "columns", "sign", "is_ns"),
     [

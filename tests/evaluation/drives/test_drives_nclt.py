@@ -138,3 +138,10 @@ def test_a_report_finds_sessions_by_their_dates(tmp_path):
     write_session(tmp_path, place="../ground_truth")
     (found,) = find_recordings(tmp_path)
     assert (found.name, found.map_name, found.stage) == (DATE, "nclt", DATE)
+    beside = tmp_path / DATE / "scenario.yaml"
+    beside.write_text("map: campus\nstage: winter\n")
+    (found,) = find_recordings(tmp_path)
+    assert (found.map_name, found.stage) == ("campus", "winter")
+    drive = open_drive(beside.parent)
+    assert beside in drive.files
+    assert drive.lidar_field.rings == 32
