@@ -105,7 +105,8 @@ Poses = Annotated[
         metavar="FILE",
         help="File with poses of the LiDAR that are used instead of those of "
         "the recording, in the form of TUM (seconds, x y z, quaternion x y z "
-        f"w) or of KITTI (a 3 x 4 matrix for each scan).{_EACH}",
+        "w), of a table whose header names these columns, or of KITTI (a "
+        f"3 x 4 matrix for each scan).{_EACH}",
     ),
 ]
 ColumnsOfEach = Annotated[

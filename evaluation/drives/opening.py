@@ -92,7 +92,8 @@ def open_drive(
         odometry: topic of the poses, if a recording of ROS has several.
         poses: file with the poses of the LiDAR, which are used instead of those
             of the recording: in the form of TUM (seconds, x y z, quaternion
-            x y z w), or in that of KITTI (3 x 4 matrices, one for each scan).
+            x y z w), of a table whose header names these columns, or of KITTI
+            (3 x 4 matrices, one for each scan).
 
     Raises:
         InputError: if nothing at `path` can be read as a drive, or the drive
