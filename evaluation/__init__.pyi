@@ -18,13 +18,12 @@ from .methods import known_methods as known_methods
 from .methods import make_method as make_method
 from .methods import method_checks as method_checks
 from .methods import register as register
+from .recognition import METRICS as METRICS
 from .recognition import Metric as Metric
-from .recognition import PlaceRecognitionMetrics as PlaceRecognitionMetrics
 from .recognition import QueryOutcomes as QueryOutcomes
 from .recognition import Retrieval as Retrieval
 from .recognition import RetrievalProtocol as RetrievalProtocol
 from .recognition import compared_frames as compared_frames
-from .recognition import evaluate as evaluate
 from .recognition import judge as judge
 from .recognition import register_metric as register_metric
 from .recognition import retrieve as retrieve

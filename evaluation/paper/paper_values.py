@@ -70,8 +70,8 @@ def paper() -> PaperValues:
     Downtown 01-04 the value of 02-04, and one R@1 of RING++ on Riverside 02->01
     contradicts the F1 beside it. The paper does not state whether a method was
     scored on all queries or only on queries with a match (the mode, see
-    `PlaceRecognitionMetrics`). The mode is inferred from the relation between
-    R@1, F1 and AUC in all rows of the method.
+    `evaluation.recognition.Mode`). The mode is inferred from the relation
+    between R@1, F1 and AUC in all rows of the method.
     """
     rows = _rows("place_recognition.csv")
     changes = {

@@ -20,8 +20,6 @@ from .overlap_truth import overlap_matrix as overlap_matrix
 from .overlap_truth import overlaps_with_best_match as overlaps_with_best_match
 from .overlap_truth import read_overlaps as read_overlaps
 from .overlap_truth import write_overlaps as write_overlaps
-from .pair_scores import PlaceRecognitionMetrics as PlaceRecognitionMetrics
-from .pair_scores import evaluate as evaluate
 from .place_outcome import PlaceOutcome as PlaceOutcome
 from .place_outcome import QueryDrive as QueryDrive
 from .place_outcome import check_has_match as check_has_match

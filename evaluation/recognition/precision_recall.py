@@ -1,4 +1,23 @@
-"""The precision-recall curve of place recognition, and the area under it."""
+"""The precision-recall curve of place recognition, and the area under it.
+
+The definitions were derived from the paper's numbers. Only the top-ranked place
+of each query counts:
+
+- TP: accepted, and the top-ranked place is a true match,
+- FP: accepted, and the top-ranked place is not a true match, whether or not the
+  query has a match,
+- FN: rejected, although the query has a match.
+
+A rejected query without a match is neither TP, FP nor FN. A query without a
+candidate is never accepted. In mode `all` every query counts; in mode
+`filtered` only queries that have a match (in this mode, the greatest F1 follows
+from R@1).
+
+A query with a match and a wrong top-ranked place is FN while it is rejected,
+and FP once it is accepted. Recall = TP / (TP + FN) therefore reaches 1 for
+every method that has a top-ranked place for all queries. The strict AUC is the
+area under another curve, see `PrCurve.strict_auc`.
+"""
 
 from __future__ import annotations
 

@@ -120,7 +120,9 @@ class QueryOutcomes:
     def recall_at(self, rank: int) -> float:
         """Returns the recall R@N for N = `rank`.
 
-        It is NaN if no query has a match, or the ranks are unknown (NaN).
+        R@N is the share of the queries with a match that have a match among
+        their N top-ranked places. It is NaN if no query has a match, or the
+        ranks are unknown (NaN).
         """
         ranks = self.first_right_ranks[self.has_match]
         if rank > 1 and np.isnan(ranks).any():

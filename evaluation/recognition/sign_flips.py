@@ -157,10 +157,10 @@ def route_blocks(
             (Canay, Romano and Shaikh, Econometrica 85, 2017).
 
     Example:
-        from evaluation import evaluate, judge, route_blocks
+        from evaluation import METRICS, judge, route_blocks
 
         blocks = route_blocks(query.X_WS[:, :3, 3], queries)
-        print(evaluate(judge(scores, matches, blocks)).auc_interval)
+        print(METRICS["auc"].interval(judge(scores, matches, blocks)))
     """
     block = np.zeros(len(positions), dtype=np.int64)
     for shortest in _BLOCK_LENGTHS if length is None else (length,):

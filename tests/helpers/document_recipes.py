@@ -674,7 +674,7 @@ RECIPES = {
         after=("own city",),
         file="scored.py",
         command=".venv/bin/python scored.py",
-        prints=("1.0 Interval(low=", ") 1.0 1.0"),
+        prints=("1.0 Interval(low=", ")\n1.0 1.0"),
     ),
     "linter": Recipe(
         ".venv/bin/ruff check",

@@ -5,7 +5,6 @@ that CONTRIBUTING.md names.
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -22,11 +21,9 @@ from evaluation.recognition import (
     RECORDED_PROTOCOL,
     Mode,
     PlaceOutcome,
-    PlaceRecognitionMetrics,
     QueryDrive,
     RetrievalProtocol,
     check_has_match,
-    evaluate,
     retrieve,
 )
 
@@ -71,11 +68,6 @@ def place_outcome(
     )
     check_has_match(outcome)
     return outcome
-
-
-def place_scores(*arguments: Any, **options: Any) -> PlaceRecognitionMetrics:
-    """Returns the scores of `place_outcome`, over all queries."""
-    return evaluate(place_outcome(*arguments, **options).outcomes)
 
 
 def values_of(

@@ -3,7 +3,7 @@
 from helpers.drive_files import make_scan, write_recording
 from helpers.internal import studies
 from helpers.internal.eval_program import write_towns
-from helpers.measured_pairs import place_scores
+from helpers.measured_pairs import place_outcome
 from helpers.small_towns import drive
 import numpy as np
 import pytest
@@ -66,13 +66,13 @@ def test_the_numbers_are_those_of_the_single_commands(folder, tmp_path):
     for stage, name in databases.items():
         here = {"both.stage": stage}
         found[stage] = values(results, **here, task="place", verified=False)
-        alone = place_scores(
+        alone = place_outcome(
             open_drive(folder / name),
             open_drive(query),
             make_method("solid", {}),
             protocol=RANDOM_YAW_PROTOCOL,
-        )
-        assert found[stage]["auc"] == pytest.approx(alone.auc, abs=1e-9)
+        ).outcomes
+        assert found[stage]["auc"] == pytest.approx(alone.curve.auc, abs=1e-9)
         change = change_between(folder / name, query)
         assert values(results, **here, task="change")["tcr_sym"] == (
             pytest.approx(change.metrics["tcr_sym"], abs=1e-9)
@@ -126,15 +126,15 @@ def test_protocols_may_vary(folder, tmp_path):
         protocol={"base": "recorded", "radius": [5.0, 15.0]},
     )
     for radius in (5.0, 15.0):
-        alone = place_scores(
+        alone = place_outcome(
             open_drive(folder / "metropolis_01"),
             open_drive(folder / "metropolis_04"),
             make_method("solid", {}),
             protocol=RetrievalProtocol(radius=radius),
-        )
+        ).outcomes
         found = values(results, **{"protocol.radius": radius}, verified=False)
-        assert found["auc"] == pytest.approx(alone.auc, abs=1e-9)
-        assert found["with_match"] == alone.num_with_match
+        assert found["auc"] == pytest.approx(alone.curve.auc, abs=1e-9)
+        assert found["with_match"] == alone.num_matched
 
 
 def test_the_last_stage_alone(folder, tmp_path):
@@ -334,13 +334,13 @@ def test_drives_are_read_anew_for_another_protocol(folder, tmp_path):
     fields = {"protocol": {"base": "recorded", "query_spacing": spacings}}
     found = measure(tmp_path, folder, tasks=["place"], **fields)
     for spacing in spacings:
-        alone = place_scores(
+        alone = place_outcome(
             open_drive(folder / "metropolis_01"),
             open_drive(folder / "metropolis_04"),
             make_method("solid", {}),
             RetrievalProtocol(query_spacing=spacing),
-        )
+        ).outcomes
         here = {"protocol.query_spacing": spacing, "verified": False}
         shown = values(found, **here)
-        assert shown["auc"] == pytest.approx(alone.auc, abs=1e-9)
-        assert shown["with_match"] == alone.num_with_match
+        assert shown["auc"] == pytest.approx(alone.curve.auc, abs=1e-9)
+        assert shown["with_match"] == alone.num_matched

@@ -5,7 +5,7 @@ import math
 import shutil
 
 from helpers.counting_method import COUNTING
-from helpers.measured_pairs import compare_maps, place_scores
+from helpers.measured_pairs import compare_maps, place_outcome
 from helpers.small_map import write_town
 import numpy as np
 import pytest
@@ -98,16 +98,16 @@ def test_the_numbers_are_those_of_the_single_commands(
         change = compare_maps(mapped[stage], mapped["query"]).change
         assert found["tcr_sym"] == pytest.approx(change.symmetric, abs=1e-9)
         for ranges in (20, 40):
-            alone = place_scores(
+            alone = place_outcome(
                 drives[stage],
                 drives["query"],
                 make_method("solid", {"ranges": str(ranges)}),
                 protocol=protocol,
-            )
+            ).outcomes
             with_it = {**there, "methods__solid__ranges": ranges}
             found = values(results, **with_it, task="place")
-            assert found["auc"] == pytest.approx(alone.auc, abs=1e-9)
-            assert found["r1"] == pytest.approx(alone.recall_at_1, abs=1e-9)
+            assert found["auc"] == pytest.approx(alone.curve.auc, abs=1e-9)
+            assert found["r1"] == pytest.approx(alone.recall_at(1), abs=1e-9)
             before = values(
                 results,
                 **{**with_it, "database__stage": "last"},
@@ -179,12 +179,12 @@ def test_protocols_are_factors(town, tmp_path, jobs_done):
         for k in ("01", "04")
     )
     for radius in (2.0, 9.0):
-        alone = place_scores(
+        alone = place_outcome(
             database,
             query,
             make_method("solid", {}),
             protocol=RetrievalProtocol(radius=radius),
-        )
+        ).outcomes
         own, last = (
             values(
                 results,
@@ -194,8 +194,8 @@ def test_protocols_are_factors(town, tmp_path, jobs_done):
             )
             for stage in ("own", "last")
         )
-        assert own["auc"] == pytest.approx(alone.auc, abs=1e-9)
-        assert own["with_match"] == alone.num_with_match
+        assert own["auc"] == pytest.approx(alone.curve.auc, abs=1e-9)
+        assert own["with_match"] == alone.num_matched
         assert last["relative_auc"] == 1.0
         assert own["relative_auc"] == pytest.approx(
             own["auc"] / last["auc"], abs=1e-6

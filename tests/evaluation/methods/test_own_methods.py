@@ -8,7 +8,7 @@ from helpers.internal.eval_program import assert_refused, make_block_scene, run
 import numpy as np
 import pytest
 
-from evaluation import check_method, evaluate, judge, open_drive, retrieve
+from evaluation import check_method, judge, open_drive, retrieve
 from evaluation.methods import load_method
 from evaluation.study import choose_methods
 
@@ -60,7 +60,7 @@ def test_a_network_in_the_documents(towns):
     drives = (open_drive(towns / f"town_0{k}") for k in (1, 2))
     found = retrieve(*drives, method)
     outcomes = judge(found.scores, found.matches)
-    assert evaluate(outcomes).recall_at_1 > 0.9
+    assert outcomes.recall_at(1) > 0.9
 
 
 def test_the_shown_method_finds_turned_places(tmp_path):

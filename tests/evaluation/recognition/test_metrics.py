@@ -3,7 +3,12 @@ import math
 import numpy as np
 import pytest
 
-from evaluation.recognition import evaluate, judge, weighted_metrics
+from evaluation.recognition import (
+    METRICS,
+    judge,
+    numbers_of,
+    weighted_metrics,
+)
 
 NAN = np.nan
 
@@ -19,6 +24,17 @@ def outcomes_of(rows):
         scores.append([best, best - 0.1, best - 0.2])
         matches.append([is_right, False, has_match and not is_right])
     return judge(np.array(scores), np.array(matches))
+
+
+def counted(outcomes, mode):
+    """Returns the outcomes that the curve counts in a mode."""
+    if mode == "filtered":
+        return outcomes.subset(outcomes.has_match)
+    return outcomes
+
+
+def value(name, outcomes):
+    return METRICS[name].of(outcomes)
 
 
 # Score, right, has a match; worked out on paper:
@@ -37,8 +53,8 @@ HAND = [
 
 
 def test_curve_by_hand():
-    metrics = evaluate(outcomes_of(HAND))
-    curve = metrics.curve
+    outcomes = outcomes_of(HAND)
+    curve = outcomes.curve
     np.testing.assert_allclose(curve.thresholds, [0.9, 0.8, 0.7, 0.6, 0.5])
     assert curve.true_positives.tolist() == [1, 1, 2, 2, 3]
     assert curve.false_positives.tolist() == [0, 1, 1, 2, 2]
@@ -51,30 +67,33 @@ def test_curve_by_hand():
     area += (1 / 4) * (1 / 2 + 2 / 3) / 2
     area += (1 / 6) * (2 / 3 + 1 / 2) / 2
     area += (1 / 3) * (1 / 2 + 3 / 5) / 2
-    assert metrics.auc == pytest.approx(area, abs=1e-15)
+    assert value("auc", outcomes) == pytest.approx(area, abs=1e-15)
     # With recall TP / N, of N = 4: 1/4, 1/4, 2/4, 2/4, 3/4.
     strict = 1 / 4
     strict += (1 / 4) * (1 / 2 + 2 / 3) / 2
     strict += (1 / 4) * (1 / 2 + 3 / 5) / 2
-    assert metrics.auc_strict == pytest.approx(strict, abs=1e-15)
-    assert metrics.f1_max == pytest.approx(3 / 4)
-    assert metrics.f1_max_index == 4
-    assert (metrics.num_queries, metrics.num_with_match) == (5, 4)
-    assert metrics.num_right == 3
-    assert metrics.recall_at_1 == pytest.approx(3 / 4)
+    assert value("auc_strict", outcomes) == pytest.approx(strict, abs=1e-15)
+    assert value("f1_max", outcomes) == pytest.approx(3 / 4)
+    assert curve.f1_max_index == 4
+    assert (len(outcomes), outcomes.num_matched) == (5, 4)
+    assert outcomes.true_positives == 3
+    assert value("r1", outcomes) == pytest.approx(3 / 4)
 
 
 def test_filtered_leaves_out_queries_without_a_match():
-    metrics = evaluate(outcomes_of(HAND), "filtered")
-    curve = metrics.curve
+    outcomes = outcomes_of(HAND)
+    curve = counted(outcomes, "filtered").curve
     np.testing.assert_allclose(curve.thresholds, [0.9, 0.7, 0.6, 0.5])
     assert curve.true_positives.tolist() == [1, 2, 2, 3]
     assert curve.false_positives.tolist() == [0, 0, 1, 1]
     assert curve.false_negatives.tolist() == [3, 2, 1, 0]
     # The queries are the same; only the curve counts fewer of them.
-    assert metrics.num_queries == 5
-    assert metrics.num_with_match == 4
-    assert metrics.recall_at_1 == pytest.approx(3 / 4)
+    numbers = numbers_of("place", outcomes, mode="filtered")
+    found = {number.metric: number.value for number in numbers}
+    assert found["f1_max"] == curve.f1_max
+    assert found["queries"] == 5
+    assert found["with_match"] == 4
+    assert found["r1"] == pytest.approx(3 / 4)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -84,9 +103,11 @@ def test_filtered_f1_is_a_function_of_recall_at_1(seed):
         (rng.uniform(), has and rng.uniform() < 0.6, has)
         for has in rng.uniform(size=80) < 0.8
     ]
-    metrics = evaluate(outcomes_of(rows), "filtered")
-    r = metrics.recall_at_1
-    assert metrics.f1_max == pytest.approx(2.0 * r / (1.0 + r), abs=1e-12)
+    outcomes = counted(outcomes_of(rows), "filtered")
+    r = outcomes.recall_at(1)
+    assert outcomes.curve.f1_max == pytest.approx(
+        2.0 * r / (1.0 + r), abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("mode", ["all", "filtered"])
@@ -100,7 +121,7 @@ def test_curve_agrees_with_counting(seed, mode):
         score = rng.integers(8) / 8.0
         rows.append((score, bool(has and rng.uniform() < 0.5), bool(has)))
     rows += [(NAN, False, True), (NAN, False, False)]
-    curve = evaluate(outcomes_of(rows), mode).curve
+    curve = counted(outcomes_of(rows), mode).curve
     if mode == "filtered":
         rows = [row for row in rows if row[2]]
     distinct = sorted({s for s, _, _ in rows if not math.isnan(s)})[::-1]
@@ -116,15 +137,13 @@ def test_curve_agrees_with_counting(seed, mode):
 
 def test_tied_queries_are_accepted_together():
     rows = [(0.5, True, True), (0.5, False, True), (0.5, False, False)]
-    curve = evaluate(outcomes_of(rows)).curve
+    curve = outcomes_of(rows).curve
     assert curve.thresholds.tolist() == [0.5]
     assert curve.precision.tolist() == [1 / 3]
     assert curve.recall.tolist() == [1.0]
     # The order of tied queries cannot matter.
     assert (
-        evaluate(outcomes_of(rows[::-1])).auc
-        == evaluate(outcomes_of(rows)).auc
-        == pytest.approx(1 / 3)
+        outcomes_of(rows[::-1]).curve.auc == curve.auc == pytest.approx(1 / 3)
     )
 
 
@@ -138,12 +157,12 @@ def test_tied_places_rank_in_the_order_of_the_database():
 
 def test_no_candidate_is_never_accepted_and_a_miss():
     rows = [(0.9, True, True), (NAN, False, True), (NAN, False, False)]
-    metrics = evaluate(outcomes_of(rows))
-    assert metrics.curve.recall.tolist() == [0.5]
-    assert metrics.curve.precision.tolist() == [1.0]
-    assert metrics.auc == pytest.approx(0.5)
-    assert metrics.recall_at_1 == pytest.approx(0.5)
-    assert metrics.recall_at_n[24] == pytest.approx(0.5)
+    outcomes = outcomes_of(rows)
+    assert outcomes.curve.recall.tolist() == [0.5]
+    assert outcomes.curve.precision.tolist() == [1.0]
+    assert outcomes.curve.auc == pytest.approx(0.5)
+    assert value("r1", outcomes) == pytest.approx(0.5)
+    assert value("r25", outcomes) == pytest.approx(0.5)
 
 
 def test_a_place_that_is_no_candidate_is_not_found():
@@ -157,38 +176,38 @@ def test_a_place_that_is_no_candidate_is_not_found():
 def test_no_query_has_a_match():
     rows = [(0.9, False, False), (0.3, False, False)]
     for mode in ("all", "filtered"):
-        metrics = evaluate(outcomes_of(rows), mode)
-        assert math.isnan(metrics.recall_at_1)
-        assert metrics.auc == 0.0
-        assert metrics.f1_max == 0.0
-        assert (metrics.num_with_match, metrics.num_right) == (0, 0)
+        outcomes = counted(outcomes_of(rows), mode)
+        assert math.isnan(value("r1", outcomes))
+        assert value("auc", outcomes) == 0.0
+        assert value("f1_max", outcomes) == 0.0
+        assert (outcomes.num_matched, outcomes.true_positives) == (0, 0)
 
 
 def test_every_accepted_query_is_wrong():
-    metrics = evaluate(outcomes_of([(0.9, False, True), (0.3, False, True)]))
-    assert metrics.curve.recall.tolist() == [0.0, 0.0]
-    assert metrics.auc == 0.0
-    assert metrics.recall_at_1 == 0.0
+    outcomes = outcomes_of([(0.9, False, True), (0.3, False, True)])
+    assert outcomes.curve.recall.tolist() == [0.0, 0.0]
+    assert value("auc", outcomes) == 0.0
+    assert value("r1", outcomes) == 0.0
 
 
 @pytest.mark.parametrize("shape", [(0, 0), (0, 4), (3, 0)])
 def test_empty_sets(shape):
     scores, matches = np.zeros(shape), np.zeros(shape, dtype=bool)
     for mode in ("all", "filtered"):
-        metrics = evaluate(judge(scores, matches), mode)
-        assert metrics.num_queries == shape[0]
-        assert len(metrics.curve.thresholds) == 0
-        assert metrics.auc == 0.0
-        assert metrics.f1_max == 0.0
-        assert metrics.f1_max_index is None
-        assert math.isnan(metrics.recall_at_1)
+        outcomes = judge(scores, matches)
+        assert len(outcomes) == shape[0]
+        outcomes = counted(outcomes, mode)
+        assert len(outcomes.curve.thresholds) == 0
+        assert value("auc", outcomes) == 0.0
+        assert value("f1_max", outcomes) == 0.0
+        assert outcomes.curve.f1_max_index is None
+        assert math.isnan(value("r1", outcomes))
 
 
 def test_perfect():
-    metrics = evaluate(outcomes_of([(0.9, True, True), (0.4, True, True)]))
-    assert metrics.auc == 1.0
-    assert metrics.f1_max == 1.0
-    assert metrics.recall_at_1 == 1.0
+    outcomes = outcomes_of([(0.9, True, True), (0.4, True, True)])
+    for name in ("auc", "f1_max", "r1"):
+        assert value(name, outcomes) == 1.0
 
 
 def test_recall_at_n():
@@ -197,11 +216,11 @@ def test_recall_at_n():
     matches = np.zeros((30, 200), dtype=bool)
     matches[np.arange(30), np.arange(30)] = True
     outcomes = judge(scores, matches)
-    metrics = evaluate(outcomes)
-    np.testing.assert_allclose(metrics.recall_at_n, np.arange(1, 26) / 30)
-    assert metrics.recall_at_1 == pytest.approx(1 / 30)
+    recalls = [outcomes.recall_at(rank) for rank in range(1, 26)]
+    np.testing.assert_allclose(recalls, np.arange(1, 26) / 30)
+    assert value("r1", outcomes) == pytest.approx(1 / 30)
     # A hundredth of 200 is 2.
-    assert metrics.recall_at_1_percent == pytest.approx(2 / 30)
+    assert value("r1_percent", outcomes) == pytest.approx(2 / 30)
     few = judge(scores[:, :40], matches[:, :40])
     assert few.recall_at_1_percent == few.recall_at(1)
 
@@ -246,23 +265,24 @@ def test_auroc_counts_pairs(seed):
 def test_intervals_of_single_queries():
     rng = np.random.default_rng(8)
     rows = [(rng.uniform(), rng.uniform() < 0.7, True) for _ in range(200)]
-    metrics = evaluate(outcomes_of(rows))
+    outcomes = outcomes_of(rows)
+    auc, r1 = METRICS["auc"], METRICS["r1"]
     # For a part r of n: 1.96 standard deviations; two imaginary queries and the
     # noise of 9,999 patterns of signs make it a little wider.
-    r = metrics.recall_at_1
+    r = r1.of(outcomes)
     half = 1.96 * math.sqrt(r * (1.0 - r) / 200)
-    interval = metrics.recall_at_1_interval
+    interval = r1.interval(outcomes)
     assert interval.low == pytest.approx(r - half, abs=0.2 * half)
     assert interval.high == pytest.approx(r + half, abs=0.2 * half)
-    assert metrics.auc_interval.low < metrics.auc < metrics.auc_interval.high
-    perfect = evaluate(outcomes_of([(u, True, True) for u, *_ in rows]))
-    for known in (perfect.auc_interval, perfect.recall_at_1_interval):
+    interval = auc.interval(outcomes)
+    assert interval.low < auc.of(outcomes) < interval.high
+    perfect = outcomes_of([(u, True, True) for u, *_ in rows])
+    for known in (auc.interval(perfect), r1.interval(perfect)):
         # With no error in n queries, 3 / n is the limit of the share of errors
         # (rule of three, one-sided).
         assert 1.0 - 6.0 / 200 < known.low < 1.0 - 1.5 / 200
         assert known.high == 1.0
-    few = evaluate(outcomes_of(rows[:5]))
-    assert math.isnan(few.auc_interval.low)
+    assert math.isnan(auc.interval(outcomes_of(rows[:5])).low)
 
 
 def test_weighted_metrics_are_those_of_repeated_queries():
@@ -273,8 +293,8 @@ def test_weighted_metrics_are_those_of_repeated_queries():
     found = np.stack(weighted_metrics(outcomes_of(rows), weights), axis=1)
     for weight, values in zip(weights.astype(int), found, strict=True):
         queries = np.repeat(np.arange(len(rows)), weight)
-        one = evaluate(outcomes_of([rows[query] for query in queries]))
-        expected = [one.auc, one.recall_at_1, one.auc_strict]
+        one = outcomes_of([rows[query] for query in queries])
+        expected = [one.curve.auc, one.recall_at(1), one.auc_strict]
         np.testing.assert_allclose(values, expected, atol=1e-12)
 
 
@@ -283,11 +303,12 @@ def test_scores_must_not_be_compared_by_value():
     rng = np.random.default_rng(1)
     scores = rng.normal(size=(50, 20))
     matches = rng.uniform(size=(50, 20)) < 0.1
-    plain = evaluate(judge(scores, matches))
-    bent = evaluate(judge(np.exp(3.0 * scores), matches))
-    assert plain.auc == bent.auc
-    assert plain.f1_max == bent.f1_max
-    np.testing.assert_array_equal(plain.recall_at_n, bent.recall_at_n)
+    plain = judge(scores, matches)
+    bent = judge(np.exp(3.0 * scores), matches)
+    assert plain.curve.auc == bent.curve.auc
+    assert plain.curve.f1_max == bent.curve.f1_max
+    for rank in range(1, 26):
+        assert plain.recall_at(rank) == bent.recall_at(rank)
 
 
 @pytest.mark.parametrize(
@@ -313,12 +334,12 @@ def test_scores_of_unsigned_integers_keep_their_order():
 @pytest.mark.parametrize("mode", ["all", "filtered"])
 def test_strict_recall_counts_every_query_with_a_match(mode):
     right = [(1.0 - 0.1 * k, True, True) for k in range(3)]
-    perfect = evaluate(outcomes_of(right), mode)
-    assert (perfect.auc, perfect.auc_strict) == (1.0, 1.0)
+    perfect = counted(outcomes_of(right), mode)
+    assert (perfect.curve.auc, perfect.auc_strict) == (1.0, 1.0)
     # Two wrong answers come last: by the paper's counts recall still gets to 1.
     wrong = [(0.1, False, True), (0.05, False, True)]
-    metrics = evaluate(outcomes_of(right + wrong), mode)
-    assert metrics.curve.recall[-1] == 1.0
-    assert metrics.auc_strict == pytest.approx(3 / 5)
-    nobody = evaluate(outcomes_of([(0.5, False, False)]), mode)
+    outcomes = counted(outcomes_of(right + wrong), mode)
+    assert outcomes.curve.recall[-1] == 1.0
+    assert outcomes.auc_strict == pytest.approx(3 / 5)
+    nobody = counted(outcomes_of([(0.5, False, False)]), mode)
     assert nobody.auc_strict == 0.0

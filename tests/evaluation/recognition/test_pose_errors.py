@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
-from evaluation.recognition import QueryOutcomes, evaluate, pose_error
+from evaluation.recognition import QueryOutcomes, pose_error
 
 
 def random_pose(rng):
@@ -43,9 +43,9 @@ def make_outcomes(scores, right, matched):
 
 def test_full_precision_that_is_never_reached():
     outcomes = make_outcomes([0.9, 0.8], [False, True], [True, True])
-    assert evaluate(outcomes).curve.recall_at_full_precision == 0.0
+    assert outcomes.curve.recall_at_full_precision == 0.0
     outcomes = make_outcomes([np.nan], [False], [True])
-    assert evaluate(outcomes).curve.recall_at_full_precision == 0.0
+    assert outcomes.curve.recall_at_full_precision == 0.0
 
 
 class Poses(Method):

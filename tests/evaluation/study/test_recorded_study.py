@@ -10,7 +10,7 @@ from helpers.contradictions import add_images
 from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
 from helpers.internal import studies
 from helpers.internal.eval_program import run
-from helpers.measured_pairs import place_scores
+from helpers.measured_pairs import place_outcome
 from helpers.small_towns import drive
 import numpy as np
 from PIL import Image
@@ -290,10 +290,10 @@ def test_each_protocol_is_that_of_the_single_command(
     # BTC's places differ between the two, those of SOLiD do not.
     for name in ("btc", "solid"):
         for protocol in both_protocols.values():
-            alone = place_scores(
+            alone = place_outcome(
                 *drives, make_method(name, {}), protocol=protocol
-            )
-            expected = alone.auc
+            ).outcomes
+            expected = alone.curve.auc
             assert found[name, protocol.name].value == expected
 
 
