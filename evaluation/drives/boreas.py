@@ -59,7 +59,7 @@ class BoreasDrive(FileDrive):
             path / _SCANS, ".bin", parse_microseconds
         )
         poses_path = path / _POSES
-        trajectory, unknown = read_angles(poses_path, num_velocities=3)
+        trajectory = read_angles(poses_path, num_velocities=3)
         X_WS = trajectory.X_WB
         X_WS[:, :3, :3] = np.swapaxes(X_WS[:, :3, :3], 1, 2)
         local = is_local(X_WS)
@@ -75,7 +75,7 @@ class BoreasDrive(FileDrive):
             read=_read_scan,
             tables=[poses_path, path / SCENARIO],
             scenario=read_scenario(path),
-            notes=unknown + notes,
+            notes=notes,
             unit="alpha-prime",
         )
 

@@ -82,7 +82,7 @@ class NcltDrive(FileDrive):
         name = as_given(path).name
         chosen: list[str] = []
         poses_path = _poses_path(path, chosen)
-        trajectory, unknown = read_angles(poses_path)
+        trajectory = read_angles(poses_path)
         files, stamps_ns, X_NB, notes = posed(files, stamps_ns, trajectory)
         super().__init__(
             name=name,
@@ -93,7 +93,7 @@ class NcltDrive(FileDrive):
             read=lambda path, stamp_ns: _read_scan(path),
             tables=[poses_path, path / SCENARIO],
             scenario=read_scenario(path),
-            notes=(*chosen, *unknown, *notes),
+            notes=(*chosen, *notes),
             unit="hdl-32e-upside-down",
         )
 

@@ -130,9 +130,7 @@ def read_trajectory(
     return StampedPoses(path, stamps_ns, X_WS)
 
 
-def read_angles(
-    path: Path, num_velocities: int = 0
-) -> tuple[StampedPoses, tuple[str, ...]]:
+def read_angles(path: Path, num_velocities: int = 0) -> StampedPoses:
     """Reads a trajectory: rows with a time, a position and three angles.
 
     Times are in microseconds; roll, pitch and yaw are in radians.
@@ -143,8 +141,8 @@ def read_angles(
             velocities that follow the angles, in a table without a header.
 
     Returns:
-        Poses with the rotation Rz(yaw) Ry(pitch) Rx(roll); a note if rows were
-        left out because a number in them is NaN.
+        Poses with the rotation Rz(yaw) Ry(pitch) Rx(roll). Rows with NaN are
+        left out, and counted.
 
     Raises:
         InputError: if the table does not have that form, or the poses are out
@@ -164,12 +162,9 @@ def read_angles(
     check_finite(path, values)
     _check_positions(path, values[:, :3])
     R = Rotation.from_euler("xyz", values[:, 3:]).as_matrix()
-    num_unknown = len(rows) - len(known)
-    note = f"{path}: {num_unknown} rows with NaN are left out"
-    return (
-        _increasing_poses(path, stamps_ns, poses.make_pose(R, values[:, :3])),
-        (note,) if num_unknown else (),
-    )
+    X_WB = poses.make_pose(R, values[:, :3])
+    found = _increasing_poses(path, stamps_ns, X_WB)
+    return replace(found, num_unknown=len(rows) - len(known))
 
 
 def read_poses(path: Path) -> np.ndarray:

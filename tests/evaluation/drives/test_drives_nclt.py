@@ -100,7 +100,7 @@ def test_poses_between_rows_and_rows_without_a_pose(tmp_path):
         (T0_US + 499_000, 5.0, 0.0, 0.0, 0.0, 0.0, 1.0),
     ]
     drive = open_drive(write_session(tmp_path, rows=rows))
-    assert "1 rows with NaN are left out" in drive.notes[0]
+    assert "1 poses without numbers or rotation are left" in drive.notes[0]
     north = drive.X_WS[1, 1, 3] - 0.002 * np.cos(0.402) - 0.004 * np.sin(0.402)
     assert north == pytest.approx(201 / 500 * 5.0, abs=1e-9)
     heading = np.arctan2(drive.X_WS[1, 0, 0], drive.X_WS[1, 1, 0])
