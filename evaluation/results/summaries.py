@@ -43,6 +43,8 @@ _NOT_MAINTAINED = "none"
 _EXACTLY = "truth"
 # Joins the names of causes that come together.
 _AND = "+"
+# Shares of a result until which `lifetimes` counts.
+_LEFT = (0.9, 0.5)
 # Least number of points that show a trend.
 LEAST_POINTS = 5
 
@@ -168,8 +170,8 @@ def excesses(queries: QueryRows) -> list[Summary]:
     levels: dict[object, Any] = {}
     for answers in queries.answers:
         conditions.setdefault(answers.without("seed"), []).append(answers)
-        name = answers.map, answers[CAUSE]
-        levels[name] = max(answers[LEVEL] or 0, levels.get(name, 0))
+        case = answers.map, answers[CAUSE]
+        levels[case] = max(answers[LEVEL] or 0, levels.get(case, 0))
     found = []
     for both in conditions.values():
         key = both[0]
@@ -185,18 +187,17 @@ def excesses(queries: QueryRows) -> list[Summary]:
         ]
         if len(names) != 2 or not all(groups):
             continue
-        all_of_it, *kept = (
+        baseline, *kept = (
             float(
                 np.mean([pr_curve(answers.outcomes).auc for answers in group])
             )
             for group in (*groups, both)
         )
-        first, second, together = (
-            float(kept_share(k, all_of_it)) for k in kept
-        )
+        first, second, together = (float(kept_share(k, baseline)) for k in kept)
+        excess = first * second - together
         interval = UNKNOWN
         if (
-            all_of_it > 0.0
+            baseline > 0.0
             and len({len(g[0].outcomes) for g in (*groups, both)}) == 1
         ):
             base, *without = (
@@ -204,29 +205,24 @@ def excesses(queries: QueryRows) -> list[Summary]:
                 for group in (*groups, both)
             )
             a, b, ab = (kept_share(one, base) for one in without)
-            excess = first * second - together
-            reach = 1.0 / all_of_it
+            _, sizes = np.unique(key.outcomes.own_blocks, return_counts=True)
+            reach = 1.0 / baseline
             interval = jackknife_interval(
                 excess,
                 a * b - ab,
-                np.bincount(_numbered(key.outcomes.own_blocks)).astype(float),
+                sizes.astype(float),
                 (excess - reach, excess + reach),
             )
         found.append(
             Summary.of(
                 f"excess of {' and '.join(names)}",
                 key,
-                first * second - together,
+                excess,
                 interval.low,
                 interval.high,
             )
         )
     return found
-
-
-def _numbered(blocks: np.ndarray) -> np.ndarray:
-    """Returns the number of each block, from 0 on."""
-    return np.unique(blocks, return_inverse=True)[1]
 
 
 def _auc_without_blocks(answers: Answers, key: Answers) -> np.ndarray:
@@ -260,13 +256,8 @@ def lifetime(
     return math.inf
 
 
-def lifetimes(
-    results: Results,
-    factor: str,
-    shares: Iterable[float] = (0.9, 0.5),
-    metric: str = "relative_auc",
-) -> list[Summary]:
-    """Returns at which values of a factor a given share of a result is left.
+def lifetimes(results: Results, factor: str, metric: str) -> list[Summary]:
+    """Returns at which values of a factor 90 % and 50 % of a result are left.
 
     For example, if the factor is the age of a map, this is the age at which a
     method still has 90 % of the AUC that it has in a new map.
@@ -277,7 +268,6 @@ def lifetimes(
             is its value in the baseline. A row that was measured with a single
             seed, such as a row of the baseline, counts for all seeds.
         factor: name of the factor, whose values are numbers.
-        shares: the given shares, from 0 to 1.
         metric: name of a retained share.
 
     Returns:
@@ -299,7 +289,7 @@ def lifetimes(
             curves.setdefault(at, {})[row.seed] = row.value
         times = sorted(curves)
         seeds = sorted({seed for at in times[1:] for seed in curves[at]})
-        for share in shares:
+        for share in _LEFT:
             mean = [float(np.mean(list(curves[at].values()))) for at in times]
             single = [
                 lifetime(*_curve_of(curves, seed), share) for seed in seeds
@@ -397,8 +387,8 @@ def growths(results: Results, over: str, metric: str) -> list[Summary]:
 def correlations(
     results: Results,
     x: str,
-    metric: str = "auc",
-    selection: Mapping[str, object] | None = None,
+    metric: str,
+    selection: Mapping[str, object],
 ) -> list[Summary]:
     """Returns how well a factor or metric predicts where each method fails.
 
@@ -535,7 +525,7 @@ def summarised(
         elif over == MAINTAIN:
             found += worths(results, metric)
         elif chart.get("kind") == "lines" and metric_named(metric).share_of:
-            found += lifetimes(results, over, metric=metric)
+            found += lifetimes(results, over, metric)
         elif chart.get("kind") == "lines" and metric_named(metric).grows:
             x = "places" if "places" in results.distinct("metric") else over
             found += growths(results, x, metric)
