@@ -6,5 +6,6 @@ from .registration import NUM_NEIGHBOURS as NUM_NEIGHBOURS
 from .registration import Surface as Surface
 from .registration import covariances as covariances
 from .registration import make_surface as make_surface
+from .registration import point_to_plane_hessian as point_to_plane_hessian
 from .registration import register as register
 from .registration import registration_at as registration_at

@@ -229,12 +229,22 @@ def _covariance(source: Surface, target: Surface, pairs: _Pairs) -> np.ndarray:
         pairs: points of S, paired with those of T.
     """
     n_T = target.normals[pairs.nearest[pairs.is_paired]]
-    arms = pairs.p_T[pairs.is_paired]
-    J = np.concatenate([np.cross(arms, n_T), n_T], axis=1)
     counting = len(source.points) / len(pairs.sample) / _CORRELATED
-    H = J.T @ J * (counting / _SIGMA**2)
+    H = point_to_plane_hessian(pairs.p_T[pairs.is_paired], n_T)
+    H *= counting / _SIGMA**2
     # Directions without constraints get uncertainties of a metre and a radian.
     return np.linalg.inv(H + np.eye(6))
+
+
+def point_to_plane_hessian(arms: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Returns the point-to-plane Hessian (6, 6) over turn, then move.
+
+    Args:
+        arms: (N, 3) vectors from the centre of the turn to the points [m].
+        normals: (N, 3) unit normals of the planes at the points.
+    """
+    J = np.concatenate([np.cross(arms, normals), normals], axis=1)
+    return J.T @ J
 
 
 def _share_of(is_counted: np.ndarray, of: np.ndarray) -> float:

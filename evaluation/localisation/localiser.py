@@ -15,7 +15,7 @@ import numpy as np
 
 from cns_drake.base import InputError, errors_at, from_xyz, poses, track, xyz
 from cns_drake.drives import Drive
-from evaluation.alignment import Surface
+from evaluation.alignment import Surface, point_to_plane_hessian
 from evaluation.drives import cropped, sample_frames
 from evaluation.localisation.estimators import Estimator
 from evaluation.localisation.initial_poses import InitialPose, Starts
@@ -355,23 +355,12 @@ def _corrected_hessian(arms: np.ndarray, normals: np.ndarray) -> np.ndarray:
         arms: (N, 3) vectors from the LiDAR to the points, in W [m].
         normals: (N, 3) unit normals of the planes at the points, in W.
     """
-    H = _point_to_plane_hessian(arms, normals)
+    H = point_to_plane_hessian(arms, normals)
     for axis in np.eye(3):
-        H -= _NORMAL_NOISE * _point_to_plane_hessian(
+        H -= _NORMAL_NOISE * point_to_plane_hessian(
             arms, np.broadcast_to(axis, arms.shape)
         )
     return H
-
-
-def _point_to_plane_hessian(
-    arms: np.ndarray, normals: np.ndarray
-) -> np.ndarray:
-    """Returns the point-to-plane Hessian (6, 6) over turn, then move.
-
-    For the arguments, see `_corrected_hessian`.
-    """
-    J = np.concatenate([np.cross(arms, normals), normals], axis=1)
-    return J.T @ J
 
 
 def _bounded_inverse(H: np.ndarray) -> np.ndarray:
