@@ -136,25 +136,22 @@ def sign_flip_test(
     return Interval(float(lows[needed - 1]), float(highs[-needed])), p_value
 
 
-def route_blocks(
-    positions: np.ndarray, frames: np.ndarray, length: float | None = None
-) -> np.ndarray:
+def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Returns the block (Q,) of street in which each query lies.
 
     Neighbouring queries tend to be right or wrong together, also if they lie
     on different passes of one street. Therefore a block is a piece of the world
     and not of the route: each position belongs to the nearest of some centres.
     The first position of the drive is a centre, and so is each further one that
-    is at least `length` from all earlier centres. On a straight street, blocks
-    are as long, except for the first and the last.
+    is at least a length from all earlier centres: the greatest of 320, 300,
+    ..., 80 m that gives at least eight blocks, or 80 m. Few long blocks are
+    less alike than many short ones (Canay, Romano and Shaikh, Econometrica 85,
+    2017). On a straight street, blocks are as long, except for the first and
+    the last.
 
     Args:
         positions: (N, 3) positions of the sensor along the drive [m].
         frames: (Q,) frame numbers of the queries.
-        length: least distance between the centres of blocks [m]. By default
-            the greatest of 320, 300, ..., 80 m that gives at least eight
-            blocks, or 80 m. Few long blocks are less alike than many short ones
-            (Canay, Romano and Shaikh, Econometrica 85, 2017).
 
     Example:
         from evaluation import METRICS, judge, route_blocks
@@ -163,8 +160,8 @@ def route_blocks(
         print(METRICS["auc"].interval(judge(scores, matches, blocks)))
     """
     block = np.zeros(len(positions), dtype=np.int64)
-    for shortest in _BLOCK_LENGTHS if length is None else (length,):
-        block = _nearest_centres(positions, shortest)
+    for length in _BLOCK_LENGTHS:
+        block = _nearest_centres(positions, length)
         if block.max(initial=0) + 1 >= _ENOUGH_BLOCKS:
             break
     return block[frames]
