@@ -153,10 +153,6 @@ class Road:
         last = self.last_station - clearance
         return sample_stations(first, last, spacing)
 
-    def centreline(self, spacing: float = 1.0) -> np.ndarray:
-        """Returns the centreline (N, 3) between the junctions' areas [m]."""
-        return self.evaluate(self.stations(spacing))[:, :3]
-
     def lane_offset(self, direction: Direction, lane: int) -> float:
         """Returns the distance of a lane's middle from the centreline [m].
 

@@ -41,10 +41,6 @@ class EllipsoidSurface:
 
     semi_axes: tuple[float, float, float]
 
-    @property
-    def is_sphere(self) -> bool:
-        return len(set(self.semi_axes)) == 1
-
 
 @dataclass(frozen=True)
 class CylinderSurface:

@@ -61,12 +61,6 @@ class VoxelMap:
     def __len__(self) -> int:
         return len(self.counts)
 
-    @property
-    def centres_W(self) -> np.ndarray:
-        """(V, 3) middle of each voxel [m]."""
-        corners = _corners(self.indices, self.voxel_size, self.origin_W)
-        return corners + 0.5 * self.voxel_size
-
     def merged(
         self,
         voxel_size: float = VOXEL_SIZE,

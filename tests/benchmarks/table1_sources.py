@@ -11,6 +11,7 @@ distances and from four sides, as red in the paper's Figure 1.
 
 import argparse
 import csv
+from operator import attrgetter
 from pathlib import Path
 import sys
 
@@ -60,15 +61,20 @@ def red_shares(a: np.ndarray, b: np.ndarray):
             yield float((shown[:, 0] > shown[:, 2]).mean())
 
 
+def centres(voxels: VoxelMap) -> np.ndarray:
+    """Returns the middle of each voxel (V, 3) [m]."""
+    return voxels.origin_W + (voxels.indices + 0.5) * voxels.voxel_size
+
+
 def rows(a: dict[float, VoxelMap], b: dict[float, VoxelMap]):
     """Yields (choice, TCR_sym or share) of two maps."""
     fine_a, fine_b = a[0.0], b[0.0]
     about = fine_a.centroids_W.mean(axis=0)
 
-    def tcr(X=None, *, shift=(0.0, 0.0, 0.0), of="centroids_W"):
+    def tcr(X=None, *, shift=(0.0, 0.0, 0.0), of=attrgetter("centroids_W")):
         clouds = (
-            getattr(fine_a.merged(shift=shift), of),
-            getattr(fine_b.merged(shift=shift, X_NW=X), of),
+            of(fine_a.merged(shift=shift)),
+            of(fine_b.merged(shift=shift, X_NW=X)),
         )
         return temporal_change(*clouds).symmetric
 
@@ -81,12 +87,12 @@ def rows(a: dict[float, VoxelMap], b: dict[float, VoxelMap]):
             f"a scan every {spacing:g} m",
             temporal_change(*clouds).symmetric,
         )
-    yield "voxel centres", tcr(of="centres_W")
+    yield "voxel centres", tcr(of=centres)
     for yaw_deg in YAWS_DEG:
         X = poses.yaw_pose(np.radians(yaw_deg))
         X[:3, 3] = about - poses.transform(X, about)
         yield f"yaw of {yaw_deg:g} deg", tcr(X)
-        yield f"yaw of {yaw_deg:g} deg, voxel centres", tcr(X, of="centres_W")
+        yield f"yaw of {yaw_deg:g} deg, voxel centres", tcr(X, of=centres)
     clouds = [one[RED_SPACING].centroids_W for one in (a, b)]
     shares = list(red_shares(*clouds))
     yield "least red share", min(shares)

@@ -46,7 +46,7 @@ def test_lanes_leave_room_for_a_median(load, cross):
     median = network.areas.medians
     assert median.area == pytest.approx(4 * (road.length - 4) + 4 * np.pi, 1e-3)
     # Its noses touch the ends of the road.
-    ends = road.centreline()[[0, -1], 0]
+    ends = road.evaluate([road.first_station, road.last_station])[:, 0]
     np.testing.assert_allclose(median.bounds, [ends[0], -2, ends[1], 2])
     assert median.intersection(network.areas.carriageway).area < 1e-6
 
@@ -176,11 +176,11 @@ def test_heights_pass_through_the_profile_and_level_off(load, cross):
     first, last = road.first_station, road.last_station
     z = road.evaluate([0, first, 40, last, road.full_length])[:, 2]
     np.testing.assert_allclose(z, [0, 0, 2, 3, 3], atol=1e-12)
-    points = road.centreline(0.01)
-    assert np.all(np.diff(points[:, 2]) >= -1e-12)
+    z = road.height(road.stations(0.01))
+    assert np.all(np.diff(z) >= -1e-12)
     # Level at the junctions: no kink where a connection takes over.
-    assert abs(points[1, 2] - points[0, 2]) < 1e-5
-    assert abs(points[-1, 2] - points[-2, 2]) < 1e-5
+    assert abs(z[1] - z[0]) < 1e-5
+    assert abs(z[-1] - z[-2]) < 1e-5
     way = network.connection(
         LaneRef("e", "forward", 1), LaneRef("ne", "backward", 1)
     )

@@ -42,14 +42,16 @@ def test_points_follow_the_lanes_and_are_even(network):
     middle = network.roads["avenue_middle"].lane_centreline("backward", 2)
     np.testing.assert_allclose(path.points[0], south[0], atol=1e-9)
     np.testing.assert_allclose(path.points[-1], middle[-1], atol=1e-9)
-    centre = network.roads["avenue_south"].centreline()[-1]
+    road = network.roads["avenue_south"]
+    centre = road.evaluate([road.last_station])[0, :3]
     np.testing.assert_allclose(path.points[0] - centre, [5.25, 0, 0], atol=0.02)
 
 
 def lateral(network, road, direction, lane, aside):
     """Distances to the right of the road's middle line along a road [m]."""
     path = path_of(network, leg(road, direction, lane), aside=aside).points
-    centre = network.roads[road].centreline(0.1)
+    middle = network.roads[road]
+    centre = middle.evaluate(middle.stations(0.1))[:, :3]
     centre = centre if direction == "forward" else centre[::-1]
     nearest = cKDTree(centre).query(path)[1]
     along = np.gradient(centre[:, :2], axis=0)[nearest]
@@ -125,7 +127,8 @@ def test_speed_limits_change_with_the_road_and_are_lower_between(network):
     assert set(path.speed_limits) == {22.4, 17.9}
     change = np.flatnonzero(np.diff(path.speed_limits))
     assert len(change) == 1
-    north = network.roads["ring_north_west"].centreline()[-1]
+    road = network.roads["ring_north_west"]
+    north = road.evaluate([road.last_station])[0, :3]
     distance = np.linalg.norm(path.points[change[0]] - north)
     assert distance == pytest.approx(5.25, abs=0.5)
 

@@ -70,7 +70,7 @@ def test_a_version_of_a_small_city(tmp_path, turn_deg):
     assert (scenario.name, scenario.map) == ("town_f01_02", str(step.folder))
     assert scenario.driver.wander == 0.35
     road, before = (
-        network.roads[name].centreline()
+        network.roads[name].evaluate(network.roads[name].stations())
         for network in (load_road_network(found.roads), roads)
     )
     c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
