@@ -179,9 +179,7 @@ class BagWriter:
         self._check_order(topic, stamp_ns)
         channel_id = self._channel_ids[topic]
         with user_errors(self._part):
-            self._chunks.add_message(
-                channel_id, stamp_ns, data, stamp_ns, sequence
-            )
+            self._chunks.add_message(channel_id, stamp_ns, data, sequence)
         self._counts[topic] += 1
         self._latest_ns[topic] = stamp_ns
         first_ns, last_ns = self._span_ns or (stamp_ns, stamp_ns)
@@ -329,20 +327,15 @@ class _TopicChunks:
         self.writer = Writer(
             stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD
         )
-        # Channel id -> the arguments of its messages.
-        self._held: dict[int, list[tuple[int, bytes, int, int]]] = {}
+        # Channel id -> log time, data and sequence of its messages.
+        self._held: dict[int, list[tuple[int, bytes, int]]] = {}
         self._held_bytes = 0
         self._start_ns: int | None = None
         # Channel id -> number of messages with the log time as their stamp.
         self._stamped: Counter[int] = Counter()
 
     def add_message(
-        self,
-        channel_id: int,
-        log_time: int,
-        data: bytes,
-        publish_time: int,
-        sequence: int,
+        self, channel_id: int, log_time: int, data: bytes, sequence: int
     ) -> None:
         """Holds a message, after messages of an earlier span were written."""
         if self._start_ns is None:
@@ -353,7 +346,7 @@ class _TopicChunks:
         ):
             self.flush()
             self._start_ns = log_time
-        message = log_time, data, publish_time, sequence
+        message = log_time, data, sequence
         self._held.setdefault(channel_id, []).append(message)
         self._held_bytes += len(data)
         self._stamped[channel_id] += read_stamp(data) == log_time
@@ -361,8 +354,10 @@ class _TopicChunks:
     def flush(self) -> None:
         """Writes all messages that are held."""
         for channel_id, held in self._held.items():
-            for message in held:
-                self.writer.add_message(channel_id, *message)
+            for log_time, data, sequence in held:
+                self.writer.add_message(
+                    channel_id, log_time, data, log_time, sequence
+                )
             self.writer.flush()
             held.clear()
         self._held_bytes = 0
