@@ -201,7 +201,7 @@ def parse_stamps_ns(texts: np.ndarray) -> np.ndarray:
     except (ValueError, OverflowError):
         return np.array(
             [
-                _seconds_to_ns(text) if _is_fraction(text) else _to_ns(text, 1)
+                _to_ns(text, NS_PER_S if _is_fraction(text) else 1)
                 for text in map(str, texts)
             ]
         )
@@ -271,10 +271,6 @@ def _begins_with_number(line: str) -> bool:
 
 def _is_fraction(text: str) -> bool:
     return "." in text or "e" in text.lower()
-
-
-def _seconds_to_ns(text: str) -> int:
-    return _to_ns(text, NS_PER_S)
 
 
 def _to_ns(text: str, unit_ns: int) -> int:

@@ -70,7 +70,9 @@ def load_method(path: Path) -> type[Method]:
             own = as_users_code(function.__func__, path)
             setattr(method, name, type(function)(own))
         elif isinstance(function, property):
-            setattr(method, name, function.getter(_own_getter(function, path)))
+            assert function.fget is not None
+            own = as_users_code(function.fget, path)
+            setattr(method, name, function.getter(own))
         else:
             setattr(method, name, as_users_code(function, path))
     return method
@@ -95,11 +97,6 @@ def _registered_method(module: ModuleType, path: Path) -> type[Method]:
             f"{path}: registers {len(found)} methods instead of one"
         )
     return found[0]
-
-
-def _own_getter(found: property, path: Path) -> Callable:
-    assert found.fget is not None
-    return as_users_code(found.fget, path)
 
 
 @dataclass

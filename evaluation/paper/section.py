@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 from evaluation.paper.paper_values import Numbers, StagePair, paper
-from evaluation.recognition import pr_curve
 from evaluation.results import (
     OWN,
     STAGE,
@@ -92,9 +91,5 @@ def _numbers(answers: Answers) -> Numbers:
     counted = answers.outcomes
     if paper().modes[answers.label] == "filtered":
         counted = counted.subset(counted.has_match)
-    curve = pr_curve(counted)
-    return Numbers(
-        curve.auc,
-        counted.recall_at(1),
-        float(curve.f1.max(initial=0.0)),
-    )
+    curve = counted.curve
+    return Numbers(curve.auc, counted.recall_at(1), curve.f1_max)

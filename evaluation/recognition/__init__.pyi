@@ -26,7 +26,6 @@ from .place_outcome import check_has_match as check_has_match
 from .place_selection import KEEP_ALL as KEEP_ALL
 from .place_selection import checked_keep as checked_keep
 from .place_selection import kept_places as kept_places
-from .precision_recall import pr_curve as pr_curve
 from .precision_recall import weighted_metrics as weighted_metrics
 from .protocol import PAPER_PROTOCOL as PAPER_PROTOCOL
 from .protocol import PROTOCOL_NAMES as PROTOCOL_NAMES

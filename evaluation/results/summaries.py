@@ -23,7 +23,6 @@ from evaluation.recognition import (
     kept_share,
     leave_one_out,
     metric_named,
-    pr_curve,
     weighted_metrics,
 )
 from evaluation.results.keys import (
@@ -188,9 +187,7 @@ def excesses(queries: QueryRows) -> list[Summary]:
         if len(names) != 2 or not all(groups):
             continue
         baseline, *kept = (
-            float(
-                np.mean([pr_curve(answers.outcomes).auc for answers in group])
-            )
+            float(np.mean([answers.outcomes.curve.auc for answers in group]))
             for group in (*groups, both)
         )
         first, second, together = (float(kept_share(k, baseline)) for k in kept)

@@ -76,7 +76,7 @@ class PrintStyle:
                 is not installed.
         """
         style = cls(
-            None if width is None else _parse_length("--width", width),
+            None if width is None else _parse_width(width),
             font or cls.font,
             title,
         )
@@ -193,11 +193,10 @@ def start_at_zero(axes: Axes, x: str = "", y: str = "") -> None:
     axes.autoscale_view()
 
 
-def _parse_length(name: str, text: str) -> float:
-    """Returns a length [inches] from text with its unit, such as `3.5in`.
+def _parse_width(text: str) -> float:
+    """Returns a width [inches] from text with its unit, such as `3.5in`.
 
     Args:
-        name: what the length is of, for errors.
         text: a number and `in`, `cm`, `mm` or `pt`, the point of TeX.
 
     Raises:
@@ -206,7 +205,7 @@ def _parse_length(name: str, text: str) -> float:
     found = re.fullmatch(r"(\d+\.?\d*|\.\d+) ?(in|cm|mm|pt)", text.strip())
     if found is None:
         raise InputError(
-            f"{name}: {text!r}: a number and in, cm, mm or pt is needed, such"
+            f"--width: {text!r}: a number and in, cm, mm or pt is needed, such"
             " as 3.5in"
         )
     return float(found[1]) / _IN_AN_INCH[found[2]]

@@ -4,7 +4,6 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from cns_drake.base import InputError, repeated
-from evaluation.recognition import pr_curve
 from evaluation.results.charts.chart import Chart
 from evaluation.results.method_names import title
 from evaluation.results.table import Row
@@ -33,7 +32,7 @@ def draw_curves(chart: Chart) -> Figure:
         for row in rows:
             if row.identity not in asked:
                 raise InputError("charts: curves: the answers are unknown")
-            curve = pr_curve(asked[row.identity].outcomes)
+            curve = asked[row.identity].outcomes.curve
             colour, line, marker = chart.styles[title(row.label)]
             # The curve begins at recall 0 with the precision of its first
             # point. The drawn area is then the AUC.

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from evaluation import QueryRows, Results
-from evaluation.recognition import pr_curve, route_blocks
+from evaluation.recognition import route_blocks
 from evaluation.results import OWN, STAGE
 from evaluation.study import choose_methods
 
@@ -185,7 +185,7 @@ def test_a_report_is_read_as_a_study(report):
     found = {one.identity: one for one in QueryRows.read(report).answers}
     assert set(results) <= set(found)
     for key, value in results.items():
-        assert pr_curve(found[key].outcomes).auc == pytest.approx(value)
+        assert found[key].outcomes.curve.auc == pytest.approx(value)
         columns = found[key].columns
         places = np.stack([columns[f"query_{axis}"] for axis in "xyz"], axis=1)
         # The drives begin at their first query, and do not turn.
