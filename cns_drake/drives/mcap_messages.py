@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import InputError, poses, value_errors
+from cns_drake.base import NS_PER_S, InputError, poses, value_errors
 from cns_drake.drives import ros_types
 
 # A few compressed kilobytes can hold a million transforms or fields: greatest
@@ -86,7 +86,7 @@ def read_cloud_header(data: bytes | memoryview) -> tuple[int, str]:
     if num_fields > _MOST_FIELDS:
         raise ValueError(f"a point cloud of {num_fields} fields")
     frame_id = text.rstrip(b"\0").decode("utf-8", "backslashreplace")
-    return sec * 1_000_000_000 + nanosec, frame_id
+    return sec * NS_PER_S + nanosec, frame_id
 
 
 def read_stamp(data: bytes | memoryview) -> int | None:
@@ -103,12 +103,12 @@ def read_stamp(data: bytes | memoryview) -> int | None:
         return None
     order = "<" if data[1] & 1 else ">"
     sec, nanosec = struct.unpack_from(f"{order}iI", data, _ENCAPSULATION_BYTES)
-    return sec * 1_000_000_000 + nanosec
+    return sec * NS_PER_S + nanosec
 
 
 def stamp_ns(header: Any) -> int:
     """Returns the time of a message's header [ns]."""
-    return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
+    return header.stamp.sec * NS_PER_S + header.stamp.nanosec
 
 
 def xyz(v: Any) -> tuple[float, float, float]:

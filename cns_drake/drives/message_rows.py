@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base import poses
+from cns_drake.base import NS_PER_S, poses
 from cns_drake.drives import ros_types
 from cns_drake.drives.drive import IMU_DTYPE, ODOMETRY_DTYPE
 from cns_drake.drives.mcap_messages import decode, stamp_ns, xyz, xyzw
@@ -199,7 +199,7 @@ class MessageRows:
         found = np.frombuffer(content, layout)
         rows = np.zeros(len(found), self._kind.dtype)
         sec = found["stamp"]["sec"].astype(np.int64)
-        rows["stamp_ns"] = sec * 1_000_000_000 + found["stamp"]["nanosec"]
+        rows["stamp_ns"] = sec * NS_PER_S + found["stamp"]["nanosec"]
         for name in (self._kind.dtype.names or ())[1:]:
             rows[name] = found["values"][name]
         return rows

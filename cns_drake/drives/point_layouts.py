@@ -13,8 +13,9 @@ from typing import Literal
 import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
+from cns_drake.base import NS_PER_S
+
 LayoutName = Literal["cns", "ouster", "velodyne", "autoware"]
-_NS_PER_S = 1e9
 _MM_PER_M = 1e3
 # Limit of times that are stored as uint32 [ns].
 _LONGEST_NS = 2.0**32
@@ -99,7 +100,7 @@ def to_layout(
         "reflectivity": brightness,
         "ambient": np.zeros(len(points)),
         "range": np.rint(_MM_PER_M * distance),
-        "time": points["t"] / _NS_PER_S,
+        "time": points["t"] / NS_PER_S,
         "time_stamp": points["t"],
         "return_type": np.full(len(points), _SINGLE_STRONGEST),
         "channel": points["ring"],
@@ -198,7 +199,7 @@ def _nanoseconds(times: np.ndarray | None) -> np.ndarray | None:
         return None
     t_ns = times.astype(float)
     if not _NS_OF_A_SCAN[0] <= t_ns.max(initial=0.0) < _NS_OF_A_SCAN[1]:
-        t_ns = t_ns * _NS_PER_S
+        t_ns = t_ns * NS_PER_S
     if not ((t_ns >= 0.0) & (t_ns < _LONGEST_NS)).all():
         return None
     return np.rint(t_ns).astype(np.uint32)
