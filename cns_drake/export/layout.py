@@ -30,9 +30,8 @@ class Layout:
     """The files that an export in one format contains for a drive.
 
     A module NAME_layout of this package has the layout of the format NAME as
-    its constant `LAYOUT`. Functions take the drive, and
-    paths are relative to the folder that holds all exported drives, unless
-    stated otherwise.
+    its constant `LAYOUT`. Functions take the drive, and paths are relative to
+    the folder that holds all exported drives, unless stated otherwise.
 
     Attributes:
         explained: what `export.yaml` says of each file: path -> content.

@@ -70,10 +70,9 @@ def year_of_date(text: str) -> int | None:
 
     The whole text must have one of the documented forms. Years before Christ
     are negative: 0 is the year 1 BC. For a range (`1914..1918`), the result is
-    the last year; for `before 1910`
-    and `~1855`, the year in the text. For a period such as a century, the
-    result is the middle year, or an earlier or later year if the text says
-    "early" or "late".
+    the last year; for `before 1910` and `~1855`, the year in the text. For a
+    period such as a century, the result is the middle year, or an earlier or
+    later year if the text says "early" or "late".
     """
     text = text.strip().lower()[:_LONGEST_TEXT].split("..")[-1].strip()
     day = _DAY.fullmatch(text)

@@ -127,7 +127,7 @@ def _check_answers(
     for answer, metric in itertools.product(answers, computed):
         name, number = metric.name, len(answer.outcomes)
         row = known.get((*answer.identity, name))
-        # Areas take time.
+        # Only what the table has is computed: areas take time.
         if row is None:
             continue
         value = metric.of(answer.outcomes)
