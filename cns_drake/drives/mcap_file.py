@@ -156,9 +156,10 @@ class McapFile:
         without a message do not count: `ros2 bag record` writes them for all
         topics that there are.
         """
+        used = self._used
         found = {
             topic: sorted(
-                {self._kind(one) for one in channels if one.id in self._used}
+                {self._kind(one) for one in channels if one.id in used}
             )
             for topic, channels in self._channels.items()
         }
@@ -167,7 +168,8 @@ class McapFile:
     @property
     def empty_topics(self) -> list[str]:
         """Topics without a message."""
-        return [one for one in self._channels if one not in self.topics]
+        used = self.topics
+        return [one for one in self._channels if one not in used]
 
     @property
     def _used(self) -> set[int]:
