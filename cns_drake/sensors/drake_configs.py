@@ -508,7 +508,8 @@ def ApplyImuConfig(
         config: description of the IMU.
         scene_graph: ignored, so that the function has the arguments of Drake's
             `ApplyCameraConfig`.
-        builder, plant, lcm_buses, lcm: see `ApplyLidarConfig`.
+
+    The other arguments are those of `ApplyLidarConfig`.
 
     Raises:
         InputError: Kalibr's file cannot be used.
@@ -563,7 +564,8 @@ def ApplyOdometryConfig(
         config: description of the odometry.
         scene_graph: ignored, so that the function has the arguments of Drake's
             `ApplyCameraConfig`.
-        builder, plant, lcm_buses, lcm: see `ApplyLidarConfig`.
+
+    The other arguments are those of `ApplyLidarConfig`.
 
     Raises:
         RuntimeError: there is no such plant, frame or bus, or the plant is not

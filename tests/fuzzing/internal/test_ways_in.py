@@ -1245,6 +1245,7 @@ NO_FILES = {
     "cns_drake.scene.find_bus": "an object",
     "cns_drake.simulation.load_drive": "reads by load_world",
     "cns_drake.simulation.load_stage": "reads by load_world",
+    "cns_drake.scenarios.load_scenario_world": "reads by load_world",
     "evaluation.drives.find_data_sets": "names of files alone",
     "evaluation.localisation.read_queries": "an open drive",
     "evaluation.methods.find_method": "a name",
