@@ -76,6 +76,7 @@ class MulranDrive(BinDrive):
                 f" frame of {name} alone",
             )
         X_WB = X_UB if local else to_world(X_UB, poses_path)
+        scenario = read_scenario(path)
         super().__init__(
             columns,
             name=name,
@@ -86,8 +87,9 @@ class MulranDrive(BinDrive):
             tables=[poses_path, path / SCENARIO],
             notes=notes,
             datum=None if local else DATUM,
-            scenario=read_scenario(path),  # cns-drake exports one.
-            unit="os1-64-33",
+            scenario=scenario,
+            # Exports of cns-drake are of any LiDAR.
+            unit="os1-64-33" if scenario is None else None,
         )
 
     def _read_bin(self, path: Path, stamp_ns: int) -> np.ndarray:
