@@ -242,10 +242,12 @@ def did_you_mean(given: object, names: Iterable[str]) -> str:
 
     Args:
         given: the misspelt name.
-        names: the known names. If no known name is similar, the result is "".
+        names: the known names. If no known name is similar, in letters of any
+            case, the result is "".
     """
-    close = difflib.get_close_matches(str(given), list(names), n=1)
-    return f"; did you mean {close[0]}?" if close else ""
+    known = {name.lower(): name for name in names}
+    close = difflib.get_close_matches(str(given).lower(), list(known), n=1)
+    return f"; did you mean {known[close[0]]}?" if close else ""
 
 
 def _fields_at(kind: Any, place: Sequence[str | int]) -> Iterator[str]:

@@ -11,7 +11,13 @@ from cns_drake.base import (
     read_yaml,
     value_errors,
 )
-from cns_drake.units import MOST_RINGS, check_one_unit, make_sheet, read_sheet
+from cns_drake.units import (
+    MOST_RINGS,
+    check_one_unit,
+    check_preset,
+    make_sheet,
+    read_sheet,
+)
 
 # Name of the file with the scenario, in the folder of an exported drive.
 SCENARIO = "scenario.yaml"
@@ -71,11 +77,16 @@ def read_scenario(folder: Path) -> Mapping | None:
         raise InputError(
             f"{path}: columns: {columns!r} is no whole number from 3 on"
         )
-    lidars = scenario.get("lidars")
-    for name, section in lidars.items() if isinstance(lidars, dict) else ():
+    lidars = scenario.get("lidars") or {}
+    if not isinstance(lidars, dict):
+        raise InputError(f"{path}: lidars: not a mapping of names to fields")
+    for name, section in lidars.items():
         if not isinstance(section, dict):
             continue
         with errors_at(f"{path}: lidars.{name}"):
+            if (preset := section.get("preset")) is not None:
+                with value_errors("preset"):
+                    check_preset(str(preset))
             rings = section.get("rings")
             if rings is not None and (
                 type(rings) is not int or not 2 <= rings <= MOST_RINGS

@@ -91,6 +91,8 @@ class _Stream(NamedTuple):
 
 
 _LIDAR_TOPIC = "/lidar/points"
+# Frames of worlds by ROS' REP 105, and those of LOAM and FAST-LIO.
+_WORLD_FRAMES = ("map", "odom", "world", "earth", "camera_init")
 _CLOUDS = _Stream(
     "point clouds",
     "LiDAR",
@@ -242,8 +244,8 @@ class McapDrive(Drive):
         if not isinstance(lidars, dict):
             return {}
         section = lidars.get(self.lidar_name)
-        if section is None and len(lidars) == len(self.lidar_names) == 1:
-            (section,) = lidars.values()  # A user's file; topics have any name.
+        if section is None and [*lidars] == ["lidar"]:
+            section = lidars["lidar"]  # A user's file; topics have any name.
         return section if isinstance(section, dict) else {}
 
     @property
@@ -482,18 +484,22 @@ class McapDrive(Drive):
     @property
     def _is_in_world(self) -> bool:
         """Whether points are in the frame of the poses, as of FAST-LIO's."""
-        return (
-            self._pose_topic is not None
-            and self._lidar_frame == self.world_frame
-        )
+        if self._pose_topic is None:
+            return self._lidar_frame in _WORLD_FRAMES
+        return self._lidar_frame == self.world_frame
 
     @cached_property
     def _mounted(self) -> tuple[np.ndarray, list[str]]:
         """The pose X_BS (4, 4), and notes on how it was found."""
         topic, base, frame = self._pose_topic, self._base, self._lidar_frame
+        where = f"{self._path}: {self._lidar_topic}"
+        if topic is None and self._is_in_world:
+            return np.eye(4), [
+                f"{where}: the frame {frame!r} is that of a world, which the"
+                " poses share; the points are moved into the frame of the LiDAR"
+            ]
         if topic is None or base == frame:
             return np.eye(4), []
-        where = f"{self._path}: {self._lidar_topic}"
         if self._is_in_world:
             return np.eye(4), [
                 f"{where}: the points are in the frame {frame!r} of the poses;"
@@ -680,11 +686,10 @@ class _Topics:
         """
         kind = self._types[topic]
         places = self.file.locate(topic)
-        if kind == ros_types.PATH:
-            # Each message has all poses up to then.
-            places = places[-1:]
         with self.faults(topic):
-            if kind in (ros_types.ODOMETRY, ros_types.IMU):
+            if kind == ros_types.PATH:
+                found = self._path(topic)
+            elif kind in (ros_types.ODOMETRY, ros_types.IMU):
                 rows = MessageRows(kind, len(places))
                 for index, data in self.file.visit(places):
                     rows.add(index, data)
@@ -698,6 +703,28 @@ class _Topics:
                 found = np.array(made, ODOMETRY_DTYPE)
             check_agreement(found)
         return found[np.argsort(found["stamp_ns"], kind="stable")]
+
+    def _path(self, topic: str) -> np.ndarray:
+        """Returns the poses of a topic of paths; the last of each stamp counts.
+
+        Usually the last message has all poses, or else each has the latest.
+        """
+        places = self.file.locate(topic)
+
+        def rows(place: np.void) -> np.ndarray:
+            made = POSE_ROWS[ros_types.PATH](self.message(topic, place))
+            return np.array([*made], ODOMETRY_DTYPE)
+
+        first, found = rows(places[0]), rows(places[-1])
+        starts_ns = [
+            one["stamp_ns"].min(initial=np.iinfo(np.int64).max)
+            for one in (first, found)
+        ]
+        if starts_ns[0] < starts_ns[1]:
+            found = np.concatenate([rows(place) for place in places[::-1]])
+            _, kept = np.unique(found["stamp_ns"], return_index=True)
+            found = found[kept]
+        return found
 
     def by_stamp(self, topic: str) -> tuple[np.ndarray, np.ndarray]:
         """Returns the stamps (N,) [ns] and locations (N,) of a topic, sorted.

@@ -92,6 +92,7 @@ def scenario_files(drive: Drive, name: str | None = None) -> dict[str, str]:
     if drive.scenario is None:
         return {}
     scenario = {**drive.scenario, "name": name or drive.name}
+    scenario.pop("columns", None)  # Those of the files that were read.
     return {"scenario.yaml": to_yaml(scenario)}
 
 

@@ -24,7 +24,8 @@ _NAME_FORMS = (
     re.compile(r"(?P<map>.*\D)(?P<stage>\d+)"),
 )
 _UNKNOWN_STAGE = (
-    "map and stage are unknown: no scenario, and no name <map>_<stage>"
+    "map and stage are unknown: neither a scenario nor a name <map>_<stage>"
+    " states both"
 )
 
 

@@ -88,11 +88,15 @@ def stamped(topic, frame, kind="PoseStamped", X_BC=ID):
         yield topic, f"geometry_msgs/msg/{kind}", stamp, fields
 
 
-def paths(topic, frame, X_BC):
-    for n in (20, len(POSE_STAMPS)):
-        rows = list(stamped(topic, frame, X_BC=X_BC))[:n]
+def paths(topic, frame, X_BC, window=0):
+    """Each message has all poses up to then, or only the latest ones."""
+    number = len(POSE_STAMPS)
+    for n in range(window, number + 1) if window else (20, number):
+        rows = list(stamped(topic, frame, X_BC=X_BC))[:n][-window:]
         fields = {"header": header(T0_NS, frame)}
         fields["poses"] = [of_pose for *_, of_pose in rows]
+        if n == window:  # A later message corrects a pose.
+            fields["poses"][5]["pose"]["position"][0] += 5.0
         yield topic, "nav_msgs/msg/Path", T0_NS + n, fields
 
 
@@ -169,6 +173,11 @@ BAGS = {
          *paths("/lio_sam/mapping/path", "odom", ID)],
         {"ending": ".bag", "storage": "bz2"},
         {"odometry": "lio_sam/mapping/path"}, TAKEN,
+    ),
+    "a window of poses": (
+        [*clouds("/points_raw", "base_link", X_BS=ID),
+         *paths("/path", "odom", ID, window=12)],
+        {}, {}, TAKEN,
     ),
     "Vicon": (
         [*static(("robot", "velodyne", X_BS)),
@@ -264,9 +273,27 @@ def test_a_scenario_beside_a_bag_states_map_stage_and_lidar(tmp_path):
     assert drive.lidar_field is None
     beside.write_text("lidars: {lidar: {preset: vlp-16}}\n")
     assert open_drive(path, **options).lidar_field.rings == 16
-    beside.write_text("[]")
-    with pytest.raises(InputError, match=r"scenario\.yaml: not a mapping"):
-        open_drive(path, **options).lidar_field  # noqa: B018  # Reads it.
+    for text, fault in (
+        ("[]", "not a mapping"),
+        ("lidars: vlp-16", "lidars: not a mapping"),
+        ("lidars: {a: {preset: VLP16}}", "lidars.a: preset: .*mean vlp-16"),
+    ):
+        beside.write_text(text)
+        with pytest.raises(InputError, match=rf"scenario\.yaml: {fault}"):
+            open_drive(path, **options).lidar_field  # noqa: B018  # Reads it.
+
+
+def test_points_in_a_world_are_moved_to_the_poses_of_a_file(tmp_path):
+    """FAST-LIO's registered clouds, with its trajectory beside the bag."""
+    entries = clouds("/cloud_registered", "camera_init", in_world=True)
+    path = write(tmp_path, [*entries])
+    kitti = tmp_path / "poses.txt"
+    X_WS = np.array([X_WB(stamp) for stamp in STAMPS])
+    np.savetxt(kitti, X_WS[:, :3].reshape(-1, 12))
+    drive = open_drive(path, poses=kitti)
+    assert "'camera_init' is that of a world" in "; ".join(drive.notes)
+    seen = poses.transform(drive.X_WS[3], xyz(drive.scan(3)))
+    np.testing.assert_allclose(seen, p_WP, atol=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import InputError
+from cns_drake.export import export_drive
 from evaluation import open_drive
 from evaluation.clouds import read_cloud
 
@@ -64,6 +65,10 @@ def test_a_drive_says_its_columns(tmp_path):
     drive = open_drive(tmp_path / "01")
     assert drive.scan(0).dtype.names[4:] == ("column_5", "column_6")
     assert len(open_drive(tmp_path / "01", columns=3).scan(0)) == 120
+    # An export has the four columns of KITTI.
+    again = open_drive(export_drive(drive, "kitti", tmp_path / "export"))
+    for axis in "xyz":
+        np.testing.assert_array_equal(again.scan(0)[axis], drive.scan(0)[axis])
     for k, value in enumerate(("2", "4.0", "true", "x")):
         folder = tmp_path / f"bad_{k}"
         write_kitti(folder, f"columns: {value}\n")

@@ -265,7 +265,7 @@ def test_poses_that_hang_down(tmp_path):
     [
         ("[vlp-16]", "lidars: not a mapping"),
         ("{roof: vlp-16}", "lidars: not a mapping"),
-        ("{roof: {preset: vlp16}}", "lidars: preset: .* did you mean vlp-16"),
+        ("{roof: {preset: vlp16}}", "preset: .* did you mean vlp-16"),
         ("{roof: {unit: 16}}", "lidars.roof: unit: not a mapping"),
         ("{roof: {unit: {columns: 16}}}", "lidars.roof: unit: ranges: "),
         ("{roof: {unit: none.yaml}}", "lidars.roof: .*none.yaml: No such file"),
