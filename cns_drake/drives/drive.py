@@ -71,6 +71,8 @@ class Drive(abc.ABC):
     Attributes:
         name: short name for tables and messages, e.g. `metropolis_04`.
         world_frame: name of W, as stated in the recording.
+        has_own_world: whether W is a frame of this drive alone, because nothing
+            says where its poses are in a frame that others share.
         placing: how drives of this format get a common world frame, for errors;
             in brackets, after a space.
 
@@ -83,6 +85,7 @@ class Drive(abc.ABC):
 
     name: str
     world_frame: str
+    has_own_world: bool = False
     placing: str = ""
     _made_of: tuple[tuple, dict]
 

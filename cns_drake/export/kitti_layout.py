@@ -61,7 +61,12 @@ def _inner_files(drive: Drive) -> dict[str, str]:
         "calib.txt": "".join(
             f"{key}: {_pose_rows(X[None])}" for key, X in calibration.items()
         ),
-        "first_pose.txt": _pose_rows(drive.X_WS[:1]),
+        # Without it, readers align the drive by its scans.
+        **(
+            {}
+            if drive.has_own_world
+            else {"first_pose.txt": _pose_rows(drive.X_WS[:1])}
+        ),
         **imu_files(drive),
         **scenario_files(drive, name),
     }
@@ -87,6 +92,11 @@ def _with_kitti_intensities(drive: Drive, scan: np.ndarray) -> np.ndarray:
 
 
 def _notes(drive: Drive) -> Iterator[str]:
+    if drive.world_frame.startswith("poses"):
+        yield (
+            f"{drive.name}: first_pose.txt says that drives with such a file"
+            " share the frame of their poses; delete it if each has its own"
+        )
     scan = drive.scan(0)
     if (
         not drive.lidar_section

@@ -155,8 +155,18 @@ def lidar_poses(drive: Drive) -> PoseColumns:
     return PoseColumns(drive.stamps_ns, [X_WS[:, :3, 3], quat_WS], np.eye(4))
 
 
+def world_notes(drive: Drive) -> Iterator[str]:
+    """Yields a note if a format cannot say that a drive's world is its own."""
+    if drive.has_own_world:
+        yield (
+            f"{drive.name}: its world frame is not that of other drives, which"
+            " readers of this format will take it for"
+        )
+
+
 def vehicle_notes(drive: Drive) -> Iterator[str]:
-    """Yields a note if a drive has no poses of a vehicle."""
+    """Yields notes on the poses of a drive, as of `world_notes`."""
+    yield from world_notes(drive)
     if _vehicle(drive) is None:
         yield (
             f"{drive.name}: has no poses of the vehicle; those of the LiDAR are"

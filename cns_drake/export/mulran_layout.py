@@ -10,6 +10,7 @@ from cns_drake.export.layout import (
     imu_files,
     scenario_files,
     stamped_rows,
+    world_notes,
 )
 
 
@@ -50,4 +51,5 @@ LAYOUT = Layout(
     scan_files=lambda _, frame, stamp_ns, scan: {
         f"Ouster/{stamp_ns}.bin": encode_bin(scan)
     },
+    notes=world_notes,
 )

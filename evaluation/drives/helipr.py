@@ -105,6 +105,7 @@ class HeliprDrive(FileDrive):
             )
         files, stamps_ns = list_stamped(drive / _SCANS / lidar, ".bin")
         in_utm = (drive / _POSES / f"global_{lidar}_gt.txt").is_file()
+        self.has_own_world = not in_utm
         poses_name = f"global_{lidar}_gt.txt" if in_utm else f"{lidar}_gt.txt"
         poses_path = drive / _POSES / poses_name
         trajectory = read_quaternions(poses_path, None)

@@ -128,6 +128,7 @@ class KittiDrive(BinDrive):
             )
         # Drives of one name in two folders have two world frames.
         world_frame = f"kitti{path.resolve()}"
+        self.has_own_world = poses is None and not is_there(first_pose)
         counts = len(stamps_ns), len(stamps_ns)
         stamps_ns = _rows_of_scans(times_path, stamps_ns, numbers, notes)
         if poses is None:

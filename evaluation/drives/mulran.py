@@ -69,7 +69,7 @@ class MulranDrive(BinDrive):
         files, stamps_ns, X_UB, notes = posed(files, stamps_ns, trajectory)
         notes = (*chosen, *notes)
         name = as_given(path).name
-        local = is_local(trajectory.X_WB)
+        local = self.has_own_world = is_local(trajectory.X_WB)
         if local:
             notes += (
                 f"{poses_path}: no UTM coordinates; taken for those of a"

@@ -599,11 +599,26 @@ class TestReadingKittiExports:
         assert drive.scan(0).dtype.names == XYZI
         np.testing.assert_allclose(drive.X_WS[0], np.eye(4), atol=1e-12)
 
-    def test_labels_that_are_too_few(self, folder):
-        path = folder / "labels/000001.label"
-        path.write_bytes(path.read_bytes()[:-4])
-        with pytest.raises(ReadingError, match=r"60 points, but 59 in .*label"):
-            open_drive(folder).scan(1)
+    def test_a_world_of_its_own_stays_one(self, folder, tmp_path):
+        """Two drives whose poses begin at 0 are in one place only by chance."""
+        notes = []
+
+        def exported(drive, layout, name=""):
+            output = tmp_path / (name or layout)
+            return export_drive(drive, layout, output, on_note=notes.append)
+
+        (folder / "first_pose.txt").unlink()
+        drive = open_drive(folder)
+        again = open_drive(exported(drive, "kitti"))
+        assert again.world_frame == f"kitti{tmp_path / 'kitti/sequences/07'}"
+        exported(drive, "mulran")
+        assert "its world frame is not that" in notes.pop()
+        poses = tmp_path / "poses.txt"
+        np.savetxt(poses, drive.X_WS[:, :3].reshape(-1, 12))
+        given = open_drive(folder, poses=poses)
+        again = open_drive(exported(given, "kitti", "given"))
+        assert again.world_frame == "map"
+        assert any("delete it if each has its own" in note for note in notes)
 
     @pytest.mark.parametrize(
         "text", ["[1]", "a: [", "name: ../../x", "name: 'a b'", "\0"]
