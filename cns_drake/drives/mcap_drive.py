@@ -172,6 +172,8 @@ class McapDrive(Drive):
         self._path = self._topics.path
         self._folder = Path(path)
         self.name = _drive_name(self._folder)
+        if self._scenario_beside is not None:
+            self.name = str((self.scenario or {}).get("name", self.name))
         self._lidar_topic = self._topics.choose(_CLOUDS, lidar)
         self._given = poses
         self._pose_topic = None

@@ -265,8 +265,9 @@ def test_a_scenario_beside_a_bag_states_map_stage_and_lidar(tmp_path):
     assert drive.scenario is None
     assert drive.lidar_field is None
     beside = path / "scenario.yaml"
-    beside.write_text("map: campus\nstage: '2021'\n")
+    beside.write_text("name: walk_1\nmap: campus\nstage: '2021'\n")
     drive = open_drive(path, **options)
+    assert drive.name == "walk_1"
     assert drive.scenario["map"] == "campus"
     assert beside in drive.files
     # A drive that was not simulated has no default LiDAR.
