@@ -378,7 +378,9 @@ def _find_columns(
 
     Raises:
         ValueError: the header names a column twice; or it names too few
-            columns, and one of these is not at its position in `names`.
+            columns, and one of these is not at its position in `names`, or
+            there is no column, or a known one, at the position of a missing
+            name.
     """
     found = [_column(word) for word in words]
     if found.count("w"):
@@ -400,6 +402,11 @@ def _find_columns(
                 f"header: {words[k]!r} in column {k + 1}; the columns must be"
                 f" {wanted}, or the header must name all of these"
             )
+    missing = [name for name in used if name not in found]
+    for name in missing:
+        place = names.index(name)
+        if place >= len(words) or found[place] is not None:
+            raise ValueError(f"header: no {' '.join(missing)}")
     return None
 
 
