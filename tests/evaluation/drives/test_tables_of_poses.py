@@ -1,5 +1,7 @@
 """Tables of poses (`--poses`) in the forms of other programs."""
 
+from decimal import Decimal
+
 from helpers.dataset_folders import make_points, write_bytes, xyzi
 import pytest
 
@@ -27,3 +29,56 @@ def test_a_table_without_rotations_is_refused(tmp_path, names):
     fault = r"^\S*poses\.csv: header: no qx qy qz qw$"
     with pytest.raises(InputError, match=fault):
         open_posed(tmp_path, [names, row])
+
+
+# Stamps that a double cannot represent.
+T0_S = 1_583_840_211
+NS = [123_456_789, 223_456_789, 323_456_788]
+
+
+@pytest.mark.parametrize(
+    ("time", "unit_ns"),
+    [
+        ("#sec,nsec", None),
+        ("#secs,nsecs", None),
+        ("header.stamp.sec,header.stamp.nanosec", None),
+        ("#timestamp [ns]", 1),
+        ("timestamp_ns", 1),
+        ("time [ms]", 1_000_000),
+        ("timestamp_ms", 1_000_000),
+        ("timestamp [us]", 1000),
+        ("Time (\u00b5s)", 1000),
+        ("t [\u03bcs]", 1000),
+        ("t_us", 1000),
+        ("time [s]", 10**9),
+        ("time_sec", 10**9),
+        ("time", 10**9),
+    ],
+)
+@pytest.mark.parametrize("start_s", [0, T0_S])
+def test_times_are_read_in_the_unit_of_the_header(
+    tmp_path, time, unit_ns, start_s
+):
+    lines = [f"{time},{NAMES}"]
+    for k, ns in enumerate(NS):
+        stamp = Decimal(start_s * 10**9 + ns)
+        words = f"{start_s},{ns}" if unit_ns is None else stamp / unit_ns
+        lines.append(f"{words},{k},0,0,0,0,0,1")
+    times = [f"{start_s}.{ns:09d}" for ns in NS]
+    drive = open_posed(tmp_path, lines, times)
+    assert drive.X_WS[:, 0, 3].tolist() == [0.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("row", "fault"),
+    [
+        ("1,1000000000", "row 1: 1000000000 ns are no part of a second"),
+        ("1,-1", "row 1: -1 ns are no part of a second"),
+        ("1,x", "time: 'x' is no time"),
+        ("1e10,5", "'1e10' is no time"),
+    ],
+)
+def test_seconds_and_nanoseconds_that_are_none(tmp_path, row, fault):
+    lines = [f"sec,nsec,{NAMES}", f"{row},0,0,0,0,0,0,1"]
+    with pytest.raises(InputError, match=rf"poses\.csv: {fault}$"):
+        open_posed(tmp_path, lines)
