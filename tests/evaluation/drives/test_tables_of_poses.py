@@ -82,3 +82,20 @@ def test_seconds_and_nanoseconds_that_are_none(tmp_path, row, fault):
     lines = [f"sec,nsec,{NAMES}", f"{row},0,0,0,0,0,0,1"]
     with pytest.raises(InputError, match=rf"poses\.csv: {fault}$"):
         open_posed(tmp_path, lines)
+
+
+@pytest.mark.parametrize("last", ["2", "2.0000", "2.5"])
+def test_times_that_count_the_scans(tmp_path, last):
+    """KISS-ICP writes numbers for times if it knows no stamps."""
+    rows = [f"{t} {k} 0 0 0 0 0 1" for k, t in enumerate(["0", "1.0", last])]
+    drive = open_posed(tmp_path, rows)
+    # Others are times: one pose a second, ten scans a second.
+    wanted = [0.0, 0.1, 0.2] if last == "2.5" else [0.0, 1.0, 2.0]
+    assert drive.X_WS[:, 0, 3] == pytest.approx(wanted)
+
+
+def test_one_of_the_scans_that_are_counted_has_no_pose(tmp_path):
+    rows = [f"{k} {k} 0 0 0 0 0 1" for k in range(3)]
+    rows[1] = "1 nan 0 0 0 0 0 1"
+    drive = open_posed(tmp_path, rows, ["0", "0.1", "0.4"])
+    assert drive.X_WS[:, 0, 3] == pytest.approx([0.0, 0.5, 2.0])
