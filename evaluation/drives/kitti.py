@@ -45,8 +45,9 @@ from cns_drake.drives import SCENARIO, as_given, index_instances, read_scenario
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     BinDrive,
+    PosedFiles,
     first_existing,
-    posed,
+    posed_by,
     read_packed,
 )
 from evaluation.drives.text_tables import (
@@ -54,11 +55,7 @@ from evaluation.drives.text_tables import (
     parse_seconds,
     read_numbers,
 )
-from evaluation.drives.trajectories import (
-    pose_matrices,
-    read_poses,
-    read_trajectory,
-)
+from evaluation.drives.trajectories import pose_matrices, read_poses
 
 _SCANS = "velodyne"
 _LABELS = "labels"
@@ -146,11 +143,13 @@ class KittiDrive(BinDrive):
                 f"{poses_path}: {counts[1]} rows, but {counts[0]} in"
                 f" {times_path}"
             )
-        if poses is not None:
-            trajectory = read_trajectory(poses, stamps_ns, numbers)
-            files, stamps_ns, X_WS, told = posed(files, stamps_ns, trajectory)
-            notes += told
-            world_frame = f"poses{poses.resolve()}"
+        scans = (
+            posed_by(poses, files, stamps_ns, numbers)
+            if poses
+            else PosedFiles(
+                files, stamps_ns, X_WS, (), world_frame, (poses_path,)
+            )
+        )
         name = as_given(path).name
         scenario = read_scenario(path)
         self._structures = path / _STRUCTURES
@@ -159,13 +158,9 @@ class KittiDrive(BinDrive):
         super().__init__(
             columns,
             name=str((scenario or {}).get("name", name)),
-            world_frame=world_frame,
-            files=files,
-            stamps_ns=stamps_ns,
-            X_WS=X_WS,
+            scans=scans,
             tables=[
                 times_path,
-                poses_path,
                 calibration,
                 first_pose,
                 path / _FRAMES,
