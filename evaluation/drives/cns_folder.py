@@ -118,7 +118,7 @@ class CnsFolderDrive(FileDrive):
                 tables=(table, *([] if mount is None else [mount])),
             )
         super().__init__(
-            name=str((scenario or {}).get("name", name)),
+            name=name,
             scans=scans,
             read=lambda path, stamp_ns: read_cloud(path),
             tables=[self._imu_path, path / SCENARIO],

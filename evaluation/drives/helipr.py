@@ -112,10 +112,9 @@ class HeliprDrive(FileDrive):
                 f" another: {', '.join(n for n in there if n != lidar)})",
             )
         files, stamps_ns = list_stamped(drive / _SCANS / lidar, ".bin")
-        session = as_given(drive).name
         super().__init__(
-            name=f"{session}_{lidar}",
-            session=session,
+            name=as_given(drive).name,
+            lidar=lidar,
             scans=(
                 posed_by(poses, files, stamps_ns)
                 if poses

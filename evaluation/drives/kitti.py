@@ -150,14 +150,13 @@ class KittiDrive(BinDrive):
                 files, stamps_ns, X_WS, (), world_frame, (poses_path,)
             )
         )
-        name = as_given(path).name
         scenario = read_scenario(path)
         self._structures = path / _STRUCTURES
         labels = path / _LABELS
         self._labels = labels if labels.is_dir() else None
         super().__init__(
             columns,
-            name=str((scenario or {}).get("name", name)),
+            name=as_given(path).name,
             scans=scans,
             tables=[
                 times_path,

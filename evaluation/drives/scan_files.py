@@ -56,12 +56,12 @@ class FileDrive(Drive):
         notes: tuple[str, ...] = (),
         scenario: Mapping | None = None,
         unit: str | LidarField | None = None,
-        session: str | None = None,
+        lidar: str = "",
     ):
         """Describes a drive of N >= 1 scans.
 
         Args:
-            name: name of the drive.
+            name: name of the drive, unless its scenario has a `name`.
             scans: its scans.
             read: function that returns the points in the file of a scan,
                 unchanged. Its arguments are the file and the time of the scan
@@ -72,10 +72,11 @@ class FileDrive(Drive):
             scenario: see `evaluation.drives.Drive.scenario`.
             unit: the LiDAR, if the data set has only one, as in
                 `cns_drake.drives.lidar_field`.
-            session: see `evaluation.drives.Drive.session`; by default the name.
+            lidar: name of the LiDAR, if a drive can have several. It follows
+                the name of the drive.
         """
-        self.name = name
-        self._session = session or name
+        self._session = str((scenario or {}).get("name", name))
+        self.name = f"{self._session}_{lidar}" if lidar else self._session
         self.world_frame = scans.world_frame
         self._files = scans.files
         self._stamps_ns = scans.stamps_ns

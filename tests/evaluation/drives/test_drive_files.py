@@ -213,6 +213,16 @@ def test_a_link_may_have_a_name_of_its_own(tmp_path, write):
         assert "mine" in drive.name
 
 
+@pytest.mark.parametrize("write", EVERY[1:], ids=lambda write: write.__name__)
+def test_a_scenario_names_a_drive(tmp_path, write):
+    folder = write(tmp_path)
+    (folder / "scenario.yaml").write_text("name: rainy_07\n")
+    drive = open_drive(folder)
+    # Each LiDAR of HeLiPR is a drive.
+    lidar = "_Ouster" if write is helipr else ""
+    assert (drive.name, drive.session) == (f"rainy_07{lidar}", "rainy_07")
+
+
 def test_the_one_of_two_tables_that_is_read_is_named(tmp_path):
     folder = kitti(tmp_path)
     common = tmp_path / "poses" / "07.txt"
