@@ -21,4 +21,5 @@ from .scan_clouds import cropped as cropped
 from .scan_clouds import cropped_with_fields as cropped_with_fields
 from .scan_clouds import within_cube as within_cube
 from .scan_files import FileDrive as FileDrive
+from .scan_files import PosedFiles as PosedFiles
 from .trajectories import read_poses as read_poses

@@ -19,9 +19,11 @@ from cns_drake.drives import SCENARIO, as_given, read_scenario
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     FileDrive,
+    PosedFiles,
     check_below,
     list_stamped,
     posed,
+    posed_by,
     read_packed,
 )
 from evaluation.drives.text_tables import parse_microseconds
@@ -49,8 +51,18 @@ _ORIGIN = (620_000.0, 4_845_000.0, 0.0)
 class BoreasDrive(FileDrive):
     """A drive of Boreas, with the scans of its LiDAR, an Alpha Prime."""
 
-    def __init__(self, path: Path, columns: int | None = None):
-        """Opens a drive; `columns` is ignored, because the layout is fixed.
+    def __init__(
+        self,
+        path: Path,
+        columns: int | None = None,
+        poses: Path | None = None,
+    ):
+        """Opens a drive.
+
+        Args:
+            path: its folder.
+            columns: is ignored, because the layout is fixed.
+            poses: file with poses of the LiDAR, which is read instead.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
@@ -58,26 +70,31 @@ class BoreasDrive(FileDrive):
         files, stamps_ns = list_stamped(
             path / _SCANS, ".bin", parse_microseconds
         )
-        poses_path = path / _POSES
-        trajectory = read_angles(poses_path, num_velocities=3)
-        X_WS = trajectory.X_WB
-        X_WS[:, :3, :3] = np.swapaxes(X_WS[:, :3, :3], 1, 2)
-        local = is_local(X_WS)
-        if not local:
-            X_WS[:, :3, 3] -= _ORIGIN
-        files, stamps_ns, X_WS, notes = posed(files, stamps_ns, trajectory)
         super().__init__(
             name=as_given(path).name,
-            world_frame=f"boreas/{'enu' if local else 'utm-17n'}",
-            files=files,
-            stamps_ns=stamps_ns,
-            X_WS=X_WS,
+            scans=(
+                posed_by(poses, files, stamps_ns)
+                if poses
+                else _posed(path / _POSES, files, stamps_ns)
+            ),
             read=_read_scan,
-            tables=[poses_path, path / SCENARIO],
+            tables=[path / SCENARIO],
             scenario=read_scenario(path),
-            notes=notes,
             unit="alpha-prime",
         )
+
+
+def _posed(path: Path, files: list[Path], stamps_ns: np.ndarray) -> PosedFiles:
+    """Gives scan files the poses of the drive, which are at `path`."""
+    trajectory = read_angles(path, num_velocities=3)
+    X_WS = trajectory.X_WB
+    X_WS[:, :3, :3] = np.swapaxes(X_WS[:, :3, :3], 1, 2)
+    local = is_local(X_WS)
+    if not local:
+        X_WS[:, :3, 3] -= _ORIGIN
+    return posed(files, stamps_ns, trajectory)._replace(
+        world_frame=f"boreas/{'enu' if local else 'utm-17n'}", tables=(path,)
+    )
 
 
 def _read_scan(path: Path, stamp_ns: int) -> np.ndarray:
@@ -92,7 +109,8 @@ def _read_scan(path: Path, stamp_ns: int) -> np.ndarray:
 
 def holds_boreas(path: Path) -> bool:
     """Returns whether a folder looks like a drive of Boreas."""
-    return (path / _POSES).is_file()
+    # A drive of the benchmark has no poses.
+    return (path / _POSES).parent.is_dir()
 
 
 DATA_SET = DataSet(

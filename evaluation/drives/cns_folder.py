@@ -35,6 +35,7 @@ from evaluation.drives.scan_files import (
     first_existing,
     list_stamped,
     posed,
+    posed_by,
 )
 from evaluation.drives.text_tables import read_stamped_rows
 from evaluation.drives.trajectories import pose_matrices, read_quaternions
@@ -71,12 +72,18 @@ class CnsFolderDrive(FileDrive):
     vehicle's frame, as in the data set.
     """
 
-    def __init__(self, path: Path, columns: int | None = None):
+    def __init__(
+        self,
+        path: Path,
+        columns: int | None = None,
+        poses: Path | None = None,
+    ):
         """Opens a drive.
 
         Args:
             path: its folder.
             columns: has no effect, because PCD files name their columns.
+            poses: file with poses of the LiDAR, which is read instead.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
@@ -89,9 +96,6 @@ class CnsFolderDrive(FileDrive):
                 f"{path}: CNS: neither {' nor '.join(_FOLDERS)} in it"
             )
         files, stamps_ns = list_stamped(folder, ".pcd")
-        files, stamps_ns, X_WB, notes = posed(
-            files, stamps_ns, read_quaternions(path / _POSES, ",")
-        )
         self._imu_path = path / _IMU
         mount = _find_mount(path, chosen)
         place = as_given(path)
@@ -103,20 +107,22 @@ class CnsFolderDrive(FileDrive):
                 "map": place.parent.name.lower(),
                 "stage": place.name,
             }
+        if poses:
+            scans = posed_by(poses, files, stamps_ns)
+        else:
+            table = path / _POSES
+            scans = posed(files, stamps_ns, read_quaternions(table, ","))
+            scans = scans._replace(
+                X_WS=scans.X_WS @ _read_mount(mount),
+                world_frame="map",
+                tables=(table, *([] if mount is None else [mount])),
+            )
         super().__init__(
-            name=str((scenario or {}).get("name", name)),
-            world_frame="map",
-            files=files,
-            stamps_ns=stamps_ns,
-            X_WS=X_WB @ _read_mount(mount),
+            name=name,
+            scans=scans,
             read=lambda path, stamp_ns: read_cloud(path),
-            tables=[
-                path / _POSES,
-                self._imu_path,
-                path / SCENARIO,
-                *([] if mount is None else [mount]),
-            ],
-            notes=(*chosen, *notes),
+            tables=[self._imu_path, path / SCENARIO],
+            notes=tuple(chosen),
             scenario=scenario,
             unit="cns",
         )

@@ -17,9 +17,11 @@ from cns_drake.drives import SCENARIO, LidarField, as_given, read_scenario
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     FileDrive,
+    PosedFiles,
     check_below,
     list_stamped,
     posed,
+    posed_by,
     read_packed,
 )
 from evaluation.drives.trajectories import read_quaternions
@@ -83,13 +85,19 @@ class HeliprDrive(FileDrive):
     return are left out.
     """
 
-    def __init__(self, path: Path, lidar: str | None = None):
+    def __init__(
+        self,
+        path: Path,
+        lidar: str | None = None,
+        poses: Path | None = None,
+    ):
         """Opens a drive.
 
         Args:
             path: the folder of the drive, or `LiDAR/<name>` in it.
             lidar: name of the LiDAR, if `path` does not contain it. By default
                 the Ouster or, in a folder without the Ouster, the only LiDAR.
+            poses: file with poses of the LiDAR, which is read instead.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
@@ -104,28 +112,37 @@ class HeliprDrive(FileDrive):
                 f" another: {', '.join(n for n in there if n != lidar)})",
             )
         files, stamps_ns = list_stamped(drive / _SCANS / lidar, ".bin")
-        in_utm = (drive / _POSES / f"global_{lidar}_gt.txt").is_file()
-        self.has_own_world = not in_utm
-        poses_name = f"global_{lidar}_gt.txt" if in_utm else f"{lidar}_gt.txt"
-        poses_path = drive / _POSES / poses_name
-        trajectory = read_quaternions(poses_path, None)
-        files, stamps_ns, X_US, notes = posed(files, stamps_ns, trajectory)
-        X_WS = to_world(X_US, poses_path) if in_utm else X_US
-        session = as_given(drive).name
         super().__init__(
-            name=f"{session}_{lidar}",
-            session=session,
-            world_frame=f"helipr{f'/{DATUM}' if in_utm else drive.resolve()}",
-            files=files,
-            stamps_ns=stamps_ns,
-            X_WS=X_WS,
+            name=as_given(drive).name,
+            lidar=lidar,
+            scans=(
+                posed_by(poses, files, stamps_ns)
+                if poses
+                else _posed(drive, lidar, files, stamps_ns)
+            ),
             read=partial(_read_scan, lidar),
-            tables=[poses_path, drive / SCENARIO],
+            tables=[drive / SCENARIO],
             scenario=read_scenario(drive),
-            notes=chosen + notes,
-            datum=DATUM if in_utm else None,
+            notes=chosen,
             unit=_UNITS.get(lidar),
         )
+
+
+def _posed(
+    drive: Path, lidar: str, files: list[Path], stamps_ns: np.ndarray
+) -> PosedFiles:
+    """Gives scan files the poses of the drive."""
+    in_utm = (drive / _POSES / f"global_{lidar}_gt.txt").is_file()
+    poses_name = f"global_{lidar}_gt.txt" if in_utm else f"{lidar}_gt.txt"
+    poses_path = drive / _POSES / poses_name
+    found = posed(files, stamps_ns, read_quaternions(poses_path, None))
+    return found._replace(
+        X_WS=to_world(found.X_WS, poses_path) if in_utm else found.X_WS,
+        world_frame=f"helipr{f'/{DATUM}' if in_utm else drive.resolve()}",
+        tables=(poses_path,),
+        datum=DATUM if in_utm else None,
+        has_own_world=not in_utm,
+    )
 
 
 def _read_scan(lidar: str, path: Path, stamp_ns: int) -> np.ndarray:

@@ -45,8 +45,9 @@ from cns_drake.drives import SCENARIO, as_given, index_instances, read_scenario
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     BinDrive,
+    PosedFiles,
     first_existing,
-    posed,
+    posed_by,
     read_packed,
 )
 from evaluation.drives.text_tables import (
@@ -54,11 +55,7 @@ from evaluation.drives.text_tables import (
     parse_seconds,
     read_numbers,
 )
-from evaluation.drives.trajectories import (
-    pose_matrices,
-    read_poses,
-    read_trajectory,
-)
+from evaluation.drives.trajectories import pose_matrices, read_poses
 
 _SCANS = "velodyne"
 _LABELS = "labels"
@@ -128,7 +125,6 @@ class KittiDrive(BinDrive):
             )
         # Drives of one name in two folders have two world frames.
         world_frame = f"kitti{path.resolve()}"
-        self.has_own_world = poses is None and not is_there(first_pose)
         counts = len(stamps_ns), len(stamps_ns)
         stamps_ns = _rows_of_scans(times_path, stamps_ns, numbers, notes)
         if poses is None:
@@ -147,26 +143,29 @@ class KittiDrive(BinDrive):
                 f"{poses_path}: {counts[1]} rows, but {counts[0]} in"
                 f" {times_path}"
             )
-        if poses is not None:
-            trajectory = read_trajectory(poses, stamps_ns, numbers)
-            files, stamps_ns, X_WS, told = posed(files, stamps_ns, trajectory)
-            notes += told
-            world_frame = f"poses{poses.resolve()}"
-        name = as_given(path).name
+        scans = (
+            posed_by(poses, files, stamps_ns, numbers)
+            if poses
+            else PosedFiles(
+                files,
+                stamps_ns,
+                X_WS,
+                (),
+                world_frame,
+                (poses_path,),
+                has_own_world=not is_there(first_pose),
+            )
+        )
         scenario = read_scenario(path)
         self._structures = path / _STRUCTURES
         labels = path / _LABELS
         self._labels = labels if labels.is_dir() else None
         super().__init__(
             columns,
-            name=str((scenario or {}).get("name", name)),
-            world_frame=world_frame,
-            files=files,
-            stamps_ns=stamps_ns,
-            X_WS=X_WS,
+            name=as_given(path).name,
+            scans=scans,
             tables=[
                 times_path,
-                poses_path,
                 calibration,
                 first_pose,
                 path / _FRAMES,

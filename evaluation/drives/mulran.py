@@ -16,9 +16,11 @@ from cns_drake.drives import SCENARIO, X_BS, as_given, read_scenario
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.scan_files import (
     BinDrive,
+    PosedFiles,
     first_existing,
     list_stamped,
     posed,
+    posed_by,
 )
 from evaluation.drives.trajectories import read_matrices
 from evaluation.drives.utm_poses import DATUM, is_local, to_world
@@ -47,12 +49,18 @@ class MulranDrive(BinDrive):
     `t`, because its file does not show which points are missing.
     """
 
-    def __init__(self, path: Path, columns: int | None = None):
+    def __init__(
+        self,
+        path: Path,
+        columns: int | None = None,
+        poses: Path | None = None,
+    ):
         """Opens a drive.
 
         Args:
             path: its folder, with or without a `sensor_data`.
             columns: number of columns of a scan, see `BinDrive`.
+            poses: file with poses of the LiDAR, which is read instead.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
@@ -64,29 +72,17 @@ class MulranDrive(BinDrive):
                 f"{path}: MulRan: neither {' nor '.join(_FOLDERS)} in it"
             )
         files, stamps_ns = list_stamped(folder, ".bin")
-        poses_path = path / _POSES
-        trajectory = read_matrices(poses_path)
-        files, stamps_ns, X_UB, notes = posed(files, stamps_ns, trajectory)
-        notes = (*chosen, *notes)
-        name = as_given(path).name
-        local = self.has_own_world = is_local(trajectory.X_WB)
-        if local:
-            notes += (
-                f"{poses_path}: no UTM coordinates; taken for those of a"
-                f" frame of {name} alone",
-            )
-        X_WB = X_UB if local else to_world(X_UB, poses_path)
         scenario = read_scenario(path)
         super().__init__(
             columns,
-            name=name,
-            world_frame=f"mulran{path.resolve() if local else f'/{DATUM}'}",
-            files=files,
-            stamps_ns=stamps_ns,
-            X_WS=X_WB @ X_BS,
-            tables=[poses_path, path / SCENARIO],
-            notes=notes,
-            datum=None if local else DATUM,
+            name=as_given(path).name,
+            scans=(
+                posed_by(poses, files, stamps_ns)
+                if poses
+                else _posed(path, files, stamps_ns)
+            ),
+            tables=[path / SCENARIO],
+            notes=tuple(chosen),
             scenario=scenario,
             # Exports of cns-drake are of any LiDAR.
             unit="os1-64-33" if scenario is None else None,
@@ -121,6 +117,29 @@ DATA_SET = DataSet(
         "`Ouster`"
     ),
 )
+
+
+def _posed(path: Path, files: list[Path], stamps_ns: np.ndarray) -> PosedFiles:
+    """Gives scan files the poses of the drive."""
+    poses_path = path / _POSES
+    trajectory = read_matrices(poses_path)
+    found = posed(files, stamps_ns, trajectory)._replace(tables=(poses_path,))
+    if is_local(trajectory.X_WB):
+        note = (
+            f"{poses_path}: no UTM coordinates; taken for those of a frame of"
+            f" {as_given(path).name} alone"
+        )
+        return found._replace(
+            X_WS=found.X_WS @ X_BS,
+            notes=(*found.notes, note),
+            world_frame=f"mulran{path.resolve()}",
+            has_own_world=True,
+        )
+    return found._replace(
+        X_WS=to_world(found.X_WS, poses_path) @ X_BS,
+        world_frame=f"mulran/{DATUM}",
+        datum=DATUM,
+    )
 
 
 def _scan_folder(path: Path, notes: list[str]) -> Path | None:

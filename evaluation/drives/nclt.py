@@ -23,6 +23,7 @@ from evaluation.drives.scan_files import (
     first_existing,
     list_stamped,
     posed,
+    posed_by,
     read_packed,
 )
 from evaluation.drives.text_tables import parse_microseconds
@@ -65,8 +66,18 @@ class NcltDrive(FileDrive):
     upwards, unlike the lasers of the unit.
     """
 
-    def __init__(self, path: Path, columns: int | None = None):
-        """Opens a session; `columns` is ignored, because the layout is fixed.
+    def __init__(
+        self,
+        path: Path,
+        columns: int | None = None,
+        poses: Path | None = None,
+    ):
+        """Opens a session.
+
+        Args:
+            path: its folder.
+            columns: is ignored, because the layout is fixed.
+            poses: file with poses of the LiDAR, which is read instead.
 
         Raises:
             InputError: there is no such session, or its poses cannot be used.
@@ -81,19 +92,22 @@ class NcltDrive(FileDrive):
         )
         name = as_given(path).name
         chosen: list[str] = []
-        poses_path = _poses_path(path, chosen)
-        trajectory = read_angles(poses_path)
-        files, stamps_ns, X_NB, notes = posed(files, stamps_ns, trajectory)
+        if poses:
+            scans = posed_by(poses, files, stamps_ns)
+        else:
+            table = _poses_path(path, chosen)
+            scans = posed(files, stamps_ns, read_angles(table))
+            X_WS = _X_WN @ scans.X_WS @ _X_BS
+            scans = scans._replace(
+                X_WS=X_WS, world_frame="nclt", tables=(table,)
+            )
         super().__init__(
             name=name,
-            world_frame="nclt",
-            files=files,
-            stamps_ns=stamps_ns,
-            X_WS=_X_WN @ X_NB @ _X_BS,
+            scans=scans,
             read=lambda path, stamp_ns: _read_scan(path),
-            tables=[poses_path, path / SCENARIO],
+            tables=[path / SCENARIO],
             scenario=read_scenario(path),
-            notes=(*chosen, *notes),
+            notes=tuple(chosen),
             unit="hdl-32e-upside-down",
         )
 

@@ -10,7 +10,10 @@ from evaluation.drives.trajectories import read_trajectory
 
 
 class PosedDrive(MovedDrive):
-    """The scans of a drive that a file of poses spans, at these poses."""
+    """The scans of a drive that a file of poses spans, at these poses.
+
+    It is for data sets of plug-ins, whose readers take no file of poses.
+    """
 
     def __init__(self, drive: Drive, path: Path):
         """Reads the poses.

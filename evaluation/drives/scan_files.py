@@ -1,9 +1,9 @@
 """Drives that are stored as one file for each scan."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 import filecmp
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,31 @@ from cns_drake.base import (
 from cns_drake.drives import Drive, LidarField, StampedPoses, lidar_field
 from evaluation.clouds import SCAN_LIMIT_BYTES, bin_dtype
 from evaluation.drives.text_tables import check_increasing, parse_stamps_ns
+from evaluation.drives.trajectories import read_trajectory
+
+
+class PosedFiles(NamedTuple):
+    """Files of N scans, with their poses.
+
+    Attributes:
+        files: N scans.
+        stamps_ns: (N,) int64 [ns], strictly increasing.
+        X_WS: (N, 4, 4) poses of the LiDAR in the world.
+        notes: notes for the user on the poses.
+        world_frame: name of W.
+        tables: the files of the poses.
+        datum: name of the survey grid in which W lies; None if there is none.
+        has_own_world: see `cns_drake.drives.Drive`.
+    """
+
+    files: list[Path]
+    stamps_ns: np.ndarray
+    X_WS: np.ndarray
+    notes: tuple[str, ...]
+    world_frame: str = ""
+    tables: tuple[Path, ...] = ()
+    datum: str | None = None
+    has_own_world: bool = False
 
 
 class FileDrive(Drive):
@@ -27,49 +52,43 @@ class FileDrive(Drive):
     def __init__(
         self,
         name: str,
-        world_frame: str,
-        files: list[Path],
-        stamps_ns: np.ndarray,
-        X_WS: np.ndarray,
+        scans: PosedFiles,
         read: Callable[[Path, int], np.ndarray],
         tables: Iterable[Path] = (),
         notes: tuple[str, ...] = (),
-        datum: str | None = None,
         scenario: Mapping | None = None,
         unit: str | LidarField | None = None,
-        session: str | None = None,
+        lidar: str = "",
     ):
         """Describes a drive of N >= 1 scans.
 
         Args:
-            name: name of the drive.
-            world_frame: name of W.
-            files: N scans.
-            stamps_ns: (N,) int64 [ns], strictly increasing.
-            X_WS: (N, 4, 4) poses of the LiDAR in the world.
+            name: name of the drive, unless its scenario has a `name`.
+            scans: its scans.
             read: function that returns the points in the file of a scan,
                 unchanged. Its arguments are the file and the time of the scan
                 [ns]. It raises ValueError if the file has another format.
-            tables: all other files that are read, such as poses. A path where
-                there is no file is left out.
+            tables: all other files that are read. A path where there is no
+                file is left out.
             notes: notes for the user on how the drive was read.
-            datum: name of the survey grid in which W lies; None if there is
-                none.
             scenario: see `evaluation.drives.Drive.scenario`.
             unit: the LiDAR, if the data set has only one, as in
                 `cns_drake.drives.lidar_field`.
-            session: see `evaluation.drives.Drive.session`; by default the name.
+            lidar: name of the LiDAR, if a drive can have several. It follows
+                the name of the drive.
         """
-        self.name = name
-        self._session = session or name
-        self.world_frame = world_frame
-        self._files = files
-        self._stamps_ns = stamps_ns
-        self._X_WS = X_WS
+        self._session = str((scenario or {}).get("name", name))
+        self.name = f"{self._session}_{lidar}" if lidar else self._session
+        self.world_frame = scans.world_frame
+        self.has_own_world = scans.has_own_world
+        self._files = scans.files
+        self._stamps_ns = scans.stamps_ns
+        self._X_WS = scans.X_WS
         self._read = read
+        tables = (*scans.tables, *tables)
         self._tables = tuple(table for table in tables if table.is_file())
-        self._notes = notes
-        self._datum = datum
+        self._notes = (*notes, *scans.notes)
+        self._datum = scans.datum
         self._scenario = scenario
         self._unit = unit
 
@@ -192,7 +211,7 @@ def _are_alike(first: Path, second: Path) -> bool:
 
 def posed(
     files: list[Path], stamps_ns: np.ndarray, trajectory: StampedPoses
-) -> tuple[list[Path], np.ndarray, np.ndarray, tuple[str, ...]]:
+) -> PosedFiles:
     """Gives scan files their poses.
 
     Args:
@@ -201,14 +220,37 @@ def posed(
         trajectory: the poses of the drive.
 
     Returns:
-        The K files between the first and the last pose, their stamps (K,) [ns],
-        their poses (K, 4, 4), and notes, see `StampedPoses.at_scans`.
+        The files between the first and the last pose, and notes, see
+        `StampedPoses.at_scans`; without a name of W.
 
     Raises:
         InputError: a scan has no pose.
     """
     kept, X_WB, notes = trajectory.at_scans(stamps_ns)
-    return files[kept], stamps_ns[kept], X_WB, notes
+    return PosedFiles(files[kept], stamps_ns[kept], X_WB, notes)
+
+
+def posed_by(
+    poses: Path,
+    files: list[Path],
+    stamps_ns: np.ndarray,
+    numbers: Sequence[int] | None = None,
+) -> PosedFiles:
+    """Gives scan files the poses of the LiDAR that the user's file has.
+
+    Args:
+        poses: the file, see `read_trajectory`.
+        files: files of all N scans, even those without ground truth.
+        stamps_ns: (N,) their stamps [ns].
+        numbers: see `read_trajectory`.
+
+    Raises:
+        InputError: the file cannot be read, or has no pose for a scan.
+    """
+    trajectory = read_trajectory(poses, stamps_ns, numbers)
+    return posed(files, stamps_ns, trajectory)._replace(
+        world_frame=f"poses{poses.resolve()}", tables=(poses,)
+    )
 
 
 def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:

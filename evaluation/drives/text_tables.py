@@ -1,9 +1,10 @@
 """Tables of numbers as text, and the times in them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
 import io
 import itertools
+from math import isfinite
 from pathlib import Path
 import re
 from typing import NamedTuple
@@ -18,6 +19,7 @@ from cns_drake.base import (
     other_separator,
     parse_rows,
     read_bytes,
+    to_number,
     value_errors,
 )
 
@@ -68,16 +70,18 @@ def read_numbers(
     Lines that begin with `#` are remarks. A header is a first line that does
     not begin with a number, or a remark above the first row that names the
     columns. If a header names the wanted columns, these columns can be in any
-    order.
+    order. If it states the unit of the time, or names the seconds and the
+    nanoseconds of the time, the times are returned as whole nanoseconds with
+    `ns` behind them.
 
     Args:
         path: the file.
         columns: NumPy type of a row, with named fields; or the type of a
             number, if all columns have the same type.
         separator: text between columns; None for white space.
-        names: names of all columns in their usual order, "" for one that is
-            not read, see `_find_columns`. By default the columns have no
-            names, and all are read.
+        names: names of all columns in their usual order, `time` first, "" for
+            one that is not read, see `_find_columns`. By default the columns
+            have no names, and all are read.
 
     Returns:
         (N,) records if `columns` has fields, otherwise (N, width) numbers. N is
@@ -85,16 +89,17 @@ def read_numbers(
 
     Raises:
         InputError: if there is no such table, it is empty, a row has another
-            form, or a header contradicts the order of the columns.
+            form, a time is out of range, or a header contradicts the order of
+            the columns.
     """
     before, header, lines = _parts(path)
     with value_errors(path):
         if names:
-            places, width = _places(
+            places, width, clock = _places(
                 header or before, lines[0], separator, names
             )
-            if places != list(range(width)):
-                lines = _pick_columns(lines, places, width, separator)
+            if clock or places != list(range(width)):
+                lines = _pick_columns(lines, places, width, separator, clock)
         return parse_rows(lines, np.dtype(columns), separator)
 
 
@@ -152,8 +157,11 @@ def _parts(path: Path) -> tuple[str, str, list[str]]:
 
 def _places(
     header: str, row: str, separator: str | None, names: Sequence[str]
-) -> tuple[list[int], int]:
+) -> tuple[list[int], int, dict[int, int]]:
     """Returns the positions of columns to read, and how many columns exist.
+
+    The third value is the columns whose sum is the time, with their units [ns];
+    it is empty if the header states no unit.
 
     Args:
         header: line above the first row, which need not be a header; "" if
@@ -175,8 +183,9 @@ def _places(
         else:
             raise ValueError(f"header: {len(words)} names for {width} columns")
     if not words:
-        return usual, len(names)
-    return _find_columns(words, names) or usual, width
+        return usual, len(names), {}
+    places = _find_columns(words, names) or usual
+    return places, width, _clock(words, places[0])
 
 
 def parse_stamps_ns(texts: np.ndarray) -> np.ndarray:
@@ -274,6 +283,8 @@ def _is_fraction(text: str) -> bool:
 
 
 def _to_ns(text: str, unit_ns: int) -> int:
+    if text.endswith("ns"):  # See `read_numbers`.
+        text, unit_ns = text.removesuffix("ns"), 1
     try:
         if not is_number(text):
             raise ValueError(text)
@@ -289,7 +300,8 @@ def _pick_columns(
     lines: Sequence[str],
     places: Sequence[int],
     width: int,
-    separator: str | None = None,
+    separator: str | None,
+    clock: Mapping[int, int],
 ) -> list[str]:
     """Returns rows with some of their columns, in a given order.
 
@@ -298,10 +310,12 @@ def _pick_columns(
         places: place of each wanted column, from 0.
         width: number of columns of a row.
         separator: text between columns; None for white space.
+        clock: columns whose sum is the first wanted column, with their units
+            [ns]; empty if this column is taken as it is.
 
     Raises:
-        ValueError: a row has another number of columns; the message names the
-            first such row.
+        ValueError: a row has another number of columns, or a time is out of
+            range; the message names the first such row.
     """
     picked = []
     for row, line in enumerate(lines, start=1):
@@ -312,13 +326,36 @@ def _pick_columns(
             raise ValueError(
                 f"row {row}: {other_separator(line, separator) or fault}"
             )
-        picked.append((separator or " ").join(words[k] for k in places))
+        wanted = [words[k] for k in places]
+        if clock:
+            wanted[0] = _whole_ns(words, clock, row)
+        picked.append((separator or " ").join(wanted))
     return picked
 
 
-_UNIT = re.compile(r"\[[^]]*\]|\([^)]*\)")
+def _whole_ns(words: Sequence[str], clock: Mapping[int, int], row: int) -> str:
+    """Returns the time in a row as text; a word that is no number, as it is."""
+    parts = [words[column].strip() for column in clock]
+    for part in parts:
+        if not isfinite(to_number(part)):
+            return part
+    times_ns = list(map(_to_ns, parts, clock.values()))
+    if len(times_ns) > 1 and not 0 <= times_ns[-1] < NS_PER_S:
+        raise ValueError(f"row {row}: {parts[-1]} ns are no part of a second")
+    return f"{sum(times_ns)}ns"
+
+
+_UNIT = re.compile(r"\s*(\[(?P<unit>[^]]*)\]|\((?P<round>[^)]*)\))")
 _OTHER = re.compile(r"[^a-z0-9]+")
-_TIME = re.compile(r"t|n?secs?|\w*(time|stamp)\w*")
+_TIME = re.compile(r"t(_[mun]?s)?|([mun]|nano)?secs?|\w*(time|stamp)\w*")
+# A unit of time behind a name, such as ns, nsec and nanoseconds.
+_CLOCK = re.compile(
+    r"(?P<stem>|.*_)(?P<part>[mun]|milli|micro|nano|)(?P<sec>s(ec(ond)?s?)?)"
+)
+_PARTS_NS = {
+    **{"": NS_PER_S, "m": 10**6, "u": _NS_PER_US, "n": 1},
+    **{"milli": 10**6, "micro": _NS_PER_US, "nano": 1},
+}
 _WORDS = {
     **{"easting": "x", "northing": "y", "altitude": "z", "height": "z"},
     **{"roll": "roll", "pitch": "pitch", "yaw": "yaw", "heading": "yaw"},
@@ -339,7 +376,9 @@ _VECTORS = {
 
 
 def _split_header(line: str, separator: str | None) -> list[str]:
-    """Returns the words of a header, without units.
+    """Returns the words of a header, without units except those of time.
+
+    `time [ns]` becomes `time_ns`.
 
     The result is empty unless most of the words are known names of columns.
     White space may separate the words even if there is another separator.
@@ -348,12 +387,50 @@ def _split_header(line: str, separator: str | None) -> list[str]:
         line: the header, or a remark that may be a header.
         separator: text between columns; None for white space.
     """
-    text = _UNIT.sub("", line.lstrip("# "))
+    line = line.lstrip("# ").replace("\u00b5", "u").replace("\u03bc", "u")
+    text = _UNIT.sub(_suffix, line)
     words = text.split(separator)
     if len(words) == 1:
         words = text.split()
     num_known = sum(_column(word) is not None for word in words)
     return words if 2 * num_known > len(words) else []
+
+
+def _suffix(unit: re.Match[str]) -> str:
+    text = (unit["unit"] or unit["round"] or "").strip().lower()
+    found = _CLOCK.fullmatch(text)
+    return f"_{text}" if found and not found["stem"] else ""
+
+
+def _clock(words: Sequence[str], column: int) -> dict[int, int]:
+    """Returns the columns whose sum is the time, with their units [ns].
+
+    Seconds and nanoseconds of one name, such as `sec` and `nsec`, are such a
+    sum.
+
+    Args:
+        words: words of the header.
+        column: the column of the time.
+
+    Returns:
+        column -> unit. Empty if the header states no unit.
+    """
+    found = [_CLOCK.fullmatch(_plain(word)) for word in words]
+    own = found[column] if _column(words[column]) else None
+    if own is None:
+        return {}
+    pair = {
+        _PARTS_NS[one["part"]]: k
+        for k, one in enumerate(found)
+        if one and one["stem"] == own["stem"] and one["sec"].startswith("sec")
+    }
+    if pair.keys() >= {NS_PER_S, 1} and column in pair.values():
+        return {pair[unit_ns]: unit_ns for unit_ns in (NS_PER_S, 1)}
+    return {column: _PARTS_NS[own["part"]]}
+
+
+def _plain(word: str) -> str:
+    return _OTHER.sub("_", word.lower()).strip("_")
 
 
 def _find_columns(
@@ -378,7 +455,9 @@ def _find_columns(
 
     Raises:
         ValueError: the header names a column twice; or it names too few
-            columns, and one of these is not at its position in `names`.
+            columns, and one of these is not at its position in `names`, or
+            there is no column, or a known one, at the position of a missing
+            name.
     """
     found = [_column(word) for word in words]
     if found.count("w"):
@@ -400,12 +479,17 @@ def _find_columns(
                 f"header: {words[k]!r} in column {k + 1}; the columns must be"
                 f" {wanted}, or the header must name all of these"
             )
+    missing = [name for name in used if name not in found]
+    for name in missing:
+        place = names.index(name)
+        if place >= len(words) or found[place] is not None:
+            raise ValueError(f"header: no {' '.join(missing)}")
     return None
 
 
 def _column(word: str) -> str | None:
     """Returns the name of a column; None for an unknown word."""
-    text = _OTHER.sub("_", word.lower()).strip("_")
+    text = _plain(word)
     if _TIME.fullmatch(text):
         return "time"
     for letter, pattern in _VECTORS.items():

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError, poses, value_errors
+from cns_drake.base import NS_PER_S, InputError, poses, value_errors
 from cns_drake.drives import StampedPoses
 from evaluation.drives.text_tables import (
     check_finite,
@@ -82,7 +82,8 @@ def read_trajectory(
             (TUM), or of columns that a header names, such as EuRoC's; or of 3 x
             4 matrices, one for each scan (KITTI), or behind a time (MulRan) or
             the number of the scan (KITTI-360). Commas may separate columns.
-            Rows with NaN are left out, and noted.
+            Rows with NaN are left out, and noted. TUM's times are the numbers
+            of the scans if they are 0, 1, ... N - 1 s, as KISS-ICP writes.
         stamps_ns: (N,) stamps of the scans [ns].
         scans: (N,) numbers of the scans, ascending; by default 0 to N - 1.
             Rows with other numbers are left out.
@@ -96,11 +97,17 @@ def read_trajectory(
         rows = read_numbers(
             path, [("stamp", "U40"), ("values", "f8", 7)], separator, _COLUMNS
         )
-        known = rows[~np.isnan(rows["values"]).any(axis=1)]
+        has_pose = ~np.isnan(rows["values"]).any(axis=1)
+        known = rows[has_pose]
         if not len(known):
             raise InputError(f"{path}: no row without NaN")
         with value_errors(f"{path}: time"):
             own_ns = parse_seconds(known["stamp"])
+        # KISS-ICP counts scans whose stamps it does not know.
+        order = np.flatnonzero(has_pose)
+        is_count = np.array_equal(own_ns, order * NS_PER_S)
+        if is_count and len(rows) == len(stamps_ns):
+            own_ns = stamps_ns[order]
         check_finite(path, known["values"])
         found = _turned_poses(path, own_ns, known["values"])
         return replace(found, num_unknown=len(rows) - len(known))

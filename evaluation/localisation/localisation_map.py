@@ -16,6 +16,7 @@ from evaluation.drives import (
     NOT_FINITE,
     FileDrive,
     JoinedDrive,
+    PosedFiles,
     sample_frames,
     within_cube,
 )
@@ -189,12 +190,14 @@ class OneScan(FileDrive):
         scan = read_cloud(path, columns, notes.append)
         super().__init__(
             name=path.name,
-            world_frame="map",
-            files=[path],
-            stamps_ns=np.zeros(1, np.int64),
-            X_WS=np.eye(4)[None],
+            scans=PosedFiles(
+                [path],
+                np.zeros(1, np.int64),
+                np.eye(4)[None],
+                notes=tuple(notes),
+                world_frame="map",
+            ),
             read=lambda path, stamp_ns: scan,
-            notes=tuple(notes),
         )
 
     def scan(self, index: int) -> np.ndarray:

@@ -213,6 +213,16 @@ def test_a_link_may_have_a_name_of_its_own(tmp_path, write):
         assert "mine" in drive.name
 
 
+@pytest.mark.parametrize("write", EVERY[1:], ids=lambda write: write.__name__)
+def test_a_scenario_names_a_drive(tmp_path, write):
+    folder = write(tmp_path)
+    (folder / "scenario.yaml").write_text("name: rainy_07\n")
+    drive = open_drive(folder)
+    # Each LiDAR of HeLiPR is a drive.
+    lidar = "_Ouster" if write is helipr else ""
+    assert (drive.name, drive.session) == (f"rainy_07{lidar}", "rainy_07")
+
+
 def test_the_one_of_two_tables_that_is_read_is_named(tmp_path):
     folder = kitti(tmp_path)
     common = tmp_path / "poses" / "07.txt"
@@ -248,3 +258,51 @@ def test_the_one_of_two_folders_or_mounts_that_is_read_is_named(tmp_path):
     assert open_drive(folder).notes[0] == (
         f"{folder / 'sensor_data/Ouster'}: read; not read: {folder / 'Ouster'}"
     )
+
+
+GROUND_TRUTH = {
+    mulran: "global_pose.csv",
+    helipr: "LiDAR_GT/*",
+    nclt: "../ground_truth/*",
+    boreas: "applanix/lidar_poses.csv",
+    cns: "gt.csv",
+}
+
+
+@pytest.mark.parametrize("form", ["matrices", "numbers", "times"])
+@pytest.mark.parametrize("is_cut", [True, False])
+@pytest.mark.parametrize("write", GROUND_TRUTH, ids=lambda one: one.__name__)
+def test_given_poses_are_read_instead_of_ground_truth(
+    tmp_path, write, is_cut, form
+):
+    """They are those of all scans, even of scans without ground truth."""
+    folder = write(tmp_path)
+    every = open_drive(folder).stamps_ns
+    for table in folder.glob(GROUND_TRUTH[write]):
+        lines = table.read_text().splitlines(keepends=True)
+        table.unlink()
+        if is_cut:
+            table.write_text("".join(lines[len(lines) // 2 :]))
+    path, X_WS = tmp_path / "given.txt", make_poses(len(every), seed=7)
+    if form == "times":
+        write_quaternions(path, every.astype("U") + "e-9", X_WS)
+    else:
+        numbers = range(len(every)) if form == "numbers" else None
+        write_matrices(path, numbers, X_WS, " ")
+    drive = open_drive(folder, poses=str(path))
+    assert drive.stamps_ns.tolist() == every.tolist()
+    np.testing.assert_allclose(drive.X_WS, X_WS, atol=1e-12)
+    assert drive.world_frame == f"poses{path}"
+    assert drive.datum is None
+    assert path in drive.files
+
+
+def test_given_poses_of_some_scans(tmp_path):
+    """Numbers count all scans, and scans outside of the poses are left out."""
+    folder, path = mulran(tmp_path), tmp_path / "given.txt"
+    every = open_drive(folder)
+    write_matrices(path, [1, 2], make_poses(2, seed=7), " ")
+    drive = open_drive(folder, poses=path)
+    assert drive.stamps_ns.tolist() == every.stamps_ns[1:3].tolist()
+    np.testing.assert_array_equal(drive.scan(0), every.scan(1))
+    assert any("no pose for 3 of 5 scans" in note for note in drive.notes)

@@ -27,7 +27,7 @@ W_LAST = "qx qy qz qw"
         ("# timestamp tx ty tz qx qy qz qw", W_LAST),
         ("timestamp x y z qw qx qy qz", W_FIRST),
         ("# timestamp x y z qw qx qy qz", W_FIRST),
-        ("#Time[s] pos.x[m] pos.y[m] pos.z[m] q_w q_x q_y q_z", W_FIRST),
+        ("#Time[ns] pos.x[m] pos.y[m] pos.z[m] q_w q_x q_y q_z", W_FIRST),
         ("t x y z w x y z", W_FIRST),
         ("t x y z x y z w", W_LAST),
         # Of a remark that is no header, nothing follows.
