@@ -21,6 +21,17 @@ _NUM_SCANS = 8
 _LONGEST_STEP = 60.0
 # Least time [s].
 _SHORTEST_STEP = 1e-3
+# Times between the scans of LiDARs [s]: 1 to 100 Hz, with some margin. Not
+# three powers of ten, so that only one unit can be meant.
+_USUAL_STEPS = (0.009, 1.1)
+_TIME_UNITS = {
+    "seconds": 1.0,
+    "milliseconds": 1e-3,
+    "microseconds": 1e-6,
+    "nanoseconds": 1e-9,
+}
+# A table of this name has seconds; all other times are nanoseconds.
+_SECONDS = "times.txt"
 # What is wrong with a drive if nothing is.
 _AS_GIVEN = "nothing is wrong"
 # Scans are this far from each other at most [m].
@@ -182,10 +193,26 @@ def check_times(drive: Drive) -> Iterator[str]:
         yield f"times: scan {frame} is not later than the scan before"
     step = float(np.median(steps)) * 1e-9
     if not _SHORTEST_STEP <= step <= _LONGEST_STEP:
-        yield (
-            f"times: a scan every {step:g} s; are they in nanoseconds, as they"
-            " must be?"
+        place, wanted = _time_unit(drive)
+        meant = [
+            name
+            for name, unit in _TIME_UNITS.items()
+            if _USUAL_STEPS[0]
+            < step * unit / _TIME_UNITS[wanted]
+            < _USUAL_STEPS[1]
+        ]
+        yield f"{place}: a scan every {step:g} s" + (
+            f": numbers in {meant[0]}? They must be in {wanted}"
+            if meant
+            else f"; are they in {wanted}, as they must be?"
         )
+
+
+def _time_unit(drive: Drive) -> tuple[str, str]:
+    """Returns where the times of a drive are, and their unit."""
+    if any(file.name == _SECONDS for file in drive.files):
+        return _SECONDS, "seconds"
+    return "times", "nanoseconds"
 
 
 @_check(check_types)
@@ -209,7 +236,7 @@ def check_motion(drive: Drive) -> Iterator[str]:
     if speed > _FASTEST:
         yield (
             f"poses: the LiDAR moves at {speed:.0f} m/s; are positions in"
-            " metres, and times in nanoseconds?"
+            f" metres, and times in {_time_unit(drive)[1]}?"
         )
     jump = int(steps.argmax())
     if steps[jump] > _FASTEST * _LONGEST_STEP:

@@ -180,6 +180,31 @@ def test_a_wrong_drive_is_refused_in_one_line(tmp_path, fault, scans, more):
 
 
 @pytest.mark.parametrize(
+    ("factor", "said"),
+    [
+        (1e3, "every 100 s: numbers in milliseconds"),
+        (1e6, r"every 100000 s: numbers in microseconds"),
+        (1e9, r"every 1e\+08 s: numbers in nanoseconds"),
+    ],
+)
+def test_the_unit_of_times_in_seconds(tmp_path, factor, said):
+    kitti(tmp_path / "00", SCANS, times=1e-9 * STAMPS_NS * factor)
+    said = rf"00: times.txt: a scan {said}\? They must be in seconds$"
+    with pytest.raises(InputError, match=said):
+        check_data_set(tmp_path / "00")
+
+
+def test_the_unit_of_times_in_nanoseconds(tmp_path, monkeypatch):
+    drive = tmp_path / "drive"
+    mulran(drive, SCANS)
+    opened = open_drive(drive)
+    monkeypatch.setattr(type(opened), "stamps_ns", STAMPS_NS // 10**3)
+    said = "drive: times: a scan every 0.0001 s: numbers in microseconds"
+    with pytest.raises(InputError, match=rf"{said}\? They must be in nano"):
+        data_set_checks[2](opened)
+
+
+@pytest.mark.parametrize(
     ("fault", "change"),
     [
         ("in kilometres", 1e-3),
