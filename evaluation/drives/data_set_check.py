@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 import functools
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -96,7 +96,7 @@ _AXES = {
 }
 
 
-def check_data_set(path: Path | str) -> None:
+def check_data_set(drive: Drive | Path | str, **options: Any) -> None:
     """Checks that a drive of your own can be used by all programs.
 
     The checks, `data_set_checks`, open the drive and read some of its scans.
@@ -105,7 +105,8 @@ def check_data_set(path: Path | str) -> None:
     without a return: they are allowed, and left out, as in all programs.
 
     Args:
-        path: a drive, as `open_drive` takes it.
+        drive: an open drive, or its path, as `open_drive` takes it.
+        options: options of `open_drive` for a path, such as `poses`.
 
     Raises:
         InputError: the drive cannot be read, or something is wrong or not
@@ -116,10 +117,18 @@ def check_data_set(path: Path | str) -> None:
 
         check_data_set("recordings/downtown_01")
     """
-    drive = open_drive(Path(path))
-    with errors_at(path, f"{drive.name}: "):
+    if isinstance(drive, Drive):
+        if options:
+            raise InputError(
+                f"{drive.name}: {', '.join(options)}: the drive is open; give"
+                " options with a path"
+            )
+        opened, place = drive, drive.name
+    else:
+        opened, place = open_drive(Path(drive), **options), str(drive)
+    with errors_at(place, f"{opened.name}: "):
         for check in data_set_checks:
-            check(drive)
+            check(opened)
 
 
 _Faults = Callable[[Drive], Iterator[str]]

@@ -133,8 +133,28 @@ def test_a_correct_drive_passes(tmp_path, name):
     write(folder, scans_in(open_drive(folder).X_WS))
     check_data_set(folder)
     check_data_set(str(folder))
+    check_data_set(open_drive(folder))
     for check in data_set_checks:
         check(str(folder))
+
+
+def test_options_of_a_drive(tmp_path):
+    folder = tmp_path / "00"
+    wrong = X_WB.copy()
+    wrong[:, :3, 3] *= 1e-3
+    kitti(folder, SCANS, wrong)
+    kilometres = "00: poses: .* in kilometres"
+    with pytest.raises(InputError, match=rf"^{folder.parent}/{kilometres}"):
+        check_data_set(folder, columns=4)
+    with pytest.raises(InputError, match=f"^{kilometres}"):
+        check_data_set(open_drive(folder))
+    right = tmp_path / "poses.tum"
+    write_quaternions(right, STAMPS_NS * 1e-9, X_WB, " ")
+    check_data_set(str(folder), poses=str(right))
+    with pytest.raises(InputError, match="00: poses: the drive is open"):
+        check_data_set(open_drive(folder), poses=right)
+    with pytest.raises(InputError, match="00: has one LiDAR, not a 'roof'"):
+        check_data_set(folder, lidar="roof")
 
 
 SCANS = scans_in(X_WB)
