@@ -13,6 +13,7 @@ from cns_drake.base import InputError, errors_at, note, poses
 from cns_drake.drives import Drive
 from cns_drake.units import check_preset
 from evaluation.drives.data_set import check_interface
+from evaluation.drives.kitti import KittiDrive
 from evaluation.drives.opening import open_drive
 
 # How many scans are read, spread over the drive.
@@ -384,8 +385,8 @@ def check_frames(drive: Drive) -> Iterator[str]:
     if best.error > 2.0 * _CLOSE:
         if abs(given.turn) > _TURNED and given.turned_error < 2.0 * _CLOSE:
             deg = np.degrees(given.turn)
-            line = _tr_line(poses.yaw_pose(given.turn))
-            yield (f"poses: turned by {deg:.0f} deg against the points{line}")
+            line = _tr_line(drive, poses.yaw_pose(given.turn))
+            yield f"poses: turned by {deg:.0f} deg against the points{line}"
             return
         note(
             f"{drive.name}: frames: not checked: what the scans measure differs"
@@ -393,7 +394,8 @@ def check_frames(drive: Drive) -> Iterator[str]:
         )
         return
     if name != _AS_GIVEN:
-        line = _tr_line(_X_PS(_AXES[name])) if name in _AXES else ""
+        turns = _turns(drive)
+        line = _tr_line(drive, turns[name]) if name in turns else ""
         yield (
             f"poses: neighbouring scans fit better (off by {best.error:.0%} of"
             f" the motion instead of {given.error:.0%}) if {name}{line}"
@@ -539,8 +541,22 @@ def _placements(
         ),
         "their rotations are transposed": transposed,
         "y is mirrored: a left-handed frame?": turned(_MIRROR_Y),
-        **{name: turned(_X_PS(axes)) for name, axes in _AXES.items()},
+        **{name: turned(X_PS) for name, X_PS in _turns(drive).items()},
     }
+
+
+def _turns(drive: Drive) -> dict[str, np.ndarray]:
+    """Returns what may be wrong with axes -> X_PS (4, 4)."""
+    found = {name: _X_PS(axes) for name, axes in _AXES.items()}
+    X_CS = _applied(drive)
+    if not np.allclose(X_CS, np.eye(4)):
+        found["the poses are of the LiDAR already"] = poses.inverse(X_CS)
+    return found
+
+
+def _applied(drive: Drive) -> np.ndarray:
+    """Returns the `Tr` (4, 4) with which the reader of KITTI made the poses."""
+    return drive.X_CS if isinstance(drive, KittiDrive) else np.eye(4)
 
 
 def _X_PS(axes: Sequence[str]) -> np.ndarray:
@@ -552,9 +568,11 @@ def _X_PS(axes: Sequence[str]) -> np.ndarray:
     return X
 
 
-def _tr_line(X_PS: np.ndarray) -> str:
+def _tr_line(drive: Drive, X_PS: np.ndarray) -> str:
     """Returns the line that corrects the axes, for the end of a message."""
-    numbers = " ".join(f"{value + 0.0:.6g}" for value in X_PS[:3].ravel())
+    # It takes the place of the line that is applied already.
+    Tr = np.round((_applied(drive) @ X_PS)[:3].ravel(), 9) + 0.0
+    numbers = " ".join(f"{value:.6g}" for value in Tr)
     return f" (in the layout of KITTI, write Tr: {numbers} into calib.txt)"
 
 

@@ -84,6 +84,9 @@ class KittiDrive(BinDrive):
     there is a file `first_pose.txt`, as in exports of cns-drake, W is the world
     frame of the recording. With a folder `labels`, points have the fields
     `label` and `instance`.
+
+    Attributes:
+        X_CS: (4, 4) the `Tr` that is applied; the identity without one.
     """
 
     placing = (
@@ -151,6 +154,7 @@ class KittiDrive(BinDrive):
             files, stamps_ns, X_WS, told = posed(files, stamps_ns, trajectory)
             notes += told
             world_frame = f"poses{poses.resolve()}"
+        self.X_CS = X_CS if poses is None else np.eye(4)
         name = as_given(path).name
         scenario = read_scenario(path)
         self._structures = path / _STRUCTURES

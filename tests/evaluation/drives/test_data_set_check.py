@@ -256,6 +256,41 @@ def test_the_cure_that_a_fault_names_helps(tmp_path, fault, change):
     check_data_set(tmp_path / "00")
 
 
+CAMERA = np.eye(4)
+CAMERA[:3, :3] = [[0, -1, 0], [0, 0, -1], [1, 0, 0]]
+CAMERA[:3, 3] = [0.0, -0.08, -0.27]
+
+
+@pytest.mark.parametrize(
+    ("applied", "X_PS", "said"),
+    [
+        # Poses of the LiDAR, beside the file of KITTI.
+        (CAMERA, np.eye(4), "of the LiDAR already"),
+        # What is left to correct is 30 and 90 deg.
+        (yaw_pose(0, 0, 0, 0.3), yaw_pose(0, 0, 0, 0.3 + np.pi / 6), "by 30"),
+        (
+            yaw_pose(0, 0, 0, 0.3),
+            yaw_pose(0, 0, 0, 0.3 + np.pi / 2),
+            "axis points to the left",
+        ),
+    ],
+)
+def test_a_cure_takes_the_place_of_the_tr_that_is_there(
+    tmp_path, applied, X_PS, said
+):
+    folder = tmp_path / "00"
+    kitti(folder, SCANS, X_PS @ X_WB @ poses.inverse(X_PS))
+    numbers = " ".join(map(str, applied[:3].ravel()))
+    (folder / "calib.txt").write_text(f"Tr: {numbers}\n")
+    with pytest.raises(InputError, match=said) as raised:
+        check_data_set(folder)
+    (line,) = re.findall(r"Tr: [-.0-9e ]+", str(raised.value))
+    found = np.reshape([float(one) for one in line.split()[1:]], (3, 4))
+    np.testing.assert_allclose(found[:, :3], X_PS[:3, :3], atol=0.01)
+    (folder / "calib.txt").write_text(f"{line.strip()}\n")
+    check_data_set(folder)
+
+
 @pytest.mark.parametrize(
     ("scans", "X_WS", "said"),
     [
