@@ -1,6 +1,6 @@
 """Drives in bags of ROS: recordings of cns-drake, and those of robots."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 import contextlib
 from functools import cached_property
 from pathlib import Path
@@ -606,11 +606,12 @@ class _Topics:
             f"{name}: {' and '.join(kinds)}"
             for name, kinds in sorted(self.file.topics.items())
         ]
+        advice = _ros_1_advice(found) or stream.advice
         if empty := self.file.empty_topics:
             found.append(f"without a message: {' '.join(empty)}")
         raise InputError(
             f"{self.path}: no topic {usual} of {stream.types[0][0]} (there are:"
-            f" {'; '.join(found) or 'no topics'}){stream.advice}"
+            f" {'; '.join(found) or 'no topics'}){advice}"
         )
 
     def of_types(self, types: tuple[str, ...]) -> list[str]:
@@ -641,7 +642,7 @@ class _Topics:
         if found != [f"{message_type} in cdr"]:
             raise InputError(
                 f"{self.path}: {topic}: {' and '.join(found)} instead of"
-                f" {message_type} in cdr"
+                f" {message_type} in cdr{_ros_1_advice(found)}"
             )
         self._types[topic] = message_type
 
@@ -868,6 +869,16 @@ def _drive_name(path: Path) -> str:
     place = as_given(path)
     # rosbag2 numbers the files of a recording: <name>_0.mcap.
     return place.name if place.is_dir() else place.stem.removesuffix("_0")
+
+
+def _ros_1_advice(kinds: Sequence[str]) -> str:
+    """Returns what helps if messages in an MCAP file are of ROS 1, or ""."""
+    if not any(kind.endswith(" in ros1") for kind in kinds):
+        return ""
+    return (
+        "; messages of ROS 1 are read in a .bag only: give the one that was"
+        " converted"
+    )
 
 
 # Endings of bags: of rosbag2, with MCAP or SQLite, and of ROS 1.

@@ -17,6 +17,9 @@ from cns_drake.base import InputError, listed
 from cns_drake.drives import ros_types
 from cns_drake.drives.mcap_file import LOCATION
 
+# How to read a damaged bag of ROS 1, for error messages.
+_ADVICE = " (rosbag reindex FILE, of ROS 1, saves what is intact)"
+
 
 class RosbagFile:
     """A bag, open for reading single messages, like `McapFile`.
@@ -143,7 +146,8 @@ class RosbagFile:
             raise
         except Exception as error:
             # rosbags, SQLite and the compression raise errors of any class.
+            is_1 = any(file.suffix == ".bag" for file in self.files)
             raise InputError(
                 f"{self.path}: the bag cannot be read"
-                f" ({type(error).__name__}: {error})"
+                f" ({type(error).__name__}: {error}){_ADVICE if is_1 else ''}"
             ) from error

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 import functools
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -13,6 +13,7 @@ from cns_drake.base import InputError, errors_at, note, poses
 from cns_drake.drives import Drive
 from cns_drake.units import check_preset
 from evaluation.drives.data_set import check_interface
+from evaluation.drives.kitti import KittiDrive
 from evaluation.drives.opening import open_drive
 
 # How many scans are read, spread over the drive.
@@ -21,6 +22,17 @@ _NUM_SCANS = 8
 _LONGEST_STEP = 60.0
 # Least time [s].
 _SHORTEST_STEP = 1e-3
+# Times between the scans of LiDARs [s]: 1 to 100 Hz, with some margin. Not
+# three powers of ten, so that only one unit can be meant.
+_USUAL_STEPS = (0.009, 1.1)
+_TIME_UNITS = {
+    "seconds": 1.0,
+    "milliseconds": 1e-3,
+    "microseconds": 1e-6,
+    "nanoseconds": 1e-9,
+}
+# A table of this name has seconds; all other times are nanoseconds.
+_SECONDS = "times.txt"
 # What is wrong with a drive if nothing is.
 _AS_GIVEN = "nothing is wrong"
 # Scans are this far from each other at most [m].
@@ -85,7 +97,7 @@ _AXES = {
 }
 
 
-def check_data_set(path: Path | str) -> None:
+def check_data_set(drive: Drive | Path | str, **options: Any) -> None:
     """Checks that a drive of your own can be used by all programs.
 
     The checks, `data_set_checks`, open the drive and read some of its scans.
@@ -94,7 +106,8 @@ def check_data_set(path: Path | str) -> None:
     without a return: they are allowed, and left out, as in all programs.
 
     Args:
-        path: a drive, as `open_drive` takes it.
+        drive: an open drive, or its path, as `open_drive` takes it.
+        options: options of `open_drive` for a path, such as `poses`.
 
     Raises:
         InputError: the drive cannot be read, or something is wrong or not
@@ -105,10 +118,18 @@ def check_data_set(path: Path | str) -> None:
 
         check_data_set("recordings/downtown_01")
     """
-    drive = open_drive(Path(path))
-    with errors_at(path, f"{drive.name}: "):
+    if isinstance(drive, Drive):
+        if options:
+            raise InputError(
+                f"{drive.name}: {', '.join(options)}: the drive is open; give"
+                " options with a path"
+            )
+        opened, place = drive, drive.name
+    else:
+        opened, place = open_drive(Path(drive), **options), str(drive)
+    with errors_at(place, f"{opened.name}: "):
         for check in data_set_checks:
-            check(drive)
+            check(opened)
 
 
 _Faults = Callable[[Drive], Iterator[str]]
@@ -182,10 +203,26 @@ def check_times(drive: Drive) -> Iterator[str]:
         yield f"times: scan {frame} is not later than the scan before"
     step = float(np.median(steps)) * 1e-9
     if not _SHORTEST_STEP <= step <= _LONGEST_STEP:
-        yield (
-            f"times: a scan every {step:g} s; are they in nanoseconds, as they"
-            " must be?"
+        place, wanted = _time_unit(drive)
+        meant = [
+            name
+            for name, unit in _TIME_UNITS.items()
+            if _USUAL_STEPS[0]
+            < step * unit / _TIME_UNITS[wanted]
+            < _USUAL_STEPS[1]
+        ]
+        yield f"{place}: a scan every {step:g} s" + (
+            f": numbers in {meant[0]}? They must be in {wanted}"
+            if meant
+            else f"; are they in {wanted}, as they must be?"
         )
+
+
+def _time_unit(drive: Drive) -> tuple[str, str]:
+    """Returns where the times of a drive are, and their unit."""
+    if any(file.name == _SECONDS for file in drive.files):
+        return _SECONDS, "seconds"
+    return "times", "nanoseconds"
 
 
 @_check(check_types)
@@ -209,7 +246,7 @@ def check_motion(drive: Drive) -> Iterator[str]:
     if speed > _FASTEST:
         yield (
             f"poses: the LiDAR moves at {speed:.0f} m/s; are positions in"
-            " metres, and times in nanoseconds?"
+            f" metres, and times in {_time_unit(drive)[1]}?"
         )
     jump = int(steps.argmax())
     if steps[jump] > _FASTEST * _LONGEST_STEP:
@@ -348,8 +385,8 @@ def check_frames(drive: Drive) -> Iterator[str]:
     if best.error > 2.0 * _CLOSE:
         if abs(given.turn) > _TURNED and given.turned_error < 2.0 * _CLOSE:
             deg = np.degrees(given.turn)
-            line = _tr_line(poses.yaw_pose(given.turn))
-            yield (f"poses: turned by {deg:.0f} deg against the points{line}")
+            line = _tr_line(drive, poses.yaw_pose(given.turn))
+            yield f"poses: turned by {deg:.0f} deg against the points{line}"
             return
         note(
             f"{drive.name}: frames: not checked: what the scans measure differs"
@@ -357,7 +394,8 @@ def check_frames(drive: Drive) -> Iterator[str]:
         )
         return
     if name != _AS_GIVEN:
-        line = _tr_line(_X_PS(_AXES[name])) if name in _AXES else ""
+        turns = _turns(drive)
+        line = _tr_line(drive, turns[name]) if name in turns else ""
         yield (
             f"poses: neighbouring scans fit better (off by {best.error:.0%} of"
             f" the motion instead of {given.error:.0%}) if {name}{line}"
@@ -503,8 +541,22 @@ def _placements(
         ),
         "their rotations are transposed": transposed,
         "y is mirrored: a left-handed frame?": turned(_MIRROR_Y),
-        **{name: turned(_X_PS(axes)) for name, axes in _AXES.items()},
+        **{name: turned(X_PS) for name, X_PS in _turns(drive).items()},
     }
+
+
+def _turns(drive: Drive) -> dict[str, np.ndarray]:
+    """Returns what may be wrong with axes -> X_PS (4, 4)."""
+    found = {name: _X_PS(axes) for name, axes in _AXES.items()}
+    X_CS = _applied(drive)
+    if not np.allclose(X_CS, np.eye(4)):
+        found["the poses are of the LiDAR already"] = poses.inverse(X_CS)
+    return found
+
+
+def _applied(drive: Drive) -> np.ndarray:
+    """Returns the `Tr` (4, 4) with which the reader of KITTI made the poses."""
+    return drive.X_CS if isinstance(drive, KittiDrive) else np.eye(4)
 
 
 def _X_PS(axes: Sequence[str]) -> np.ndarray:
@@ -516,9 +568,11 @@ def _X_PS(axes: Sequence[str]) -> np.ndarray:
     return X
 
 
-def _tr_line(X_PS: np.ndarray) -> str:
+def _tr_line(drive: Drive, X_PS: np.ndarray) -> str:
     """Returns the line that corrects the axes, for the end of a message."""
-    numbers = " ".join(f"{value + 0.0:.6g}" for value in X_PS[:3].ravel())
+    # It takes the place of the line that is applied already.
+    Tr = np.round((_applied(drive) @ X_PS)[:3].ravel(), 9) + 0.0
+    numbers = " ".join(f"{value:.6g}" for value in Tr)
     return f" (in the layout of KITTI, write Tr: {numbers} into calib.txt)"
 
 

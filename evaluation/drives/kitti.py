@@ -81,6 +81,9 @@ class KittiDrive(BinDrive):
     there is a file `first_pose.txt`, as in exports of cns-drake, W is the world
     frame of the recording. With a folder `labels`, points have the fields
     `label` and `instance`.
+
+    Attributes:
+        X_CS: (4, 4) the `Tr` that is applied; the identity without one.
     """
 
     placing = (
@@ -156,6 +159,7 @@ class KittiDrive(BinDrive):
                 has_own_world=not is_there(first_pose),
             )
         )
+        self.X_CS = X_CS if poses is None else np.eye(4)
         scenario = read_scenario(path)
         self._structures = path / _STRUCTURES
         labels = path / _LABELS

@@ -106,6 +106,7 @@ def open_drive(
             print(len(scan))
     """
     path = Path(path)
+    poses = None if poses is None else Path(poses)
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
     doing(f"opening {path.name}")

@@ -318,9 +318,9 @@ def _draw(picture: Picture, stem: Path) -> None:
 def _show(axes: Axes, picture: Picture) -> None:
     """Shows a picture, axes in metres, with a scale bar."""
     # Without paper, so that the picture lies on a dark page, too.
-    alpha = np.where((picture.image < 255).any(axis=2), 255, 0)
+    alpha = (picture.image < 255).any(axis=2) * np.uint8(255)
     axes.imshow(
-        np.dstack([picture.image, alpha.astype(np.uint8)]),
+        np.dstack([picture.image, alpha]),
         extent=picture.extent,
         interpolation="antialiased",
     )

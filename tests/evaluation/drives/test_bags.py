@@ -12,6 +12,7 @@ from helpers.bags import (
     write_bag,
 )
 from helpers.drive_files import T0_NS, yaw_pose
+from mcap.writer import Writer
 import numpy as np
 import pytest
 
@@ -420,3 +421,29 @@ def test_what_is_missing_is_named(tmp_path, options, fault):
     path = write_bag(tmp_path / "a", rows, empty=[("/late", POINTS)])
     with pytest.raises(InputError, match=fault):
         _ = open_drive(path, **options).X_WS
+
+
+def test_a_bag_of_ros_1_that_is_cut_off_names_its_cure(tmp_path):
+    path = write(tmp_path, [*clouds("/points", "os")], ending=".bag")
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    said = r"ride_0.bag: the bag cannot be read .* \(rosbag reindex FILE"
+    with pytest.raises(InputError, match=said):
+        open_drive(path)
+
+
+@pytest.mark.parametrize("options", [{}, {"lidar": "/velodyne"}])
+def test_messages_of_ros_1_in_mcap_name_their_cure(tmp_path, options):
+    """As `mcap convert ride.bag ride.mcap` writes them."""
+    path = tmp_path / "ride.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros1")
+        schema = writer.register_schema(
+            "sensor_msgs/PointCloud2", "ros1msg", b"Header header"
+        )
+        channel = writer.register_channel("/velodyne", "ros1", schema)
+        writer.add_message(channel, T0_NS, b"0", T0_NS)
+        writer.finish()
+    said = r"PointCloud2 in ros1.*ROS 1 are read in a \.bag only: give the one"
+    with pytest.raises(InputError, match=said):
+        open_drive(path, **options)

@@ -133,8 +133,28 @@ def test_a_correct_drive_passes(tmp_path, name):
     write(folder, scans_in(open_drive(folder).X_WS))
     check_data_set(folder)
     check_data_set(str(folder))
+    check_data_set(open_drive(folder))
     for check in data_set_checks:
         check(str(folder))
+
+
+def test_options_of_a_drive(tmp_path):
+    folder = tmp_path / "00"
+    wrong = X_WB.copy()
+    wrong[:, :3, 3] *= 1e-3
+    kitti(folder, SCANS, wrong)
+    kilometres = "00: poses: .* in kilometres"
+    with pytest.raises(InputError, match=rf"^{folder.parent}/{kilometres}"):
+        check_data_set(folder, columns=4)
+    with pytest.raises(InputError, match=f"^{kilometres}"):
+        check_data_set(open_drive(folder))
+    right = tmp_path / "poses.tum"
+    write_quaternions(right, STAMPS_NS * 1e-9, X_WB, " ")
+    check_data_set(str(folder), poses=str(right))
+    with pytest.raises(InputError, match="00: poses: the drive is open"):
+        check_data_set(open_drive(folder), poses=right)
+    with pytest.raises(InputError, match="00: has one LiDAR, not a 'roof'"):
+        check_data_set(folder, lidar="roof")
 
 
 SCANS = scans_in(X_WB)
@@ -180,6 +200,31 @@ def test_a_wrong_drive_is_refused_in_one_line(tmp_path, fault, scans, more):
 
 
 @pytest.mark.parametrize(
+    ("factor", "said"),
+    [
+        (1e3, "every 100 s: numbers in milliseconds"),
+        (1e6, r"every 100000 s: numbers in microseconds"),
+        (1e9, r"every 1e\+08 s: numbers in nanoseconds"),
+    ],
+)
+def test_the_unit_of_times_in_seconds(tmp_path, factor, said):
+    kitti(tmp_path / "00", SCANS, times=1e-9 * STAMPS_NS * factor)
+    said = rf"00: times.txt: a scan {said}\? They must be in seconds$"
+    with pytest.raises(InputError, match=said):
+        check_data_set(tmp_path / "00")
+
+
+def test_the_unit_of_times_in_nanoseconds(tmp_path, monkeypatch):
+    drive = tmp_path / "drive"
+    mulran(drive, SCANS)
+    opened = open_drive(drive)
+    monkeypatch.setattr(type(opened), "stamps_ns", STAMPS_NS // 10**3)
+    said = "drive: times: a scan every 0.0001 s: numbers in microseconds"
+    with pytest.raises(InputError, match=rf"{said}\? They must be in nano"):
+        data_set_checks[2](opened)
+
+
+@pytest.mark.parametrize(
     ("fault", "change"),
     [
         ("in kilometres", 1e-3),
@@ -209,6 +254,41 @@ def test_the_cure_that_a_fault_names_helps(tmp_path, fault, change):
         X_WP[:, :3, 3] *= float(message.rpartition(" by ")[2])
         kitti(tmp_path / "00", SCANS, X_WP)
     check_data_set(tmp_path / "00")
+
+
+CAMERA = np.eye(4)
+CAMERA[:3, :3] = [[0, -1, 0], [0, 0, -1], [1, 0, 0]]
+CAMERA[:3, 3] = [0.0, -0.08, -0.27]
+
+
+@pytest.mark.parametrize(
+    ("applied", "X_PS", "said"),
+    [
+        # Poses of the LiDAR, beside the file of KITTI.
+        (CAMERA, np.eye(4), "of the LiDAR already"),
+        # What is left to correct is 30 and 90 deg.
+        (yaw_pose(0, 0, 0, 0.3), yaw_pose(0, 0, 0, 0.3 + np.pi / 6), "by 30"),
+        (
+            yaw_pose(0, 0, 0, 0.3),
+            yaw_pose(0, 0, 0, 0.3 + np.pi / 2),
+            "axis points to the left",
+        ),
+    ],
+)
+def test_a_cure_takes_the_place_of_the_tr_that_is_there(
+    tmp_path, applied, X_PS, said
+):
+    folder = tmp_path / "00"
+    kitti(folder, SCANS, X_PS @ X_WB @ poses.inverse(X_PS))
+    numbers = " ".join(map(str, applied[:3].ravel()))
+    (folder / "calib.txt").write_text(f"Tr: {numbers}\n")
+    with pytest.raises(InputError, match=said) as raised:
+        check_data_set(folder)
+    (line,) = re.findall(r"Tr: [-.0-9e ]+", str(raised.value))
+    found = np.reshape([float(one) for one in line.split()[1:]], (3, 4))
+    np.testing.assert_allclose(found[:, :3], X_PS[:3, :3], atol=0.01)
+    (folder / "calib.txt").write_text(f"{line.strip()}\n")
+    check_data_set(folder)
 
 
 @pytest.mark.parametrize(

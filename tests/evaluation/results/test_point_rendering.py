@@ -74,3 +74,31 @@ def test_pixels_and_coordinates_agree():
     rows = np.minimum(rows, height - 1)
     hit = picture.image[rows.astype(int), columns.astype(int), 0]
     assert np.count_nonzero(hit == 255) <= 1
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "shape"),
+    [
+        # (20000 s + 3) (10000 s + 3) = 2^15 at s = 0.012575 pixels/m.
+        (20e3, 10e3, (128, 254)),
+        # The longest side of WebP: 16383 = 1e6 s + 3.
+        (1e6, 0.0, (3, 16383)),
+        # Within the bounds, at 4 pixels/m.
+        (50.0, 25.0, (103, 203)),
+    ],
+)
+def test_a_picture_of_far_drives_is_bounded(width, height, shape):
+    view = OrthographicView(
+        azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=4.0
+    )
+    points = np.array([[0.0, 0.0, 0.0], [width, height, 0.0]])
+    rgb = np.array([RED, RED], dtype=np.uint8)
+    most_px = 2**15 if height else 2**25
+    picture = render(points, rgb, view, most_px=most_px)
+    assert picture.image.shape[:2] == pytest.approx(shape, abs=1)
+    assert picture.image[..., 0].size <= most_px
+    # The axes stay in metres.
+    left, right, bottom, top = picture.extent
+    pixel = 1.0 / picture.view.pixels_per_metre
+    assert right - left == pytest.approx(width, abs=4 * pixel)
+    assert top - bottom == pytest.approx(height, abs=4 * pixel)

@@ -172,7 +172,7 @@ def test_seeds_of_any_length(tmp_path, seed):
         ("map", " ", ["map: empty"]),
         ("task", "", ["task: empty"]),
         ("method", "", ["method: empty"]),
-        ("protocol", "mine", ["protocol: 'mine'", "random-yaw"]),
+        ("protocol", "mine", ["protocol: no protocol 'mine'", "random-yaw"]),
         ("method", "bt\x07c", ["method", "control character"]),
         ("map", '"to\nwn"', ["map", "control character"]),
         ("value", "0.2,5", ["16 cells instead of 15"]),
