@@ -350,7 +350,7 @@ _OTHER = re.compile(r"[^a-z0-9]+")
 _TIME = re.compile(r"t(_[mun]?s)?|([mun]|nano)?secs?|\w*(time|stamp)\w*")
 # A unit of time behind a name, such as ns, nsec and nanoseconds.
 _CLOCK = re.compile(
-    r"(?P<stem>|.*_)(?P<part>[mun]|milli|micro|nano|)(?P<sec>s(ec(ond)?s?)?)"
+    r"(?P<stem>|.*_)(?P<part>[mun]|milli|micro|nano|)(?P<sec>s|secs?|seconds?)"
 )
 _PARTS_NS = {
     **{"": NS_PER_S, "m": 10**6, "u": _NS_PER_US, "n": 1},

@@ -150,7 +150,7 @@ def test_what_is_not_positive_is_refused(name, value):
     [
         ({"overlap": 70.0}, "--overlap: 70.0 is not above 0 and up to 1"),
         ({"overlap": 0.0}, "--overlap: 0.0 is not above 0"),
-        ({"place": "midle"}, "--place: no place 'midle' .*mean middle"),
+        ({"place": "Middle"}, "--place: no place 'Middle' .*mean middle"),
     ],
 )
 def test_what_no_match_could_have_is_refused(fields, fault):
