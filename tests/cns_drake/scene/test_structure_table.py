@@ -91,7 +91,10 @@ def test_more_structures_than_ids():
             "instance,name,class\n1,a,building\n2,a,building\n",
             "line 3: name: 'a'",
         ),
-        ("instance,name,class\n1,a,castle\n", "line 2: class: no class 'castle'"),
+        (
+            "instance,name,class\n1,a,castle\n",
+            "line 2: class: no class 'castle'",
+        ),
         *(
             (
                 f"instance,name,class,reflectivity\n1,a,building,{value}\n",
