@@ -79,6 +79,7 @@ class FileDrive(Drive):
         """
         self._session = str((scenario or {}).get("name", name))
         self.name = f"{self._session}_{lidar}" if lidar else self._session
+        self._lidar = lidar
         self.world_frame = scans.world_frame
         self.has_own_world = scans.has_own_world
         self._files = scans.files
@@ -122,6 +123,13 @@ class FileDrive(Drive):
     @property
     def scenario(self) -> Mapping | None:
         return self._scenario
+
+    @property
+    def lidar_section(self) -> Mapping:
+        lidars = (self.scenario or {}).get("lidars") or {}
+        if self._lidar and [*lidars] != ["lidar"]:
+            return lidars.get(self._lidar) or {}
+        return super().lidar_section
 
     @property
     def lidar_field(self) -> LidarField | None:

@@ -81,6 +81,13 @@ def test_which_lidar_is_read(tmp_path):
     write_drive(tmp_path / "all")
     assert open_drive(tmp_path / "all").name == "all_Ouster"
     assert open_drive(tmp_path / "all", "Avia").name == "all_Avia"
+    # A scenario that names one LiDAR says nothing of the others.
+    beside = tmp_path / "all" / "scenario.yaml"
+    beside.write_text("name: walk\nlidars: {Velodyne: {preset: vlp-16}}\n")
+    for lidar, rings in (("Velodyne", 16), ("Ouster", 128)):
+        drive = open_drive(tmp_path / "all", lidar)
+        assert drive.name == f"walk_{lidar}"
+        assert drive.lidar_field.rings == rings
     write_drive(tmp_path / "one", ("Velodyne",))
     assert open_drive(tmp_path / "one").name == "one_Velodyne"
     write_drive(tmp_path / "two", ("Velodyne", "Aeva"))
