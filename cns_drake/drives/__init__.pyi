@@ -2,10 +2,12 @@ from .deskewing import deskew as deskew
 from .deskewing import deskewed_notes as deskewed_notes
 from .deskewing import deskewed_scan as deskewed_scan
 from .drive import IMU_DTYPE as IMU_DTYPE
+from .drive import POSES_FRAME as POSES_FRAME
 from .drive import Drive as Drive
 from .drive import ImuSamples as ImuSamples
 from .drive import as_given as as_given
 from .drive import index_instances as index_instances
+from .drive import poses_frame as poses_frame
 from .drive_scenario import SCENARIO as SCENARIO
 from .drive_scenario import driven_way as driven_way
 from .drive_scenario import read_scenario as read_scenario

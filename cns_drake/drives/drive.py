@@ -57,6 +57,8 @@ class ImuSamples(NamedTuple):
 
 
 _Made = TypeVar("_Made", bound="Drive")
+# How the name of the world frame of a user's file of poses begins.
+POSES_FRAME = "poses"
 
 
 class Drive(abc.ABC):
@@ -297,6 +299,11 @@ class Drive(abc.ABC):
 
 def _opened_again(kind: type[Drive], args: tuple, kwargs: dict) -> Drive:
     return kind(*args, **kwargs)
+
+
+def poses_frame(path: Path) -> str:
+    """Returns the name of the world frame of a user's file of poses."""
+    return f"{POSES_FRAME}{path.resolve()}"
 
 
 def as_given(path: Path) -> Path:

@@ -28,6 +28,7 @@ from cns_drake.drives.drive import (
     Drive,
     as_given,
     index_instances,
+    poses_frame,
 )
 from cns_drake.drives.drive_scenario import SCENARIO, read_scenario
 from cns_drake.drives.mcap_file import LOCATION, McapFile
@@ -253,7 +254,7 @@ class McapDrive(Drive):
     @property
     def world_frame(self) -> str:  # type: ignore[override]  # Read late.
         if self._pose_topic is None:
-            return f"poses{Path(str(self._posed_by.source)).resolve()}"
+            return poses_frame(Path(str(self._posed_by.source)))
         return frame_name(self._topics.first(self._pose_topic).header.frame_id)
 
     @property
@@ -295,7 +296,7 @@ class McapDrive(Drive):
             " (cns_drake.drives.deskewing takes the motion out)"
         )
 
-    @property
+    @cached_property
     def scenario(self) -> Mapping | None:
         scenario = self._topics.json("scenario.json")
         if scenario is None:

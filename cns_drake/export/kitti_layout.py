@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from cns_drake.base import encode_bin, poses
-from cns_drake.drives import Drive
+from cns_drake.drives import POSES_FRAME, Drive
 from cns_drake.export.layout import (
     Layout,
     imu_files,
@@ -92,7 +92,7 @@ def _with_kitti_intensities(drive: Drive, scan: np.ndarray) -> np.ndarray:
 
 
 def _notes(drive: Drive) -> Iterator[str]:
-    if drive.world_frame.startswith("poses"):
+    if drive.world_frame.startswith(f"{POSES_FRAME}/"):
         yield (
             f"{drive.name}: first_pose.txt says that drives with such a file"
             " share the frame of their poses; delete it if each has its own"

@@ -124,7 +124,6 @@ def open_drive(
                 f"{path}: {found.title}: has no topics of poses, as --odometry"
                 " names one"
             )
-        poses = None if poses is None else Path(poses)
         named: dict[str, Any] = {"odometry": odometry, "poses": poses}
         given = lidar if found.has_lidars else columns
         asked = {name: one for name, one in named.items() if name in arguments}

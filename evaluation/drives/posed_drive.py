@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.drives import Drive
+from cns_drake.drives import Drive, poses_frame
 from evaluation.drives.drive_views import MovedDrive
 from evaluation.drives.trajectories import read_trajectory
 
@@ -29,7 +29,7 @@ class PosedDrive(MovedDrive):
         trajectory = read_trajectory(path, drive.stamps_ns)
         self._kept, X_WS, self._told = trajectory.at_scans(drive.stamps_ns)
         self._path = path
-        super().__init__(drive, X_WS, f"poses{path.resolve()}", None)
+        super().__init__(drive, X_WS, poses_frame(path), None)
 
     def __len__(self) -> int:
         return len(self._X_WS)

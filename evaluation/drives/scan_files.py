@@ -16,7 +16,13 @@ from cns_drake.base import (
     user_errors,
     value_errors,
 )
-from cns_drake.drives import Drive, LidarField, StampedPoses, lidar_field
+from cns_drake.drives import (
+    Drive,
+    LidarField,
+    StampedPoses,
+    lidar_field,
+    poses_frame,
+)
 from evaluation.clouds import SCAN_LIMIT_BYTES, bin_dtype
 from evaluation.drives.text_tables import check_increasing, parse_stamps_ns
 from evaluation.drives.trajectories import read_trajectory
@@ -257,7 +263,7 @@ def posed_by(
     """
     trajectory = read_trajectory(poses, stamps_ns, numbers)
     return posed(files, stamps_ns, trajectory)._replace(
-        world_frame=f"poses{poses.resolve()}", tables=(poses,)
+        world_frame=poses_frame(poses), tables=(poses,)
     )
 
 
