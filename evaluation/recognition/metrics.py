@@ -455,7 +455,7 @@ _RESAMPLED: dict[str, Any] = {"by_mode": True, "has_interval": True}
 _BY_MODE: dict[str, Any] = {"by_mode": True}
 _POSE: dict[str, Any] = {"tasks": ("pose",), "number": "num_poses"}
 _LOCALISE: dict[str, Any] = {"tasks": ("localise",)}
-_LOCALISED: dict[str, Any] = {"tasks": ("localise",), "number": "num_poses"}
+_LOCALISED = _LOCALISE | {"number": "num_poses"}
 _MAP: dict[str, Any] = {"tasks": ("map",), "number": "num_changed"}
 _CHANGE: dict[str, Any] = {"tasks": ("change",), "better": ""}
 
@@ -824,7 +824,8 @@ def register_metric(
         and name.strip() == name != ""
     ):
         raise ValueError(f"{name!r} is no name of a metric")
-    known = {one.name for one in fields_of(Metric)} - {"compute", "file"}
+    made_here = ("compute", "file")
+    known = [f.name for f in fields_of(Metric) if f.name not in made_here]
     for field in fields:
         if field not in known:
             raise ValueError(f"{name}: {no_such('field', field, known)}")
