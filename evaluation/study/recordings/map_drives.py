@@ -143,23 +143,15 @@ class MapDrives:
         *earlier, _ = sorted(self.stages, key=natural_key)
         return [(self.stages[key], self.last) for key in earlier]
 
-    def recognition_pairs(
-        self, *, with_itself: bool = False
-    ) -> list[Recordings]:
+    def recognition_pairs(self) -> list[Recordings]:
         """Returns the pairs (database, query) for place recognition.
 
         Each earlier stage is paired with the last stage as the query. If the
         map has only two stages, each of the two stages is the query once.
-
-        Args:
-            with_itself: whether to add a pair of each stage with itself, for
-                loop closure.
         """
         pairs = self.change_pairs()
         if len(pairs) == 1:
             pairs += [(later, earlier) for earlier, later in pairs]
-        if with_itself:
-            pairs += [(one, one) for one in self.stages.values()]
         return pairs
 
     def unchanged_pair(

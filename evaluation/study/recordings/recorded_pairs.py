@@ -20,8 +20,6 @@ from evaluation.study.tasks.pair import Pair
 # Clocks of recordings that begin at 0 say nothing about their order: the first
 # stamps of others are years after 1970 [ns].
 _DATED_NS = 10**17
-
-
 # Fields of a database of several recordings.
 _OF_RECORDINGS = (f"database.{SESSIONS}", "database.keep")
 
@@ -187,7 +185,6 @@ def _composed_pair(
     """Returns the pair of a database of several recordings and the query."""
     fields, query = condition.changes["database"], city.last
     names, where = fields[SESSIONS], f"{source}: database.{SESSIONS}"
-    keep = fields.get("keep", KEEP_ALL)
     is_list = isinstance(names, list) and bool(names)
     if not (is_list and all(isinstance(one, str) for one in names)):
         raise InputError(f"{where}: not a list of names of recordings")
