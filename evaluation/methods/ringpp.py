@@ -45,7 +45,7 @@ _FIRST_FREQUENCIES = 20
 _REFERENCES_KEPT = 64
 # Number of pairs of a query and a place whose shifts are kept in memory, two
 # bytes each. A search scores at most as many pairs before it asks for poses
-# (`MOST_PAIRS` in `evaluation.recognition.retrieval`).
+# (`_MOST_PAIRS` in `evaluation.recognition.retrieval`).
 _SHIFTS_KEPT = 16_000_000
 # Number of headings whose rotated pixels are kept in memory: those of a whole
 # turn, 60 kB each.

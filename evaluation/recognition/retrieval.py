@@ -30,7 +30,7 @@ from evaluation.recognition.search import Search
 
 # Greatest number of pairs of a query and a place in one batch. An array of
 # numbers of a batch has 128 MB, and there are about five.
-MOST_PAIRS = 16_000_000
+_MOST_PAIRS = 16_000_000
 
 
 @dataclass(frozen=True)
@@ -168,17 +168,14 @@ def _joined(batches: Sequence[Retrieval]) -> Retrieval:
     )
 
 
-def query_batches(
-    num_queries: int, num_places: int, most_pairs: int = MOST_PAIRS
-) -> Iterator[range]:
+def query_batches(num_queries: int, num_places: int) -> Iterator[range]:
     """Yields successive batches of queries that fit into memory, at least one.
 
     Args:
         num_queries: number of queries.
         num_places: number of places with which each query is compared.
-        most_pairs: greatest number of pairs of a query and a place in a batch.
     """
-    most = max(1, most_pairs // max(num_places, 1))
+    most = max(1, _MOST_PAIRS // max(num_places, 1))
     for start in range(0, max(num_queries, 1), most):
         yield range(start, min(start + most, num_queries))
 
@@ -190,8 +187,6 @@ def compare_at_radii(
     protocol: RetrievalProtocol,
     verification_radii: Collection[float | None],
     overlaps: np.ndarray | None = None,
-    *,
-    most_pairs: int = MOST_PAIRS,
 ) -> Iterator[tuple[range, list[Retrieval]]]:
     """Yields the scores after geometric verification with several radii.
 
@@ -211,7 +206,6 @@ def compare_at_radii(
             of a radius stands for scores without geometric verification.
         overlaps: (Q, D) share of each query's scan that each place's scan
             shows; needed for matches by overlap.
-        most_pairs: see `query_batches`.
 
     Yields:
         The numbers of the queries of a batch, and their retrieval for each of
@@ -222,7 +216,7 @@ def compare_at_radii(
     """
     places = database.places
     queries = query.queries
-    batches = query_batches(len(queries.frames), len(places.frames), most_pairs)
+    batches = query_batches(len(queries.frames), len(places.frames))
     if search.method.config.center_scores:
         batches = iter([range(len(queries.frames))])
     for rows in batches:
