@@ -124,14 +124,8 @@ def _by_robust(
             source, num_neighbors=settings.neighbours
         )
         spread = covariances(source)
-    X, iterations = align_robustly(
-        surroundings.surface,
-        scan,
-        start,
-        (settings.width, settings.last_width or settings.width),
-        settings.iterations,
-        (_LEAST_MOVE, _LEAST_TURN),
-        spread,
+    X, iterations = _align_robustly(
+        surroundings.surface, scan, start, settings, spread
     )
     return Estimate(X, None, iterations)
 
@@ -276,14 +270,12 @@ _DAMPING = 1e-6
 _FEWEST_PAIRS = 6
 
 
-def align_robustly(
+def _align_robustly(
     surface: Surface,
     scan: np.ndarray,
     start: np.ndarray,
-    widths: tuple[float, float],
-    iterations: int,
-    still: tuple[float, float],
-    covariances: np.ndarray | None = None,
+    settings: Settings,
+    covariances: np.ndarray | None,
 ) -> tuple[np.ndarray, int]:
     """Registers a scan to a map by ICP or GICP with a Geman-McClure kernel.
 
@@ -295,11 +287,8 @@ def align_robustly(
         surface: the map.
         scan: (N, 3) in S [m].
         start: initial pose X_WS (4, 4).
-        widths: greatest distance between a scan point and the map point with
-            which it is paired, in the first and in the last alignment [m].
-        iterations: greatest number of steps of each alignment.
-        still: translation and rotation below which a step ends an alignment [m,
-            rad].
+        settings: the widths of the first and of the last alignment, and the
+            greatest number of steps of each.
         covariances: (N, 3, 3) covariances of the scan's points in S, for GICP;
             None for point-to-plane ICP.
 
@@ -307,12 +296,13 @@ def align_robustly(
         The estimated X_WS, and the number of steps.
     """
     X = start
-    width, last_width = widths
+    width = settings.width
+    last_width = settings.last_width or width
     total = 0
     while True:
         begin = X
         X, number = _align(
-            surface, scan, begin, width, iterations, still, covariances
+            surface, scan, begin, width, settings.iterations, covariances
         )
         total += number
         if width <= last_width:
@@ -327,27 +317,25 @@ def _align(
     start: np.ndarray,
     width: float,
     iterations: int,
-    still: tuple[float, float],
     covariances: np.ndarray | None,
 ) -> tuple[np.ndarray, int]:
     """Registers a scan with one search width.
 
     Args:
         width: greatest distance between paired points [m].
-        surface, scan, start, iterations, still, covariances: see
-            `align_robustly`.
+        iterations: greatest number of steps.
+        surface, scan, start, covariances: see `_align_robustly`.
 
     Returns:
         The estimated X_WS, and the number of steps.
     """
     X = start
-    least_move, least_turn = still
     for number in range(1, iterations + 1):
         step = _gauss_newton_step(surface, scan, X, width, covariances)
         R = Rotation.from_rotvec(step[:3]).as_matrix() @ X[:3, :3]
         X = poses.make_pose(R, X[:3, 3] + step[3:])
         move, turn = np.linalg.norm(step[3:]), np.linalg.norm(step[:3])
-        if move < least_move and turn < least_turn:
+        if move < _LEAST_MOVE and turn < _LEAST_TURN:
             return X, number
     return X, iterations
 
