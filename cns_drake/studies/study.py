@@ -30,8 +30,8 @@ from cns_drake.scene import MapFolder
 from cns_drake.studies.cause_check import check_causes
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
 from cns_drake.studies.maps.experiment_maps import MapPairs, pairs_by_map
-from cns_drake.studies.maps.made_maps import ONLY_STAGE
-from cns_drake.studies.maps.redrawing import redraw_cities
+from cns_drake.studies.maps.map_step import make_maps
+from cns_drake.studies.maps.redrawing import redrawn_city
 from cns_drake.studies.pairs.comparisons import ChangedPair
 from cns_drake.studies.pairs.simulated_pairs import (
     changed_pairs,
@@ -410,11 +410,10 @@ def _drives_elsewhere(
     others = [name for name in maps if name != own]
 
     def redrawn(name: str, seed: int) -> Iterator[Scenario]:
-        cities = redraw_cities(
-            maps[name].path, ONLY_STAGE, [seed], output, cluster
-        )
+        city = redrawn_city(maps[name].path.resolve(), seed, output.resolve())
+        make_maps([city], city.folder.parent, cluster)
         for one in drives[name]:
-            yield _moved(one, str(cities[seed]), ONLY_STAGE, f"c{seed}")
+            yield _moved(one, str(city.folder), city.stage, f"c{seed}")
 
     for name in others:
         yield from drives[name]

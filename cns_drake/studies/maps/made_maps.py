@@ -25,14 +25,12 @@ from cns_drake.imports import ImportOptions, import_city, map_sources
 from cns_drake.scenarios import Scenario, digest_file
 from cns_drake.scene import MapFolder
 from cns_drake.studies.maps.map_step import MakeMap, make_maps
-from cns_drake.studies.maps.redrawing import RedrawCity
+from cns_drake.studies.maps.redrawing import RedrawCity, redrawn_city
 from evaluation.study import Experiment, MadeMap
 
 _FACTOR = "factor"
 # Seeds of redraws are below this number.
 _SEEDS = 2**31
-# The only stage of a city that is drawn anew.
-ONLY_STAGE = "01"
 
 
 @dataclass(frozen=True)
@@ -158,11 +156,10 @@ class MadeMaps:
             raise InputError(
                 f"redraw: {seed!r} is no whole number from 0 to {_SEEDS - 1}"
             )
-        source = drive.folder.path.resolve()
-        path = self.folder / f"{source.name}_c{seed}"
+        city = redrawn_city(drive.folder.path.resolve(), seed, self.folder)
         if self._are_made:
-            return str(path), ONLY_STAGE
-        self._steps[path] = RedrawCity(path, source, ONLY_STAGE, seed)
+            return str(city.folder), city.stage
+        self._steps[city.folder] = city
         return self._present(drive)
 
     def _present(self, drive: Scenario) -> tuple[str, str]:

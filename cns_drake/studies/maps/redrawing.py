@@ -5,7 +5,7 @@ buildings, plants, cars and furniture are sampled anew. Each redrawn city is a
 map folder.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 import os
 from pathlib import Path
@@ -13,7 +13,6 @@ from pathlib import Path
 import yaml
 
 from cns_drake.base import (
-    Cluster,
     Reporter,
     __version__,
     draft_folder,
@@ -23,45 +22,12 @@ from cns_drake.base import (
 )
 from cns_drake.city import generate_city, load_plan
 from cns_drake.scene import STAGES_NAME, MapFolder
-from cns_drake.studies.maps.map_step import MakeMap, make_maps
+from cns_drake.studies.maps.map_step import MakeMap
 
 # Start of the first line of each input that is written here.
 _MARK = "# Of a city drawn anew by cns-drake"
-
-
-def redraw_cities(
-    map_folder: Path,
-    stage: str,
-    seeds: Sequence[int],
-    output: Path,
-    cluster: Cluster,
-) -> dict[int, Path]:
-    """Generates the city of a map anew with several seeds.
-
-    A city that exists is kept if its inputs and the program have not changed.
-
-    Args:
-        map_folder: folder of the map, with `roads.yaml` and `city.yaml`.
-        stage: name of the only stage of each new map.
-        seeds: a seed for each city.
-        output: folder for the cities.
-        cluster: runs the jobs.
-
-    Raises:
-        InputError: the map cannot be used, another file or folder has the name
-            of a city, or cities could not be generated; the error names all of
-            these cities.
-    """
-    map_folder, output = map_folder.resolve(), output.resolve()
-    folders = {seed: output / f"{map_folder.name}_c{seed}" for seed in seeds}
-    # Quick checks come before all slow work.
-    load_plan(MapFolder(map_folder).plan)
-    steps = [
-        RedrawCity(folder, map_folder, stage, seed)
-        for seed, folder in folders.items()
-    ]
-    make_maps(steps, output, cluster)
-    return folders
+# The only stage of a city that is drawn anew.
+_ONLY_STAGE = "01"
 
 
 @dataclass(frozen=True)
@@ -111,11 +77,20 @@ class RedrawCity(MakeMap):
     def sources(self) -> dict[str, object]:
         """Returns all inputs of the city, ready for JSON."""
         return {
-            **{
-                name: content.decode()
-                for name, content in self.inputs().items()
-            },
+            name: content.decode() for name, content in self.inputs().items()
         }
+
+
+def redrawn_city(map_folder: Path, seed: int, output: Path) -> RedrawCity:
+    """Returns the step that makes a map's city anew, in a folder of `output`.
+
+    Args:
+        map_folder: folder of the map, with `roads.yaml` and `city.yaml`.
+        seed: seed of the new city.
+        output: folder of the new cities.
+    """
+    folder = output / f"{map_folder.name}_c{seed}"
+    return RedrawCity(folder, map_folder, _ONLY_STAGE, seed)
 
 
 def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:

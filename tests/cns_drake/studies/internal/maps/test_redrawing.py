@@ -11,7 +11,7 @@ from cns_drake.base import Cluster
 from cns_drake.city import generate_city, load_plan, load_stages, make_city
 from cns_drake.roads import load_road_network
 from cns_drake.studies.maps import map_step
-from cns_drake.studies.maps.redrawing import redraw_cities, redrawn_inputs
+from cns_drake.studies.maps.redrawing import RedrawCity, redrawn_inputs
 
 pytestmark = pytest.mark.slow
 
@@ -34,14 +34,19 @@ def drawn(tmp_path_factory):
 
 
 def redraw_here(town, seeds, output):
-    """Draws cities in the process of the test."""
+    """Draws cities in the process of the test; returns seed -> folder."""
+    cities = {
+        seed: RedrawCity(output / f"{town.name}_c{seed}", town, "02", seed)
+        for seed in seeds
+    }
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             map_step,
             "run_jobs",
             lambda jobs, cluster, unit="": studies.do(jobs),
         )
-        return redraw_cities(town, "02", seeds, output, Cluster())
+        map_step.make_maps([*cities.values()], output, Cluster())
+    return {seed: city.folder for seed, city in cities.items()}
 
 
 def contents(folder):
