@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import KDTree
 import small_gicp
 
-from cns_drake.base import InputError, errors_at, note, poses
+from cns_drake.base import InputError, errors_at, note, poses, step_lengths
 from cns_drake.drives import Drive
 from cns_drake.units import check_preset
 from evaluation.drives.data_set import check_interface
@@ -241,7 +241,7 @@ def check_poses(drive: Drive) -> Iterator[str]:
 def check_motion(drive: Drive) -> Iterator[str]:
     """A vehicle can move as the poses say, and the LiDAR's z axis points up."""
     p_WS = drive.X_WS[:, :3, 3]
-    steps = np.linalg.norm(np.diff(p_WS, axis=0), axis=1)
+    steps = step_lengths(p_WS)
     speed = float(np.median(steps / (np.diff(drive.stamps_ns) * 1e-9)))
     if speed > _FASTEST:
         yield (

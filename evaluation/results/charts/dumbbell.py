@@ -13,7 +13,12 @@ import numpy as np
 
 from cns_drake.base import InputError
 from evaluation.recognition import kept_share
-from evaluation.results.charts.chart import ROW, Chart, start_at_zero
+from evaluation.results.charts.chart import (
+    ROW,
+    Chart,
+    rows_of_methods,
+    start_at_zero,
+)
 from evaluation.results.charts.words import in_words, value_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import STAGE
@@ -49,9 +54,6 @@ def draw_dumbbell(chart: Chart) -> Figure:
         _draw_methods(axes, chart, ends, both, verified)
         if len(panels) > 1:
             axes.set_title(_PANELS[verified], loc="left")
-        axes.grid(axis="x")
-        axes.tick_params(length=0)
-        axes.spines["left"].set_visible(False)
         start_at_zero(axes, x=chart.metric)
     number = max(map(len, ends.values()))
     text = textwrap.fill(_axis_text(chart, *both, number), chart.width // 9)
@@ -142,10 +144,7 @@ def _draw_methods(
             axes.text(
                 1.02, y, text, transform=side, va="center", fontweight="bold"
             )
-    axes.set_yticks(
-        range(len(chart.styles)), list(map(escape_dollars, chart.styles))
-    )
-    axes.set_ylim(len(chart.styles) - 0.4, -0.6)
+    rows_of_methods(axes, list(chart.styles))
 
 
 def _interval(

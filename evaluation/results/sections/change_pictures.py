@@ -19,6 +19,7 @@ from cns_drake.base import (
     GONE_RGB,
     NEW_RGB,
     UNSEEN_RGB,
+    distances_along,
     figure_style,
     file_name,
 )
@@ -180,8 +181,7 @@ def is_in_sight(points: np.ndarray, other: DrivenMap) -> np.ndarray:
         other: the map of the drive.
     """
     found = np.zeros(len(points), dtype=bool)
-    steps = np.linalg.norm(np.diff(other.positions, axis=0), axis=1)
-    along = np.floor(np.cumsum([0.0, *steps]) / _SIGHT_SPACING)
+    along = np.floor(distances_along(other.positions) / _SIGHT_SPACING)
     _, chosen = np.unique(along, return_index=True)
     for place in other.positions[chosen]:
         rows = np.flatnonzero(~found)
