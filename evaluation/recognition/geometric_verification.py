@@ -36,9 +36,9 @@ def verified_scores(
     query: Any,
     database: Any,
     scores: np.ndarray,
-    radii: Sequence[float],
-) -> list[np.ndarray]:
-    """Returns scores after geometric verification: (D,) for each radius.
+    radius: float,
+) -> np.ndarray:
+    """Returns scores (D,) after geometric verification.
 
     Geometric verification tests the `NUM_VERIFIED` places with the best scores.
     The method estimates the distance of each of these places from the query,
@@ -55,18 +55,17 @@ def verified_scores(
         query: descriptor of the query by the method.
         database: database of the D places, made by the method.
         scores: (D,) scores by the method; NaN for a place that is no candidate.
-        radii: radii of a match [m].
+        radius: radius of a match [m].
 
     Raises:
         InputError: if the method returns something other than poses.
     """
-    best = tested_places(scores)
-    if len(best) == 0 or not radii:
-        return [scores for _ in radii]
-    poses = estimated_poses(method, query, database, best.tolist())
-    return verified_by_poses(
-        scores, dict(zip(best.tolist(), poses, strict=True)), radii
-    )
+    best = tested_places(scores).tolist()
+    if not best:
+        return scores
+    poses = estimated_poses(method, query, database, best)
+    of_place = dict(zip(best, poses, strict=True))
+    return verified_by_poses(scores, of_place, [radius])[0]
 
 
 def estimated_poses(
@@ -99,7 +98,9 @@ def verified_by_poses(
     poses: Mapping[int, np.ndarray | None],
     radii: Sequence[float],
 ) -> list[np.ndarray]:
-    """Returns scores after geometric verification, see `verified_scores`.
+    """Returns scores (D,) after verification by each radius.
+
+    See `verified_scores`.
 
     Args:
         scores: (D,) scores; NaN for a place that is no candidate.

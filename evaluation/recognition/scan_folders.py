@@ -17,6 +17,7 @@ from cns_drake.base import (
 from evaluation.clouds import OnNote, is_cloud, no_note, read_cloud
 from evaluation.drives import NOT_FINITE, cropped, cropped_with_fields
 from evaluation.methods import Method
+from evaluation.recognition.geometric_verification import verified_scores
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.scoring import score_places
 
@@ -92,10 +93,13 @@ def write_scores(
                 places,
                 clouds,
                 is_known,
-                verification_radius=verification_radius,
                 exhaustive=True,
                 where=str(path),
             )
+            if verification_radius is not None:
+                values = verified_scores(
+                    method, queries[-1], places, values, verification_radius
+                )
             for place, value in zip(place_files, values, strict=True):
                 text = "" if np.isnan(value) else repr(float(value))
                 names = quoted_cell(path.stem), quoted_cell(place.stem)

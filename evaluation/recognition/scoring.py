@@ -7,7 +7,6 @@ import numpy as np
 
 from cns_drake.base import InputError, read_only
 from evaluation.methods import Method, checked_scores
-from evaluation.recognition.geometric_verification import verified_scores
 from evaluation.recognition.query_outcomes import ranked_places
 
 
@@ -19,14 +18,13 @@ def score_places(
     place_clouds: Sequence[np.ndarray],
     is_known: np.ndarray,
     *,
-    verification_radius: float | None = None,
-    exhaustive: bool = False,
-    where: str = "",
+    exhaustive: bool,
+    where: str,
 ) -> np.ndarray:
     """Returns a method's scores for the last of several queries, (D,).
 
-    The scores are float64, and include geometric verification and the method's
-    second stage, if there is one.
+    The scores are float64, and include the method's second stage, if there is
+    one, but no geometric verification.
 
     Args:
         method: method that described queries and places.
@@ -37,8 +35,6 @@ def score_places(
         is_known: (D,) bool, which places may be candidates. If a place is
             excluded, the query is compared with every place, because a search
             for a few top-ranked places might return only excluded places.
-        verification_radius: radius of geometric verification [m] (see
-            `verified_scores`); None for scores without this verification.
         exhaustive: whether to also compare places that a search would skip only
             to save time.
         where: the name of the current query, for errors.
@@ -56,19 +52,15 @@ def score_places(
         missing = int(np.isnan(ask(True)).sum())
         if missing:
             raise InputError(
-                f"{method.name}: {where or f'query {len(queries)}'}: {missing}"
-                f" of {len(scores)} scores are NaN (skips_places = True, in the"
-                " class, allows it for places that are no candidates)"
+                f"{method.name}: {where}: {missing} of {len(scores)} scores are"
+                " NaN (skips_places = True, in the class, allows it for places"
+                " that are no candidates)"
             )
     scores = np.where(is_known, scores, np.nan)
     if method.rerank_best:
         assert query_cloud is not None
         scores = _reranked(method, scores, query_cloud, place_clouds)
-    if verification_radius is None:
-        return scores
-    return verified_scores(
-        method, queries[-1], database, scores, [verification_radius]
-    )[0]
+    return scores
 
 
 def _reranked(

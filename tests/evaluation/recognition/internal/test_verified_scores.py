@@ -45,8 +45,8 @@ class Far(Method):
 
 def after(scores, distances):
     return verified_scores(
-        Far(), None, distances, np.array(scores, float), [RADIUS]
-    )[0]
+        Far(), None, distances, np.array(scores, float), RADIUS
+    )
 
 
 def test_the_ramp():
@@ -94,4 +94,4 @@ def test_what_is_no_pose_is_refused(pose):
             return pose
 
     with pytest.raises(InputError, match="far: relative_pose returned"):
-        verified_scores(Wrong(), None, [1.0], np.array([0.5]), [RADIUS])
+        verified_scores(Wrong(), None, [1.0], np.array([0.5]), RADIUS)
