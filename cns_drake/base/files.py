@@ -154,12 +154,10 @@ def listed(folder: Path, pattern: str = "*") -> list[Path]:
         folder: the folder. If the folder does not exist, the result is empty.
         pattern: pattern of the names, as for `Path.glob`.
     """
-    found = [path for path in folder.glob(pattern) if not _is_hidden(path)]
+    found = [
+        path for path in folder.glob(pattern) if not path.name.startswith(".")
+    ]
     return sorted(found, key=lambda path: natural_key(str(path)))
-
-
-def _is_hidden(path: Path) -> bool:
-    return path.name.startswith(".")
 
 
 def file_name(text: str) -> str:

@@ -70,11 +70,6 @@ def next_page(page: Path | str) -> None:
     note(f"next: open {page} in a browser")
 
 
-def print_json(values: dict) -> None:
-    """Prints a result as one JSON object."""
-    print(dumps(values, indent=2, allow_nan=False))
-
-
 def print_rows(rows: Iterable[tuple[str, str]]) -> None:
     """Prints a result as lines, each with a name and a value."""
     rows = list(rows)
@@ -89,9 +84,9 @@ def show(
     *,
     json: bool,
 ) -> None:
-    """Prints a result as JSON, or in a form for people: rows or text."""
+    """Prints a result as a JSON object, or for people: as rows or text."""
     if json:
-        print_json(dict(values))
+        print(dumps(dict(values), indent=2, allow_nan=False))
     elif isinstance(rows, str):
         print(rows)
     else:
