@@ -37,6 +37,7 @@ from .elementary import rotated as rotated
 from .elementary import sin as sin
 from .elementary import tan as tan
 from .errors import InputError as InputError
+from .errors import check_type as check_type
 from .errors import describe_validation_error as describe_validation_error
 from .errors import did_you_mean as did_you_mean
 from .errors import errors_at as errors_at
@@ -89,6 +90,7 @@ from .json_text import parse_json as parse_json
 from .launch import start as start
 from .npz_archives import read_npz as read_npz
 from .number_format import is_number as is_number
+from .number_format import is_real as is_real
 from .number_format import other_separator as other_separator
 from .number_format import parse_rows as parse_rows
 from .number_format import to_number as to_number

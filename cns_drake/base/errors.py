@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import sys
+from types import NoneType
 import typing
 from typing import TYPE_CHECKING, Any
 
@@ -221,6 +222,22 @@ def _advice(fault: Mapping[str, Any], model: type[BaseModel] | None) -> str:
     if fault["type"] == "string_type" and is_number and place:
         return f'; quote it: {place[-1]}: "{given}"'
     return ""
+
+
+def check_type(argument: str, value: object, *types: type) -> None:
+    """Checks the type of an argument.
+
+    Args:
+        argument: name of the argument, with which the message begins.
+        value: its value.
+        types: the types that it may have.
+
+    Raises:
+        TypeError: it has another type.
+    """
+    if not isinstance(value, types):
+        names = [one.__name__ for one in types if one is not NoneType]
+        raise TypeError(f"{argument}: {value!r} is no {' or '.join(names)}")
 
 
 def no_such(noun: str, given: object, names: Collection[str]) -> str:

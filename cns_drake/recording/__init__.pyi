@@ -5,6 +5,7 @@ from .mcap_recorder import McapRecorder as McapRecorder
 from .mcap_recorder import RecordedCamera as RecordedCamera
 from .mcap_recorder import RecordedSensor as RecordedSensor
 from .messages import ENCODINGS as ENCODINGS
+from .messages import END_NS as END_NS
 from .messages import make_camera_info as make_camera_info
 from .messages import make_compressed_image as make_compressed_image
 from .messages import make_header as make_header

@@ -29,6 +29,8 @@ from cns_drake.drives import (
     serialize,
 )
 
+# Time stamps of ROS 2 have an int32 number of seconds.
+END_NS = 2**31 * NS_PER_S
 IMAGE = "sensor_msgs/msg/Image"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 # Kind of image -> its encoding in ROS.
@@ -148,9 +150,27 @@ def to_quat_xyzw(R: RotationMatrix) -> tuple[float, float, float, float]:
 
 
 def make_header(frame_id: str, stamp_ns: int) -> Any:
-    """Returns the header of a message."""
-    stamp = divmod(stamp_ns, NS_PER_S)
+    """Returns the header of a message.
+
+    Raises:
+        ValueError: ROS 2 has no such time stamp.
+    """
+    stamp = _to_stamp(stamp_ns)
     return make_message("std_msgs/msg/Header", stamp=stamp, frame_id=frame_id)
+
+
+def _to_stamp(stamp_ns: int) -> tuple[int, int]:
+    """Returns a time stamp in whole seconds, and nanoseconds.
+
+    Raises:
+        ValueError: ROS 2 has no such time stamp.
+    """
+    if stamp_ns >= END_NS:
+        raise ValueError(
+            f"a message at {stamp_ns / NS_PER_S:.0f} s: time stamps of ROS 2"
+            f" are below {END_NS // NS_PER_S} s"
+        )
+    return divmod(stamp_ns, NS_PER_S)
 
 
 def make_image(
@@ -268,7 +288,7 @@ def encode_point_cloud(
         for column in padding:
             rows[:, column] = 0
     start, middle, steps, end = _cloud_frame(points.dtype, frame_id)
-    stamp = struct.pack("=iI", *divmod(stamp_ns, NS_PER_S))
+    stamp = struct.pack("=iI", *_to_stamp(stamp_ns))
     width, length = (struct.pack("=I", n) for n in (len(rows), rows.nbytes))
     # The data follow their length twice: of a row, and of the whole. Records
     # are copied once here, and three times by the serialiser.

@@ -3,6 +3,7 @@ from .camera.camera import optical_pose as optical_pose
 from .camera.camera_scene import CameraScene as CameraScene
 from .camera.config import CameraSection as CameraSection
 from .camera.renderer import check_renderer as check_renderer
+from .carriers import check_in_diagram as check_in_diagram
 from .carriers import sensor_pose as sensor_pose
 from .drake_configs import ApplyImuConfig as ApplyImuConfig
 from .drake_configs import ApplyLidarConfig as ApplyLidarConfig

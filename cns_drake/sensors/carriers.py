@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.tree import Frame, RigidBody
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
+
+from cns_drake.base import check_type
 
 if TYPE_CHECKING:
     from cns_drake.sensors.sensor_config import Mount
@@ -35,8 +38,12 @@ def body_and_pose(
 
     Raises:
         RuntimeError: the plant is not finalized.
-        TypeError: `place` is of another type.
+        TypeError: an argument is of another type.
+        ValueError: the pose is not finite.
     """
+    check_type("X_PB", X_PS, RigidTransform)
+    if not np.isfinite(X_PS.GetAsMatrix34()).all():
+        raise ValueError("X_PB: not finite")
     if not isinstance(place, RigidBody | Frame):
         cure = ""
         if isinstance(place, str):

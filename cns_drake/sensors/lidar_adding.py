@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any, TypeVar
 import warnings
 
@@ -16,6 +17,7 @@ from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import LinearSystem
 
+from cns_drake.base import check_type
 from cns_drake.scene import anchored_frames as find_anchored_frames
 from cns_drake.scene import geometry_port
 from cns_drake.sensors.carriers import (
@@ -134,8 +136,7 @@ def add_lidar(
             "AddMultibodyPlantSceneGraph returns one beside the plant"
         )
     check_in_diagram(builder, scene_graph, "scene_graph")
-    if not isinstance(X_PB, RigidTransform):
-        raise TypeError(f"X_PB: {X_PB!r} is not a RigidTransform")
+    check_type("X_PB", X_PB, RigidTransform)
     check_new_sensor(builder, name, parts=(_DRAW,))
     if not isinstance(body, FrameId):
         body, X_PB = body_and_pose(body, X_PB)
@@ -161,6 +162,7 @@ def add_lidar(
 
         pattern = aimed(pattern, model.sheet)
     measurement = options.get("measurement")
+    check_type("measurement", measurement, MeasurementModel, NoneType)
     if model is not None:
         _check_no_noise(measurement, range_noise, dropout)
     else:

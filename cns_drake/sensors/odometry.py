@@ -144,9 +144,9 @@ def add_odometry(
 
     Raises:
         RuntimeError: the plant is not finalized.
-        TypeError: the body is of another type.
-        ValueError: the name is taken, reserved or cannot be a part of a ROS 2
-            topic.
+        TypeError: an argument is of another type.
+        ValueError: the pose is not finite, or the name is taken, reserved or
+            cannot be a part of a ROS 2 topic.
 
     Example:
         from cns_drake import add_odometry

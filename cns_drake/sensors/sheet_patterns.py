@@ -68,7 +68,7 @@ def make_beam_pattern(
             f"period: {period:g} s is not above 0 and up to {LONGEST_PERIOD:g}"
         )
     if isinstance(sheet, SpinningSheet):
-        if sheet.fires_steadily and period and not num_columns:
+        if sheet.fires_steadily and period and num_columns is None:
             num_columns = max(round(sheet.columns * period / sheet.period), 1)
     elif num_columns is not None:
         raise ValueError(

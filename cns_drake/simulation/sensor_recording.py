@@ -1,18 +1,20 @@
 """Recording the sensors of any diagram."""
 
 from collections.abc import Collection, Iterable, Mapping
-import math
 import numbers
 from pathlib import Path
+from types import NoneType
 
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.sensors import RgbdSensor
 
+from cns_drake.base import check_type, is_real
 from cns_drake.drives import check_sensor_names
 from cns_drake.recording import (
     ENCODINGS,
+    END_NS,
     IMU_TOPIC,
     ODOMETRY_TOPIC,
     TF_TOPIC,
@@ -33,11 +35,9 @@ from cns_drake.sensors import (
     Imu,
     Lidar,
     OdometrySensor,
+    check_in_diagram,
     check_unused_names,
 )
-
-# Time stamps of ROS 2 have an int32 number of seconds.
-_END_NS = 2**31 * 10**9
 
 
 def add_mcap_recorder(
@@ -90,6 +90,8 @@ def add_mcap_recorder(
 
     Raises:
         InputError: the folder contains a finished recording or other files.
+        RuntimeError: a sensor is in another diagram.
+        TypeError: an argument is of another type.
         ValueError: `rates` names an unknown sensor, neither a period nor a
             LiDAR is given, `period` or `start_ns` is out of range, a LiDAR is
             causal (its scan covers the revolution before its time stamp), scans
@@ -105,10 +107,25 @@ def add_mcap_recorder(
             simulator.AdvanceTo(10.0)
     """
     cameras = cameras or {}
-    if not (isinstance(start_ns, numbers.Integral) and 0 <= start_ns < _END_NS):
+    check_type("imu", imu, Imu, NoneType)
+    check_type("odometry", odometry, OdometrySensor, NoneType)
+    check_type("rates", rates, Mapping, NoneType)
+    check_type("cameras", cameras, Mapping)
+    check_type("lidars", lidars, Collection)
+    for lidar in lidars:
+        check_type("lidars", lidar, Lidar)
+        check_in_diagram(builder, lidar, "lidars")
+    for key, camera in cameras.items():
+        check_type(f"cameras: {key}", camera, RgbdSensor)
+        check_in_diagram(builder, camera, f"cameras: {key}")
+    if odometry is not None:
+        check_in_diagram(builder, odometry, "odometry")
+    if imu is not None:
+        check_in_diagram(builder, imu.gyroscope, "imu")
+    if not (isinstance(start_ns, numbers.Integral) and 0 <= start_ns < END_NS):
         raise ValueError(
             f"start_ns: {start_ns!r} is not an integer from 0 on, below"
-            f" {_END_NS}"
+            f" {END_NS}"
         )
     check_unused_names(builder, name)
     _check_sensors(lidars, cameras)
@@ -259,7 +276,9 @@ def _message_periods(
     revolutions = {lidar.get_name(): lidar.pattern.period for lidar in lidars}
     if period is None and not revolutions:
         raise ValueError("period: a recording without a LiDAR needs one")
-    if period is not None and not 1.0 / HIGHEST_RATE <= period < math.inf:
+    if period is not None and not (
+        is_real(period) and period >= 1.0 / HIGHEST_RATE
+    ):
         raise ValueError(
             f"period: {period!r} is not a number of seconds from"
             f" {1.0 / HIGHEST_RATE:g} on"
@@ -275,9 +294,9 @@ def _message_periods(
             raise ValueError(
                 f"rates: no sensor '{name}'; there are: {', '.join(periods)}"
             )
-        if isinstance(rate, bool) or not 0.0 < rate <= HIGHEST_RATE:
+        if not (is_real(rate) and 0.0 < rate <= HIGHEST_RATE):
             raise ValueError(
-                f"rates: {name}: {rate} is not a positive number of messages "
+                f"rates: {name}: {rate!r} is not a positive number of messages "
                 f"a second, at most {HIGHEST_RATE}"
             )
         periods[name] = 1.0 / rate

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-import math
+from types import NoneType
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -17,6 +17,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.sensors import Accelerometer, Gyroscope
 
+from cns_drake.base import check_type, is_real
 from cns_drake.drives import IMU_FRAME
 from cns_drake.sensors import carriers, system_names
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
@@ -140,9 +141,10 @@ def add_imu(
 
     Raises:
         RuntimeError: the plant is not finalized.
-        TypeError: `body` is neither a body nor a frame.
-        ValueError: there is noise without a rate, the rate is not positive, or
-            the name is taken, reserved or cannot be a part of a ROS 2 topic.
+        TypeError: an argument is of another type.
+        ValueError: there is noise without a rate, the rate is not positive, the
+            pose is not finite, or the name is taken, reserved or cannot be a
+            part of a ROS 2 topic.
 
     Example:
         from cns_drake import add_imu
@@ -150,9 +152,10 @@ def add_imu(
         imu = add_imu(builder, body, X_PB)
         builder.ExportOutput(imu.ports()["specific_force"], "specific_force")
     """
-    if rate is not None and not 0.0 < rate < math.inf:
+    check_type("noise", noise, ImuNoise, NoneType)
+    if rate is not None and not (is_real(rate) and rate > 0.0):
         raise ValueError(
-            f"rate: {rate} is not a positive number of samples a second"
+            f"rate: {rate!r} is not a positive number of samples a second"
         )
     if noise is not None and rate is None:
         raise ValueError("noise: it needs a rate; give rate as well")

@@ -14,8 +14,9 @@ from cns_drake.sensors.noise_draws import check_seed, noise_generator
 _TURN_ON, _WHITE, _WALK_AT_BLOCK, _WALK_STEPS = range(16, 20)
 # Number of samples whose random numbers are made at a time.
 _BLOCK = 1024
-# Number of blocks of the random walk: a century at 1,000 samples a second.
-_MOST_BLOCKS = 1 << 32
+# Blocks of the random walk until its first node: a century at 1,000 samples a
+# second.
+_FIRST_NODE = 1 << 32
 
 
 @dataclass(frozen=True)
@@ -169,9 +170,14 @@ class ImuErrors:
 
     def _walk_at_block(self, number: int) -> np.ndarray:
         """Returns the walk (6,) at the start of a block."""
-        low, high = 0, _MOST_BLOCKS if number > 0 else -_MOST_BLOCKS
+        low, high = 0, _FIRST_NODE if number > 0 else -_FIRST_NODE
         at_low = np.zeros(6)
-        at_high = np.sqrt(_BLOCK * _MOST_BLOCKS) * self._walk_node(high)
+        at_high = np.sqrt(_BLOCK * _FIRST_NODE) * self._walk_node(high)
+        while abs(number) >= abs(high):
+            low, at_low = high, at_high
+            high *= 2
+            spread = np.sqrt(_BLOCK * abs(low))
+            at_high = at_low + spread * self._walk_node(high)
         while number != low:
             middle = (low + high) // 2
             spread = 0.5 * np.sqrt(_BLOCK * abs(high - low))

@@ -165,10 +165,11 @@ class BeamPattern(ABC):
             azimuths_deg: first and last azimuth [deg], from -180 to 180; if the
                 first is greater than the last, the field of view includes the
                 rear.
-            elevations_deg: limits of the elevation [deg].
+            elevations_deg: limits of the elevation [deg], from -90 to 90.
 
         Raises:
-            ValueError: no beam is left.
+            ValueError: an argument is not two numbers in this range, or no beam
+                is left.
         """
         return LimitedPattern(self, azimuths_deg, elevations_deg)
 
@@ -193,6 +194,15 @@ class LimitedPattern(BeamPattern):
         self.period = whole.period
         self.repeats = whole.repeats
         self._whole = whole
+        for name, limits, most in (
+            ("azimuths_deg", azimuths_deg, 180.0),
+            ("elevations_deg", elevations_deg, 90.0),
+        ):
+            if np.shape(limits) != (2,) or not np.all(np.abs(limits) <= most):
+                raise ValueError(
+                    f"{name}: {limits} is not two numbers from {-most:g} to "
+                    f"{most:g}"
+                )
         self._limits = tuple(azimuths_deg), tuple(elevations_deg)
         self._first = _limited_beams(whole.beams(0), *self._limits)
         if len(self._first.column) == 0:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import math
-import numbers
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -26,7 +25,7 @@ from pydrake.systems.framework import (
     ValueProducer,
 )
 
-from cns_drake.base import product, rotated
+from cns_drake.base import check_type, is_real, product, rotated
 from cns_drake.ray_casting import (
     EVERYWHERE,
     NOTHING_KNOWN,
@@ -160,8 +159,12 @@ class LidarOptions(GeometryView):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        check_type("measurement", self.measurement, MeasurementModel)
+        check_type("causal", self.causal, bool)
+        if self.moving_bodies is not None:
+            check_type("moving_bodies", self.moving_bodies, Mapping)
         offset = self.capture_offset
-        if not (_is_number(offset) and offset >= 0.0):
+        if not (is_real(offset) and offset >= 0.0):
             raise ValueError(
                 f"capture_offset: {offset!r} is not a time from 0 on"
             )
@@ -202,7 +205,7 @@ def period_of_rate(rate: float, longest: float = math.inf) -> float:
         ValueError: the rate is not a positive number, or is out of range.
     """
     if not (
-        _is_number(rate) and 0.0 < rate <= HIGHEST_RATE and rate * longest >= 1
+        is_real(rate) and 0.0 < rate <= HIGHEST_RATE and rate * longest >= 1
     ):
         least = f"at least {1.0 / longest:g} and " if longest < math.inf else ""
         raise ValueError(
@@ -210,14 +213,6 @@ def period_of_rate(rate: float, longest: float = math.inf) -> float:
             f"up to {HIGHEST_RATE}"
         )
     return 1.0 / rate
-
-
-def _is_number(value: object) -> bool:
-    return (
-        isinstance(value, numbers.Real)
-        and not isinstance(value, bool)
-        and math.isfinite(value)
-    )
 
 
 class Lidar(LeafSystem):

@@ -55,7 +55,12 @@ class SpinningPattern(BeamPattern):
         self.check()
         if not (self.num_columns >= 1 and self.num_columns % 1 == 0):
             raise ValueError(f"num_columns: {self.num_columns} is no number")
+        object.__setattr__(self, "num_columns", int(self.num_columns))
         elevations = np.asarray(self.elevations_rad, float)
+        azimuths = np.zeros(2)
+        if self.azimuths_rad is not None:
+            azimuths = np.asarray(self.azimuths_rad, float)
+            object.__setattr__(self, "azimuths_rad", tuple(azimuths.tolist()))
         # Equal patterns are found by their hash, which an array has not.
         object.__setattr__(self, "elevations_rad", tuple(elevations.tolist()))
         if not (
@@ -67,7 +72,7 @@ class SpinningPattern(BeamPattern):
                 "elevations_rad: they must descend, from pi/2 at most to "
                 "-pi/2 at least, and there must be one"
             )
-        if not np.ptp(self.azimuths_rad or 0.0) <= 2.0 * math.pi + 1e-9:
+        if azimuths.shape != (2,) or not np.ptp(azimuths) <= 2 * math.pi + 1e-9:
             raise ValueError(
                 f"azimuths_rad: {self.azimuths_rad} is no range within 360 deg"
             )
@@ -226,6 +231,9 @@ def make_flash_pattern(
         max_range: farthest range that is measured [m].
         period: time between two flashes [s].
 
+    Raises:
+        ValueError: a value is impossible.
+
     Example:
         from cns_drake import make_flash_pattern
 
@@ -234,6 +242,10 @@ def make_flash_pattern(
         )
     """
     across, up = np.deg2rad(fov_deg)
+    if not (0.0 < across <= 2.0 * math.pi and 0.0 < up <= math.pi):
+        raise ValueError(
+            f"fov_deg: {fov_deg} is not above 0, up to 360 and 180 deg"
+        )
     azimuth = across * (0.5 - (np.arange(width) + 0.5) / width)
     elevation = up * (0.5 - (np.arange(height) + 0.5) / height)
     elevation, azimuth = np.meshgrid(elevation, azimuth, indexing="ij")

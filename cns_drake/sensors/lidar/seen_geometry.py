@@ -7,8 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 import operator
-from typing import TYPE_CHECKING, Protocol, TypeAlias, cast
+from types import NoneType
+from typing import (
+    TYPE_CHECKING,
+    Protocol,
+    TypeAlias,
+    cast,
+    runtime_checkable,
+)
 import weakref
 
 import numpy as np
@@ -16,7 +24,7 @@ from pydrake.geometry import FrameId, GeometryId, QueryObject, Role
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import Frame, RigidBody
 
-from cns_drake.base import doing
+from cns_drake.base import check_type, doing
 from cns_drake.ray_casting import Ball, KnownPoses, Motion, RayCastingScene
 from cns_drake.scene import (
     MAX_INSTANCE,
@@ -39,6 +47,7 @@ if TYPE_CHECKING:
 Place: TypeAlias = RigidBody | Frame | FrameId | GeometryId
 
 
+@runtime_checkable
 class Structures(Protocol):
     """A table from which a LiDAR takes the labels and ids of what it hits."""
 
@@ -68,8 +77,8 @@ class GeometryView:
             not depend on this number.
 
     Raises:
-        TypeError: the role is no role of geometry, `unseen` has an element of
-            another type, or the number of threads is no integer.
+        TypeError: the role is no role of geometry, or another field is of
+            another type.
         ValueError: there is no thread.
     """
 
@@ -86,13 +95,17 @@ class GeometryView:
                 "Role.kPerception, Role.kIllustration or Role.kProximity of "
                 "pydrake.geometry"
             )
-        for place in self.unseen or ():
-            if not isinstance(place, Place):
-                raise TypeError(
-                    f"unseen: {place!r} is not a FrameId, GeometryId, "
-                    "RigidBody or Frame"
-                )
-        if operator.index(self.num_threads) < 1:
+        for name, kinds in (
+            ("unseen", (FrameId, GeometryId, RigidBody, Frame)),
+            ("anchored_frames", (FrameId,)),
+        ):
+            found = getattr(self, name)
+            check_type(name, found, Collection, NoneType)
+            for one in found or ():
+                check_type(name, one, *kinds)
+        check_type("structures", self.structures, Structures, NoneType)
+        check_type("num_threads", self.num_threads, Integral)
+        if self.num_threads < 1:
             raise ValueError(f"num_threads: {self.num_threads} is less than 1")
         # The caller's collections may go on changing.
         if self.unseen is not None:

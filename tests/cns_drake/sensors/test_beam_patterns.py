@@ -94,6 +94,8 @@ def test_no_preset_of_that_name():
         make_beam_pattern("os1-65")
     with pytest.raises(ValueError, match="'rosette' has none"):
         make_beam_pattern("avia", num_columns=100)
+    with pytest.raises(ValueError, match="num_columns: 0"):
+        make_beam_pattern("vlp-16", 0.1, num_columns=0)
 
 
 def test_hokuyo():
@@ -176,6 +178,11 @@ def test_limits_of_the_field_of_view():
     np.testing.assert_array_equal(front.column_t_ns, whole.column_t_ns)
     with pytest.raises(ValueError, match="no beam within"):
         whole.within(elevations_deg=(20, 30))
+    for azimuths in ((0, 350), (-181, 9), (np.nan, 3), (1, 2, 3), 9):
+        with pytest.raises(ValueError, match=r"azimuths_deg: .* two numbers"):
+            whole.within(azimuths)
+    with pytest.raises(ValueError, match=r"elevations_deg: .* -90 to 90"):
+        whole.within(elevations_deg=(0, 91))
 
 
 def test_limits_of_a_pattern_that_does_not_repeat():
@@ -277,6 +284,8 @@ def test_impossible_limits(limits, fault):
         ((0.0,), 4, (0.0, np.inf), "azimuths_rad"),
         ((0.0,), 4, (0.0, np.nan), "azimuths_rad"),
         ((0.0,), 4, (2.0 * np.pi + 1e-6, 0.0), "azimuths_rad"),
+        ((0.0,), 4, (0.0, 1.0, 2.0), "azimuths_rad"),
+        ((0.0,), 4, (0.0,), "azimuths_rad"),
     ],
 )
 def test_turns_that_are_none(elevations, columns, azimuths, fault):
@@ -284,6 +293,15 @@ def test_turns_that_are_none(elevations, columns, azimuths, fault):
         SpinningPattern(elevations, columns, 0.1, 9.0, 0.1, azimuths)
     whole = SpinningPattern((0.0,), 4, 0.1, 9.0, 0.1, (0.0, 2.0 * np.pi))
     assert whole.beams(0).column_t_ns[-1] == 0.1e9
+    # Arrays and lists are as good as tuples, and numbers of either type.
+    listed = SpinningPattern([0.0], 4.0, 0.1, 9.0, 0.1, np.array([-1.0, 1.0]))
+    assert listed == SpinningPattern((0.0,), 4, 0.1, 9.0, 0.1, (-1.0, 1.0))
+    assert repr(listed.num_beams) == "4"
+    for across, up in ((361.0, 9.0), (9.0, 181.0), (0.0, 9.0), (9.0, -9.0)):
+        with pytest.raises(ValueError, match=r"fov_deg: .* up to 360 and 180"):
+            make_flash_pattern(
+                2, 2, (across, up), min_range=0.1, max_range=9.0, period=0.1
+            )
 
 
 def test_patterns_that_never_repeat_have_limits_of_their_own():

@@ -584,7 +584,7 @@ def test_nothing_is_published_on_a_null_bus(struct, apply):
 def test_places_that_are_no_numbers(struct, apply, value):
     text = f"{{name: top, X_PB: {{translation: [0, {value}, 0]}}}}"
     config = yaml_load_typed(schema=struct, data=text)
-    with pytest.raises(ValueError, match=r"Config top: X_PB: .* not finite"):
+    with pytest.raises(ValueError, match=r"Config top: X_PB: not finite"):
         apply(config, make_site()[0], lcm=DrakeLcm("memq://"))
 
 

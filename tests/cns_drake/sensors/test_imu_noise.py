@@ -81,6 +81,20 @@ def test_the_walk_has_no_jump_between_blocks(walk):
     assert abs(neighbours) < 3.0 / np.sqrt(len(steps))
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_walk_goes_on_without_a_jump_where_it_is_drawn_first(sign):
+    """The first node is 2^32 blocks away; others are twice as far each."""
+    errors = ImuErrors(WALK, RATE)
+    step = 2e-4 / np.sqrt(RATE)
+    for doublings in (0, 1, 9):
+        node = sign * BLOCK << 32 + doublings
+        near = errors.measure(node - 2, np.zeros((5, 6)))
+        assert np.abs(np.diff(near[:, :3], axis=0)).max() < 6.0 * step
+        # A walk spreads as the root of time.
+        share = np.abs(near[0, :3]).max() / (step * np.sqrt(abs(node)))
+        assert 0.05 < share < 5.0
+
+
 @pytest.mark.parametrize("first", [0, 5 * BLOCK - 3, -BLOCK - 2, 10**9])
 def test_a_sample_depends_on_its_number_alone(first):
     noise = replace(WHITE, accelerometer_random_walk=1e-3)

@@ -67,7 +67,7 @@ class Site:
     [
         ({"body": "wall"}, TypeError, r"plant.GetBodyByName\('wall'\)"),
         ({"body": 3}, TypeError, "body: 3 is not a RigidBody"),
-        ({"pose": [0, 0, 1]}, TypeError, "X_PB: .* is not a RigidTransform"),
+        ({"pose": [0, 0, 1]}, TypeError, "X_PB: .* is no RigidTransform"),
         (
             {"pose": RigidTransform([np.nan, 0, 0])},
             ValueError,
@@ -104,9 +104,14 @@ class Site:
             "^motion: ConstantVectorSource .* not in this builder",
         ),
         ({"num_threads": 0}, ValueError, "^num_threads: 0 is less than 1"),
-        ({"num_threads": 1.5}, TypeError, "'float' .* as an integer"),
-        ({"unseen": ["wall"]}, TypeError, "^unseen: 'wall' is not a FrameId"),
-        ({"unseen": "wall"}, TypeError, "^unseen: '.' is not a FrameId"),
+        ({"num_threads": 1.5}, TypeError, "^num_threads: 1.5 is no Int"),
+        ({"measurement": 0.1}, TypeError, "^measurement: 0.1 is no Meas"),
+        ({"structures": "x"}, TypeError, "^structures: 'x' is no Struct"),
+        ({"anchored_frames": 3}, TypeError, "^anchored_frames: 3 is no Coll"),
+        ({"moving_bodies": 3}, TypeError, "^moving_bodies: 3 is no Map"),
+        ({"causal": "no"}, TypeError, "^causal: 'no' is no bool"),
+        ({"unseen": ["wall"]}, TypeError, "^unseen: 'wall' is no FrameId"),
+        ({"unseen": "wall"}, TypeError, "^unseen: '.' is no FrameId"),
         ({"role": "visual"}, TypeError, "^role: 'visual' is not a role .*"),
         ({"role": Role.kUnassigned}, TypeError, "^role: .* is not a role .*"),
     ],
@@ -178,6 +183,27 @@ def test_sensors_need_a_finalized_plant(place):
     add_imu(site.builder, body, X_PS)
     add_odometry(site.builder, body)
     site.builder.Build()
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "fault"),
+    [
+        ({"rate": "200"}, ValueError, "^rate: '200' is not"),
+        ({"rate": True}, ValueError, "^rate: True is not"),
+        ({"rate": 9, "noise": "x"}, TypeError, "^noise: 'x' is no ImuNoise"),
+        ({}, ValueError, "^X_PB: not finite"),
+    ],
+)
+def test_slips_in_the_arguments_of_imu_and_odometry(options, error, fault):
+    site = Site()
+    place = X_PS if options else RigidTransform([0.0, np.inf, 0.0])
+    adders = [lambda: add_imu(site.builder, site.world, place, **options)]
+    if not options:
+        adders += [lambda: add_odometry(site.builder, site.world, X_PB=place)]
+    for add in adders:
+        with pytest.raises(error, match=fault):
+            add()
+    assert len(site.builder.GetSystems()) == 2
 
 
 def test_odometry_keeps_the_pose_of_the_call():

@@ -372,6 +372,47 @@ def test_depth_images_of_a_camera_of_their_own(tmp_path, depth):
         np.testing.assert_allclose(R, X_WC.rotation().matrix(), atol=1e-12)
 
 
+def test_slips_in_the_arguments_of_a_recorder(tmp_path):
+    made, other = Carousel(), Carousel()
+    lidars = [
+        add_lidar(one.builder, one.scene_graph, one.arm, X_PL, PATTERN)
+        for one in (made, other)
+    ]
+    number = len(made.builder.GetSystems())
+    for options, error, fault in (
+        ({"imu": 3}, TypeError, "^imu: 3 is no Imu"),
+        ({"odometry": made.plant}, TypeError, "^odometry: .* OdometrySensor"),
+        (
+            {"cameras": {"c": 3}},
+            TypeError,
+            "^cameras: c: 3 is no RgbdSensor",
+        ),
+        ({"rates": 5}, TypeError, "^rates: 5 is no Mapping"),
+        ({"rates": {"lidar": "a"}}, ValueError, "^rates: lidar: 'a' is not"),
+        ({"period": "x"}, ValueError, "^period: 'x' is not"),
+        ({"lidars": lidars[0]}, TypeError, "^lidars: .* is no Collection"),
+        ({"lidars": lidars}, RuntimeError, "^lidars: Lidar 'lidar' is not in"),
+    ):
+        given = {"lidars": lidars[:1]} | options
+        with pytest.raises(error, match=fault):
+            add_mcap_recorder(made.builder, tmp_path / "drive", **given)
+        assert len(made.builder.GetSystems()) == number
+
+
+def test_a_recording_ends_before_the_stamps_of_ros(tmp_path):
+    """Their number of seconds is an int32."""
+    made = Carousel()
+    lidar = add_lidar(made.builder, made.scene_graph, made.arm, X_PL, PATTERN)
+    bag = add_mcap_recorder(
+        made.builder,
+        tmp_path / "drive",
+        lidars=[lidar],
+        start_ns=(2**31 - 1) * 10**9 + 999_999_999,
+    )
+    with pytest.raises(ValueError, match="ROS 2 are below 2147483648 s"):
+        made.simulate(2, bag)
+
+
 def test_names_in_a_recording_are_unique_and_fit_ros(tmp_path):
     made = Carousel()
     lidars = {
