@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
+from shapely import STRtree
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -52,9 +53,10 @@ from cns_drake.imports.openstreetmap.features import (
 )
 from cns_drake.imports.openstreetmap.grounds import ground_areas
 from cns_drake.imports.openstreetmap.passages import (
+    HEADROOM,
+    THROUGH,
     Passage,
     WayOpenings,
-    count_walled_up,
     passages_of,
 )
 from cns_drake.imports.openstreetmap.sea import coasts_of, sea
@@ -217,17 +219,22 @@ def _count_walled_up(
     faults: ImportFaults,
 ) -> None:
     """Counts streets that lead through buildings without a passage."""
-    count_walled_up(
-        [(street.name, LineString(street.line)) for street in driven],
-        [
-            (local.polygon(polygon), heights(building.tags).low)
-            for building in buildings
-            if not is_gone(building.tags)
-            for polygon in building.polygons
-        ],
-        passages,
-        faults,
-    )
+    low = [
+        local.polygon(polygon)
+        for building in buildings
+        if not is_gone(building.tags) and heights(building.tags).low < HEADROOM
+        for polygon in building.polygons
+    ]
+    tree = STRtree(low)
+    open_ways = {passage.name for passage in passages}
+    for street in driven:
+        line = LineString(street.line)
+        if street.name not in open_ways and any(
+            low[k].intersection(line).length > THROUGH
+            for k in tree.query(line, "intersects")
+        ):
+            kind = "street into a building without a passage"
+            faults.add(kind, street.name)
 
 
 def _without_outers(
