@@ -155,8 +155,7 @@ def _foot_of(road: ImportedRoad, thing: Thing) -> _Foot:
     inside = np.clip(s, _INSIDE, road.length - _INSIDE)
     x, y, z = road.points(s, inside, np.array([thing.t]))[0].tolist()
     heading = float(road.reference(s, inside)[0, 3])
-    low = thing.z
-    return _Foot(round(x, 3), round(y, 3), round(z + low, 3), heading)
+    return _Foot(round(x, 3), round(y, 3), round(z + thing.z, 3), heading)
 
 
 def _name_by_type(kind: str, table: str, otherwise: str) -> str:

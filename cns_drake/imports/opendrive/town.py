@@ -368,7 +368,13 @@ def _city_along(
             kerbs=kerbs if kerbs.differ else None,
             junctions=on_ground.junctions,
             margins=on_ground.margins,
-            reserved=_reserved_area(streets.raised, of_file.things),
+            # Nothing is built below bridges, nor on things of the file.
+            reserved=shapely.union_all(
+                [
+                    *map(lane_polygon, streets.raised),
+                    *(one.footprint_W for one in of_file.things),
+                ]
+            ),
             structures=(
                 *surfaces,
                 *of_file.decks,
@@ -380,18 +386,6 @@ def _city_along(
         ),
         plan,
         str(source),
-    )
-
-
-def _reserved_area(
-    raised: Sequence[LaneBand], things: Sequence[Structure]
-) -> BaseGeometry:
-    """Returns the area in W that stays free: below bridges and things [m]."""
-    return shapely.union_all(
-        [
-            *(lane_polygon(band) for band in raised),
-            *(one.footprint_W for one in things),
-        ]
     )
 
 
