@@ -51,7 +51,11 @@ from cns_drake.imports.openstreetmap.features import (
     OsmWay,
     Tags,
 )
-from cns_drake.imports.openstreetmap.grounds import ground_areas
+from cns_drake.imports.openstreetmap.grounds import (
+    coasts_of,
+    ground_areas,
+    sea,
+)
 from cns_drake.imports.openstreetmap.passages import (
     HEADROOM,
     THROUGH,
@@ -59,7 +63,6 @@ from cns_drake.imports.openstreetmap.passages import (
     WayOpenings,
     passages_of,
 )
-from cns_drake.imports.openstreetmap.sea import coasts_of, sea
 from cns_drake.imports.openstreetmap.small_objects import (
     make_small_objects,
     object_kind,
