@@ -26,7 +26,7 @@ from cns_drake.base import (
 )
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive import curves, road_model
-from cns_drake.imports.opendrive.thing_reader import read_things
+from cns_drake.imports.opendrive.things import read_things
 from cns_drake.imports.part_tables import PartTable
 
 # Greatest length of a road [m].
