@@ -114,8 +114,8 @@ def demolition_year(
 def construction_year(
     attributes: Mapping[str, Any],
     attribute: str | None,
-    name: str = "",
-    faults: ImportFaults | None = None,
+    name: str,
+    faults: ImportFaults,
 ) -> int | None:
     """Returns the year in which an object was built; None if unknown.
 
@@ -126,7 +126,6 @@ def construction_year(
         name: name of the object, as an example in `faults`.
         faults: counts placeholders for unknown years, and years in the future.
     """
-    faults = faults or ImportFaults()
     if attribute is not None:
         candidates = {attribute: attributes.get(attribute)}
     else:

@@ -12,7 +12,6 @@ from cns_drake.city.facades import (
     Building,
     Facade,
     Relief,
-    Site,
     WallFrame,
     around,
     balconies,
@@ -89,7 +88,7 @@ class BalconyFlats(Building):
 
         The building's site must be a rectangle.
         """
-        sections = _sections(self, self.site)
+        sections = _sections(self)
         plan, fronts = _outline(sections)
         body = self.height - _TOP_M
         storeys = max(2, round(body / self.storey))
@@ -184,9 +183,9 @@ def _add_section_roof(
     equip_roof(flats, section, roof, items, prefix=f"{part}_")
 
 
-def _sections(flats: BalconyFlats, site: Site) -> list[np.ndarray]:
+def _sections(flats: BalconyFlats) -> list[np.ndarray]:
     """Returns the outlines of the rectangular sections, left to right."""
-    x0, y0, x1, _ = site.bounds
+    x0, y0, x1, _ = flats.site.bounds
     bounds = np.round(np.linspace(x0, x1, flats.sections + 1), 2).tolist()
     fronts = [
         y0 + _FRONT_M + flats.stagger * (k % 2) for k in range(flats.sections)

@@ -134,7 +134,6 @@ def _add_pilasters(block: BrickBlock, z0: float, z1: float) -> None:
         pitch=block.pitch,
         margin=_END_M,
         every=3,
-        width=0.5,
         reach=0.2,
         z0=z0,
         z1=z1,

@@ -100,7 +100,6 @@ class CornerBuilding(Building):
                 pitch=self.pitch,
                 margin=_END_M,
                 every=2,
-                width=0.5,
                 reach=0.16,
                 z0=bottom,
                 z1=top,

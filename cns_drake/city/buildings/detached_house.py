@@ -291,10 +291,7 @@ def _add_chimney(house: DetachedHouse) -> None:
         wall = main.wall(1 if house.mirrored else 3)
         x = wall.length / 2
         brick = house.colours["base"]
-        breast = _chimney_breast(
-            wall, x, _BREAST_M, _BREAST_REACH_M, top=main.top - 0.1
-        )
-        house.add_to("base", breast)
+        house.add_to("base", _chimney_breast(wall, x, top=main.top - 0.1))
         foot = (*wall.point(x, 0.18), main.top - 0.9)
         add_chimney(house, "chimney", foot, brick, yaw=np.pi / 2)
     elif house.chimney == "ridge":
@@ -303,18 +300,13 @@ def _add_chimney(house: DetachedHouse) -> None:
         add_chimney(house, "chimney", foot, house.kind.choices["bricks"][0])
 
 
-def _chimney_breast(
-    wall: WallFrame, x: float, width: float, reach: float, top: float
-) -> Mesh:
+def _chimney_breast(wall: WallFrame, x: float, top: float) -> Mesh:
     """Returns a chimney that narrows at its shoulders, in front of a wall.
 
-    Args:
-        wall: the wall.
-        x: middle of the chimney along the wall [m].
-        width: width at the foot [m].
-        reach: how far it reaches out of the wall [m].
-        top: height of its top [m].
+    `x` is the middle of the chimney along the wall, and `top` the height of its
+    top [m].
     """
+    width, reach = _BREAST_M, _BREAST_REACH_M
     neck = 0.62 * width / 2
     shoulder = 0.5 * top
     low = outlines.rectangle(x - width / 2, -0.05, x + width / 2, reach)

@@ -55,16 +55,14 @@ def window_rows(house: FamilyHouse, wing: Wing, storeys: int) -> Openings:
         (_FRONT_AND_BACK, house.window_pitch),
         (_SIDES, _SIDE_PITCH_M),
     )
-    for edges, pitch in pitches:
-        wing_openings.add_window_storeys(
-            openings,
-            edges,
-            floor=house.floor,
-            storey=STOREY_M,
-            count=storeys,
-            pitch=pitch,
-            width=house.window_width,
-        )
+    wing_openings.add_window_storeys(
+        openings,
+        pitches,
+        floor=house.floor,
+        storey=STOREY_M,
+        count=storeys,
+        width=house.window_width,
+    )
     return openings
 
 

@@ -159,7 +159,7 @@ def _add_ground(flats: GalleryFlats, slab: np.ndarray) -> float:
             foot_band(height=0.4, reach=0.05),
             top_band(height, height=0.2, reach=0.1),
         ),
-        layout=bays.by_edge({_FRONT: front, _BACK: rows}, bays.plain),
+        layout=bays.by_edge({_FRONT: front, _BACK: rows}),
         glass=(flats.recess, _HALL_RECESS_M),
     )
     return tiers.add_ground(flats, slab, walls)

@@ -118,17 +118,15 @@ def _add_house(
     openings = Openings(flats, wing, boxes)
     storey = (wing.wall_top - 0.15 - _FLOOR_M) / storeys
     pitches = (((0, 2), flats.window_pitch), ((1, 3), _SIDE_PITCH_M))
-    for edges, pitch in pitches:
-        wing_openings.add_window_storeys(
-            openings,
-            edges,
-            floor=_FLOOR_M,
-            storey=storey,
-            count=storeys,
-            pitch=pitch,
-            width=flats.window_width,
-            head=min(2.2, storey - 0.4),
-        )
+    wing_openings.add_window_storeys(
+        openings,
+        pitches,
+        floor=_FLOOR_M,
+        storey=storey,
+        count=storeys,
+        width=flats.window_width,
+        head=min(2.2, storey - 0.4),
+    )
     _add_entrance(flats, openings)
     _add_verandas(flats, wing, storeys, storey, number)
     wing_openings.add_casings(openings, flats.casing)

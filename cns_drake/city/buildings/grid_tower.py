@@ -6,7 +6,6 @@ from cns_drake.city.facades import (
     Band,
     Building,
     Facade,
-    Site,
     WallFrame,
     bays,
     canopies,
@@ -81,7 +80,7 @@ class GridTower(Building):
 
         The building's site must be a rectangle.
         """
-        plan = np.round(_outline(self, self.site), 2)
+        plan = np.round(_outline(self), 2)
         top = _add_lobby(self, plan)
         if self.waist > 0:
             top = _add_grid(self, plan, top, self.waist * self.height, "low")
@@ -110,9 +109,9 @@ class GridTower(Building):
         equip_roof(self, free, roof, self.roof_items, clear=0.8)
 
 
-def _outline(tower: GridTower, site: Site) -> np.ndarray:
+def _outline(tower: GridTower) -> np.ndarray:
     """Returns the outline, slightly within the site; the front comes first."""
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = tower.site.bounds
     base = outlines.rectangle(
         x0 + _STRIP_M, y0 + _STRIP_M, x1 - _STRIP_M, y1 - _STRIP_M
     )

@@ -120,20 +120,15 @@ def add_house(
     openings = Openings(house, wing)
     step = (wing.wall_top - _WALL_ABOVE_M - house.floor) / storeys
     sides = [k for k in (1, 3) if k not in blind]
-    for edges, pitch in (
-        ((0, 2), house.window_pitch),
-        (sides, _SIDE_PITCH_M),
-    ):
-        wing_openings.add_window_storeys(
-            openings,
-            edges,
-            floor=house.floor,
-            storey=step,
-            count=storeys,
-            pitch=pitch,
-            width=house.window_width,
-            head=min(2.2, step - 0.45),
-        )
+    wing_openings.add_window_storeys(
+        openings,
+        [((0, 2), house.window_pitch), (sides, _SIDE_PITCH_M)],
+        floor=house.floor,
+        storey=step,
+        count=storeys,
+        width=house.window_width,
+        head=min(2.2, step - 0.45),
+    )
     door = _add_entrance(house, wing, openings, door_material)
     _add_bay(house, wing, openings, storeys, step, door)
     wing_openings.add_casings(openings, house.casing)

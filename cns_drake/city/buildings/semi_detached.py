@@ -122,11 +122,10 @@ def _add_gabled_bay(houses: SemiDetached, bay: Wing, storeys: int) -> None:
     openings = Openings(houses, bay, houses.boxes)
     wing_openings.add_window_storeys(
         openings,
-        (0,),
+        [((0,), 2.4)],
         floor=houses.floor,
         storey=STOREY_M,
         count=storeys,
-        pitch=2.4,
         width=1.5,
         margin=0.2,
     )

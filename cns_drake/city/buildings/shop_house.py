@@ -92,20 +92,15 @@ class ShopHouse(HouseInRow):
         upper = storeys if room > _LEAST_STOREY_M else 0
         step = room / max(upper, 1)
         sides = [k for k in (1, 3) if k not in blind]
-        for edges, pitch in (
-            ((0, 2), self.window_pitch),
-            (sides, _SIDE_PITCH_M),
-        ):
-            wing_openings.add_window_storeys(
-                openings,
-                edges,
-                floor=ground,
-                storey=step,
-                count=upper,
-                pitch=pitch,
-                width=self.window_width,
-                head=min(2.25, step - 0.4),
-            )
+        wing_openings.add_window_storeys(
+            openings,
+            [((0, 2), self.window_pitch), (sides, _SIDE_PITCH_M)],
+            floor=ground,
+            storey=step,
+            count=upper,
+            width=self.window_width,
+            head=min(2.25, step - 0.4),
+        )
         _add_ground(self, wing, openings)
         _add_oriels(self, wing, openings, upper, step)
         wing_openings.add_casings(openings, self.casing)

@@ -109,11 +109,10 @@ def _add_unit(strip: ShopStrip, wing: Wing, tall: bool) -> None:
     width = strip.uniform(1.1, 2.2, digits=2)
     wing_openings.add_window_storeys(
         openings,
-        (0, 2),
+        [((0, 2), width + 1.1)],
         floor=strip.ground,
         storey=storey,
         count=upper_floors,
-        pitch=width + 1.1,
         width=width,
         head=min(2.3, storey - 0.4),
     )

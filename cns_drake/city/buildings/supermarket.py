@@ -134,7 +134,6 @@ def _add_hall(market: Supermarket, hall: Wing) -> None:
         pitch=pitch,
         margin=0.6,
         every=1,
-        width=0.5,
         reach=0.2,
         z0=0.0,
         z1=eaves - 0.5,

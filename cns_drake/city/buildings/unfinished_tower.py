@@ -210,7 +210,7 @@ def _add_core(tower: UnfinishedTower, plan: np.ndarray) -> None:
     core = np.round(outlines.rectangle(left, front, right, back), 2)
     door = bays.window(width=1.2, sill=0.05, head=2.2, depth=0.35)
     doorway = bays.alone(door, width=2.0)
-    layout = bays.by_edge({0: doorway, 2: doorway}, bays.plain)
+    layout = bays.by_edge({0: doorway, 2: doorway})
     walls = Facade(tower.storey, layout=layout).stacked(tower.storeys)
     top_slab = round(tower.storeys * tower.storey, 3)
     top = tower.height

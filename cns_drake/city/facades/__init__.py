@@ -7,7 +7,6 @@ from cns_drake.city.facades.reliefs import Band as Band
 from cns_drake.city.facades.reliefs import Patch as Patch
 from cns_drake.city.facades.reliefs import Relief as Relief
 from cns_drake.city.facades.reliefs import foot_band as foot_band
-from cns_drake.city.facades.reliefs import lifted as lifted
 from cns_drake.city.facades.reliefs import top_band as top_band
 from cns_drake.city.facades.roof_equipment import add_chimney as add_chimney
 from cns_drake.city.facades.roof_equipment import equip_roof as equip_roof
@@ -18,7 +17,6 @@ from cns_drake.city.facades.walls import Facade as Facade
 from cns_drake.city.facades.walls import Layout as Layout
 from cns_drake.city.facades.walls import facade_mesh as facade_mesh
 from cns_drake.city.facades.walls import glass_mesh as glass_mesh
-from cns_drake.city.facades.walls import single_wall as single_wall
 from cns_drake.city.facades.wing_walls import Openings as Openings
 from cns_drake.city.facades.wings import Roof as Roof
 from cns_drake.city.facades.wings import Wing as Wing

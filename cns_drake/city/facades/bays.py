@@ -8,7 +8,7 @@ walls of a storey. All heights are above the storey's floor [m].
 from collections.abc import Callable, Sequence
 
 from cns_drake.city.facades.reliefs import Arch, Patch, Relief
-from cns_drake.city.facades.walls import Layout
+from cns_drake.city.facades.walls import Layout, no_relief
 
 Bay = Callable[[float, float], list[Relief]]
 # Start and end of a stretch of a wall [m].
@@ -291,11 +291,6 @@ def bounds(cells: Sequence[Span]) -> list[float]:
     return [cells[0][0], *(end for _, end in cells)]
 
 
-def plain(edge: int, length: float) -> list[Relief]:
-    """A layout for walls without openings: it returns no reliefs."""
-    return []
-
-
 def rhythm(pitch: float, bays: Sequence[Bay], margin: float = 0.5) -> Layout:
     """Returns a layout that repeats a sequence of bays along each wall.
 
@@ -344,14 +339,16 @@ def alone(bay: Bay, width: float) -> Layout:
 
     Walls shorter than the bay have no bay.
     """
-    return with_middle(plain, bay, width)
+    return with_middle(no_relief, bay, width)
 
 
-def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
+def by_edge(
+    layouts: dict[int, Layout], otherwise: Layout = no_relief
+) -> Layout:
     """Returns a layout that chooses between other layouts by edge.
 
     `layouts` maps the number of an edge to the layout of its wall. Walls at all
-    other edges get the layout `otherwise`.
+    other edges get the layout `otherwise`, by default no openings.
     """
 
     def layout(edge: int, length: float) -> Sequence[Relief]:

@@ -9,6 +9,9 @@ from cns_drake.city.facades import bays, outlines, solids
 from cns_drake.city.facades.wall_frames import WallFrame
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
+# Width of a pilaster [m].
+_PILASTER_M = 0.5
+
 
 def wall_piers(
     outline: ArrayLike,
@@ -65,7 +68,6 @@ def pilasters(
     pitch: float,
     margin: float,
     every: int,
-    width: float,
     reach: float,
     z0: float,
     z1: float,
@@ -81,7 +83,6 @@ def pilasters(
         pitch: width of a bay, as given to `rhythm` [m].
         margin: distance of the bays from corners, as given to `rhythm` [m].
         every: number of bays from one pilaster to the next.
-        width: width of a pilaster [m].
         reach: how far a pilaster reaches out of the wall [m].
         z0: height of its foot [m].
         z1: height of its top [m].
@@ -93,7 +94,7 @@ def pilasters(
         cells = bays.stretches(wall.length, pitch, margin)
         if edge not in skip and len(cells) > 2:
             for x, _ in cells[every::every]:
-                pier = _pier(round(x, 2), width, 0.02, reach, z0, z1)
+                pier = _pier(round(x, 2), _PILASTER_M, 0.02, reach, z0, z1)
                 pieces.append(wall.place(pier))
     return merge_meshes(*pieces)
 

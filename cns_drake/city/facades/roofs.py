@@ -208,14 +208,10 @@ def hip(
         fascia: height of the vertical edge of the eaves [m].
     """
     outer = outlines.inset(outline, -np.asarray(eaves))
-    slopes = solids.skirt(outer, _ridge(outer), z + fascia, top)
-    return merge_meshes(*_boxed_eaves(outer, z, fascia), slopes)
-
-
-def _boxed_eaves(outer: np.ndarray, z: float, fascia: float) -> list[Mesh]:
-    """Returns the underside of the eaves and their vertical edge."""
+    underside = solids.flat(outer, z, up=False)
     edge = solids.skirt(outer, outer, z, z + fascia)
-    return [solids.flat(outer, z, up=False), edge]
+    slopes = solids.skirt(outer, _ridge(outer), z + fascia, top)
+    return merge_meshes(underside, edge, slopes)
 
 
 def _ridge(rectangle: np.ndarray) -> np.ndarray:

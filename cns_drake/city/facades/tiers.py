@@ -256,8 +256,7 @@ def shaft_walls(
         rim: the band around the top.
     """
     layouts = {0: bays.alone(entry, room), 2: bays.alone(slit, room)}
-    layout = bays.by_edge(layouts, bays.plain)
-    return Facade(height, (rim,), layout)
+    return Facade(height, (rim,), bays.by_edge(layouts))
 
 
 def add_crown(

@@ -30,7 +30,8 @@ _WIDE_ARCH_CHORDS = 6
 _WIDE_ARCH_M = 2.0
 
 
-def _no_relief(edge: int, length: float) -> Sequence[Relief]:
+def no_relief(edge: int, length: float) -> Sequence[Relief]:
+    """A layout for walls without openings: it returns no reliefs."""
     return ()
 
 
@@ -54,7 +55,7 @@ class Facade:
 
     height: float
     bands: tuple[Band, ...] = ()
-    layout: Layout = _no_relief
+    layout: Layout = no_relief
     glass: tuple[float, ...] = ()
     plain: frozenset[int] = frozenset()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from cns_drake.city.facades import bays, boards, canopies
 from cns_drake.city.facades.reliefs import Patch, Relief
@@ -19,11 +19,10 @@ SHOP_GLASS_M = (0.35, 0.95)
 
 def add_window_storeys(
     openings: Openings,
-    edges: Iterable[int],
+    pitches: Iterable[tuple[Sequence[int], float]],
     floor: float,
     storey: float,
     count: int,
-    pitch: float,
     width: float,
     margin: float = 0.6,
     head: float = 2.15,
@@ -34,20 +33,21 @@ def add_window_storeys(
 
     Args:
         openings: the openings of the wing.
-        edges: numbers of the walls.
+        pitches: numbers of walls, and the approximate distance from one of
+            their windows to the next [m].
         floor: height of the lowest floor [m].
         storey: height of a storey [m].
         count: number of storeys.
-        pitch: approximate distance from one window to the next [m].
         width: width of a window [m].
         margin: least distance of windows from corners [m].
         head: height of the top of a window above the storey's floor [m].
     """
-    for k in range(count):
-        z = floor + k * storey
-        wide = round(width * (1.25 if k == 0 else 1.0), 2)
-        choices = [sash(wide, z, 0.85, head), sash(width, z, 0.85, head)]
-        openings.add_bays(edges, z + 0.7, pitch, choices, margin)
+    for edges, pitch in pitches:
+        for k in range(count):
+            z = floor + k * storey
+            wide = round(width * (1.25 if k == 0 else 1.0), 2)
+            choices = [sash(wide, z, 0.85, head), sash(width, z, 0.85, head)]
+            openings.add_bays(edges, z + 0.7, pitch, choices, margin)
 
 
 def add_door(

@@ -93,7 +93,7 @@ def _add_gable(
 ) -> None:
     """Adds the wall below the roof at one end of the ridge."""
     wall = wing.wall(edge)
-    under = _seen_from(wing, edge, wing.roof_line)
+    under = _underside(wing, edge)
     holes: list[Patch] = []
     if attic is not None and edge not in wing.blind:
         holes = [
@@ -120,11 +120,9 @@ def _sides(wing: Wing) -> tuple[int, int]:
     return (3, 1) if wing.roof.along_y else (0, 2)
 
 
-def _seen_from(
-    wing: Wing, edge: int, line: list[bays.Span]
-) -> list[tuple[float, float]]:
+def _underside(wing: Wing, edge: int) -> list[tuple[float, float]]:
     """Returns the underside of the roof in the wall coordinates of a gable."""
-    thickness = wing.roof.thickness
+    line, thickness = wing.roof_line, wing.roof.thickness
     start, end = line[0][0], line[-1][0]
     # Walls run counter-clockwise. Seen from the front and from the right, the
     # line therefore keeps its direction.

@@ -18,13 +18,16 @@ from cns_drake.city.geometry import (
     ground_triangles,
     snap,
 )
-from cns_drake.city.ground.bridges import bridge_structures
 from cns_drake.city.ground.coverings import GROUND_TAG
 from cns_drake.city.ground.districts import share_out
 from cns_drake.city.ground.elevation import Ground, Pad, aprons, make_ground
 from cns_drake.city.ground.markings import marking_structure
 from cns_drake.city.ground.streets import kerb_height, street_structures
-from cns_drake.city.ground.terrain import GroundShape, ground_structures
+from cns_drake.city.ground.terrain import (
+    GroundShape,
+    bridge_structures,
+    ground_structures,
+)
 from cns_drake.city.placement import sidewalks
 from cns_drake.city.placement.building_rows import place_buildings
 from cns_drake.city.placement.draft import Draft

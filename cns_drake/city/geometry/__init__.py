@@ -13,7 +13,6 @@ from cns_drake.city.geometry.models import Shape as Shape
 from cns_drake.city.geometry.models import SphereShape as SphereShape
 from cns_drake.city.geometry.models import part_mesh as part_mesh
 from cns_drake.city.geometry.models import triple as triple
-from cns_drake.city.geometry.object_models import OBJECT_MESHES as OBJECT_MESHES
 from cns_drake.city.geometry.object_models import Builder as Builder
 from cns_drake.city.geometry.object_models import assemble as assemble
 from cns_drake.city.geometry.object_models import bar as bar
@@ -27,7 +26,6 @@ from cns_drake.city.geometry.occupancy import Occupancy as Occupancy
 from cns_drake.city.geometry.polygon_meshes import HeightMap as HeightMap
 from cns_drake.city.geometry.polygon_meshes import surface_mesh as surface_mesh
 from cns_drake.city.geometry.polygon_meshes import wall_mesh as wall_mesh
-from cns_drake.city.geometry.polygons import hull_of as hull_of
 from cns_drake.city.geometry.polygons import placed as placed
 from cns_drake.city.geometry.polygons import polygons_of as polygons_of
 from cns_drake.city.geometry.polygons import snap as snap
@@ -36,11 +34,4 @@ from cns_drake.city.geometry.structures import Structure as Structure
 from cns_drake.city.geometry.structures import (
     ground_triangles as ground_triangles,
 )
-from cns_drake.city.geometry.triangles import from_above as from_above
-from cns_drake.city.geometry.triangles import long_normals as long_normals
-from cns_drake.city.geometry.triangles import looks_up as looks_up
-from cns_drake.city.geometry.triangles import quartered as quartered
-from cns_drake.city.geometry.triangles import turned_up as turned_up
-from cns_drake.city.geometry.triangles import unit_normals as unit_normals
-from cns_drake.city.geometry.triangulation import triangulate as triangulate
 from cns_drake.city.geometry.upper_sides import UpperSides as UpperSides

@@ -116,6 +116,12 @@ def import_objects(
             continue
         object_type = city.objects[root].object_type
         semantic_class, finish = _class_of(object_type)
+        where = (names[root], city.faults)
+        attributes = [member.attributes for member in members]
+        built = [
+            construction_year(one, year_attribute, *where) for one in attributes
+        ]
+        demolished = [demolition_year(one, *where) for one in attributes]
         made.append(
             make_object(
                 names[root],
@@ -123,50 +129,13 @@ def import_objects(
                 object_type,
                 surfaces,
                 {"body": finish, "roof": colours.RED_ROOF},
-                _year_of_family(
-                    members, year_attribute, names[root], city.faults
-                ),
-                _demolition_of_family(members, names[root], city.faults),
+                _first_year(built, *where),
+                _first_year(demolished, *where),
                 tags=_tags_of_family(members),
                 lod=max(geometry.lod for geometry in chosen),
             )
         )
     return made
-
-
-def _year_of_family(
-    members: Iterable[CityObject],
-    year_attribute: str | None,
-    name: str,
-    faults: ImportFaults,
-) -> int | None:
-    """Returns the year in which an object was built; None if unknown.
-
-    The result is the first year that the object or one of its parts states. The
-    arguments are as for `construction_year`.
-    """
-    return _first_year(
-        [
-            construction_year(member.attributes, year_attribute, name, faults)
-            for member in members
-        ],
-        name,
-        faults,
-    )
-
-
-def _demolition_of_family(
-    members: Iterable[CityObject], name: str, faults: ImportFaults
-) -> int | None:
-    """Returns the year in which an object was demolished; None if unknown."""
-    return _first_year(
-        [
-            demolition_year(member.attributes, name, faults)
-            for member in members
-        ],
-        name,
-        faults,
-    )
 
 
 def _first_year(

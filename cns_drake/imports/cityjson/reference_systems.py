@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 import pyproj
@@ -25,20 +24,6 @@ _NEAR_AREA_DEG = 0.5
 # A projection that changes lengths by more than this share is refused.
 _MOST_STRETCHED = 0.005
 _PLAIN = ("east [metre]", "north [metre]", "up [metre]")
-
-
-class _Axis(NamedTuple):
-    """An axis of a reference system.
-
-    Attributes:
-        direction: direction, such as `east`.
-        unit: name of the unit.
-        metres: length of the unit [m].
-    """
-
-    direction: str
-    unit: str
-    metres: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,14 +140,15 @@ def reference_system(name: str, where: str) -> ReferenceSystem:
             " example with cjio's crs_reproject)"
         )
     defined = [axis for part in parts for axis in part.axis_info]
+    # Direction, name of the unit, and length of the unit [m].
     axes = [
-        _Axis(axis.direction, axis.unit_name, axis.unit_conversion_factor)
+        (axis.direction, axis.unit_name, axis.unit_conversion_factor)
         for axis in defined
     ]
     heights_assumed = len(axes) == 2
     if heights_assumed:
-        axes.append(axes[0]._replace(direction="up"))
-    rows = [_ROWS.get(axis.direction, (-1, 0.0)) for axis in axes]
+        axes.append(("up", *axes[0][1:]))
+    rows = [_ROWS.get(direction, (-1, 0.0)) for direction, _, _ in axes]
     if sorted(row for row, _ in rows) != [0, 1, 2]:
         listed = ", ".join(f"{a.name} ({a.direction})" for a in defined)
         raise InputError(
@@ -171,8 +157,8 @@ def reference_system(name: str, where: str) -> ReferenceSystem:
         )
     matrix = np.zeros((3, 3))
     for column, (row, sign) in enumerate(rows):
-        matrix[row, column] = sign * axes[column].metres
-    words = tuple(f"{axis.direction} [{axis.unit}]" for axis in axes)
+        matrix[row, column] = sign * axes[column][2]
+    words = tuple(f"{direction} [{unit}]" for direction, unit, _ in axes)
     return ReferenceSystem(name, words, matrix, heights_assumed)
 
 

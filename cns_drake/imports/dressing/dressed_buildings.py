@@ -331,28 +331,25 @@ class _DriveViews:
             self._scene = EmbreeScene()
             TriangleMesh(self._scene, (solids - self._middle).astype("f4"))
 
-    def are_near(self, limits: np.ndarray, distance: float) -> np.ndarray:
+    def are_near(self, limits: np.ndarray) -> np.ndarray:
         """Returns (N,) bool: whether boxes are near a drive.
 
         `limits` (N, 2, 2) contains the least and the greatest x and y of each
-        box [m]. A box counts as near if the circle around it is at most
-        `distance` [m] from a viewpoint.
+        box [m]. A box counts as near if the circle around it is at most 60 m
+        from a viewpoint.
         """
         middles = limits.mean(axis=1)
         reach = np.linalg.norm(limits[:, 1] - middles, axis=1)
-        return np.asarray(self._tree.query(middles)[0] <= reach + distance)
+        return np.asarray(self._tree.query(middles)[0] <= reach + _WALLS_WITHIN)
 
-    def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
+    def distances(self, panels: Sequence[Panel]) -> np.ndarray:
         """Returns the distance from which drives see each wall, (N,) [m].
 
         This is the distance from the wall to the nearest viewpoint on a drive
-        from which the wall is visible; infinite without such a viewpoint.
-
-        Args:
-            panels: the N walls.
-            most: greatest distance at which a viewpoint counts [m].
+        from which the wall is visible; infinite without such a viewpoint within
+        60 m.
         """
-        facing = [self._facing_places(panel, most) for panel in panels]
+        facing = [self._facing_places(panel) for panel in panels]
         counts = [len(distances) for _, distances in facing]
         if not sum(counts):
             return np.full(len(panels), np.inf)
@@ -369,15 +366,14 @@ class _DriveViews:
         np.minimum.at(nearest, number[is_seen], distance[is_seen])
         return nearest
 
-    def _facing_places(
-        self, panel: Panel, most: float
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _facing_places(self, panel: Panel) -> tuple[np.ndarray, np.ndarray]:
         """Returns the places that face a panel, and their distances.
 
-        The result is two arrays (K,): numbers of places at most `most` from the
+        The result is two arrays (K,): numbers of places at most 60 m from the
         panel, and their distances from the panel [m]. The nearest places are
         all included, of the others only some.
         """
+        most = _WALLS_WITHIN
         middle = panel.origin[:2] + panel.along * panel.length / 2.0
         near = self._tree.query_ball_point(middle, most + panel.length / 2.0)
         index = np.array(near, dtype=int)
@@ -517,9 +513,9 @@ def _visible_panels(
     the limit of triangles allows. `walls` has the vertical triangles (M, 3, 3)
     of each building [m].
     """
-    panels = find_panels(walls, lambda xy: views.are_near(xy, _WALLS_WITHIN))
+    panels = find_panels(walls, views.are_near)
     panels = [panel for panel in panels if panel.is_plane]
-    distances = views.distances(panels, _WALLS_WITHIN)
+    distances = views.distances(panels)
     order = np.argsort(distances, kind="stable")
     order = order[distances[order] <= _WALLS_WITHIN]
     costs = [

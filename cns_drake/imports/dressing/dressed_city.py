@@ -182,7 +182,13 @@ def dress_city(
     names = {one.structure.name for one in added} - placed.from_file
     origins |= dict.fromkeys(names, "lot")
     dressed = staged.replaced({**changed, **placed.moved}).with_objects(added)
-    _check_number(len(dressed.kept))
+    number = len(dressed.kept)
+    if number >= MAX_INSTANCE:
+        raise InputError(
+            f"--plain: without it the city has {number} structures,"
+            f" more than instance ids can count ({MAX_INSTANCE}); or give"
+            " --within"
+        )
     if is_paved:
         guessed_ground = list(map(in_paving_colour, guessed_ground))
     return Dressing(dressed, origins, facts, guessed_ground)
@@ -239,20 +245,6 @@ def _take_back_placed(city: ForeignCity, placed: PlacedObjects) -> None:
         if small.source in left:
             left.remove(small.source)
             city.faults.take_back(f"{small.element}, left out")
-
-
-def _check_number(number: int) -> None:
-    """Checks that there are ids for a number of structures.
-
-    Raises:
-        InputError: there are too few ids.
-    """
-    if number >= MAX_INSTANCE:
-        raise InputError(
-            f"--plain: without it the city has {number} structures,"
-            f" more than instance ids can count ({MAX_INSTANCE}); or give"
-            " --within"
-        )
 
 
 def _laid_paving(

@@ -16,8 +16,7 @@ def _write_town(
     folder: Path,
 ) -> Any:
     with uninterrupted():  # This imports the whole city generator.
-        from cns_drake.imports.opendrive.town import build_town
-        from cns_drake.imports.opendrive.town_files import write_town
+        from cns_drake.imports.opendrive.town import build_town, write_town
 
     return write_town(folder, source, build_town(source, options, own))
 

@@ -38,7 +38,11 @@ class RoadHeights:
 
     def __init__(self, bands: Sequence[LaneBand]):
         """Takes all lanes on the ground, at least one."""
-        places = np.concatenate([_middle_places(band) for band in bands])
+        rows = []
+        for band in bands:
+            columns = band.middle, band.heading, band.roll, band.grade
+            rows.append(_interpolated(band, np.column_stack(columns)))
+        places = np.concatenate(rows)
         self._p = places[:, :3]
         heading, roll, grade = places[:, 3:].T
         across = np.tan(roll)
@@ -121,14 +125,6 @@ class KerbHeights:
         own = at_inner + np.clip(share, 0.0, 1.0) * (at_outer - at_inner)
         is_beside = distance < np.sqrt(width2) / 2.0 + _BESIDE
         return np.where(is_beside, own, self.usual)
-
-
-def _middle_places(band: LaneBand) -> np.ndarray:
-    """Returns (N, 6): places in the middle, and heading, roll and grade."""
-    return _interpolated(
-        band,
-        np.column_stack([band.middle, band.heading, band.roll, band.grade]),
-    )
 
 
 def _interpolated(band: LaneBand, rows: np.ndarray) -> np.ndarray:

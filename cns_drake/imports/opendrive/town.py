@@ -1,7 +1,7 @@
-"""Builds a town on an imported road network."""
+"""Builds a town on an imported road network, and writes its files."""
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -23,14 +23,17 @@ from cns_drake.city import (
     Structure,
     build_along,
     place_car,
+    render_stages,
     starter_plan,
     starter_stages,
     street_surfaces,
+    surface_mesh,
 )
+from cns_drake.imports import map_files, overview
 from cns_drake.imports.drives import search, steerable_drives
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faults import ImportFaults
-from cns_drake.imports.imported_objects import make_object
+from cns_drake.imports.imported_objects import ImportedObject, make_object
 from cns_drake.imports.opendrive.band_graph import BandGraph
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
 from cns_drake.imports.opendrive.lanes import (
@@ -47,7 +50,8 @@ from cns_drake.imports.opendrive.road_model import RoadMap
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
 from cns_drake.imports.options import ImportOptions
-from cns_drake.scene import GROUND_CLASSES
+from cns_drake.imports.report import ImportReport
+from cns_drake.scene import GROUND_CLASSES, MESH_FOLDER
 
 # Height of sidewalks above the road if the file states none [m].
 _KERB_HEIGHT = 0.1
@@ -76,6 +80,21 @@ _HEADROOM = 3.0
 _ABOVE_WITHIN = 2.5
 # A bridge extends this far to both sides of the road that it crosses [m].
 _BRIDGE_REACH = 8.0
+# About the radius of a tree's crown, in pictures [m].
+_CROWN_RADIUS = 1.5
+# Side of the squares into which footprints are divided, in pictures [m].
+_TILE = 20.0
+# Least and greatest speed of a drive [m/s].
+_SPEEDS = (3.0, 12.0)
+# Classes that the picture from above shows; small things could not be seen.
+_SHOWN_CLASSES = (
+    "road",
+    "parking",
+    "sidewalk",
+    "other-ground",
+    "building",
+    "vegetation",
+)
 # The arrays of a band, with one row for each place along the road.
 _ARRAYS = (
     "inner", "outer", "middle", "heading", "roll", "grade", "rise", "s",
@@ -368,7 +387,13 @@ def _city_along(
             kerbs=kerbs if kerbs.differ else None,
             junctions=on_ground.junctions,
             margins=on_ground.margins,
-            reserved=_reserved_area(streets.raised, of_file.things),
+            # Nothing is built below bridges, nor on things of the file.
+            reserved=shapely.union_all(
+                [
+                    *map(lane_polygon, streets.raised),
+                    *(one.footprint_W for one in of_file.things),
+                ]
+            ),
             structures=(
                 *surfaces,
                 *of_file.decks,
@@ -380,18 +405,6 @@ def _city_along(
         ),
         plan,
         str(source),
-    )
-
-
-def _reserved_area(
-    raised: Sequence[LaneBand], things: Sequence[Structure]
-) -> BaseGeometry:
-    """Returns the area in W that stays free: below bridges and things [m]."""
-    return shapely.union_all(
-        [
-            *(lane_polygon(band) for band in raised),
-            *(one.footprint_W for one in things),
-        ]
     )
 
 
@@ -602,3 +615,100 @@ def _stretches_of_one_level(
         last = min(b + 1, len(is_bridge))
         if last - a > 1:
             yield slice(int(a), int(last)), bool(is_bridge[a])
+
+
+def write_town(
+    draft: Path, source: Path, town: Town
+) -> tuple[ImportReport, dict[str, tuple[int, int]]]:
+    """Writes all files of a town to a map folder.
+
+    Returns:
+        What was imported, and name of a stage -> counts of its structures and
+        of its triangles.
+
+    Raises:
+        InputError: the town has more structures than there are instance ids.
+    """
+    stages = town.stages.stages
+    files, sizes = render_stages(
+        draft.name,
+        town.city,
+        town.stages,
+        stages,
+        source,
+        origin=f"Imported by cns-drake from {source.name}.",
+    )
+    (draft / MESH_FOLDER).mkdir(exist_ok=True)
+    for name, text in files.items():
+        (draft / name).write_text(text, "utf-8")
+    map_files.write_facts(
+        draft,
+        source,
+        {
+            "reference_system": town.roads.reference_system or "unknown",
+            "origin": list(town.roads.origin),
+            "seed": town.seed,
+            "stages": {name: plan.story for name, plan in stages.items()},
+        },
+        town.faults,
+        "# Where the roads of this map come from; all else is random."
+        "\n# A place of the map plus the origin is one of the system [m].\n",
+    )
+    _write_drives(draft, town)
+    overview.draw_overview(
+        draft / "from_above.png",
+        list(_seen_from_above(town.city.structures)),
+        None,
+        town.drives,
+    )
+    return _report_of(town, sizes), sizes
+
+
+def _write_drives(draft: Path, town: Town) -> None:
+    """Writes the drives of a town, at the speed limit of their roads."""
+    stages = list(town.stages.stages)
+    map_files.write_drives(
+        draft,
+        {
+            stage: "" if stage == stages[-1] else ", not all of it built"
+            for stage in stages
+        },
+        [drive.waypoints for drive in town.drives],
+        [
+            float(np.clip(drive.limit or _SPEEDS[1], *_SPEEDS))
+            for drive in town.drives
+        ],
+    )
+
+
+def _report_of(
+    town: Town, sizes: Mapping[str, tuple[int, int]]
+) -> ImportReport:
+    return ImportReport(
+        kinds=town.kinds,
+        triangles=sum(
+            structure.model.num_triangles for structure in town.city.structures
+        ),
+        stages={stage: size[0] for stage, size in sizes.items()},
+        undated=0,
+        dated=0,
+        drives=tuple(drive.length for drive in town.drives),
+        faults=town.faults.rows(),
+        parts=town.faults.parts(),
+    )
+
+
+def _seen_from_above(
+    structures: Iterable[Structure],
+) -> Iterable[ImportedObject]:
+    """Yields the footprints of structures as flat triangles."""
+    for structure in structures:
+        if structure.semantic_class not in _SHOWN_CLASSES:
+            continue
+        area = structure.footprint_W
+        if structure.semantic_class == "vegetation":
+            area = area.buffer(_CROWN_RADIUS)
+        mesh = surface_mesh(area, 0.0, _TILE)
+        if mesh.num_triangles:
+            triangles = mesh.vertices[mesh.triangles()]
+            yield ImportedObject(structure, "", None, triangles)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
 import re
 
@@ -50,9 +50,9 @@ class Bridges:
         tunnels: ids of the tunnels.
     """
 
-    over_streets: Mapping[str, float] = field(default_factory=dict)
-    level: AbstractSet[str] = frozenset()
-    tunnels: AbstractSet[str] = frozenset()
+    over_streets: Mapping[str, float]
+    level: AbstractSet[str]
+    tunnels: AbstractSet[str]
 
     @property
     def left_out(self) -> AbstractSet[str]:

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+import math
 from pathlib import Path
 import re
 from typing import NamedTuple
 
 import numpy as np
 import shapely
+from shapely import STRtree
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -22,7 +24,7 @@ from cns_drake.city import Structure, tree
 from cns_drake.imports import faces
 from cns_drake.imports.colours import WHITE_PAINT
 from cns_drake.imports.faults import ImportFaults
-from cns_drake.imports.foreign_city import ForeignCity
+from cns_drake.imports.foreign_city import ForeignCity, SmallObject
 from cns_drake.imports.imported_objects import ImportedObject, make_object
 from cns_drake.imports.openstreetmap import reading, streets
 from cns_drake.imports.openstreetmap.area_looks import AreaLook, raised_object
@@ -50,21 +52,22 @@ from cns_drake.imports.openstreetmap.features import (
     OsmWay,
     Tags,
 )
-from cns_drake.imports.openstreetmap.grounds import ground_areas
+from cns_drake.imports.openstreetmap.grounds import (
+    coasts_of,
+    ground_areas,
+    sea,
+)
 from cns_drake.imports.openstreetmap.passages import (
+    HEADROOM,
+    THROUGH,
     Passage,
     WayOpenings,
-    count_walled_up,
     passages_of,
 )
-from cns_drake.imports.openstreetmap.sea import coasts_of, sea
-from cns_drake.imports.openstreetmap.small_objects import (
-    make_small_objects,
-    object_kind,
-    tree_height,
-)
 from cns_drake.imports.openstreetmap.tags import (
+    TABLES,
     has_tag,
+    heading_deg,
     is_inside,
     length,
     tag_value,
@@ -112,6 +115,13 @@ _BARRIERS = {
 _SEA_MARGIN = 60.0
 # Wider areas, such as whole countries, are refused [m].
 _WIDEST = 20_000.0
+# Values of the tags `lamp_mount` and `support` for an object that stands on a
+# post of its own. With other values, such as `wall_mounted`, another structure
+# carries the object.
+_POSTS = ("pole", "straight_mast", "bent_mast", "mast")
+_TALLEST_TREE = 150.0  # [m]
+# Distance between the trees of a tree row [m].
+_TREE_SPACING = 8.0
 # Width of the stripes of a zebra crossing, and of the gaps between them [m].
 _STRIPE_WIDTH = 0.5
 # Length of the stripes [m].
@@ -190,7 +200,7 @@ def import_openstreetmap(
         faults,
         driven,
         any(way.tags.get("driving_side") == "left" for way in features.ways),
-        small_objects=list(make_small_objects(features, local)),
+        small_objects=list(_make_small_objects(features, local)),
     )
 
 
@@ -217,17 +227,22 @@ def _count_walled_up(
     faults: ImportFaults,
 ) -> None:
     """Counts streets that lead through buildings without a passage."""
-    count_walled_up(
-        [(street.name, LineString(street.line)) for street in driven],
-        [
-            (local.polygon(polygon), heights(building.tags).low)
-            for building in buildings
-            if not is_gone(building.tags)
-            for polygon in building.polygons
-        ],
-        passages,
-        faults,
-    )
+    low = [
+        local.polygon(polygon)
+        for building in buildings
+        if not is_gone(building.tags) and heights(building.tags).low < HEADROOM
+        for polygon in building.polygons
+    ]
+    tree = STRtree(low)
+    open_ways = {passage.name for passage in passages}
+    for street in driven:
+        line = LineString(street.line)
+        if street.name not in open_ways and any(
+            low[k].intersection(line).length > THROUGH
+            for k in tree.query(line, "intersects")
+        ):
+            kind = "street into a building without a passage"
+            faults.add(kind, street.name)
 
 
 def _without_outers(
@@ -334,7 +349,7 @@ def _account_for_tags(
                 ["crossing"], tags, f"n{number}", features.faults, "tag "
             )
     for name, tags, _ in features.nodes if dressed else ():
-        if object_kind(tags) is not None and not is_inside(tags):
+        if _object_kind(tags) is not None and not is_inside(tags):
             _PARTS.account(
                 ["small object"], tags, name, features.faults, "tag "
             )
@@ -419,13 +434,74 @@ def _trees(
             # Editors give negative numbers to new objects.
             np.random.default_rng([abs(int(name[1:]))]),
             species="spruce" if needles else "lime_tree",
-            height=tree_height(name, tags, features.faults),
+            height=_tree_height(name, tags, features.faults),
         )
         place_W = (round(x, 3), round(y, 3), 0.0)
         structure = Structure(f"tree_{name}", "vegetation", model, place_W)
         trunk = Point(x, y).buffer(_TRUNK_RADIUS, quad_segs=2)
         walls, _ = extruded(trunk, 0.0, _TRUNK_HEIGHT, name, ImportFaults())
         yield ImportedObject(structure, "Tree", None, walls)
+
+
+def _object_kind(tags: Tags) -> str | None:
+    """Returns the kind of small object that a node's tags describe.
+
+    The kind is a key of `cns_drake.city.placement.objects.OBJECTS`, or None for
+    a node without such an object.
+    """
+    kinds: list[str] = [
+        kind
+        for key, value, kind in TABLES["objects"]
+        if has_tag(tags, key) and value in ("", tags[key])
+    ]
+    if not kinds:
+        return None
+    if tags.get("fire_hydrant:type", "pillar") != "pillar":
+        return None
+    if tags.get("lamp_mount", tags.get("support", "pole")) not in _POSTS:
+        return None
+    if kinds[0] == "bus_shelter" and tags.get("shelter") != "yes":
+        return "sign_rectangular"
+    return kinds[0]
+
+
+def _make_small_objects(
+    features: OsmFeatures, local: LocalMetres
+) -> Iterator[SmallObject]:
+    """Yields small objects: objects at nodes, and the trees of tree rows.
+
+    `local` converts places of the file to metres in W.
+    """
+    elements = features.kinds
+    for name, tags, place in features.nodes:
+        kind = _object_kind(tags)
+        if kind is not None and not is_inside(tags):
+            x, y = local(np.array([place]))[0].tolist()
+            degrees = heading_deg(tags.get("direction"))
+            heading = None if degrees is None else math.radians(degrees)
+            yield SmallObject(name, elements[name], kind, (x, y), heading)
+    for name, tags, line, _ in features.ways:
+        if tags.get("natural") == "tree_row":
+            needles = tags.get("leaf_type") == "needleleaved"
+            course = LineString(local(line))
+            count = max(1, round(course.length / _TREE_SPACING))
+            steps = (np.arange(count) + 0.5) / count
+            points = shapely.line_interpolate_point(
+                course, steps, normalized=True
+            )
+            kind = "spruce" if needles else "lime_tree"
+            height = _tree_height(name, tags, features.faults)
+            for xy in map(tuple, shapely.get_coordinates(points).tolist()):
+                yield SmallObject(name, elements[name], kind, xy, None, height)
+
+
+def _tree_height(name: str, tags: Tags, faults: ImportFaults) -> float | None:
+    """Returns the height of a tree, or of a row's trees [m]; None if unknown.
+
+    A height that cannot be is counted in `faults`.
+    """
+    where = (name, faults)
+    return tag_value(tags, "height", length, _TALLEST_TREE, where) or None
 
 
 def _crossing_stripes(

@@ -47,11 +47,11 @@ _LEAST_LENGTH = 1e-9
 # On each side, a passage is this much wider than its way [m].
 _BESIDE_WAY = 0.25
 # A way leads through a building if more than this is inside [m].
-_THROUGH = 0.5
+THROUGH = 0.5
 # Values of `maxheight` that are no heights, but usual.
 _NO_HEIGHTS = ("default", "none", "below_default", "no_sign", "no_indications")
 # Walls do not block a way if they begin above this height [m].
-_HEADROOM = 2.0
+HEADROOM = 2.0
 
 
 class Passage(NamedTuple):
@@ -98,7 +98,7 @@ def passages_of(
         if tags.get("maxheight") not in _NO_HEIGHTS:
             where = (name, faults)
             clear = tag_value(
-                tags, "maxheight", length, _HIGHEST_CLEARANCE, where, _HEADROOM
+                tags, "maxheight", length, _HIGHEST_CLEARANCE, where, HEADROOM
             )
         course = LineString(local(line))
         area: BaseGeometry
@@ -148,38 +148,12 @@ class Passages:
             passage
             for k in self._tree.query(polygon, "intersects")
             if (passage := self._passages[k]).height > low
-            and passage.course.intersection(polygon).length > _THROUGH
+            and passage.course.intersection(polygon).length > THROUGH
         ]
         if not passages:
             return None
         area = shapely.union_all([passage.area for passage in passages])
         return area, max(passage.height for passage in passages)
-
-
-def count_walled_up(
-    streets: Iterable[tuple[str, LineString]],
-    solids: Sequence[tuple[Polygon, float]],
-    passages: Sequence[Passage],
-    faults: ImportFaults,
-) -> None:
-    """Counts streets that lead through buildings without a passage.
-
-    Args:
-        streets: ids and lines of the streets in W [m].
-        solids: footprints of buildings in W, and the heights at which they
-            begin [m].
-        passages: the passages, whose streets are not counted.
-        faults: counts the streets.
-    """
-    low = [polygon for polygon, begin in solids if begin < _HEADROOM]
-    tree = STRtree(low)
-    open_ways = {passage.name for passage in passages}
-    for name, line in streets:
-        if name not in open_ways and any(
-            low[k].intersection(line).length > _THROUGH
-            for k in tree.query(line, "intersects")
-        ):
-            faults.add("street into a building without a passage", name)
 
 
 class WayOpenings:
