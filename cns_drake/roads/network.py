@@ -292,7 +292,8 @@ def _make_curve(
         *((x, y) for x, y, _ in entry.via),
         file.junctions[entry.end].position,
     ]
-    with value_errors(f"{path}: roads.{name}.via"):
+    place = "via" if entry.via else "start, end"
+    with value_errors(f"{path}: roads.{name}.{place}"):
         return Centreline(points, [radius for _, _, radius in entry.via])
 
 

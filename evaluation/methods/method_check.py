@@ -317,7 +317,8 @@ def _cloud(method: Method, seed: int, number: int | None = None) -> np.ndarray:
     inside[..., 1] = np.where(wall >= 2, wall - 2, inside[..., 1])
     boxes = inside * size[:, None]
     boxes[..., :2] += foot
-    ground = rng.uniform(-_REACH, _REACH, (_NUM_GROUND, 3))
+    # Clouds differ in their number of points, as scans do.
+    ground = rng.uniform(-_REACH, _REACH, (_NUM_GROUND + 10 * seed, 3))
     ground[:, 2] = 0.0
     points = np.concatenate([boxes.reshape(-1, 3), ground])
     points[:, 2] -= method.config.sensor_height

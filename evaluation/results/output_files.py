@@ -6,12 +6,20 @@ are never removed or overwritten.
 """
 
 from collections.abc import Iterable
+import contextlib
 import os
 from pathlib import Path
 import re
 from typing import NamedTuple
 
-from cns_drake.base import InputError, check_writable, make_folder, user_errors
+from cns_drake.base import (
+    InputError,
+    check_writable,
+    completing,
+    errors_at,
+    make_folder,
+    user_errors,
+)
 from evaluation.results.table import QUERIES, RESULTS, QueryRows, Results
 
 
@@ -125,9 +133,16 @@ def write_tables(folder: Path, results: Results, queries: QueryRows) -> None:
     Raises:
         InputError: a file cannot be written or removed.
     """
-    remove_earlier(folder)
-    results.write_csv(folder / RESULTS)
-    queries.write_csv(folder / QUERIES)
+    # Both are whole before either gets its name.
+    with contextlib.ExitStack() as stack:
+        for path, table in (
+            (folder / RESULTS, results),
+            (folder / QUERIES, queries),
+        ):
+            part = stack.enter_context(completing(path))
+            with errors_at(path, f"{part}: "):
+                table.write_csv(part)
+        remove_earlier(folder)
 
 
 def _found(folder: Path, group: _Group) -> list[Path]:

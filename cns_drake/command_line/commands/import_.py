@@ -100,7 +100,7 @@ def import_(
     if len(paths) != 1 or (more and not years):
         raise InputError(f"give one file, not {' '.join(source)}")
     path = Path(paths[0])
-    stages = tuple(sorted([*(years or ()), *more]))
+    stages = (*(years or ()), *more)
     if plain and grow is not None:
         raise InputError(
             "--grow: not with --plain, which adds nothing at random"

@@ -1,5 +1,6 @@
 """Reads the parts of an OpenStreetMap file that make up a city."""
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
 import contextlib
@@ -37,6 +38,8 @@ _NOT_CLOSED = "whose outline does not close"
 _MANY_NODES = 64
 # Distance of pieces of a way that lie in each other, 0.3 to 0.6 m [deg].
 _NEAR = 5e-6
+# A coordinate that osmium does not know.
+_NOT_IN_FILE = 2**31 - 1
 _LETTERS = {"Node": "n", "Way": "w", "Relation": "r"}
 # A negative id of a file becomes this number minus the id.
 _FIRST_NEW = 10**12
@@ -204,10 +207,15 @@ def _way_of(
     building.
     """
     nodes = [node for node in way.nodes if node.location.valid()]
-    missing = len(way.nodes) - len(nodes)
-    if missing and not is_building(tags):
-        gap = "place of a way that is not in the file, left out"
-        faults.add(gap, name, missing)
+    if not is_building(tags):
+        others = Counter(
+            node.location.x == _NOT_IN_FILE
+            for node in way.nodes
+            if not node.location.valid()
+        )
+        for is_absent, number in others.items():
+            gap = "that is not in the file" if is_absent else "off the globe"
+            faults.add(f"place of a way {gap}, left out", name, number)
     if len(nodes) < 2:
         return None
     line = np.array([(node.lon, node.lat) for node in nodes])

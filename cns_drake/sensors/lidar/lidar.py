@@ -652,7 +652,8 @@ class Lidar(LeafSystem):
         """Casts N rays on the geometry that the LiDAR sees in a Context.
 
         The rays do not depend on the LiDAR's pattern or noise. For rays that
-        start within 1 km of the LiDAR, ranges are exact to 1e-4 m.
+        start within 1 km of the LiDAR, ranges of up to 1 km are exact to 1e-4
+        m.
 
         Args:
             context: context of the LiDAR.

@@ -8,7 +8,12 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import InputError, shared_options, terminal
+from cns_drake.base import (
+    InputError,
+    check_writable,
+    shared_options,
+    terminal,
+)
 from evaluation.command_line.printed_text import spaced_interval
 
 # Endings of figures.
@@ -83,6 +88,8 @@ def compare(
         )
     if output is not None and rankings:
         raise InputError("--output: --rankings has no figure")
+    if output is not None:
+        check_writable(output)
     found = compare_tables(
         tables or (), metric, protocol, verified=verified, rankings=rankings
     )

@@ -267,7 +267,8 @@ def check_factors(
     for name in names:
         if name not in factors:
             raise InputError(
-                f"charts: {chart['kind']}: {no_such('factor', name, factors)}"
+                f"charts: {chart['kind']}: no factor {name!r} (the experiment"
+                f" varies: {', '.join(factors) or 'nothing'})"
             )
 
 

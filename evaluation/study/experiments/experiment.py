@@ -229,7 +229,9 @@ class Experiment(Section):
     design: Literal["product", "one-at-a-time"] = "product"
     tasks: _Settings = Field(default={"place": {}}, min_length=1)
     methods: _Settings | None = Field(default=None, min_length=1)
-    metrics: Annotated[tuple[str, ...], BeforeValidator(_listed)] = ()
+    metrics: Annotated[tuple[str, ...], BeforeValidator(_listed)] = Field(
+        default=(), min_length=1
+    )
     seeds: Annotated[
         tuple[Annotated[int, Field(ge=0, lt=2**31, strict=True)], ...],
         BeforeValidator(_listed),

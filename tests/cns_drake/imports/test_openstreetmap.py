@@ -244,6 +244,23 @@ def test_objects_cut_off_at_the_edge_are_noted(tmp_path):
     ]
 
 
+def test_a_place_off_the_globe_is_named(tmp_path):
+    osm = OsmWriter()
+    street = osm.way([(0, 20), (40, 20), (80, 20)], highway="residential")
+    osm.box(0, 0, 10, 10, building="yes")
+    path = osm.write(tmp_path / "city.osm")
+    text = path.read_text()
+    refs = re.search(rf'<way id="{street}".*?</way>', text)[0]
+    node = re.findall(r'ref="(\d+)"', refs)[-1]
+    path.write_text(
+        re.sub(rf'(<node id="{node}" .*?lat=)"[^"]*"', r'\1"152.5"', text)
+    )
+    city, _ = import_osm(path)
+    assert city.faults.rows() == [
+        ("place of a way off the globe, left out", 1, f"w{street}")
+    ]
+
+
 def height_above(one, x, y):
     """Returns the intervals of a solid above a place, from its faces [m]."""
     a, b, c = np.moveaxis(one.triangles, 1, 0)

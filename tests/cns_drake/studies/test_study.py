@@ -482,8 +482,8 @@ def test_an_own_method(town, tmp_path, jobs_done, own_methods):
                     }
                 ],
             },
-            r"charts: lines: no factor 'methods.solid.range' \(there are:"
-            r" methods.solid.ranges\)",
+            r"charts: lines: no factor 'methods.solid.range' \(the experiment"
+            r" varies: methods.solid.ranges\)",
         ),
         (
             {"metrics": ["auc", "r2"]},

@@ -3,7 +3,14 @@
 import pytest
 
 from cns_drake.base import InputError
-from evaluation.results import RESULTS, make_output
+from evaluation.results import (
+    QUERIES,
+    RESULTS,
+    QueryRows,
+    Results,
+    make_output,
+    write_tables,
+)
 from evaluation.results.output_files import remove_earlier
 
 TABLE = "experiment,map,task,method,verified,metric,value,low,high,n\n"
@@ -38,6 +45,22 @@ def test_files_of_an_earlier_run_go_and_others_stay(tmp_path):
     make_output(tmp_path, GROUPS)
     remove_earlier(tmp_path)
     assert names(tmp_path) == {*OTHERS, "parts"}
+
+
+def test_earlier_tables_stay_if_new_ones_cannot_be_written(tmp_path):
+    """The tables of a pair belong together."""
+    earlier = {name: OWN[name] for name in (RESULTS, QUERIES)}
+    write(tmp_path, earlier)
+
+    class Broken(QueryRows):
+        def write_csv(self, path):
+            path.write_text("half")
+            raise InputError(f"{path}: File too large")
+
+    fault = rf"^{tmp_path / QUERIES}: File too large"
+    with pytest.raises(InputError, match=fault):
+        write_tables(tmp_path, Results((), ()), Broken((), ()))
+    assert {one.name: one.read_text() for one in tmp_path.iterdir()} == earlier
 
 
 @pytest.mark.parametrize("name", OWN)

@@ -37,7 +37,7 @@ def test_a_chart_is_over_a_factor_or_a_column(read, name):
 def test_other_names_are_refused_with_all_factors(read, chart):
     with pytest.raises(InputError, match=r"mine\.yaml: charts: ") as raised:
         read(f"{TEXT}  - {chart}")
-    assert f"(there are: {NAMES})" in str(raised.value)
+    assert f"(the experiment varies: {NAMES})" in str(raised.value)
 
 
 @pytest.mark.parametrize(
