@@ -436,7 +436,8 @@ class RecordingFolder:
             if self.mcap.exists():
                 raise InputError(
                     f"{self.path}: the folder already exists and holds a "
-                    "recording (--overwrite replaces it)"
+                    "recording (replace it by --overwrite, in Python"
+                    " overwrite=True)"
                 )
             # Completed last, so a killed run has left it.
             part = part_path(self.mcap).name

@@ -325,10 +325,11 @@ def read_waypoints(path: Path | str) -> Waypoints:
     rows, lines = [], []
     columns: dict[str, int] = {}
     unused: list[str] = []
+    width = 0
     for line, cells in read_rows(path):
         where = f"{path}: line {line}"
         if not columns:
-            columns = _columns(cells, where)
+            columns, width = _columns(cells, where), len(cells)
             if not _is_number(cells[columns["x"]]):
                 unused = [
                     cell
@@ -336,6 +337,11 @@ def read_waypoints(path: Path | str) -> Waypoints:
                     if k not in columns.values()
                 ]
                 continue
+        if any(cells[width:]):
+            raise InputError(
+                f"{where}: {len(cells)} columns are more than the {width} of"
+                " the first line"
+            )
         if max(columns.values()) >= len(cells):
             raise InputError(
                 f"{where}: {len(cells)} column(s) are too few; give x and y, "

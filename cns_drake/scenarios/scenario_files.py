@@ -100,7 +100,9 @@ def read_scenario_file(path: Path) -> Scenario:
     scenario = None
     for file, values in reversed(files.items()):
         if scenario is None:
-            scenario = make_scenario(values, file)
+            # As in a file with a base, null stands for the default.
+            given = {k: one for k, one in values.items() if one is not None}
+            scenario = make_scenario(given, file)
         else:
             scenario = scenario.with_fields(values, file)
         scenario._files = (file, *scenario.files)

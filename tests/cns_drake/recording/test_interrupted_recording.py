@@ -125,7 +125,9 @@ def test_one_writer_at_a_time(folder):
 def test_an_mcap_file_without_metadata_is_kept(folder):
     folder.mkdir()
     (folder / MCAP).write_bytes(b"of another program")
-    with pytest.raises(InputError, match=r"drive_01: .*--overwrite replaces"):
+    with pytest.raises(
+        InputError, match=r"drive_01: .*replace it by --overwrite"
+    ):
         record(folder)
     assert (folder / MCAP).read_bytes() == b"of another program"
     record(folder, overwrite=True)

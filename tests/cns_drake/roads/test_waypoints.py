@@ -121,6 +121,7 @@ def test_ways_to_write_the_same(load, text):
         ("0,0,0\n\n30,0,nan\n", r"line 3: 'nan' is not a finite number"),
         ("0,0,0\n30,0\n", r"line 2: 2 column\(s\) are too few"),
         ("0,0,0,0\n", r"line 1: 4 column\(s\); it must be x, y or x, y, z"),
+        ("x,y\n0,0,50\n9,0,50\n", "line 2: 3 columns are more than the 2"),
         ("Z,x,y,z\n0,0,5,0\n", "line 1: column 'z' is there twice"),
         ("x,y\n0,0\n1_0,0\n", "line 3: '1_0' is not a finite number"),
         ("lat,lon\n1,2\n", r"line 1: neither numbers nor the names"),

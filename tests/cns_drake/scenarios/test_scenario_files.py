@@ -19,6 +19,18 @@ def test_written_scenarios_are_the_same(tmp_path):
     assert [load_scenario(path) for path in paths] == scenarios
 
 
+def test_null_is_the_default_without_a_base_too(tmp_path):
+    plain = scenario_values(write_small_map(tmp_path / "town"))
+    for name, values in (
+        ("plain", {}),
+        ("nulls", dict.fromkeys(("imu", "lidars", "seed", "frames"))),
+    ):
+        text = yaml.safe_dump(plain | values | {"name": "drive"})
+        (tmp_path / f"{name}.yaml").write_text(text)
+    found = load_scenario(tmp_path / "nulls.yaml")
+    assert found == load_scenario(tmp_path / "plain.yaml")
+
+
 def test_a_folder_of_cities_and_scenarios_can_be_moved(tmp_path):
     output = tmp_path / "out"
     (output / "cities").mkdir(parents=True)
