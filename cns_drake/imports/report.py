@@ -43,5 +43,7 @@ class ImportReport:
         share = self.shares.get(fault.kind)
         if share is None:
             return str(fault.number)
-        part = f"{100 * share:.2g} % of the volume of all buildings"
+        part = (
+            f"{float(f'{100 * share:.2g}'):g} % of the volume of all buildings"
+        )
         return f"{fault.number}, {part}"

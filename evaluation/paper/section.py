@@ -30,11 +30,13 @@ def paper_section(
         stages: name of a drive -> its stage.
     """
     changes = {}
-    for row in results.where({STAGE: OWN}, metric="tcr_sym").rows:
-        if (pair := _pair(row, stages)) is not None:
+    known, _ = results.defined()
+    for row in known.where({STAGE: OWN}, metric="tcr_sym").rows:
+        pair = _pair(row, stages)
+        if pair is not None and pair[0] in paper().city_names:
             city, *both = pair
             changes[(city, *sorted(both))] = row.value
-    if not any(city in paper().city_names for city, *_ in changes):
+    if not changes:
         return None
     of_pair: dict[
         StagePair, dict[str, tuple[Numbers, Numbers | None, float | None]]

@@ -460,16 +460,30 @@ _MAP: dict[str, Any] = {"tasks": ("map",), "number": "num_changed"}
 _CHANGE: dict[str, Any] = {"tasks": ("change",), "better": ""}
 
 
+def _of_curve(name: str) -> Callable[[QueryOutcomes], float]:
+    """Returns what computes a value of the precision-recall curve.
+
+    Without a match it is NaN: every curve then has recall 0.
+    """
+
+    def compute(outcomes: QueryOutcomes) -> float:
+        return (
+            getattr(outcomes.curve, name) if outcomes.num_matched else math.nan
+        )
+
+    return compute
+
+
 # fmt: off
 def _of_answers() -> Iterator[Metric]:
     """Yields the metrics of place recognition."""
     yield _share(
-        "auc", "AUC", "area under the precision-recall curve",
-        value="curve.auc", **_PLACE, **_RESAMPLED)
+        "auc", "AUC", "area under the precision-recall curve", _NO_MATCH,
+        _of_curve("auc"), **_PLACE, **_RESAMPLED)
     yield _share(
         "auc_strict", "AUC strict",
         "area under the curve in which every query with a match counts",
-        **_PLACE, **_RESAMPLED)
+        _NO_MATCH, **_PLACE, **_RESAMPLED)
     yield _share(
         "r1", "R@1", "share of the queries with a match", _NO_MATCH,
         methodcaller("recall_at", 1), **_PLACE, **_RESAMPLED)
@@ -488,11 +502,11 @@ def _of_answers() -> Iterator[Metric]:
         _NO_MATCH, "mean_reciprocal_rank", **_RESAMPLED)
     yield _share(
         "f1_max", "F1max", "greatest F1 on the precision-recall curve",
-        value="curve.f1_max", **_BY_MODE)
+        _NO_MATCH, _of_curve("f1_max"), **_BY_MODE)
     yield _share(
         "recall_at_full_precision", "recall at full precision",
-        "greatest recall at which no accepted place is wrong",
-        value="curve.recall_at_full_precision", **_BY_MODE)
+        "greatest recall at which no accepted place is wrong", _NO_MATCH,
+        _of_curve("recall_at_full_precision"), **_BY_MODE)
     yield _share(
         "match_auroc", "match AUROC", "probability that a query with a match"
         " has a better best score than a query without a match",

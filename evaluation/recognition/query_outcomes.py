@@ -162,7 +162,12 @@ class QueryOutcomes:
 
     @property
     def auc_strict(self) -> float:
-        """Area under the curve with recall = TP / N at each of its points."""
+        """Area under the curve with recall = TP / N at each of its points.
+
+        NaN if no query has a match.
+        """
+        if not self.num_matched:
+            return math.nan
         return self.curve.strict_auc(self.num_matched)
 
     @property

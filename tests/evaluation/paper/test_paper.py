@@ -1,5 +1,7 @@
 """The values that the paper prints."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -68,5 +70,25 @@ def test_what_the_paper_measured_is_shown_beside_it(method, changes, is_shown):
         assert (number in section.body) == is_shown
 
 
-def test_no_section_of_other_cities():
-    assert paper_section(Results.of([]), QueryRows.of([]), {}) is None
+@pytest.mark.parametrize(
+    ("city", "value"), [("town", 0.125), ("riverside", math.nan)]
+)
+def test_no_section_of_other_cities_or_unknown_changes(city, value):
+    change = Row(
+        experiment="stages",
+        map=city,
+        database="a",
+        query="b",
+        seed=1,
+        factors={STAGE: OWN},
+        verified=False,
+        protocol="paper",
+        task="change",
+        method="",
+        metric="tcr_sym",
+        value=value,
+    )
+    stages = {"a": "01", "b": "02"}
+    for rows in ([], [change]):
+        results = Results.of(rows)
+        assert paper_section(results, QueryRows.of([]), stages) is None

@@ -177,9 +177,8 @@ def test_no_query_has_a_match():
     rows = [(0.9, False, False), (0.3, False, False)]
     for mode in ("all", "filtered"):
         outcomes = counted(outcomes_of(rows), mode)
-        assert math.isnan(value("r1", outcomes))
-        assert value("auc", outcomes) == 0.0
-        assert value("f1_max", outcomes) == 0.0
+        for name in ("r1", "auc", "auc_strict", "f1_max"):
+            assert math.isnan(value(name, outcomes))
         assert (outcomes.num_matched, outcomes.true_positives) == (0, 0)
 
 
@@ -198,10 +197,10 @@ def test_empty_sets(shape):
         assert len(outcomes) == shape[0]
         outcomes = counted(outcomes, mode)
         assert len(outcomes.curve.thresholds) == 0
-        assert value("auc", outcomes) == 0.0
-        assert value("f1_max", outcomes) == 0.0
+        assert outcomes.curve.auc == outcomes.curve.f1_max == 0.0
         assert outcomes.curve.f1_max_index is None
-        assert math.isnan(value("r1", outcomes))
+        for name in ("auc", "f1_max", "recall_at_full_precision", "r1"):
+            assert math.isnan(value(name, outcomes))
 
 
 def test_perfect():
@@ -342,4 +341,4 @@ def test_strict_recall_counts_every_query_with_a_match(mode):
     assert outcomes.curve.recall[-1] == 1.0
     assert outcomes.auc_strict == pytest.approx(3 / 5)
     nobody = counted(outcomes_of([(0.5, False, False)]), mode)
-    assert nobody.auc_strict == 0.0
+    assert math.isnan(nobody.auc_strict)

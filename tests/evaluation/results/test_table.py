@@ -157,7 +157,6 @@ def test_seeds_of_any_length(tmp_path, seed):
         ("value", "-0.0001", ["value", "0 to 1"]),
         ("value", "nan", ["value", "'nan' is no number"]),
         ("value", "1e999", ["value", "no number"]),
-        ("value", "", ["value", "needs a number"]),
         ("low", "0.51", ["low", "more than high"]),
         ("low", "", ["low", "high"]),
         ("high", "", ["low", "high"]),
@@ -186,6 +185,15 @@ def test_values_that_cannot_be(tmp_path, column, cell, words):
         Results.read(path)
     for word in (str(path), "line 3" if "\n" not in cell else "line 4", *words):
         assert word in str(raised.value)
+
+
+def test_a_number_of_queries_is_never_undefined(tmp_path):
+    line = replaced(LINE, HEADER, "metric", "with_match")
+    path = write(
+        tmp_path / "r.csv", HEADER, replaced(line, HEADER, "value", "")
+    )
+    with pytest.raises(InputError, match=r"line 2: value: .*needs a number"):
+        Results.read(path)
 
 
 @pytest.mark.parametrize(
