@@ -55,6 +55,19 @@ DATABASE_FIELDS = (
     "keep",
     "maintain",
 )
+# Fields that no scenario has.
+_OF_STUDIES = (
+    *QUERY_FIELDS,
+    *DATABASE_FIELDS,
+    "missing",
+    "rates",
+    "redraw",
+    "returns",
+    "scattered",
+    "towards",
+    "viewpoint",
+    "years",
+)
 # Field -> type or types of its value, and the greatest value.
 _LIMITS: Mapping[str, tuple[tuple[type, ...], int]] = {
     "distractors": ((int,), 100_000),
@@ -385,6 +398,12 @@ class DriveChanger:
             lidars = {"lidars": left["lidars"]}
             make_paths_absolute(lidars, Path(self._source))
             left = {**left, **lidars}
+        known = (*Scenario.model_fields, *_OF_STUDIES)
+        for name in left:
+            if name not in known and (near := did_you_mean(name, known)):
+                raise InputError(
+                    f"{self._source}: {place}: no field {name!r}{near}"
+                )
         if left:
             self._check_lidars(place, drive, left.get("lidars"))
             drive = drive.with_fields(left, f"{self._source}: {place}")
