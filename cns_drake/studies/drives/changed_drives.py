@@ -402,7 +402,7 @@ class DriveChanger:
         for name in left:
             if name not in known and (near := did_you_mean(name, known)):
                 raise InputError(
-                    f"{self._source}: {place}: no field {name!r}{near}"
+                    f"{self._source}: {place}: {name}: no such field{near}"
                 )
         if left:
             self._check_lidars(place, drive, left.get("lidars"))

@@ -491,10 +491,10 @@ def test_an_own_method(town, tmp_path, jobs_done, own_methods):
         ),
         ({"metrics": ["none.py"]}, "metrics: none.py: no such file"),
         (
-            {"database": {"mising": [0, 0.2]}},
-            "database: no field 'mising'; did you mean missing",
+            {"database": {"yeers": [0, 5]}},
+            "database: yeers: no such field; did you mean years",
         ),
-        ({"query": {"frame": 9}}, "query: no field 'frame'; .* frames"),
+        ({"query": {"frame": 9}}, "query: frame: no such field; .* frames"),
         (
             {"query": {"lidars": {"lidr": {"xyz": [[0, 0, 1], [0, 0, 2]]}}}},
             r"query.lidars: the drive has no LiDAR 'lidr' \(it has: lidar\);"
