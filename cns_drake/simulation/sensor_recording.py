@@ -8,7 +8,7 @@ from types import NoneType
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
-from pydrake.systems.sensors import RgbdSensor
+from pydrake.systems.sensors import Gyroscope, RgbdSensor
 
 from cns_drake.base import check_type, is_real
 from cns_drake.drives import check_sensor_names
@@ -107,28 +107,14 @@ def add_mcap_recorder(
             simulator.AdvanceTo(10.0)
     """
     cameras = cameras or {}
-    check_type("imu", imu, Imu, NoneType)
-    check_type("odometry", odometry, OdometrySensor, NoneType)
-    check_type("rates", rates, Mapping, NoneType)
-    check_type("cameras", cameras, Mapping)
-    check_type("lidars", lidars, Collection)
-    for lidar in lidars:
-        check_type("lidars", lidar, Lidar)
-        check_in_diagram(builder, lidar, "lidars")
-    for key, camera in cameras.items():
-        check_type(f"cameras: {key}", camera, RgbdSensor)
-        check_in_diagram(builder, camera, f"cameras: {key}")
-    if odometry is not None:
-        check_in_diagram(builder, odometry, "odometry")
-    if imu is not None:
-        check_in_diagram(builder, imu.gyroscope, "imu")
     if not (isinstance(start_ns, numbers.Integral) and 0 <= start_ns < END_NS):
         raise ValueError(
             f"start_ns: {start_ns!r} is not an integer from 0 on, below"
             f" {END_NS}"
         )
     check_unused_names(builder, name)
-    _check_sensors(lidars, cameras)
+    _check_sensors(builder, lidars, cameras, imu, odometry)
+    check_type("rates", rates, Mapping, NoneType)
     periods = _message_periods(period, rates or {}, lidars, cameras, imu)
     _check_captures(lidars, periods)
     X_BSs = {
@@ -180,21 +166,41 @@ def add_mcap_recorder(
 
 
 def _check_sensors(
-    lidars: Collection[Lidar], camera_names: Iterable[str]
+    builder: DiagramBuilder,
+    lidars: Collection[Lidar],
+    cameras: Mapping[str, RgbdSensor],
+    imu: Imu | None,
+    odometry: OdometrySensor | None,
 ) -> None:
     """Checks sensors before they are recorded.
 
     Raises:
+        RuntimeError: a sensor is in another diagram.
+        TypeError: a sensor is of another type.
         ValueError: a LiDAR is causal, or names are not unique or cannot be
             parts of ROS 2 topics.
     """
+    check_type("lidars", lidars, Collection)
+    check_type("cameras", cameras, Mapping)
+    check_type("imu", imu, Imu, NoneType)
+    systems = [
+        *(("lidars", lidar, Lidar) for lidar in lidars),
+        *((f"cameras: {n}", one, RgbdSensor) for n, one in cameras.items()),
+    ]
+    if odometry is not None:
+        systems.append(("odometry", odometry, OdometrySensor))
+    if imu is not None:
+        systems.append(("imu", imu.gyroscope, Gyroscope))
+    for argument, system, kind in systems:
+        check_type(argument, system, kind)
+        check_in_diagram(builder, system, argument)
     for lidar in lidars:
         if lidar.causal:
             raise ValueError(
                 f"lidars: '{lidar.get_name()}' is causal: its scan begins a "
                 "revolution before the time with which a recording stamps it"
             )
-    check_sensor_names((*(lidar.get_name() for lidar in lidars), *camera_names))
+    check_sensor_names((*(lidar.get_name() for lidar in lidars), *cameras))
 
 
 def _check_captures(

@@ -15,6 +15,7 @@ from typing import (
     Protocol,
     TypeAlias,
     cast,
+    get_args,
     runtime_checkable,
 )
 import weakref
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
 
 
 # What a LiDAR can leave out.
-Place: TypeAlias = RigidBody | Frame | FrameId | GeometryId
+Place: TypeAlias = FrameId | GeometryId | RigidBody | Frame
 
 
 @runtime_checkable
@@ -96,7 +97,7 @@ class GeometryView:
                 "pydrake.geometry"
             )
         for name, kinds in (
-            ("unseen", (FrameId, GeometryId, RigidBody, Frame)),
+            ("unseen", get_args(Place)),
             ("anchored_frames", (FrameId,)),
         ):
             found = getattr(self, name)
