@@ -1,5 +1,3 @@
-from .base import InputError as InputError
-from .base import __version__ as __version__
 from .command_line import run_drive as run_drive
 from .command_line import run_script as run_script
 from .motion import VehicleMotion as VehicleMotion
@@ -40,6 +38,9 @@ from .sensors import add_lidar_view as add_lidar_view
 from .sensors import add_odometry as add_odometry
 from .sensors import make_beam_pattern as make_beam_pattern
 from .sensors import make_flash_pattern as make_flash_pattern
+from .shared import LIDAR_PRESETS as LIDAR_PRESETS
+from .shared import InputError as InputError
+from .shared import __version__ as __version__
 from .simulation import FinishedSimulation as FinishedSimulation
 from .simulation import add_mcap_recorder as add_mcap_recorder
 from .simulation import make_station as make_station
@@ -49,4 +50,3 @@ from .simulation import simulate as simulate
 from .studies import causes as causes
 from .studies import register_cause as register_cause
 from .traffic import add_traffic as add_traffic
-from .units import LIDAR_PRESETS as LIDAR_PRESETS

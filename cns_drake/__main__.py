@@ -3,7 +3,7 @@
 from collections.abc import Callable
 import sys
 
-from cns_drake.base import leave_out_folder
+from evaluation.base import leave_out_folder
 
 try:
     leave_out_folder(sys.path)  # Before anything else is imported.
@@ -11,7 +11,7 @@ except FileNotFoundError:
     print("error: the working folder is not there any more", file=sys.stderr)
     sys.exit(2)
 
-from cns_drake.base import start
+from evaluation.base import start
 
 
 def main() -> None:

@@ -22,9 +22,9 @@ ROOT = Path(__file__).resolve().parents[1]
 # As a program, this file is not in the package `docs`.
 sys.path.insert(0, str(ROOT))
 
-from cns_drake.base import figure_style  # noqa: E402
 from docs import chart_pictures, scene_pictures  # noqa: E402
 from docs.picture_parts import STYLE  # noqa: E402
+from evaluation.base import figure_style  # noqa: E402
 
 PICTURES = ROOT / "docs/pictures"
 REGISTRY = ROOT / "docs/pictures.yaml"

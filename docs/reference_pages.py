@@ -24,32 +24,7 @@ from pydantic.fields import FieldInfo
 import typer
 
 from cns_drake import command_line as cli
-from cns_drake.city import (
-    BuildingPlan,
-    CityPlan,
-    DistrictPlan,
-    Growth,
-    LinePlan,
-    ObjectPlan,
-    ParkingPlan,
-    PatchPlan,
-    RowPlan,
-    ScatterPlan,
-    Stage,
-    Stages,
-    StreetPlan,
-)
 from cns_drake.export import export_formats
-from cns_drake.imports import map_sources
-from cns_drake.roads import (
-    JunctionEntry,
-    RoadEntry,
-    RoadsFile,
-    RoadStyle,
-    Route,
-    RouteLeg,
-    Speeds,
-)
 from cns_drake.scenarios import (
     DriverConfig,
     RideConfig,
@@ -65,7 +40,9 @@ from cns_drake.sensors import (
     WeatherConfig,
 )
 from cns_drake.studies import DrawnRoute, Fleet, Losses
-from cns_drake.units import (
+from evaluation import command_line as evaluation_cli
+from evaluation.drives import data_sets
+from evaluation.lidar_sheets import (
     LIDAR_PRESETS,
     Head,
     LidarSheet,
@@ -75,8 +52,6 @@ from cns_drake.units import (
     RosetteSheet,
     SpinningSheet,
 )
-from evaluation import command_line as evaluation_cli
-from evaluation.drives import data_sets
 from evaluation.methods import (
     MethodConfig,
     find_method,
@@ -86,6 +61,31 @@ from evaluation.methods import (
 from evaluation.recognition import METRICS, Metric
 from evaluation.results import in_table_order
 from evaluation.study import Experiment, MadeMap, causes
+from worlds.city import (
+    BuildingPlan,
+    CityPlan,
+    DistrictPlan,
+    Growth,
+    LinePlan,
+    ObjectPlan,
+    ParkingPlan,
+    PatchPlan,
+    RowPlan,
+    ScatterPlan,
+    Stage,
+    Stages,
+    StreetPlan,
+)
+from worlds.imports import map_sources
+from worlds.roads import (
+    JunctionEntry,
+    RoadEntry,
+    RoadsFile,
+    RoadStyle,
+    Route,
+    RouteLeg,
+    Speeds,
+)
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 Sections = dict[str, type[BaseModel]]
@@ -155,7 +155,7 @@ METHODS: Sections = {
 }
 # Where the page of the fields of a drive finds those of a data sheet.
 _OF_LIDARS = "lidars.md"
-_SHEETS = "../../cns_drake/units/sheets"
+_SHEETS = "../../evaluation/lidar_sheets"
 # What stands for the default where the model's own does not say it.
 _FILLED_IN = {
     (Scenario, "name"): "the file's name",

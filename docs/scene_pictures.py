@@ -19,8 +19,6 @@ from pydrake.math import RigidTransform
 from scipy.spatial import cKDTree
 
 from cns_drake import Scenario, load_scenario, make_station
-from cns_drake.ageing import air_view
-from cns_drake.base import GONE_RGB, NEW_RGB, UNSEEN_RGB
 from cns_drake.pictures import (
     StageScene,
     View,
@@ -28,8 +26,7 @@ from cns_drake.pictures import (
     draw_stages,
     load_views,
 )
-from cns_drake.scenarios import plan_drive, shipped_maps
-from cns_drake.scene import CLASS_IDS, MapFolder
+from cns_drake.scenarios import plan_drive
 from cns_drake.sensors import CameraSection, WeatherConfig
 from docs.fill_numbers import csv_rows
 from docs.picture_parts import (
@@ -42,6 +39,7 @@ from docs.picture_parts import (
     write_tiles,
 )
 from evaluation import make_method, open_drive
+from evaluation.base import GONE_RGB, NEW_RGB, UNSEEN_RGB
 from evaluation.map_update import Label, read_session
 from evaluation.methods import LayeredOverlap, LayeredOverlapConfig
 from evaluation.results import (
@@ -54,6 +52,9 @@ from evaluation.results import (
     title,
     unit_rgb,
 )
+from worlds.ageing import air_view
+from worlds.maps import MapFolder, shipped_maps
+from worlds.shapes import CLASS_IDS
 
 
 def street(path: Path, rows: Sequence[dict[str, Any]]) -> None:

@@ -2,8 +2,7 @@
 
 `recognise`, `change_between`, `localise` and `update_map` measure two drives or
 maps; the commands of `cns-eval` print what they return. The package imports
-neither Drake nor anything of `cns_drake` but `cns_drake.base`,
-`cns_drake.drives` and `cns_drake.units`.
+neither Drake, nor `cns_drake` or `worlds`.
 
 `__all__` lists the public names. Each is imported when it is first used, from
 the module that `__init__.pyi` names. `evaluation.drives` and

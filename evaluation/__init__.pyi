@@ -1,9 +1,10 @@
+from .base import InputError as InputError
+from .base import __version__ as __version__
 from .change import TemporalChange as TemporalChange
 from .change import covered as covered
 from .change import temporal_change as temporal_change
 from .drives import DataSet as DataSet
 from .drives import Drive as Drive
-from .drives import InputError as InputError
 from .drives import check_data_set as check_data_set
 from .drives import data_set_checks as data_set_checks
 from .drives import open_drive as open_drive

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from cns_drake.base import start
+from evaluation.base import start
 
 
 def main() -> None:

@@ -13,7 +13,7 @@ from types import ModuleType
 
 import pytest
 
-from cns_drake.base import num_cores
+from evaluation.base import num_cores
 
 # What is imported is there to stay: nobody looks for garbage in it.
 gc.disable()

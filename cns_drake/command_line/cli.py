@@ -5,7 +5,7 @@ when the command runs, and not before, so that `--help` and `list` answer at
 once. Interrupts wait during imports.
 """
 
-from cns_drake.base import example, program, show_progress
+from evaluation.base import example, program, show_progress
 
 app = program.make_program(
     "cns-drake",

@@ -7,7 +7,10 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Any
 
-from cns_drake.base import (
+from cns_drake.command_line import options
+from cns_drake.command_line.fields import changed, field_options
+from cns_drake.command_line.suggestions import suggest_export
+from evaluation.base import (
     InputError,
     example,
     program,
@@ -15,9 +18,6 @@ from cns_drake.base import (
     terminal,
     uninterrupted,
 )
-from cns_drake.command_line import options
-from cns_drake.command_line.fields import changed, field_options
-from cns_drake.command_line.suggestions import suggest_export
 
 if TYPE_CHECKING:
     from cns_drake.simulation import FinishedSimulation
@@ -69,8 +69,8 @@ def run_drive(
 
         run_drive("downtown_01", "recordings", frames=20)
     """
-    from cns_drake.base import num_cores
     from cns_drake.scenarios import load_scenario
+    from evaluation.base import num_cores
 
     with uninterrupted():
         simulate = import_simulation()

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import typer
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     errors_at_option,
     nested,
     note,
     with_options,
 )
-from cns_drake.units import LIDAR_PRESETS
+from evaluation.lidar_sheets import LIDAR_PRESETS
 
 if TYPE_CHECKING:
     from cns_drake.scenarios import Scenario

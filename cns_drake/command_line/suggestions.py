@@ -11,7 +11,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cns_drake.base import InputError, terminal
+from evaluation.base import InputError, terminal
 
 if TYPE_CHECKING:
     from cns_drake.scenarios import Scenario

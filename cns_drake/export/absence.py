@@ -7,15 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import InputError
-from cns_drake.drives import Drive, read_scenario
-from cns_drake.scenarios import shipped_maps
 from cns_drake.scene import (
-    MapFolder,
-    load_structure_table,
     load_world,
-    moving_id,
     structures_in,
+)
+from evaluation.base import InputError
+from evaluation.drives import Drive, read_scenario
+from worlds.maps import MapFolder, shipped_maps
+from worlds.shapes import (
+    load_structure_table,
+    moving_id,
 )
 
 

@@ -6,8 +6,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 import yaml
 
-from cns_drake.base import InputError, encode_pcd
-from cns_drake.drives import Drive
 from cns_drake.export.layout import (
     Layout,
     PoseColumns,
@@ -19,6 +17,8 @@ from cns_drake.export.layout import (
     vehicle_notes,
     vehicle_poses,
 )
+from evaluation.base import InputError, encode_pcd
+from evaluation.drives import Drive
 
 
 def _drive_folder(drive: Drive) -> PurePosixPath:

@@ -16,7 +16,10 @@ from pathlib import Path
 import shutil
 from typing import TYPE_CHECKING
 
-from cns_drake.base import (
+from cns_drake.export.formats import ENDING, export_formats
+from cns_drake.export.layout import Layout, structure_files
+from cns_drake.recording import to_yaml
+from evaluation.base import (
     InputError,
     check_folder_writable,
     make_folder,
@@ -28,10 +31,7 @@ from cns_drake.base import (
     value_errors,
     write_text,
 )
-from cns_drake.drives import Drive, deskewed_notes, deskewed_scan
-from cns_drake.export.formats import ENDING, export_formats
-from cns_drake.export.layout import Layout, structure_files
-from cns_drake.recording import to_yaml
+from evaluation.drives import Drive, deskewed_notes, deskewed_scan
 
 if TYPE_CHECKING:
     from cns_drake.export.absence import Absence

@@ -6,14 +6,14 @@ import re
 
 import numpy as np
 
-from cns_drake.base import encode_bin, poses
-from cns_drake.drives import POSES_FRAME, Drive
 from cns_drake.export.layout import (
     Layout,
     imu_files,
     scenario_files,
     seconds_text,
 )
+from evaluation.base import encode_bin, poses
+from evaluation.drives import POSES_FRAME, Drive
 
 # Pose of the LiDAR S in KITTI's camera frame C: x right, y down, z ahead.
 _X_CS = np.array(

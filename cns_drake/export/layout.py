@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError, poses
-from cns_drake.drives import Drive
 from cns_drake.recording import to_yaml
+from evaluation.base import InputError, poses
+from evaluation.drives import Drive
 
 # Text that may become the name of a folder; it cannot lead out of its parent.
 _NAME = re.compile(r"\w[\w.-]*")

@@ -2,8 +2,6 @@
 
 from pathlib import PurePosixPath
 
-from cns_drake.base import encode_bin, poses
-from cns_drake.drives import ORIGIN, X_BS, Drive
 from cns_drake.export.layout import (
     Layout,
     checked_name,
@@ -12,6 +10,8 @@ from cns_drake.export.layout import (
     stamped_rows,
     world_notes,
 )
+from evaluation.base import encode_bin, poses
+from evaluation.drives import ORIGIN, X_BS, Drive
 
 
 def _inner_files(drive: Drive) -> dict[str, str]:

@@ -2,7 +2,6 @@
 
 from pathlib import PurePosixPath
 
-from cns_drake.drives import Drive
 from cns_drake.export.layout import (
     Layout,
     checked_name,
@@ -13,6 +12,7 @@ from cns_drake.export.layout import (
     vehicle_notes,
     vehicle_poses,
 )
+from evaluation.drives import Drive
 
 
 def _inner_files(drive: Drive) -> dict[str, str]:

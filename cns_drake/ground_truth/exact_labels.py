@@ -27,11 +27,11 @@ import itertools
 
 import numpy as np
 
-from cns_drake.base import num_cores, track
 from cns_drake.ground_truth.exact_overlap import Sight, sights_of
 from cns_drake.ground_truth.labelled import LabelledDrive
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.simulation import SimulatedDrive
+from evaluation.base import num_cores, track
 from evaluation.drives import sample_frames
 from evaluation.map_update import SIDES, Session
 

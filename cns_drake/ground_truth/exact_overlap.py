@@ -21,11 +21,10 @@ import math
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cns_drake.drives import Drive, check_same_world
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.sensors import BeamCoverage, BeamPattern
 from cns_drake.simulation import SimulatedDrive
-from evaluation.drives import within_cube
+from evaluation.drives import Drive, check_same_world, within_cube
 from evaluation.recognition import TOLERANCE, RetrievalProtocol, overlap_matrix
 
 

@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cns_drake.base import InputError, validated
-from cns_drake.drives import Drive, McapDrive, holds_mcap
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.scenarios import (
     DrivePlan,
@@ -22,7 +20,8 @@ from cns_drake.simulation import (
     load_stage,
     still_scene,
 )
-from evaluation.drives import find_data_sets
+from evaluation.base import InputError, validated
+from evaluation.drives import Drive, McapDrive, find_data_sets, holds_mcap
 from evaluation.study import DriveSource, RecordingSource
 
 # Recorded poses are those of the scenario up to this [m, or without a unit].

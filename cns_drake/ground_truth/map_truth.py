@@ -10,7 +10,9 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
-from cns_drake.base import (
+from cns_drake.ground_truth.exact_labels import label_points
+from cns_drake.ground_truth.labelled import LabelledDrive, open_labelled
+from evaluation.base import (
     GONE_RGB,
     NEW_RGB,
     UNSEEN_RGB,
@@ -18,9 +20,7 @@ from cns_drake.base import (
     draft_folder,
     write_text,
 )
-from cns_drake.drives import check_same_world
-from cns_drake.ground_truth.exact_labels import label_points
-from cns_drake.ground_truth.labelled import LabelledDrive, open_labelled
+from evaluation.drives import check_same_world
 from evaluation.map_update import (
     SIDES,
     SPACING,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.base import cos, product, rotated, sin
+from evaluation.base import cos, product, rotated, sin
 
 # Heave, roll and pitch.
 NUM_COORDINATES = 3

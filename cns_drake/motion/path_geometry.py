@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.base import arctan2
 from cns_drake.motion.splines import SplineDerivatives, make_uniform_spline
+from evaluation.base import arctan2
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly

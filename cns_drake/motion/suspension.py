@@ -11,10 +11,10 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import PrismaticJoint
 
-from cns_drake.base import product, read_yaml, rotated, validated
 from cns_drake.motion.body_ride import NUM_COORDINATES, BodyRide
 from cns_drake.motion.road_profile import RoadProfile
 from cns_drake.motion.trajectory import Trajectory
+from evaluation.base import product, read_yaml, rotated, validated
 
 # Longest time step [s]: a fifteenth of the period of the wheels on their tyres.
 _STEP = 0.005

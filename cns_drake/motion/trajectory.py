@@ -11,7 +11,6 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.trajectories import BsplineTrajectory
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import cos, product, rotated, sin
 from cns_drake.motion.body_ride import (
     BodyRide,
     FrameMotion,
@@ -25,7 +24,8 @@ from cns_drake.motion.splines import (
     SplineDerivatives,
     make_uniform_spline,
 )
-from cns_drake.roads import LanePath, Speeds
+from evaluation.base import cos, product, rotated, sin
+from worlds.roads import LanePath, Speeds
 
 _UP = np.array([[0.0, 0.0, 1.0]])
 

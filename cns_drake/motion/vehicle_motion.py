@@ -24,9 +24,9 @@ from pydrake.systems.framework import (
     ValueProducer,
 )
 
-from cns_drake.base import arctan2
 from cns_drake.motion.path_geometry import PathJet
 from cns_drake.motion.trajectory import Moments, Trajectory, poses_and_motion
+from evaluation.base import arctan2
 
 # Number of states that are computed at a time.
 _BLOCK = 64

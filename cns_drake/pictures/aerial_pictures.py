@@ -11,15 +11,15 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 import numpy as np
 
-from cns_drake.base import (
+from cns_drake.pictures.camera_views import View
+from cns_drake.pictures.stage_scene import StageScene
+from cns_drake.scenarios import Scenario, plan_drive
+from evaluation.base import (
     distances_along,
     figure_style,
     make_folder,
     save_figure,
 )
-from cns_drake.pictures.camera_views import View
-from cns_drake.pictures.stage_scene import StageScene
-from cns_drake.scenarios import Scenario, plan_drive
 
 # Side of a picture from above [pixels].
 _SIDE = 600

@@ -17,7 +17,7 @@ from pydantic import (
 )
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cns_drake.base import InputError, describe_validation_error, read_yaml
+from evaluation.base import InputError, describe_validation_error, read_yaml
 
 _Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 # Nearer points are not in a picture [m].

@@ -7,16 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import distances_along
 from cns_drake.scene import (
-    CLASS_RGB,
-    MAX_INSTANCE,
-    StructureTable,
     TriangleSurface,
     World,
-    kind_in_name,
     merge_surfaces,
     read_perception_geometry,
+)
+from evaluation.base import MAX_INSTANCE, distances_along
+from worlds.shapes import (
+    CLASS_RGB,
+    StructureTable,
+    kind_in_name,
 )
 
 # Colour of geometry without one in pictures.

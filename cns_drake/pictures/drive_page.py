@@ -18,7 +18,6 @@ from pydrake import geometry
 from pydrake.geometry import FrameId, Meshcat, MeshcatParams
 from pydrake.math import RigidTransform
 
-from cns_drake.base import InputError, read_text, write_text
 from cns_drake.pictures import meshcat_drawing as drawing
 from cns_drake.pictures.city_parts import (
     ColouredPart,
@@ -33,6 +32,7 @@ from cns_drake.pictures.page_panel import (
     read_template,
 )
 from cns_drake.scene import PerceptionGeometry, World, read_perception_geometry
+from evaluation.base import InputError, read_text, write_text
 
 Parts = Mapping[str, Sequence[ColouredPart]]
 

@@ -7,7 +7,6 @@ from numpy.typing import DTypeLike
 from pydrake.geometry import Meshcat, MeshcatCone, Rgba
 from pydrake.math import RigidTransform
 
-from cns_drake.base import distances_along
 from cns_drake.pictures.city_parts import DEFAULT_RGB, ColouredPart
 from cns_drake.scene import (
     PerceptionGeometry,
@@ -15,6 +14,7 @@ from cns_drake.scene import (
     merge_surfaces,
     merge_triangles,
 )
+from evaluation.base import distances_along
 
 # Vertices are rounded to an invisible grid of 16 mm, because the zeros at the
 # end of each float compress well.

@@ -13,7 +13,6 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
 
-from cns_drake.base import to_jpeg, write_text
 from cns_drake.pictures.city_parts import changed_above, read_parts
 from cns_drake.pictures.drive_page import (
     OtherPage,
@@ -24,7 +23,8 @@ from cns_drake.pictures.drive_page import (
 from cns_drake.pictures.drive_record import DriveRecord, ScanRecord, pack_scan
 from cns_drake.pictures.page_panel import ShownStages, point_kinds
 from cns_drake.scene import World
-from cns_drake.units import MOST_RINGS
+from evaluation.base import to_jpeg, write_text
+from evaluation.lidar_sheets import MOST_RINGS
 
 # Greatest number of images per camera.
 _MAX_IMAGES = 200

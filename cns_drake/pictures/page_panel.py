@@ -11,11 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import GONE_RGB, NEW_RGB, length_of
 from cns_drake.pictures import meshcat_drawing as drawing
 from cns_drake.pictures.city_parts import PassedChange
 from cns_drake.pictures.drive_record import DriveRecord, ScanRecord
-from cns_drake.scene import CLASS_IDS, MOVING_IDS, World
+from cns_drake.scene import World
+from evaluation.base import GONE_RGB, NEW_RGB, length_of
+from worlds.shapes import (
+    CLASS_IDS,
+    MOVING_IDS,
+)
 
 Rgb = tuple[float, float, float]
 

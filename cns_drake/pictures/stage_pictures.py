@@ -7,11 +7,11 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 import numpy as np
 
-from cns_drake.base import figure_style, make_folder, save_figure
 from cns_drake.pictures.camera_views import View
 from cns_drake.pictures.stage_scene import StageScene
 from cns_drake.recording import FRAME_PERIOD
 from cns_drake.sensors import make_beam_pattern
+from evaluation.base import figure_style, make_folder, save_figure
 
 # Size of a camera's view [pixels].
 _WIDTH = 704

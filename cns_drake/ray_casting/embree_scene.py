@@ -15,13 +15,13 @@ import weakref
 import numpy as np
 from pydrake.math import RotationMatrix
 
-from cns_drake.base import compiled, product, rotated
 from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.moving_groups import Placed
 from cns_drake.ray_casting.packets import PLACE_NUMBERS, Targets, cast_on
 from cns_drake.ray_casting.proxies import SHAPE_NUMBERS, Proxies, make_proxies
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
+from evaluation.base import compiled, product, rotated
 
 # Least number of rays that a thread takes at once: a multiple of every packet
 # size, and large enough that the call costs little.

@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import compiled, compiled_callback
 from cns_drake.ray_casting.embree import (
     COHERENT_RAYS,
     FILTERED_RAYS,
@@ -34,6 +33,7 @@ from cns_drake.ray_casting.embree import (
 )
 from cns_drake.ray_casting.proxies import RECORD, SHAPE_NUMBERS
 from cns_drake.ray_casting.rays import Hits, Rays
+from evaluation.base import compiled, compiled_callback
 
 # Embree treats smaller direction components as positive, whatever their sign. A
 # packet that mixes such rays with rays of truly positive components loses hits.

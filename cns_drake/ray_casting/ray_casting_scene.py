@@ -10,13 +10,13 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
-from cns_drake.base import compiled
 from cns_drake.ray_casting import moving_groups
 from cns_drake.ray_casting.embree_scene import EmbreeScene
 from cns_drake.ray_casting.known_poses import NOTHING_KNOWN, KnownPoses
 from cns_drake.ray_casting.ray_groups import Motion, group_geometries, serves
 from cns_drake.ray_casting.rays import Hits, Rays
 from cns_drake.scene import PerceptionGeometry
+from evaluation.base import compiled
 
 _IDENTITY = np.eye(3)
 _AT_ONCE = np.zeros(1, np.float32)

@@ -10,7 +10,6 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
-from cns_drake.base import cos, product, rotated, sin
 from cns_drake.scene import (
     MOST_COPIED_TRIANGLES,
     HalfSpaceSurface,
@@ -18,6 +17,7 @@ from cns_drake.scene import (
     Surface,
     TriangleSurface,
 )
+from evaluation.base import cos, product, rotated, sin
 
 # Largest rotation in a step: Embree interpolates along the shorter rotation.
 _LARGEST_STEP_RAD = 2.0

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import compiled
+from evaluation.base import compiled
 
 
 class Rays(NamedTuple):

@@ -24,7 +24,9 @@ from typing import Any, BinaryIO
 
 from mcap.writer import CompressionType, Writer
 
-from cns_drake.base import (
+from cns_drake.recording import rosbag2_metadata
+from cns_drake.recording.rosbag2_metadata import Topic, to_yaml
+from evaluation.base import (
     InputError,
     __version__,
     complete_part,
@@ -33,9 +35,7 @@ from cns_drake.base import (
     user_errors,
     write_part,
 )
-from cns_drake.drives import STAMPED_RECORD, message_definition, read_stamp
-from cns_drake.recording import rosbag2_metadata
-from cns_drake.recording.rosbag2_metadata import Topic, to_yaml
+from evaluation.drives import STAMPED_RECORD, message_definition, read_stamp
 
 # Length of a span [ns].
 _SPAN_NS = 800_000_000

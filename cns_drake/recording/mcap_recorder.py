@@ -26,15 +26,6 @@ from pydrake.systems.sensors import (
     ImageRgba8U,
 )
 
-from cns_drake.drives import (
-    BASE_FRAME,
-    IMU_FRAME,
-    MAP_FRAME,
-    check_sensor_names,
-    serialize,
-    to_labels,
-    to_layout,
-)
 from cns_drake.recording import messages, object_messages, recorded_topics
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.messages import encode_point_cloud
@@ -47,6 +38,15 @@ from cns_drake.recording.recorded_topics import (
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
 from cns_drake.scene import optional_value
+from evaluation.drives import (
+    BASE_FRAME,
+    IMU_FRAME,
+    MAP_FRAME,
+    check_sensor_names,
+    serialize,
+    to_labels,
+    to_layout,
+)
 
 _IMAGES = {"color": ImageRgba8U, "depth": ImageDepth32F, "label": ImageLabel16I}
 

@@ -14,8 +14,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.sensors import CameraInfo
 
-from cns_drake.base import NS_PER_S, to_jpeg
-from cns_drake.drives import (
+from evaluation.base import NS_PER_S, to_jpeg
+from evaluation.drives import (
     BASE_FRAME,
     COMPRESSED_IMAGE,
     IMU,

@@ -5,15 +5,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base import NS_PER_S
-from cns_drake.drives import (
+from cns_drake.recording import messages
+from evaluation.base import NS_PER_S
+from evaluation.drives import (
     DETECTIONS_3D,
     MAP_FRAME,
     SCENE_UPDATE,
     make_message,
     serialize,
 )
-from cns_drake.recording import messages
 
 # Placeholders of numbers in a message: this and the following integers, which
 # are exact in double precision and larger than any measurement.

@@ -5,7 +5,10 @@ from collections.abc import Iterable, Mapping
 
 from pydrake.math import RigidTransform
 
-from cns_drake.drives import (
+from cns_drake.recording import messages
+from cns_drake.recording.messages import CAMERA_INFO, ENCODINGS, IMAGE
+from cns_drake.recording.rosbag2_metadata import Topic
+from evaluation.drives import (
     BASE_FRAME,
     COMPRESSED_IMAGE,
     DETECTIONS_3D,
@@ -16,9 +19,6 @@ from cns_drake.drives import (
     SCENE_UPDATE,
     TF,
 )
-from cns_drake.recording import messages
-from cns_drake.recording.messages import CAMERA_INFO, ENCODINGS, IMAGE
-from cns_drake.recording.rosbag2_metadata import Topic
 
 TF_STATIC_TOPIC = Topic("/tf_static", TF, latched=True)
 TF_TOPIC = Topic("/tf", TF)

@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from cns_drake.drives import message_hash
+from evaluation.drives import message_hash
 
 # Version of the format of `metadata.yaml`.
 _VERSION = 8

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 import math
 
-from cns_drake.base import NS_PER_S
+from evaluation.base import NS_PER_S
 
 # Time between frames [s] if the first LiDAR has the paper's rate, 20 Hz.
 FRAME_PERIOD = 0.05

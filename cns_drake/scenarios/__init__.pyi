@@ -28,10 +28,3 @@ from .scenario_files import make_paths_absolute as make_paths_absolute
 from .scenario_files import make_scenario as make_scenario
 from .scenario_files import set_fields as set_fields
 from .scenario_files import write_scenarios as write_scenarios
-from .shipped import recordable_drives as recordable_drives
-from .shipped import recordable_map as recordable_map
-from .shipped import recordable_maps as recordable_maps
-from .shipped import shipped_cities as shipped_cities
-from .shipped import shipped_maps as shipped_maps
-from .shipped import vehicle_file as vehicle_file
-from .shipped import worlds_folder as worlds_folder

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from cns_drake.base import note
-from cns_drake.city import generate_city, start_city
 from cns_drake.scenarios.drive_table import check_table, write_table
+from evaluation.base import note
+from worlds.city import generate_city, start_city
 
 
 def build_city(

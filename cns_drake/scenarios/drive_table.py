@@ -11,7 +11,10 @@ from pathlib import Path
 from typing import get_type_hints
 import zlib
 
-from cns_drake.base import (
+from cns_drake.recording import frames_within
+from cns_drake.scenarios import scenario_files
+from cns_drake.scenarios.scenario import Scenario
+from evaluation.base import (
     InputError,
     check_writable,
     doing,
@@ -20,11 +23,12 @@ from cns_drake.base import (
     user_errors,
     write_csv,
 )
-from cns_drake.recording import frames_within
-from cns_drake.scenarios import scenario_files
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.shipped import shipped_cities
-from cns_drake.scene import MapFolder, drive_name, no_drives
+from worlds.maps import (
+    MapFolder,
+    drive_name,
+    no_drives,
+    shipped_cities,
+)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from pydrake.math import RigidTransform
 import shapely
 from shapely import STRtree
 
-from cns_drake.base import InputError, errors_at_option
 from cns_drake.motion import (
     Suspension,
     Trajectory,
@@ -22,7 +21,20 @@ from cns_drake.motion import (
 )
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.recording import frames_within
-from cns_drake.roads import (
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import check_files
+from cns_drake.scene import (
+    InSight,
+    World,
+    load_world,
+    read_perception_geometry,
+)
+from evaluation.base import InputError, errors_at_option
+from worlds.maps import (
+    suspension_file,
+    vehicle_file,
+)
+from worlds.roads import (
     FINE_SPACING,
     POINT_SPACING,
     TIGHTEST_RADIUS,
@@ -34,15 +46,6 @@ from cns_drake.roads import (
     load_waypoint_path,
     make_lane_path,
     read_waypoints,
-)
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import check_files
-from cns_drake.scenarios.shipped import suspension_file, vehicle_file
-from cns_drake.scene import (
-    InSight,
-    World,
-    load_world,
-    read_perception_geometry,
 )
 
 # Heights above the path at which rays look for obstacles, from below the top of

@@ -6,7 +6,10 @@ import json
 from pathlib import Path
 import platform
 
-from cns_drake.base import (
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scene import FileWatch, referenced_files
+from cns_drake.sensors import KALIBR_FILE
+from evaluation.base import (
     __version__,
     check_regular,
     fingerprint,
@@ -14,10 +17,10 @@ from cns_drake.base import (
     is_there,
     user_errors,
 )
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.shipped import suspension_file, vehicle_file
-from cns_drake.scene import FileWatch, referenced_files
-from cns_drake.sensors import KALIBR_FILE
+from worlds.maps import (
+    suspension_file,
+    vehicle_file,
+)
 
 # Packages that can influence a message's bytes.
 _PACKAGES = (

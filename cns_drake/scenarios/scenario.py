@@ -17,12 +17,7 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base import Name, Section, validated
-from cns_drake.drives import check_sensor_name
 from cns_drake.motion import RoadProfile, RoughnessClass
-from cns_drake.roads import Route, Speeds
-from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.scene import MapFolder
 from cns_drake.sensors import (
     CameraSection,
     Echoes,
@@ -34,7 +29,14 @@ from cns_drake.sensors import (
     check_rate,
     field_off_by_default,
 )
-from cns_drake.units import LidarSheet
+from evaluation.base import Name, Section, validated
+from evaluation.drives import check_sensor_name
+from evaluation.lidar_sheets import LidarSheet
+from worlds.maps import (
+    MapFolder,
+    shipped_maps,
+)
+from worlds.roads import Route, Speeds
 
 # Defaults are validated as well, because a rule may depend on another field.
 _Optional = Field(default=None, validate_default=True)

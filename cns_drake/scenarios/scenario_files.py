@@ -7,7 +7,9 @@ import re
 
 import yaml
 
-from cns_drake.base import (
+from cns_drake.scenarios.scenario import SUMO_INSTEAD, Scenario
+from cns_drake.sensors import KALIBR_FILE
+from evaluation.base import (
     InputError,
     check_writable,
     did_you_mean,
@@ -20,10 +22,12 @@ from cns_drake.base import (
     value_errors,
     write_text,
 )
-from cns_drake.scenarios.scenario import SUMO_INSTEAD, Scenario
-from cns_drake.scenarios.shipped import shipped_drives, shipped_maps
-from cns_drake.scene import MapFolder, drive_name
-from cns_drake.sensors import KALIBR_FILE
+from worlds.maps import (
+    MapFolder,
+    drive_name,
+    shipped_drives,
+    shipped_maps,
+)
 
 
 def make_scenario(values: dict, source: object) -> Scenario:

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import Element, read_bytes, read_elements, to_number
+from evaluation.base import Element, read_bytes, read_elements, to_number
 
 # Elements that show what their `url` names.
 _INSTANCES = (

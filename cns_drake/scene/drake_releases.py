@@ -6,7 +6,7 @@ from typing import Any
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.lcm import LcmBuses
 
-from cns_drake.base import installed_versions
+from evaluation.base import installed_versions
 
 
 def find_bus(

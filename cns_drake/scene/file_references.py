@@ -8,9 +8,9 @@ import re
 import stat
 from xml.parsers import expat
 
-from cns_drake.base import readable_xml, user_errors
 from cns_drake.scene.file_watch import FileWatch
 from cns_drake.scene.model_finder import ModelFinder
+from evaluation.base import readable_xml, user_errors
 
 # File name endings of the files of a model's folder, besides meshes.
 _MODEL_ENDINGS = (".sdf", ".urdf", ".config", ".xml")

@@ -24,7 +24,7 @@ from typing import IO
 
 import numpy as np
 
-from cns_drake.base import missing_library, start_python
+from evaluation.base import missing_library, start_python
 
 # Open3D returns what it has read before a fault, and warns.
 _FAULT = re.compile(

@@ -14,9 +14,9 @@ from urllib.parse import unquote_to_bytes
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import parse_json, read_bytes
 from cns_drake.scene.model_finder import resolve
 from cns_drake.scene.obj_check import LARGEST_FILE
+from evaluation.base import parse_json, read_bytes
 
 # Prefixes of glTF extensions that do not change shapes.
 _HARMLESS = (

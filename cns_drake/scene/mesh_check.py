@@ -14,11 +14,11 @@ import struct
 
 import numpy as np
 
-from cns_drake.base import read_bytes
 from cns_drake.scene.collada_check import check_collada
 from cns_drake.scene.gltf_check import check_gltf
 from cns_drake.scene.obj_check import LARGEST_FILE, check_obj, unmarked
 from cns_drake.scene.ply_check import check_ply
+from evaluation.base import read_bytes
 
 # File name extensions of glTF.
 GLTF = (".gltf", ".glb")

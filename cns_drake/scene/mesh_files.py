@@ -12,7 +12,6 @@ from pydrake.geometry import (
     ReadObjToTriangleSurfaceMesh,
 )
 
-from cns_drake.base import InputError, note, read_bytes
 from cns_drake.scene.collada_check import plain_collada
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.file_watch import once_a_file
@@ -22,6 +21,7 @@ from cns_drake.scene.mesh_check import GLTF, check_mesh_file, stl_corners
 from cns_drake.scene.obj_check import LARGEST_FILE, check_obj, unmarked
 from cns_drake.scene.ply_check import has_single_vertices
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
+from evaluation.base import InputError, note, read_bytes
 
 # Formats whose y axis points up. Drake rotates them so that z does.
 _Y_UP = (*GLTF, ".dae")

@@ -11,9 +11,9 @@ import re
 from typing import NoReturn, cast
 from xml.etree import ElementTree
 
-from cns_drake.base import Element, InputError, read_elements, value_errors
 from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE
+from evaluation.base import Element, InputError, read_elements, value_errors
 
 # File name extensions of models.
 _MODELS = (".sdf", ".world", ".urdf")

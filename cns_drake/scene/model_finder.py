@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 from urllib.parse import unquote
 
-from cns_drake.base import natural_key, read_elements
+from evaluation.base import natural_key, read_elements
 
 # Environment variables of old and new Gazebo and of libsdformat that list
 # folders of models.

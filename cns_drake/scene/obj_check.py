@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import read_bytes, user_errors
 from cns_drake.scene.file_watch import once_a_file
+from evaluation.base import read_bytes, user_errors
 
 # Larger mesh files are refused [bytes].
 LARGEST_FILE = 1 << 28

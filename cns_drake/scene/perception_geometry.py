@@ -31,12 +31,12 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-from cns_drake.base import InputError
 from cns_drake.scene import surfaces
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.mesh_files import MeshFiles, mesh_shape_key
 from cns_drake.scene.structure_names import part_name, structure_name
 from cns_drake.scene.surfaces import LARGEST_SIZE, Surface, TriangleSurface
+from evaluation.base import InputError
 
 # The corners of a unit cube, and its faces, counter-clockwise from outside.
 _CUBE_CORNERS = np.array(

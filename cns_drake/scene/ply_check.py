@@ -8,7 +8,7 @@ import struct
 
 import numpy as np
 
-from cns_drake.base import repeated, user_errors
+from evaluation.base import repeated, user_errors
 
 # Elements of PLY that are no shapes.
 _NO_SHAPES = ("vertex", "face", "camera", "material")

@@ -1,7 +1,5 @@
 """What the name of a geometry says: its structure, its part and its kind."""
 
-import re
-
 
 def structure_name(geometry_name: str, *, is_scoped: bool = False) -> str:
     """Returns the name of the structure to which a geometry belongs.
@@ -32,15 +30,3 @@ def part_name(geometry_name: str) -> str:
     visual = geometry_name.rpartition("::")[2]
     _, slash, part = visual.partition("/")
     return part if slash else visual
-
-
-def kind_in_name(name: str) -> str:
-    """Returns the kind with which the name of a structure begins.
-
-    Names are made of a kind and a number, such as `row_house_017` for the kind
-    `row_house`. The name of an object that stands on the lot of a future
-    building begins with the name of the building: `office_003_lot_02_bench`.
-    """
-    own = re.sub(r".*_lot_\d+_", "", name)
-    # OpenStreetMap's numbers have the letter of node, way or relation.
-    return re.sub(r"_[nwr]?-?\d.*", "", own)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cns_drake.base import revolved
+from evaluation.base import revolved
 
 # Rays are cast in single precision, which cannot resolve a metre beyond this
 # [m].

@@ -12,9 +12,9 @@ from xml.etree.ElementTree import Element, tostring
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from cns_drake.base import InputError
 from cns_drake.scene.model_check import read_model
 from cns_drake.scene.model_finder import ModelFinder, note_of_missing
+from evaluation.base import InputError
 
 # Element -> child elements that are read.
 _READ = {

@@ -19,7 +19,15 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
-from cns_drake.base import (
+from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
+from cns_drake.scene.mesh_check import check_mesh_file
+from cns_drake.scene.model_check import check_model
+from cns_drake.scene.model_finder import ModelFinder
+from cns_drake.scene.perception_geometry import anchored_frames, check_shape
+from cns_drake.scene.sdf_worlds import InSight, UnseenMesh, read_sdf_world
+from cns_drake.scene.structure_names import structure_name
+from cns_drake.scene.urdf_worlds import read_urdf_world
+from evaluation.base import (
     InputError,
     doing,
     errors_at,
@@ -27,16 +35,13 @@ from cns_drake.base import (
     read_bytes,
     value_errors,
 )
-from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
-from cns_drake.scene.map_folder import MapFolder
-from cns_drake.scene.mesh_check import check_mesh_file
-from cns_drake.scene.model_check import check_model
-from cns_drake.scene.model_finder import ModelFinder
-from cns_drake.scene.perception_geometry import anchored_frames, check_shape
-from cns_drake.scene.sdf_worlds import InSight, UnseenMesh, read_sdf_world
-from cns_drake.scene.structure_names import structure_name
-from cns_drake.scene.structure_table import StructureTable, load_structure_table
-from cns_drake.scene.urdf_worlds import read_urdf_world
+from worlds.maps import (
+    MapFolder,
+)
+from worlds.shapes import (
+    StructureTable,
+    load_structure_table,
+)
 
 
 @dataclass(frozen=True)

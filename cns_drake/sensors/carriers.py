@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.tree import Frame, RigidBody
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 
-from cns_drake.base import check_type
+from evaluation.base import check_type
 
 if TYPE_CHECKING:
     from cns_drake.sensors.sensor_config import Mount

@@ -35,7 +35,6 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
 from pydrake.systems.primitives import ZeroOrderHold
 
-from cns_drake.base import Section, describe_validation_error, one_line
 from cns_drake.scene import find_bus
 from cns_drake.sensors import odometry
 from cns_drake.sensors.imu.config import ImuDescription, ImuSection
@@ -48,7 +47,8 @@ from cns_drake.sensors.lidar_config import (
     make_lidar_model,
 )
 from cns_drake.sensors.system_names import check_unused_names
-from cns_drake.units import DEFAULT_PRESET, LONGEST_PERIOD
+from evaluation.base import Section, describe_validation_error, one_line
+from evaluation.lidar_sheets import DEFAULT_PRESET, LONGEST_PERIOD
 
 # Fields of a section that a config does not have, as `X_PB` replaces the mount
 # and only recordings have a layout, or that differ from the config's.

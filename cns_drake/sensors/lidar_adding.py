@@ -17,7 +17,6 @@ from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import LinearSystem
 
-from cns_drake.base import check_type
 from cns_drake.scene import anchored_frames as find_anchored_frames
 from cns_drake.scene import geometry_port
 from cns_drake.sensors.carriers import (
@@ -29,6 +28,7 @@ from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.lidar import Lidar, period_of_rate
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.system_names import check_new_sensor, check_unused_names
+from evaluation.base import check_type
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.
@@ -144,7 +144,7 @@ def add_lidar(
     if unit is not None:
         # Imported here: patterns of the caller's own need no data sheets.
         from cns_drake.sensors.sheet_patterns import make_beam_pattern
-        from cns_drake.units import LONGEST_PERIOD
+        from evaluation.lidar_sheets import LONGEST_PERIOD
 
         rate = options.get("rate")
         pattern = make_beam_pattern(

@@ -15,8 +15,6 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base import InputError, Section, validated
-from cns_drake.drives import LayoutName
 from cns_drake.sensors.lidar.measurement import Echoes, MeasurementModel
 from cns_drake.sensors.lidar.patterns import SpinningPattern
 from cns_drake.sensors.sensor_config import Mount, Triple, field_off_by_default
@@ -25,7 +23,9 @@ from cns_drake.sensors.sheet_patterns import (
     aimed,
     make_beam_pattern,
 )
-from cns_drake.units import (
+from evaluation.base import InputError, Section, validated
+from evaluation.drives import LayoutName
+from evaluation.lidar_sheets import (
     DEFAULT_PRESET,
     LIDAR_PRESETS,
     MOST_BEAMS,

@@ -1,6 +1,6 @@
 """The description of odometry, which is read without Drake."""
 
-from cns_drake.base import Section
+from evaluation.base import Section
 
 
 class OdometrySection(Section):

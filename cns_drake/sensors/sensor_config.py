@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
-from cns_drake.base import NS_PER_S, Section
 from cns_drake.sensors.lidar.beams import HIGHEST_RATE
+from evaluation.base import NS_PER_S, Section
 
 if TYPE_CHECKING:
     from pydrake.geometry import SceneGraph

@@ -15,7 +15,7 @@ from cns_drake.sensors.lidar.patterns import (
     RosettePattern,
     SpinningPattern,
 )
-from cns_drake.units import (
+from evaluation.lidar_sheets import (
     LONGEST_PERIOD,
     LidarSheet,
     NoddingSheet,

@@ -4,7 +4,7 @@ from collections.abc import Collection
 
 from pydrake.systems.framework import DiagramBuilder
 
-from cns_drake.drives import check_sensor_name
+from evaluation.drives import check_sensor_name
 
 # Endings of the names of an IMU's systems.
 IMU_PARTS = ("accelerometer", "gyroscope", "noise")

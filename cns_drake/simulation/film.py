@@ -16,7 +16,13 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, Diagram
 from pydrake.systems.sensors import CameraInfo
 
-from cns_drake.base import (
+from cns_drake.motion import Trajectory
+from cns_drake.pictures import height_rgb
+from cns_drake.scenarios import DrivePlan, Scenario, plan_drive
+from cns_drake.sensors import CameraSection, check_renderer, optical_pose
+from cns_drake.simulation.loaded_drive import load_drive
+from cns_drake.simulation.station import make_station
+from evaluation.base import (
     InputError,
     JobError,
     ProcessDiedError,
@@ -27,12 +33,6 @@ from cns_drake.base import (
     doing,
     run_process,
 )
-from cns_drake.motion import Trajectory
-from cns_drake.pictures import height_rgb
-from cns_drake.scenarios import DrivePlan, Scenario, plan_drive
-from cns_drake.sensors import CameraSection, check_renderer, optical_pose
-from cns_drake.simulation.loaded_drive import load_drive
-from cns_drake.simulation.station import make_station
 
 # Images per second.
 RATE = 10

@@ -8,8 +8,6 @@ import math
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import RigidBody
 
-from cns_drake.base import doing
-from cns_drake.drives import BASE_FRAME
 from cns_drake.motion import Trajectory
 from cns_drake.recording import (
     IMU_TOPIC,
@@ -34,6 +32,8 @@ from cns_drake.simulation.scenario_traffic import (
 )
 from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.traffic import TrafficPlan
+from evaluation.base import doing
+from evaluation.drives import BASE_FRAME
 
 # Tolerance, in periods, for a time to count as a multiple of a period.
 _TOLERANCE = 1e-6

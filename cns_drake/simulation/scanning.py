@@ -11,15 +11,6 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
-from cns_drake.base import (
-    InputError,
-    check_writable,
-    completing,
-    doing,
-    encode_bin,
-    encode_pcd,
-    make_folder,
-)
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.scene import World, load_world
 from cns_drake.sensors import (
@@ -29,6 +20,15 @@ from cns_drake.sensors import (
     WeatherConfig,
     connect_lidar,
     make_lidar_model,
+)
+from evaluation.base import (
+    InputError,
+    check_writable,
+    completing,
+    doing,
+    encode_bin,
+    encode_pcd,
+    make_folder,
 )
 
 

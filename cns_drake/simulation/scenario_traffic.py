@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from cns_drake.base import InputError, arctan2
 from cns_drake.motion import Trajectory
 from cns_drake.scenarios import (
     SUMO_INSTEAD,
@@ -16,7 +15,7 @@ from cns_drake.scenarios import (
     check_files,
     count_frames,
 )
-from cns_drake.scene import GROUND_CLASSES, MOVING_IDS, World, metres_on_map
+from cns_drake.scene import World
 from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.traffic import (
     EgoBox,
@@ -31,6 +30,12 @@ from cns_drake.traffic import (
     traffic_structures,
 )
 from cns_drake.transient import GroundSurface, geometry_by_structure
+from evaluation.base import InputError, arctan2
+from worlds.maps import metres_on_map
+from worlds.shapes import (
+    GROUND_CLASSES,
+    MOVING_IDS,
+)
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 _EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)

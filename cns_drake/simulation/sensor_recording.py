@@ -10,8 +10,6 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.sensors import Gyroscope, RgbdSensor
 
-from cns_drake.base import check_type, is_real
-from cns_drake.drives import check_sensor_names
 from cns_drake.recording import (
     ENCODINGS,
     END_NS,
@@ -38,6 +36,8 @@ from cns_drake.sensors import (
     check_in_diagram,
     check_unused_names,
 )
+from evaluation.base import check_type, is_real
+from evaluation.drives import check_sensor_names
 
 
 def add_mcap_recorder(

@@ -16,8 +16,6 @@ from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context
 
-from cns_drake.base import doing, poses
-from cns_drake.drives import MAP_FRAME, Drive, index_instances
 from cns_drake.motion import pose_at
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.recording import frame_stamp_ns, to_quat_xyzw
@@ -32,6 +30,8 @@ from cns_drake.scene import structures_in
 from cns_drake.sensors import BeamPattern, sensor_pose
 from cns_drake.simulation.loaded_drive import load_drive
 from cns_drake.simulation.station import make_station
+from evaluation.base import doing, poses
+from evaluation.drives import MAP_FRAME, Drive, index_instances
 
 
 @dataclass(frozen=True)

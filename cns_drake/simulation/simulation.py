@@ -9,15 +9,6 @@ import time
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
-from cns_drake.base import (
-    InputError,
-    __version__,
-    check_folder_writable,
-    check_writable,
-    doing,
-    interrupts_wait,
-    write_text,
-)
 from cns_drake.pictures import (
     MeshcatRecorder,
     ShownStages,
@@ -55,6 +46,15 @@ from cns_drake.sensors import (
 from cns_drake.simulation.loaded_drive import LoadedDrive, load_drive
 from cns_drake.simulation.stage_loading import load_stage, sight_along
 from cns_drake.simulation.station import make_station
+from evaluation.base import (
+    InputError,
+    __version__,
+    check_folder_writable,
+    check_writable,
+    doing,
+    interrupts_wait,
+    write_text,
+)
 
 # Reports how many frames of how many are done.
 ProgressCallback = Callable[[int, int], None]

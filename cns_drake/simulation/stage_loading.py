@@ -7,17 +7,17 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base import doing
 from cns_drake.scenarios import (
     DrivePlan,
     count_frames,
     ground_notes,
     load_scenario_world,
-    vehicle_file,
 )
 from cns_drake.scene import InSight, World
 from cns_drake.sensors import make_lidar_model
 from cns_drake.transient import change_world
+from evaluation.base import doing
+from worlds.maps import vehicle_file
 
 # Distance from the car's middle line to its sides, with a margin [m].
 _HALF_WIDTH = 1.3

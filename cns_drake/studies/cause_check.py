@@ -5,10 +5,10 @@ import contextlib
 import functools
 from typing import Any
 
-from cns_drake.base import InputError, merged
 from cns_drake.scenarios import Scenario, load_scenario
 from cns_drake.studies.drives.named_stages import MissingError
 from cns_drake.studies.pairs.comparisons import PairMaker
+from evaluation.base import InputError, merged
 from evaluation.study import Case, Cause, Experiment, source_of_cause
 from evaluation.study import causes as all_causes
 from evaluation.study import register_cause as register_cause

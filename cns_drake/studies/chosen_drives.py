@@ -3,16 +3,16 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from cns_drake.base import Cluster, note
 from cns_drake.scenarios import (
     Scenario,
     check_written_scenarios,
     load_scenario,
-    recordable_drives,
     write_scenarios,
 )
 from cns_drake.studies.study import study_drives
+from evaluation.base import Cluster, note
 from evaluation.study import Study, load_experiment
+from worlds.maps import recordable_drives
 
 
 def named_drives(

@@ -8,7 +8,16 @@ from pathlib import Path
 import shutil
 import sys
 
-from cns_drake.base import (
+from cns_drake.pictures import other_stage
+from cns_drake.recording import RecordingFolder
+from cns_drake.scenarios import (
+    Scenario,
+    digest_file,
+    digest_inputs,
+    recording_fingerprint,
+)
+from cns_drake.simulation import simulate
+from evaluation.base import (
     Cluster,
     InputError,
     Job,
@@ -20,15 +29,6 @@ from cns_drake.base import (
     run_jobs,
     user_errors,
 )
-from cns_drake.pictures import other_stage
-from cns_drake.recording import RecordingFolder
-from cns_drake.scenarios import (
-    Scenario,
-    digest_file,
-    digest_inputs,
-    recording_fingerprint,
-)
-from cns_drake.simulation import simulate
 from evaluation.study import Part
 
 # Expected time to load a stage [s].

@@ -4,7 +4,22 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from cns_drake.base import (
+from cns_drake.pictures import draw_drives, draw_stages, load_views
+from cns_drake.scenarios import (
+    Scenario,
+    describe_scenario,
+    digest_file,
+    digest_inputs,
+    load_scenario,
+)
+from cns_drake.simulation import SimulationSource
+from cns_drake.studies.drives.changed_drives import control_drive
+from cns_drake.studies.recording import (
+    is_recorded,
+    plan_recordings,
+    usual_frames,
+)
+from evaluation.base import (
     Cluster,
     InputError,
     Job,
@@ -13,25 +28,7 @@ from cns_drake.base import (
     make_folder,
     natural_key,
 )
-from cns_drake.drives import driven_way
-from cns_drake.pictures import draw_drives, draw_stages, load_views
-from cns_drake.scenarios import (
-    Scenario,
-    describe_scenario,
-    digest_file,
-    digest_inputs,
-    load_scenario,
-    recordable_map,
-    recordable_maps,
-)
-from cns_drake.scene import MapFolder
-from cns_drake.simulation import SimulationSource
-from cns_drake.studies.drives.changed_drives import control_drive
-from cns_drake.studies.recording import (
-    is_recorded,
-    plan_recordings,
-    usual_frames,
-)
+from evaluation.drives import driven_way
 from evaluation.recognition import RetrievalProtocol
 from evaluation.results import PrintStyle
 from evaluation.study import (
@@ -41,6 +38,11 @@ from evaluation.study import (
     choose_methods,
     scenario_digest,
     study_recordings,
+)
+from worlds.maps import (
+    MapFolder,
+    recordable_map,
+    recordable_maps,
 )
 
 # Mean size of a page.

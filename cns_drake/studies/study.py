@@ -6,16 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import (
-    Cluster,
-    InputError,
-    check_folder_writable,
-    doing,
-    errors_at,
-    fingerprint,
-    read_records,
-    whole_number,
-)
 from cns_drake.scenarios import (
     Scenario,
     combined_digest,
@@ -23,10 +13,7 @@ from cns_drake.scenarios import (
     digest_inputs,
     load_scenario,
     plan_drive,
-    shipped_cities,
-    worlds_folder,
 )
-from cns_drake.scene import MapFolder
 from cns_drake.studies.cause_check import check_causes
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
 from cns_drake.studies.maps.experiment_maps import MapPairs, pairs_by_map
@@ -40,6 +27,16 @@ from cns_drake.studies.pairs.simulated_pairs import (
 )
 from cns_drake.studies.tasks.map_task import DrivenMapTask
 from cns_drake.studies.tasks.seen_task import SeenTask
+from evaluation.base import (
+    Cluster,
+    InputError,
+    check_folder_writable,
+    doing,
+    errors_at,
+    fingerprint,
+    read_records,
+    whole_number,
+)
 from evaluation.drives import sample_frames
 from evaluation.results import LEVEL, PrintStyle
 from evaluation.study import (
@@ -60,6 +57,11 @@ from evaluation.study import (
     recorded_pairs,
     recorded_sections,
     shipped_experiments,
+)
+from worlds.maps import (
+    MapFolder,
+    shipped_cities,
+    worlds_folder,
 )
 
 TASKS: Mapping[str, type[Task]] = {

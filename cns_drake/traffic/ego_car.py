@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from cns_drake.base import cos, sin
-from cns_drake.roads import outlines
 from cns_drake.traffic.traffic_plan import Tracks
+from evaluation.base import cos, sin
+from worlds.roads import outlines
 
 # Greatest time between two comparisons of road users with the ego car [s]: they
 # notice everything that crosses its path.

@@ -12,7 +12,16 @@ import zlib
 
 import numpy as np
 
-from cns_drake.base import (
+from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meets_ego
+from cns_drake.traffic.traffic_plan import (
+    KINDS,
+    WALKER_SIZE,
+    Tracks,
+    TrafficPlan,
+    VehicleKind,
+    gait_phases,
+)
+from evaluation.base import (
     Element,
     InputError,
     arctan2,
@@ -23,15 +32,6 @@ from cns_drake.base import (
     step_lengths,
     value_errors,
     wrapped,
-)
-from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meets_ego
-from cns_drake.traffic.traffic_plan import (
-    KINDS,
-    WALKER_SIZE,
-    Tracks,
-    TrafficPlan,
-    VehicleKind,
-    gait_phases,
 )
 
 # A drive may take this much longer than the trace because of rounding [s].

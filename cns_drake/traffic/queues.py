@@ -8,8 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 import numpy as np
 import shapely
 
-from cns_drake.base import arcsin, arctan2, distances_along
-from cns_drake.roads import ENDS, Connection, End, LaneRef, Road, RoadNetwork
 from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath
 from cns_drake.traffic.traffic_plan import (
     KINDS,
@@ -17,6 +15,8 @@ from cns_drake.traffic.traffic_plan import (
     TrafficPlan,
     VehicleKind,
 )
+from evaluation.base import arcsin, arctan2, distances_along
+from worlds.roads import ENDS, Connection, End, LaneRef, Road, RoadNetwork
 
 # Least and greatest gap between vehicles in a queue [m].
 _GAPS = (1.5, 3.5)

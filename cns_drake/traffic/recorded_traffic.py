@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import read_npz, value_errors
 from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meets_ego
 from cns_drake.traffic.traffic_plan import (
     KINDS,
@@ -22,6 +21,7 @@ from cns_drake.traffic.traffic_plan import (
     TrafficPlan,
     gait_phases,
 )
+from evaluation.base import read_npz, value_errors
 
 _NAMES = (
     "period", "units", "kinds",

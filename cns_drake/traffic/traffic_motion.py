@@ -18,13 +18,16 @@ from pydrake.systems.framework import (
 )
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError, cos, product, sin
 from cns_drake.ray_casting import KnownPoses
 from cns_drake.recording import RecordedObjects
-from cns_drake.scene import MAX_INSTANCE, StructureEntry, StructureTable
 from cns_drake.sensors import check_unused_names
 from cns_drake.traffic.body_shapes import Limb, vehicle_limbs, walker_limbs
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
+from evaluation.base import MAX_INSTANCE, InputError, cos, product, sin
+from worlds.shapes import (
+    StructureEntry,
+    StructureTable,
+)
 
 # Faster bodies are labelled as moving, all others as standing [m/s].
 MOVING_SPEED = 0.5

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import TypeAdapter
 
-from cns_drake.base import parse_yaml
+from evaluation.base import parse_yaml
 
 # A pedestrian's box, which contains swinging limbs: length, width, height [m].
 WALKER_SIZE = (0.84, 0.6, 1.8)
@@ -20,7 +20,7 @@ class VehicleKind:
 
     Attributes:
         name: name of the kind, with which the names of the kind's meshes begin.
-        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
+        semantic_class: a key of `worlds.shapes.semantics.CLASS_IDS`.
         share: weight in the random choice of kinds.
         size: length, width and height of the vehicle's box, mirrors and rider
             included [m].

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.methods import SECTORS
 
 # Number of cities in a batch.

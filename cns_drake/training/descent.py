@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import InputError, track
 from cns_drake.training.batches import BatchSampler, TrainingScans
 from cns_drake.training.network import (
     Parameters,
@@ -15,6 +14,7 @@ from cns_drake.training.network import (
     scores,
     start_parameters,
 )
+from evaluation.base import InputError, track
 from evaluation.methods import WEIGHTS_VERSION
 from evaluation.study import Part
 

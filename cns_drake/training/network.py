@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.methods import FEATURES, FREQUENCIES, HEADINGS, LAYERS, TURNS
 
 # Name -> weights of the network.

@@ -17,7 +17,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base import (
+from cns_drake.export import claim_folder
+from cns_drake.ground_truth import exact_overlaps
+from cns_drake.scenarios import Scenario, load_scenario
+from cns_drake.simulation import SimulationSource
+from cns_drake.studies import named_drives
+from evaluation.base import (
     Cluster,
     InputError,
     Job,
@@ -29,12 +34,6 @@ from cns_drake.base import (
     track,
     user_errors,
 )
-from cns_drake.export import claim_folder
-from cns_drake.ground_truth import exact_overlaps
-from cns_drake.scenarios import Scenario, load_scenario
-from cns_drake.scene import CLASS_IDS, GROUND_CLASSES
-from cns_drake.simulation import SimulationSource
-from cns_drake.studies import named_drives
 from evaluation.drives import cloud_at, sample_frames
 from evaluation.maps import downsample
 from evaluation.recognition import (
@@ -43,6 +42,10 @@ from evaluation.recognition import (
     write_overlaps,
 )
 from evaluation.study import MakePart, Part
+from worlds.shapes import (
+    CLASS_IDS,
+    GROUND_CLASSES,
+)
 
 # File or folder of a set of training data -> content.
 _EXPLAINED = {

@@ -14,18 +14,25 @@ import numpy as np
 from scipy.spatial import cKDTree
 import yaml
 
-from cns_drake.base import draft_folder
-from cns_drake.city import City, generate_city, make_city, start_city
-from cns_drake.roads import draw_route, load_road_network
-from cns_drake.scenarios import Scenario, load_scenario, shipped_maps
-from cns_drake.scene import STAGES_NAME, MapFolder
+from cns_drake.scenarios import (
+    Scenario,
+    load_scenario,
+)
 from cns_drake.studies import (
     marked_yaml,
     redrawn_inputs,
     turned_content,
     with_lidars_moved,
 )
-from cns_drake.units import make_sheet
+from evaluation.base import draft_folder
+from evaluation.lidar_sheets import make_sheet
+from worlds.city import City, generate_city, make_city, start_city
+from worlds.maps import (
+    STAGES_NAME,
+    MapFolder,
+    shipped_maps,
+)
+from worlds.roads import draw_route, load_road_network
 
 # First seed, far from the seeds of all experiments and tests.
 _FIRST_SEED = 500_000

@@ -11,7 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import (
+from cns_drake.ground_truth import VisibleSurfaces, sights_of
+from cns_drake.simulation import SimulatedDrive
+from cns_drake.training.batches import HIDDEN_DEG, TrainingScans
+from cns_drake.training.descent import train
+from cns_drake.training.network import import_jax
+from cns_drake.training.sampled_city import DRAWN_STREETS, SampledCity
+from evaluation.base import (
     Cluster,
     InputError,
     Job,
@@ -27,12 +33,6 @@ from cns_drake.base import (
     terminal,
     track,
 )
-from cns_drake.ground_truth import VisibleSurfaces, sights_of
-from cns_drake.simulation import SimulatedDrive
-from cns_drake.training.batches import HIDDEN_DEG, TrainingScans
-from cns_drake.training.descent import train
-from cns_drake.training.network import import_jax
-from cns_drake.training.sampled_city import DRAWN_STREETS, SampledCity
 from evaluation.drives import cloud_at, sample_frames
 from evaluation.methods import SEEN_SHARES, WEIGHTS_VERSION, polar_image
 from evaluation.study import MakePart, Part

@@ -5,13 +5,13 @@ import itertools
 
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base import import_modules
 from cns_drake.scenarios import TransientConfig
 from cns_drake.scene import World
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.scene_editing import SceneEditing
 from cns_drake.transient.structure_geometry import geometry_by_structure
 from cns_drake.transient.surroundings import Surroundings
+from evaluation.base import import_modules
 
 
 def change_world(

@@ -6,9 +6,9 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 
-from cns_drake.scene import GROUND_CLASSES
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.surroundings import Surroundings
+from worlds.shapes import GROUND_CLASSES
 
 # Cause of these changes in the structure table.
 _CAUSE = "furniture"

@@ -9,18 +9,18 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from cns_drake.city import (
+from cns_drake.transient.structure_geometry import (
+    PartGeometry,
+    StructureGeometry,
+    triangle_corners,
+)
+from worlds.shapes import (
+    GROUND_CLASSES,
     UpperSides,
     from_above,
     polygons_of,
     turned_up,
     unit_normals,
-)
-from cns_drake.scene import GROUND_CLASSES
-from cns_drake.transient.structure_geometry import (
-    PartGeometry,
-    StructureGeometry,
-    triangle_corners,
 )
 
 # Steeper surfaces are not ground: least z of the unit normal.

@@ -7,16 +7,6 @@ from pydrake.geometry import Mesh as DrakeMesh
 from pydrake.math import RigidTransform
 from shapely.geometry import box
 
-from cns_drake.city import (
-    OBJECT_MESHES,
-    STOREY,
-    Mesh,
-    MeshShape,
-    Model,
-    Part,
-    lowered,
-    top_of,
-)
 from cns_drake.scene import tessellate
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.scene_editing import SceneEditing
@@ -25,6 +15,18 @@ from cns_drake.transient.structure_geometry import (
     StructureGeometry,
 )
 from cns_drake.transient.surroundings import Surroundings, change_rng
+from worlds.city import (
+    STOREY,
+    lowered,
+    top_of,
+)
+from worlds.shapes import (
+    OBJECT_MESHES,
+    Mesh,
+    MeshShape,
+    Model,
+    Part,
+)
 
 # Cause of these changes in the structure table.
 _CAUSE = "height_limit"

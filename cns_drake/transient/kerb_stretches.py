@@ -7,10 +7,13 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base import length_of
-from cns_drake.city import Model, placed
 from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.surroundings import FARTHEST, Surroundings
+from evaluation.base import length_of
+from worlds.shapes import (
+    Model,
+    placed,
+)
 
 # Distance between points along a kerb [m].
 _SPACING = 1.0

@@ -7,14 +7,18 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely import Polygon
 
-from cns_drake.base import product
-from cns_drake.city import PARKED_CARS, Model, part_mesh
-from cns_drake.scene import GROUND_CLASSES
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.structure_geometry import StructureGeometry
 from cns_drake.transient.surroundings import Surroundings
+from evaluation.base import product
+from worlds.city import PARKED_CARS
+from worlds.shapes import (
+    GROUND_CLASSES,
+    Model,
+    part_mesh,
+)
 
 # Cause of these changes in the structure table.
 _CAUSE = "parked_cars"

@@ -10,13 +10,13 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base import parse_yaml
-from cns_drake.city import OBJECTS
-from cns_drake.scene import GROUND_CLASSES
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.kerb_stretches import straight_kerbs
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings, change_rng
+from evaluation.base import parse_yaml
+from worlds.city import OBJECTS
+from worlds.shapes import GROUND_CLASSES
 
 # Cell size of the grid, in W, of kerb stretches [m].
 _CELL = 6.5

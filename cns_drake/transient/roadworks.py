@@ -5,12 +5,19 @@ from dataclasses import dataclass
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city import OBJECTS, assemble, block, pick_key
-from cns_drake.scene import GROUND_CLASSES
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.kerb_stretches import KerbStretch, straight_kerbs
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings
+from worlds.city import (
+    OBJECTS,
+    pick_key,
+)
+from worlds.shapes import (
+    GROUND_CLASSES,
+    assemble,
+    block,
+)
 
 # Cell size of the grid, in W, of kerb stretches [m].
 _CELL = 20.0

@@ -7,10 +7,17 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city import Model, Part, assemble, bar, block, post
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.structure_geometry import StructureGeometry
 from cns_drake.transient.surroundings import FARTHEST, Surroundings
+from worlds.shapes import (
+    Model,
+    Part,
+    assemble,
+    bar,
+    block,
+    post,
+)
 
 # Distance of a scaffold's inner uprights from the front [m].
 _ROW_INNER = 0.25

@@ -11,8 +11,17 @@ from pydrake import geometry
 from pydrake.common import MemoryFile
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cns_drake.base import InputError, product
-from cns_drake.city import (
+from cns_drake.scene import (
+    GREY,
+    TriangleSurface,
+    World,
+)
+from cns_drake.transient.structure_geometry import (
+    PartGeometry,
+    StructureGeometry,
+)
+from evaluation.base import MAX_INSTANCE, InputError, product
+from worlds.shapes import (
     OBJECT_MESHES,
     BoxShape,
     CylinderShape,
@@ -21,18 +30,8 @@ from cns_drake.city import (
     Part,
     Shape,
     SphereShape,
-)
-from cns_drake.scene import (
-    GREY,
-    MAX_INSTANCE,
     StructureEntry,
     StructureTable,
-    TriangleSurface,
-    World,
-)
-from cns_drake.transient.structure_geometry import (
-    PartGeometry,
-    StructureGeometry,
 )
 
 # Points up to this far above a structure's lowest one belong to its foot [m].

@@ -5,9 +5,6 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 import shapely
 
-from cns_drake.base import sin
-from cns_drake.city import from_above, quartered, turned_up, unit_normals
-from cns_drake.scene import GROUND_CLASSES
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.scene_editing import SceneEditing, SurfaceLook
@@ -16,6 +13,14 @@ from cns_drake.transient.structure_geometry import (
     triangle_corners,
 )
 from cns_drake.transient.surroundings import Surroundings, change_rng
+from evaluation.base import sin
+from worlds.shapes import (
+    GROUND_CLASSES,
+    from_above,
+    quartered,
+    turned_up,
+    unit_normals,
+)
 
 # Cause of these changes in the structure table.
 _CAUSE = "snow"

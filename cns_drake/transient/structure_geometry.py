@@ -12,20 +12,22 @@ from pydrake.math import RigidTransform
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base import product
 from cns_drake.scene import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
     HalfSpaceSurface,
-    Material,
     PerceptionGeometry,
-    StructureEntry,
     TriangleSurface,
     World,
     list_geometry,
     read_geometry,
     structure_name,
+)
+from evaluation.base import product
+from worlds.shapes import (
+    Material,
+    StructureEntry,
 )
 
 # Cars and people can pass below parts that are higher than this above a

@@ -25,7 +25,6 @@ from pydrake.systems.framework import (
 )
 
 from cns_drake import Scenario, load_scenario, simulate
-from cns_drake.drives import message_class
 from cns_drake.recording import Topic, make_header
 from cns_drake.sensors import (
     SensorConfig,
@@ -34,6 +33,7 @@ from cns_drake.sensors import (
     noise_generator,
     sensor_pose,
 )
+from evaluation.drives import message_class
 
 FIX = "sensor_msgs/msg/NavSatFix"
 METRES_PER_DEG = 111_319.5

@@ -26,8 +26,6 @@ from typing import Literal
 
 import numpy as np
 
-from cns_drake.base import InputError, doing, poses
-from cns_drake.drives import Drive, check_same_map, check_same_world
 from evaluation.alignment.loop_search import (
     SAME_PLACE,
     LoopSearch,
@@ -43,7 +41,13 @@ from evaluation.alignment.pose_graph import (
 )
 from evaluation.alignment.pose_guesses import find_candidates, find_guesses
 from evaluation.alignment.submaps import Submaps
-from evaluation.drives import MovedDrive
+from evaluation.base import InputError, doing, poses
+from evaluation.drives import (
+    Drive,
+    MovedDrive,
+    check_same_map,
+    check_same_world,
+)
 
 When = Literal["auto", "always", "never"]
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import poses, track
 from evaluation.alignment.registration import register
 from evaluation.alignment.submaps import Submaps
+from evaluation.base import poses, track
 
 # Least share of a submap's points that have a counterpart in the other submap.
 # In a simulated city that lost three quarters of its buildings, trees and

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from cns_drake.base import InputError
-from cns_drake.drives import Drive
 from evaluation.alignment.align import AlignmentReport, When, in_one_world
-from evaluation.drives import Reading
+from evaluation.base import InputError
+from evaluation.drives import Drive, Reading
 
 
 def open_in_one_world(

@@ -7,9 +7,9 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import poses
 from evaluation.alignment.loop_search import Loop, implied_poses, loop_errors
 from evaluation.alignment.submaps import Submaps
+from evaluation.base import poses
 
 # Factors of the kernel's width.
 _WIDTHS = (100.0, 30.0, 10.0, 3.0, 1.0)

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import poses, track, wrapped
 from evaluation.alignment.submaps import Submaps
+from evaluation.base import poses, track, wrapped
 from evaluation.drives import cloud_at
 from evaluation.methods import ScanContext
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import small_gicp
 
-from cns_drake.base import poses
+from evaluation.base import poses
 
 # Number of points to which a normal is fitted, including the point itself.
 NUM_NEIGHBOURS = 10

@@ -4,10 +4,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from cns_drake.base import poses
-from cns_drake.drives import Drive
 from evaluation.alignment.registration import Surface, make_surface
-from evaluation.drives import sample_frames, travelled
+from evaluation.base import poses
+from evaluation.drives import Drive, sample_frames, travelled
 from evaluation.maps import VoxelAccumulator
 
 # Distance between keyframes along the path [m].

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base import InputError
-from cns_drake.drives import Drive, check_same_world
+from evaluation.base import InputError
 from evaluation.change.tcr import (
     COVERAGE_RADIUS,
     GRIDS,
@@ -28,6 +27,7 @@ from evaluation.change.tcr import (
     temporal_change,
 )
 from evaluation.clouds import read_blocks
+from evaluation.drives import Drive, check_same_world
 from evaluation.maps import (
     CELL_SIZE,
     VOXEL_SIZE,

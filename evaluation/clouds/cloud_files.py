@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     check_range,
     check_regular,

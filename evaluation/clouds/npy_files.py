@@ -7,7 +7,7 @@ import warnings
 
 import numpy as np
 
-from cns_drake.base import check_regular, from_xyz, user_errors, value_errors
+from evaluation.base import check_regular, from_xyz, user_errors, value_errors
 from evaluation.clouds.notes import OnNote
 from evaluation.clouds.record_reading import check_size, read_records
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import compiled, is_number
+from evaluation.base import compiled, is_number
 from evaluation.clouds.notes import OnNote
 from evaluation.clouds.record_reading import (
     BYTE_ORDER_MARK,

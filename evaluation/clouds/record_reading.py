@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from cns_drake.base import parse_rows, repeated
+from evaluation.base import parse_rows, repeated
 
 # Room for some tens of numbers with some tens of characters each.
 _LONGEST_LINE_BYTES = 1 << 16

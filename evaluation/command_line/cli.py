@@ -4,7 +4,7 @@ Each module of the folder `commands` is a command, and imports its slow modules
 itself, so that the help comes at once.
 """
 
-from cns_drake.base import example, program, show_progress
+from evaluation.base import example, program, show_progress
 
 app = program.make_program(
     "cns-eval",

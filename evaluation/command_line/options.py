@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cns_drake.base import InputError, terminal
+from evaluation.base import InputError, terminal
 
 if TYPE_CHECKING:
     from evaluation.verbs import Measured

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 import math
 from typing import TYPE_CHECKING
 
-from cns_drake.base import terminal
+from evaluation.base import terminal
 
 if TYPE_CHECKING:
     from evaluation.recognition import Interval

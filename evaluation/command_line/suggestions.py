@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from cns_drake.base import note, terminal
+from evaluation.base import note, terminal
 from evaluation.results import (
     QUERIES,
     RESULTS,

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     YamlLoader,
     is_there,
@@ -27,9 +27,16 @@ from cns_drake.base import (
     read_text,
     value_errors,
 )
-from cns_drake.drives import IMU_DTYPE, SCENARIO, as_given, read_scenario
 from evaluation.clouds import read_cloud
 from evaluation.drives.data_set import DataSet
+from evaluation.drives.drive import (
+    IMU_DTYPE,
+    as_given,
+)
+from evaluation.drives.drive_scenario import (
+    SCENARIO,
+    read_scenario,
+)
 from evaluation.drives.scan_files import (
     FileDrive,
     first_existing,

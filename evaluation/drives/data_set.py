@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import InputError, value_errors
-from cns_drake.drives import Drive
+from evaluation.base import InputError, value_errors
+from evaluation.drives.drive import Drive
 
 # Greatest error of a rotation by rounding.
 _ROUNDED = 1e-3

@@ -9,12 +9,12 @@ import numpy as np
 from scipy.spatial import KDTree
 import small_gicp
 
-from cns_drake.base import InputError, errors_at, note, poses, step_lengths
-from cns_drake.drives import Drive
-from cns_drake.units import check_preset
+from evaluation.base import InputError, errors_at, note, poses, step_lengths
 from evaluation.drives.data_set import check_interface
+from evaluation.drives.drive import Drive
 from evaluation.drives.kitti import KittiDrive
 from evaluation.drives.opening import open_drive
+from evaluation.lidar_sheets import check_preset
 
 # How many scans are read, spread over the drive.
 _NUM_SCANS = 8

@@ -5,8 +5,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cns_drake.base import xyz
-from cns_drake.drives import Drive, LidarField
+from evaluation.base import xyz
+from evaluation.drives.drive import Drive
+from evaluation.drives.lidar_fields import LidarField
 
 
 class DriveView(Drive):

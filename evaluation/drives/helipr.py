@@ -12,9 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import InputError
-from cns_drake.drives import SCENARIO, LidarField, as_given, read_scenario
+from evaluation.base import InputError
 from evaluation.drives.data_set import DataSet
+from evaluation.drives.drive import as_given
+from evaluation.drives.drive_scenario import (
+    SCENARIO,
+    read_scenario,
+)
+from evaluation.drives.lidar_fields import LidarField
 from evaluation.drives.scan_files import (
     FileDrive,
     PosedFiles,

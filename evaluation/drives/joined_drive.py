@@ -4,7 +4,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cns_drake.drives import Drive, check_same_world
+from evaluation.drives.drive import Drive
+from evaluation.drives.same_world import check_same_world
 from evaluation.drives.sampling import sample_frames
 
 

@@ -30,7 +30,7 @@ import re
 import numpy as np
 from numpy.lib.recfunctions import append_fields
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     is_there,
     listed,
@@ -41,8 +41,15 @@ from cns_drake.base import (
     read_text,
     value_errors,
 )
-from cns_drake.drives import SCENARIO, as_given, index_instances, read_scenario
 from evaluation.drives.data_set import DataSet
+from evaluation.drives.drive import (
+    as_given,
+    index_instances,
+)
+from evaluation.drives.drive_scenario import (
+    SCENARIO,
+    read_scenario,
+)
 from evaluation.drives.scan_files import (
     BinDrive,
     PosedFiles,

@@ -3,8 +3,11 @@
 from functools import partial
 from pathlib import Path
 
-from cns_drake.drives import McapDrive, holds_mcap
 from evaluation.drives.data_set import DataSet
+from evaluation.drives.mcap_drive import (
+    McapDrive,
+    holds_mcap,
+)
 from evaluation.drives.trajectories import read_trajectory
 
 

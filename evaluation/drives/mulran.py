@@ -11,9 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import InputError
-from cns_drake.drives import SCENARIO, X_BS, as_given, read_scenario
+from evaluation.base import InputError
 from evaluation.drives.data_set import DataSet
+from evaluation.drives.drive import as_given
+from evaluation.drives.drive_scenario import (
+    SCENARIO,
+    read_scenario,
+)
+from evaluation.drives.mulran_frames import X_BS
 from evaluation.drives.scan_files import (
     BinDrive,
     PosedFiles,

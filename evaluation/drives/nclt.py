@@ -14,9 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import InputError, poses
-from cns_drake.drives import SCENARIO, as_given, read_scenario
+from evaluation.base import InputError, poses
 from evaluation.drives.data_set import DataSet
+from evaluation.drives.drive import as_given
+from evaluation.drives.drive_scenario import (
+    SCENARIO,
+    read_scenario,
+)
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,

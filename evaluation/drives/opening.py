@@ -8,11 +8,11 @@ import inspect
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Family, doing, errors_at, import_modules, listed
-from cns_drake.base import InputError as InputError
-from cns_drake.drives import Drive as Drive
+from evaluation.base import Family, doing, errors_at, import_modules, listed
+from evaluation.base import InputError as InputError
 from evaluation.clouds import is_cloud
 from evaluation.drives.data_set import DataSet, check_interface
+from evaluation.drives.drive import Drive as Drive
 from evaluation.drives.posed_drive import PosedDrive
 
 

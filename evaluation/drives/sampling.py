@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from cns_drake.base import step_lengths
+from evaluation.base import step_lengths
 
 # Frames closer than this are at the same place [m].
 _LEAST_SPACING = 1e-6

@@ -12,8 +12,8 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError, compiled, poses, read_only
-from cns_drake.drives import Drive
+from evaluation.base import InputError, compiled, poses, read_only
+from evaluation.drives.drive import Drive
 
 
 def within_cube(points: np.ndarray, half_extent: float) -> np.ndarray:

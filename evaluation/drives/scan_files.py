@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base import (
+from evaluation.base import (
     FARTHEST_RETURN,
     InputError,
     check_range,
@@ -16,14 +16,16 @@ from cns_drake.base import (
     user_errors,
     value_errors,
 )
-from cns_drake.drives import (
+from evaluation.clouds import SCAN_LIMIT_BYTES, bin_dtype
+from evaluation.drives.drive import (
     Drive,
-    LidarField,
-    StampedPoses,
-    lidar_field,
     poses_frame,
 )
-from evaluation.clouds import SCAN_LIMIT_BYTES, bin_dtype
+from evaluation.drives.lidar_fields import (
+    LidarField,
+    lidar_field,
+)
+from evaluation.drives.stamped_poses import StampedPoses
 from evaluation.drives.text_tables import check_increasing, parse_stamps_ns
 from evaluation.drives.trajectories import read_trajectory
 
@@ -39,7 +41,7 @@ class PosedFiles(NamedTuple):
         world_frame: name of W.
         tables: the files of the poses.
         datum: name of the survey grid in which W lies; None if there is none.
-        has_own_world: see `cns_drake.drives.Drive`.
+        has_own_world: see `evaluation.drives.Drive`.
     """
 
     files: list[Path]
@@ -79,7 +81,7 @@ class FileDrive(Drive):
             notes: notes for the user on how the drive was read.
             scenario: see `evaluation.drives.Drive.scenario`.
             unit: the LiDAR, if the data set has only one, as in
-                `cns_drake.drives.lidar_field`.
+                `evaluation.drives.lidar_field`.
             lidar: name of the LiDAR, if a drive can have several. It follows
                 the name of the drive.
         """

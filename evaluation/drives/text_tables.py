@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import (
+from evaluation.base import (
     NS_PER_S,
     InputError,
     decode_text,

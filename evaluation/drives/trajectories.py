@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import NS_PER_S, InputError, poses, value_errors
-from cns_drake.drives import StampedPoses
+from evaluation.base import NS_PER_S, InputError, poses, value_errors
+from evaluation.drives.stamped_poses import StampedPoses
 from evaluation.drives.text_tables import (
     check_finite,
     check_increasing,

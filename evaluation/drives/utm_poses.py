@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import InputError
-from cns_drake.drives import ORIGIN
+from evaluation.base import InputError
+from evaluation.drives.mulran_frames import ORIGIN
 
 # The zone of MulRan and HeLiPR.
 DATUM = "utm-52n"

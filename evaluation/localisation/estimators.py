@@ -23,8 +23,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 import small_gicp
 
-from cns_drake.base import InputError, did_you_mean, poses
 from evaluation.alignment import Surface, covariances
+from evaluation.base import InputError, did_you_mean, poses
 from evaluation.localisation.localisation_map import (
     FEWEST_POINTS,
     LocalisationMap,

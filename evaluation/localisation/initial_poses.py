@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError, poses
+from evaluation.base import InputError, poses
 
 # Greatest distance of a start [m]; beyond it lies place recognition.
 FARTHEST_START = 50.0

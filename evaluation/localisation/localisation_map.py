@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import small_gicp
 
-from cns_drake.base import InputError, poses, track, xyz
-from cns_drake.drives import Drive
 from evaluation.alignment import Surface, make_surface
+from evaluation.base import InputError, poses, track, xyz
 from evaluation.clouds import OnNote, no_note, read_blocks, read_cloud
 from evaluation.drives import (
     NOT_FINITE,
+    Drive,
     FileDrive,
     JoinedDrive,
     PosedFiles,

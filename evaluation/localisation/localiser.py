@@ -13,10 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import InputError, errors_at, from_xyz, poses, track, xyz
-from cns_drake.drives import Drive
 from evaluation.alignment import Surface, point_to_plane_hessian
-from evaluation.drives import cropped, sample_frames
+from evaluation.base import InputError, errors_at, from_xyz, poses, track, xyz
+from evaluation.drives import Drive, cropped, sample_frames
 from evaluation.localisation.estimators import Estimator
 from evaluation.localisation.initial_poses import InitialPose, Starts
 from evaluation.localisation.localisation_map import (

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import write_csv
+from evaluation.base import write_csv
 from evaluation.clouds import OnNote
 from evaluation.localisation.localisation_map import FEWEST_POINTS
 from evaluation.recognition import auroc

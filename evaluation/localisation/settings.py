@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 import math
 from typing import Any
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 
 # Greatest coordinate of a point that is used, along each axis of the LiDAR [m].
 HALF_EXTENT = 100.0

@@ -7,9 +7,8 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError, poses, track
-from cns_drake.drives import Drive
-from evaluation.drives import sample_frames, travelled
+from evaluation.base import InputError, poses, track
+from evaluation.drives import Drive, sample_frames, travelled
 from evaluation.localisation.initial_poses import InitialPose, Starts
 from evaluation.localisation.localiser import Localiser, Query, path_axes
 from evaluation.localisation.results import (

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base import InputError, num_cores, track
+from evaluation.base import InputError, num_cores, track
 from evaluation.drives import sample_frames
 from evaluation.map_update.labels import SIDES, PairLabels
 from evaluation.map_update.nearest_points import nearest_distances

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cns_drake.base import poses, xyz
+from evaluation.base import poses, xyz
 from evaluation.maps import CELLS_PER_AXIS, cell_keys
 
 # Side of the cells of which each keeps one point [m].

@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import InputError, json_values
+from evaluation.base import InputError, json_values
 from evaluation.map_update.labels import SIDES, Label, PairLabels
 from evaluation.map_update.nearest_points import nearest_distances
 from evaluation.map_update.sessions import SessionPair

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     completing,
     draft_folder,
@@ -36,9 +36,8 @@ from cns_drake.base import (
     user_errors,
     xyz,
 )
-from cns_drake.drives import Drive, check_same_world
 from evaluation.clouds import read_blocks, read_cloud, read_npy
-from evaluation.drives import read_poses, sample_frames
+from evaluation.drives import Drive, check_same_world, read_poses, sample_frames
 from evaluation.map_update.labels import (
     MOVING_CLASSES,
     SIDES,

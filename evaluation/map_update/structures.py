@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import is_there, read_records, whole_number, write_csv
+from evaluation.base import is_there, read_records, whole_number, write_csv
 from evaluation.map_update.labels import MOVING_CLASSES, SIDES, Label
 from evaluation.map_update.sessions import Session, SessionPair
 

@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.base import poses, xyz
-from cns_drake.drives import Drive
-from evaluation.drives import MovedDrive
+from evaluation.base import poses, xyz
+from evaluation.drives import Drive, MovedDrive
 from evaluation.map_update.upkeep import Updates
 from evaluation.recognition import TOLERANCE, SeenSurfaces
 

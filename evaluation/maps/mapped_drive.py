@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from cns_drake.base import track
-from cns_drake.drives import Drive
-from evaluation.drives import RecentScans
+from evaluation.base import track
+from evaluation.drives import Drive, RecentScans
 from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator, VoxelMap
 
 # Divisions of a cell's side for pictures, with a point in each 0.5 m.

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.base import compiled, from_xyz, poses, track
-from cns_drake.drives import Drive
+from evaluation.base import compiled, from_xyz, poses, track
+from evaluation.drives import Drive
 
 # Side of a voxel [m].
 VOXEL_SIZE = 5.0

@@ -40,7 +40,7 @@ from pydantic import computed_field
 from scipy.ndimage import correlate1d
 from scipy.special import softmax
 
-from cns_drake.base import InputError, read_bytes, read_npz
+from evaluation.base import InputError, read_bytes, read_npz
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.network_weights import Weights, checked_weights
 from evaluation.methods.registry import register

@@ -44,7 +44,7 @@ from pydantic import (
 )
 from scipy.spatial import cKDTree
 
-from cns_drake.base import compiled, rotated
+from evaluation.base import compiled, rotated
 from evaluation.methods.btc_keypoints import (
     Keypoints,
     count_bits,

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base import compiled, product
+from evaluation.base import compiled, product
 
 # Fixed in the public program: side of a square that may contain one keypoint
 # [cells].

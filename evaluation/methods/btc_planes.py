@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from cns_drake.base import compiled
+from evaluation.base import compiled
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
 
-from cns_drake.base import compiled, poses
+from evaluation.base import compiled, poses
 from evaluation.maps import extremes
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from pydantic import computed_field
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     check_regular,
     note,

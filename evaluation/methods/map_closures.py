@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from pydantic import PositiveFloat, PositiveInt
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.maps import downsample
 from evaluation.methods.method import Method, MethodConfig, PlaceScan
 from evaluation.methods.registry import register

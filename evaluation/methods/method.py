@@ -11,8 +11,8 @@ from typing import ClassVar, Generic, Literal, TypeVar
 import numpy as np
 from pydantic import ConfigDict, NonNegativeFloat
 
-from cns_drake.base import InputError, InputModel, poses
-from cns_drake.drives import LidarField
+from evaluation.base import InputError, InputModel, poses
+from evaluation.drives import LidarField
 
 Descriptor = TypeVar("Descriptor")
 Database = TypeVar("Database")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import InputError, did_you_mean, errors_at, read_only
+from evaluation.base import InputError, did_you_mean, errors_at, read_only
 from evaluation.methods.method import (
     Method,
     check_class,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 
 # Name of a parameter, such as `layer.weight` -> its values.
 Weights = Mapping[str, np.ndarray]

@@ -24,7 +24,7 @@ import traceback
 from types import ModuleType
 from typing import Any
 
-from cns_drake.base import InputError, errors_at
+from evaluation.base import InputError, errors_at
 from evaluation.methods.method import Method
 
 # Functions of the interface that a method's author may have written.
@@ -267,7 +267,9 @@ def _is_below(place: str, folders: tuple[str, ...]) -> bool:
 def _installed() -> tuple[str, ...]:
     """Returns the folders of Python, of its packages and of this project."""
     project = Path(__file__).parents[2]
-    ours = (str(project / "evaluation"), str(project / "cns_drake"))
+    ours = [
+        str(project / name) for name in ("evaluation", "worlds", "cns_drake")
+    ]
     return (*sysconfig.get_paths().values(), *ours)
 
 

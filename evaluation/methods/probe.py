@@ -29,7 +29,7 @@ import numpy as np
 from pydantic import PositiveFloat, PositiveInt
 from scipy.ndimage import gaussian_filter1d
 
-from cns_drake.base import poses
+from evaluation.base import poses
 from evaluation.maps import packed_cells
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from cns_drake.base import (
+from evaluation.base import (
     Family,
     InputError,
     describe_validation_error,

@@ -27,7 +27,7 @@ import scipy.fft
 import scipy.sparse
 import small_gicp
 
-from cns_drake.base import compiled, poses
+from evaluation.base import compiled, poses
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register
 

@@ -35,7 +35,7 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 from scipy.spatial import cKDTree
 
-from cns_drake.base import poses
+from evaluation.base import poses
 from evaluation.maps import downsample
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register

@@ -16,8 +16,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from cns_drake.base import poses
-from cns_drake.drives import LidarField
+from evaluation.base import poses
+from evaluation.drives import LidarField
 from evaluation.maps import Z_ORIGIN, downsample
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register

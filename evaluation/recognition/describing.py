@@ -9,9 +9,8 @@ from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
-from cns_drake.base import InputError, track
-from cns_drake.drives import Drive
-from evaluation.drives import QuerySensor, cloud_at, sample_frames
+from evaluation.base import InputError, track
+from evaluation.drives import Drive, QuerySensor, cloud_at, sample_frames
 from evaluation.methods import Method, check_number
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol

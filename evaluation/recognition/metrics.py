@@ -19,7 +19,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from cns_drake.base import Family, InputError, errors_at, no_such
+from evaluation.base import Family, InputError, errors_at, no_such
 from evaluation.methods import as_users_code, run_module
 from evaluation.recognition.precision_recall import (
     WeightedMetrics,

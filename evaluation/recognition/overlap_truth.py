@@ -17,9 +17,8 @@ from typing import Protocol
 
 import numpy as np
 
-from cns_drake.base import InputError, poses, read_records, track, write_csv
-from cns_drake.drives import Drive
-from evaluation.drives import cloud_at, sample_frames
+from evaluation.base import InputError, poses, read_records, track, write_csv
+from evaluation.drives import Drive, cloud_at, sample_frames
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
 

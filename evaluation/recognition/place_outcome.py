@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.methods import Method
 from evaluation.recognition.metrics import Mode, Number, numbers_of
 from evaluation.recognition.protocol import RetrievalProtocol

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 
 # All places are kept.
 KEEP_ALL = "all"

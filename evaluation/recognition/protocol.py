@@ -6,13 +6,12 @@ from dataclasses import asdict, dataclass, replace
 import math
 from typing import TYPE_CHECKING, Any
 
-from cns_drake.base import InputError, no_such
+from evaluation.base import InputError, no_such
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from cns_drake.drives import Drive
-    from evaluation.drives import QuerySensor
+    from evaluation.drives import Drive, QuerySensor
     from evaluation.methods import Method, PlaceScan
 
 
@@ -240,7 +239,7 @@ class RetrievalProtocol:
                 as the height of the LiDAR.
         """
         # Imported here: it takes time, and options need only the fields.
-        from cns_drake.base import fingerprint
+        from evaluation.base import fingerprint
 
         return fingerprint({**self._counted_fields, **further})[:_DIGEST_LENGTH]
 

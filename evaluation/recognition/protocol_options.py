@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from cns_drake.base import with_options
+from evaluation.base import with_options
 from evaluation.recognition.protocol import (
     PROTOCOLS,
     RECORDED_PROTOCOL,

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from cns_drake.base import poses, read_only
+from evaluation.base import poses, read_only
 from evaluation.recognition.precision_recall import PrCurve, pr_curve
 
 # With fewer places, sorting all of them is as quick.

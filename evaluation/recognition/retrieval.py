@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from cns_drake.drives import Drive, check_same_world
+from evaluation.drives import Drive, check_same_world
 from evaluation.methods import Method
 from evaluation.recognition.describing import describe_drive
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     completing,
     listed,

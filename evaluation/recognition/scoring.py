@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import InputError, read_only
+from evaluation.base import InputError, read_only
 from evaluation.methods import Method, checked_scores
 from evaluation.recognition.query_outcomes import ranked_places
 

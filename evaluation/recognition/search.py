@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import track
+from evaluation.base import track
 from evaluation.methods import Method, checked_scores
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 from evaluation.recognition.geometric_verification import estimated_poses

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import compiled
+from evaluation.base import compiled
 
 # Greatest distance of a shown point from a surface [m].
 TOLERANCE = 0.2

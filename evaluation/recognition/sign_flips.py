@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import json_values
+from evaluation.base import json_values
 from evaluation.recognition.query_outcomes import QueryOutcomes, common_blocks
 
 # A difference is significant if its p-value is below this value; intervals

@@ -11,8 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from cns_drake.base import figure_style
-from cns_drake.base import save_figure as write_figure
+from evaluation.base import figure_style
+from evaluation.base import save_figure as write_figure
 
 # The formats of pictures, the one for the page last.
 PIXELS = ("png", "webp")

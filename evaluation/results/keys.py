@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import Any
 
-from cns_drake.base import InputError, __version__, did_you_mean
+from evaluation.base import InputError, __version__, did_you_mean
 from evaluation.recognition import Metric, RetrievalProtocol
 
 # The beginning of a factor that is a setting of a method.

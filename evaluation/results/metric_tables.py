@@ -8,7 +8,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.recognition import METRICS, PROTOCOLS, metric_named
 from evaluation.results.keys import PROTOCOL_BASE, SETTINGS
 from evaluation.results.table import (

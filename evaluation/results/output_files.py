@@ -12,7 +12,7 @@ from pathlib import Path
 import re
 from typing import NamedTuple
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     check_writable,
     completing,

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from matplotlib.markers import MarkerStyle
 import numpy as np
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     __version__,
     make_folder,

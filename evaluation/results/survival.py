@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base import json_values
+from evaluation.base import json_values
 from evaluation.recognition import LEAST_CITIES, Interval, city_interval
 from evaluation.results.keys import FROZEN_REDRAW
 from evaluation.results.ranking import common_conditions

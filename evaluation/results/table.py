@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     check_separator,
     csv_text,

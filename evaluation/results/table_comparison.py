@@ -12,7 +12,13 @@ import zlib
 
 import numpy as np
 
-from cns_drake.base import InputError, doing, json_values, no_such, value_errors
+from evaluation.base import (
+    InputError,
+    doing,
+    json_values,
+    no_such,
+    value_errors,
+)
 from evaluation.recognition import (
     LEAST_CITIES,
     METRICS,

@@ -5,7 +5,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 import numpy as np
 
-from cns_drake.base import figure_style
+from evaluation.base import figure_style
 from evaluation.localisation import LOST, RIGHT_TRANSLATION
 from evaluation.results.figure_files import save_figure
 from evaluation.results.styles import INK, PALE

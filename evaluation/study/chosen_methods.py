@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 
-from cns_drake.base import InputError, did_you_mean, no_such, repeated
+from evaluation.base import InputError, did_you_mean, no_such, repeated
 from evaluation.methods import (
     Method,
     MethodConfig,

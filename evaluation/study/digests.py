@@ -15,7 +15,7 @@ import os
 from pathlib import Path
 import time
 
-from cns_drake.base import cache_folder, check_regular, user_errors, write_text
+from evaluation.base import cache_folder, check_regular, user_errors, write_text
 
 _BLOCK_BYTES = 1 << 20
 # A file that was changed so recently may change again without another time:

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     Reporter,
     Step,
@@ -19,9 +19,14 @@ from cns_drake.base import (
     make_folder,
     xyz,
 )
-from cns_drake.drives import Drive
 from evaluation.change import DriveMap
-from evaluation.drives import RecentScans, cropped, sample_frames, within_cube
+from evaluation.drives import (
+    Drive,
+    RecentScans,
+    cropped,
+    sample_frames,
+    within_cube,
+)
 from evaluation.maps import (
     CELL_SIZE,
     MappedDrive,

@@ -30,7 +30,7 @@ import weakref
 import numpy as np
 import zstandard
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     Reporter,
     Step,

@@ -8,9 +8,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from cns_drake.base import Reporter, track
-from cns_drake.drives import Drive
-from evaluation.drives import cloud_at
+from evaluation.base import Reporter, track
+from evaluation.drives import Drive, cloud_at
 from evaluation.methods import Method
 from evaluation.recognition import (
     KEEP_ALL,

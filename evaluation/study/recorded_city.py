@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cns_drake.base import Job, Reporter, doing, make_folder
+from evaluation.base import Job, Reporter, doing, make_folder
 from evaluation.recognition import (
     RANDOM_YAW_PROTOCOL,
     PlaceOutcome,

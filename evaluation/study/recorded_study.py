@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Cluster, InputError, Job, Space
+from evaluation.base import Cluster, InputError, Job, Space
 from evaluation.paper import paper, paper_section
 from evaluation.recognition import (
     PAPER_PROTOCOL,

@@ -12,8 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from cns_drake.drives import Drive
-from evaluation.drives import JoinedDrive, MovedDrive, open_drive
+from evaluation.drives import Drive, JoinedDrive, MovedDrive, open_drive
 from evaluation.study.digests import file_digests
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import (
+from evaluation.base import (
     Cluster,
     InputError,
     Job,

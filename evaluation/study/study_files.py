@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import os
 from pathlib import Path
 
-from cns_drake.base import InputError, file_name, user_errors
+from evaluation.base import InputError, file_name, user_errors
 from evaluation.results import check_output
 from evaluation.study.parts import Part
 

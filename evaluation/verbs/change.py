@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import json_values, note
-from cns_drake.drives import Drive
 from evaluation.alignment import When, open_in_one_world
+from evaluation.base import json_values, note
 from evaluation.change import (
     ChangeReport,
     DriveMap,
@@ -19,7 +18,7 @@ from evaluation.change import (
     same_stage_partner,
     spread_over_grids,
 )
-from evaluation.drives import NOT_FINITE, Reading
+from evaluation.drives import NOT_FINITE, Drive, Reading
 from evaluation.recognition import numbers_of
 from evaluation.results import LAST, OWN, STAGE, QueryRows, Results
 from evaluation.verbs.measured import Measured, map_of, pair_key, rows_of

@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base import InputError, json_values, note
-from cns_drake.drives import Drive
 from evaluation.alignment import When, open_in_one_world
-from evaluation.drives import Reading
+from evaluation.base import InputError, json_values, note
+from evaluation.drives import Drive, Reading
 from evaluation.localisation import (
     FEWEST_POINTS,
     OneScan,

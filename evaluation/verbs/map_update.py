@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import InputError, Reporter, json_values, no_such, one_line
+from evaluation.base import InputError, Reporter, json_values, no_such, one_line
 from evaluation.map_update import BASELINES, PairLabels, read_pair
 from evaluation.recognition import numbers_of
 from evaluation.results import QueryRows, Results

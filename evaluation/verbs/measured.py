@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Reporter, one_line
-from cns_drake.drives import Drive
+from evaluation.base import Reporter, one_line
+from evaluation.drives import Drive
 from evaluation.recognition import (
     RANDOM_YAW_PROTOCOL,
     Interval,

@@ -11,10 +11,15 @@ from typing import Any, get_args
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from cns_drake.base import InputError, check_regular, json_values, no_such, note
-from cns_drake.drives import Drive
 from evaluation.alignment import When, open_in_one_world
-from evaluation.drives import NOT_FINITE, CountedDrive, Reading
+from evaluation.base import (
+    InputError,
+    check_regular,
+    json_values,
+    no_such,
+    note,
+)
+from evaluation.drives import NOT_FINITE, CountedDrive, Drive, Reading
 from evaluation.methods import Method
 from evaluation.recognition import (
     PROTOCOLS,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from cns_drake.base import Cluster, choose_cluster, note
+from evaluation.base import Cluster, choose_cluster, note
 from evaluation.recognition import PROTOCOLS, RetrievalProtocol
 from evaluation.results import PrintStyle
 from evaluation.study import choose_methods, find_recordings, study_recordings

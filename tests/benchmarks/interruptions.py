@@ -84,9 +84,10 @@ GRACE = 1.0
 
 def make_inputs(folder: Path) -> None:
     """Makes what the commands read, unless it is there."""
-    from cns_drake.scenarios import load_scenario, shipped_maps
+    from cns_drake.scenarios import load_scenario
     from cns_drake.simulation import simulate
     import evaluation
+    from worlds.maps import shipped_maps
 
     for name in DRIVES:
         if not (folder / "drives" / name).exists():

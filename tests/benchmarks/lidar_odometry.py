@@ -37,7 +37,6 @@ import numpy as np
 from rosbags.highlevel import AnyReader
 import yaml
 
-from cns_drake.base import poses
 from cns_drake.recording import START_NS
 from cns_drake.scenarios import (
     Scenario,
@@ -46,6 +45,7 @@ from cns_drake.scenarios import (
     plan_drive,
 )
 from cns_drake.simulation import simulate
+from evaluation.base import poses
 from evaluation.drives import travelled
 
 _TURNS = 10

@@ -25,10 +25,10 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.model_selection import GroupKFold, cross_val_score
 from threadpoolctl import threadpool_limits
 
-from cns_drake.drives import Drive
 from cns_drake.scenarios import RideConfig
 from cns_drake.simulation import SimulatedDrive
 from evaluation import open_drive
+from evaluation.drives import Drive
 
 DRIVES = ("riverside_02", "metropolis_04", "suburbia_02")
 # Of a revolution of KITTI's LiDAR, by its manual.

@@ -31,14 +31,14 @@ from processes import in_process
 from stages import Open3dStage, read_stage
 import zstandard
 
-from cns_drake.base import num_cores
-from cns_drake.drives import serialize
 from cns_drake.motion import VehicleMotion
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.recording import FRAME_PERIOD, BagWriter, McapRecorder
 from cns_drake.scenarios import Scenario, load_scenario, plan_drive
 from cns_drake.sensors import Lidar, OdometrySensor, make_pattern, sensor_pose
 from cns_drake.simulation import simulate
+from evaluation.base import num_cores
+from evaluation.drives import serialize
 
 DRIVES = ("metropolis_04", "downtown_04")
 # Step -> what does it; of calls within calls, the innermost counts.

@@ -23,15 +23,15 @@ import sys
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.drives import Drive
 from cns_drake.motion import pose_at
 from cns_drake.scenarios import (
     DrivePlan,
     RideConfig,
     Scenario,
     load_scenario,
-    recordable_drives,
 )
+from evaluation.drives import Drive
+from worlds.maps import recordable_drives
 
 # Time between two poses [s].
 _PERIOD = 0.1

@@ -17,8 +17,8 @@ import sys
 
 import numpy as np
 
-from cns_drake.base import poses
 from evaluation import map_drive, open_drive
+from evaluation.base import poses
 from evaluation.change import lacks_counterpart, temporal_change
 from evaluation.drives import sample_frames
 from evaluation.maps import CELL_SIZE, VOXEL_SIZE, VoxelMap

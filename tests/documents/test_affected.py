@@ -9,7 +9,7 @@ import pytest
     [
         # Far away within a package, through a door and three modules.
         ("cns_drake/scene/test_sdf_worlds.py", "scene/obj_check.py", True),
-        ("cns_drake/roads/test_route.py", "scene/obj_check.py", False),
+        ("worlds/roads/test_route.py", "scene/obj_check.py", False),
         # In another package, through its door alone.
         ("cns_drake/sensors/test_lidar.py", "ray_casting/rays.py", False),
         (
@@ -19,9 +19,9 @@ import pytest
         ),
         # Members of families, which nothing imports.
         ("cns_drake/transient/test_snow.py", "transient/snow.py", True),
-        ("cns_drake/roads/test_towns.py", "transient/snow.py", False),
+        ("worlds/roads/test_towns.py", "transient/snow.py", False),
         # One in a folder without tests of its own.
-        ("cns_drake/city/test_buildings.py", "city/buildings/barn.py", True),
+        ("worlds/city/test_buildings.py", "city/buildings/barn.py", True),
     ],
 )
 def test_a_change_concerns_what_imports_it(test, file, expected):

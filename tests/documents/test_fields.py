@@ -5,10 +5,10 @@ import re
 from helpers import documents
 import pytest
 
-from cns_drake.city import ARCHETYPES, OBJECTS
 from cns_drake.scenarios import Scenario
 from docs import reference_pages
 from docs.reference_pages import CITY, EXPERIMENT, LIDAR, METHODS, SCENARIO
+from worlds.city import ARCHETYPES, OBJECTS
 
 NAMES = sorted(path.name for path in reference_pages.FOLDER.iterdir())
 # Each once, in one order for all processes of a run.

@@ -7,7 +7,7 @@ from helpers import documents
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.clouds import read_cloud
 from evaluation.methods import load_method
 

@@ -13,7 +13,7 @@ from rosbags import rosbag1, rosbag2
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from cns_drake.drives import make_message, message_definition, serialize
+from evaluation.drives import make_message, message_definition, serialize
 
 # Topic, type, stamp [ns], fields of the message.
 Entry = tuple[str, str, int, dict[str, Any]]

@@ -9,8 +9,8 @@ import numpy as np
 from shapely.affinity import rotate
 from shapely.geometry import Polygon, box
 
-from cns_drake.city import ARCHETYPES, sample
 from helpers.mesh_checks import rotation_matrix
+from worlds.city import ARCHETYPES, sample
 
 
 def typical_request(name: str, seed: int):

@@ -5,7 +5,7 @@ import pytest
 import shapely
 from shapely.strtree import STRtree
 
-from cns_drake.city import part_mesh
+from worlds.shapes import part_mesh
 
 # Only parts below this height take ground [m].
 HEADROOM = 2.4

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cns_drake.base import from_xyz
+from evaluation.base import from_xyz
 from evaluation.maps import VoxelAccumulator
 from evaluation.results import DrivenMap
 

@@ -5,8 +5,9 @@ from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 import yaml
 
 from cns_drake.motion import Trajectory
-from cns_drake.roads import LanePath, Speeds, load_road_network, make_lane_path
-from cns_drake.scenarios import Scenario, recordable_drives
+from cns_drake.scenarios import Scenario
+from worlds.maps import recordable_drives
+from worlds.roads import LanePath, Speeds, load_road_network, make_lane_path
 
 SPACING = 2.0
 NO_LIMIT = 100.0

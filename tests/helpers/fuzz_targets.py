@@ -9,12 +9,8 @@ import shutil
 import numpy as np
 import yaml
 
-from cns_drake.base import Cluster, InputError
-from cns_drake.base import InputError as ReadingError
-from cns_drake.city import load_plan, load_stages, make_city
 from cns_drake.export import export_drive
 from cns_drake.pictures import load_views
-from cns_drake.roads import Route, load_road_network, make_lane_path
 from cns_drake.scenarios import (
     Scenario,
     listed_drives,
@@ -27,6 +23,8 @@ from cns_drake.sensors import LidarSection, make_pattern
 from cns_drake.simulation import scan, simulate
 from cns_drake.studies import study_drives
 from evaluation import drives
+from evaluation.base import Cluster, InputError
+from evaluation.base import InputError as ReadingError
 from evaluation.clouds import read_cloud
 from evaluation.study import Study, load_experiment
 from helpers import (
@@ -44,6 +42,8 @@ from helpers.small_city import PLAN, ROADS, STAGES
 from helpers.small_cityjson import CityWriter
 from helpers.small_map import box_visual, world_text
 from helpers.small_osm import write_corner
+from worlds.city import load_plan, load_stages, make_city
+from worlds.roads import Route, load_road_network, make_lane_path
 
 REFUSALS = (InputError, ReadingError)
 

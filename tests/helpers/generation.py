@@ -9,8 +9,8 @@ import pytest
 # The program, with the names of all that its jobs do.
 _PROGRAM = """
 import sys
-from cns_drake.base import program
-from cns_drake.base.progress import JobsListener, Listener, heard_by
+from evaluation.base import program
+from evaluation.base.progress import JobsListener, Listener, heard_by
 from cns_drake.command_line.cli import app
 
 class Printing(Listener, JobsListener):

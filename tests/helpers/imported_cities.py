@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cns_drake.imports import ImportOptions, map_sources
+from worlds.imports import ImportOptions, map_sources
 
 
 def read_city(path, **options):

@@ -9,7 +9,7 @@ import select
 import signal
 import threading
 
-from cns_drake.base import InputError, Step
+from evaluation.base import InputError, Step
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from cns_drake.drives import Drive
 from evaluation.change import (
     ChangeReport,
     DriveMap,
@@ -16,6 +15,7 @@ from evaluation.change import (
     same_stage_partner,
     spread_over_grids,
 )
+from evaluation.drives import Drive
 from evaluation.methods import Method
 from evaluation.recognition import (
     RECORDED_PROTOCOL,

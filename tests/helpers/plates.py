@@ -18,7 +18,7 @@ from cns_drake.sensors import (
     Lidar,
     connect_lidar,
 )
-from cns_drake.units import Response
+from evaluation.lidar_sheets import Response
 
 
 def plate(name, reflectivity, X_WG, size=(0.1, 400.0, 400.0), shape=None):

@@ -2,7 +2,7 @@
 
 import yaml
 
-from cns_drake.roads import load_road_network
+from worlds.roads import load_road_network
 
 # A crossing of a four-lane road (west-east) and a two-lane road, joined in
 # a loop so that no road ends in the open.

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import from_xyz
-from cns_drake.drives import Drive
+from evaluation.base import from_xyz
+from evaluation.drives import Drive
 
 LIDAR_HEIGHT = 1.6
 _RANGE = 45.0

@@ -6,10 +6,10 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 
-from cns_drake.city import OBJECT_MESHES
 from cns_drake.scenarios import TransientConfig
 from cns_drake.scene import load_world
 from cns_drake.transient import change_world, geometry_by_structure
+from worlds.shapes import OBJECT_MESHES
 
 _WORLD = """<?xml version="1.0"?>
 <sdf version="1.9">

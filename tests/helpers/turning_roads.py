@@ -4,7 +4,7 @@ import numpy as np
 import yaml
 
 from cns_drake.motion import Trajectory
-from cns_drake.roads import (
+from worlds.roads import (
     POINT_SPACING,
     Route,
     Speeds,

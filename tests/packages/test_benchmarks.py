@@ -60,7 +60,7 @@ folder, *modules = sys.argv[1:]
 sys.path.insert(0, folder)
 for module in modules:
     importlib.import_module(module)
-sys.modules["cns_drake.base.compilation"].start_compiler()
+sys.modules["evaluation.base.compilation"].start_compiler()
 gc.freeze()
 for line in sys.stdin:
     *outputs, words = json.loads(line)

@@ -59,17 +59,17 @@ def test_who_is_outside_uses_doors(path):
 
 def test_imports_behind_a_door_are_noticed():
     code = """
-import cns_drake.base.units
-from cns_drake.base.units import wrapped
+import evaluation.base.units
+from evaluation.base.units import wrapped
 def late():
     from evaluation.methods import registry
 """
     assert list(inner_imports(code)) == [
-        "cns_drake.base.units",
-        "cns_drake.base.units",
+        "evaluation.base.units",
+        "evaluation.base.units",
         "evaluation.methods.registry",
     ]
-    fine = "from cns_drake.base import poses, wrapped\nimport evaluation\n"
+    fine = "from evaluation.base import poses, wrapped\nimport evaluation\n"
     assert list(inner_imports(fine)) == []
 
 

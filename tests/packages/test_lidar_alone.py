@@ -20,7 +20,7 @@ class Absent:
 
 ABSENT = {"pydantic", "yaml", "open3d", "shapely", "osmium", "mcap", "rosbags",
     "typer", "jinja2", "matplotlib", "PIL", "distributed", "small_gicp"}
-OURS = ("cns_drake.drives", "cns_drake.units", "cns_drake.city",
+OURS = ("evaluation.drives", "evaluation.lidar_sheets", "worlds.city",
     "cns_drake.scenarios", "cns_drake.recording", "evaluation")
 sys.meta_path.insert(0, Absent())
 import numpy as np
@@ -54,7 +54,7 @@ assert abs(x - 5.0) < 1e-5, x
 """
 # The rules of sensors' names are those of recorded drives.
 ADD = """
-OURS = tuple(one for one in OURS if one != "cns_drake.drives")
+OURS = tuple(one for one in OURS if one != "evaluation.drives")
 from cns_drake import SpinningPattern, add_lidar, add_lidar_view
 add_lidar.__name__
 """
@@ -103,4 +103,4 @@ def test_add_lidar_needs_no_data_sheets():
     """Names of presets and files do; patterns of the user's own don't."""
     loaded = modules_after(ADD)
     assert "cns_drake.sensors.lidar_adding" in loaded
-    assert not {n for n in loaded if n.startswith("cns_drake.drives.mcap")}
+    assert not {n for n in loaded if n.startswith("evaluation.drives.mcap")}

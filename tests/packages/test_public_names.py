@@ -101,7 +101,7 @@ def test_the_documents_use_public_names():
 
 def test_private_names_are_noticed():
     code = """from cns_drake.sensors.lidar.lidar import Lidar
-import cns_drake.base.jobs"""
+import evaluation.base.jobs"""
     assert len(private_imports(code)) == 2
 
 

@@ -10,7 +10,7 @@ import zipfile
 
 import pytest
 
-from cns_drake.base import __version__
+from evaluation.base import __version__
 
 ROOT = Path(__file__).parents[2]
 # As in a workflow of a repository.

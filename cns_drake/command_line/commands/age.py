@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import (
+from cns_drake.command_line.suggestions import suggest_reproduction
+from evaluation.base import (
     InputError,
     ended_by_interrupts,
     errors_at_option,
@@ -15,7 +16,6 @@ from cns_drake.base import (
     terminal,
     whole_number,
 )
-from cns_drake.command_line.suggestions import suggest_reproduction
 
 GROUP = "Make cities"
 # Years before today look like options.
@@ -116,8 +116,8 @@ def age(
     if len(maps) != 1:
         raise InputError(f"give one map, not {' '.join(maps) or 'none'}")
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.ageing import age_map, draw_pictures, read_rates
-        from cns_drake.scenarios import recordable_map
+        from worlds.ageing import age_map, draw_pictures, read_rates
+        from worlds.maps import recordable_map
 
     with errors_at_option("--output", "output"):
         aged = age_map(

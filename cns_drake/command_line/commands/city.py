@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import InputError, ended_by_interrupts, note
 from cns_drake.command_line.suggestions import suggest_reproduction
+from evaluation.base import InputError, ended_by_interrupts, note
 
 GROUP = "Make cities"
 
@@ -43,8 +43,8 @@ def city(
         cns-drake city town --new
     """
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.city import differing_files
         from cns_drake.scenarios import build_city
+        from worlds.city import differing_files
 
     if seed is not None and not new:
         raise InputError("--seed: has no effect without --new")

@@ -8,7 +8,9 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import (
+from cns_drake.command_line.suggestions import suggest_evaluation
+from cns_drake.export import export_formats
+from evaluation.base import (
     InputError,
     commands,
     ended_by_interrupts,
@@ -17,8 +19,6 @@ from cns_drake.base import (
     shared_options,
     terminal,
 )
-from cns_drake.command_line.suggestions import suggest_evaluation
-from cns_drake.export import export_formats
 
 GROUP = "Convert for other programs"
 

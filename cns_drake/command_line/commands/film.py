@@ -8,14 +8,14 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import (
+from cns_drake.command_line.suggestions import suggest_page
+from evaluation.base import (
     InputError,
     ended_by_interrupts,
     note,
     shared_options,
     terminal,
 )
-from cns_drake.command_line.suggestions import suggest_page
 
 GROUP = "Drive through them"
 

@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from cns_drake.base import ended_by_interrupts, shared_options, terminal
 from cns_drake.command_line import options
 from cns_drake.command_line.fields import changed, field_options
+from evaluation.base import ended_by_interrupts, shared_options, terminal
 
 GROUP = "Drive through them"
 
@@ -45,8 +45,8 @@ def generate(
             --output drives --jobs 2
     """
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.base import choose_cluster
         from cns_drake.studies import named_drives, record_all
+        from evaluation.base import choose_cluster
 
     cluster = choose_cluster(jobs, scheduler)
     drives = named_drives(names or (), vary, output, cluster)

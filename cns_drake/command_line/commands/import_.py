@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     ended_by_interrupts,
     errors_at_option,
@@ -19,7 +19,7 @@ from cns_drake.base import (
     terminal,
     whole_number,
 )
-from cns_drake.imports import (
+from worlds.imports import (
     REPORT_NAME,
     DriveOn,
     ImportOptions,
@@ -27,7 +27,7 @@ from cns_drake.imports import (
     Undated,
     map_sources,
 )
-from cns_drake.scene import MapFolder
+from worlds.maps import MapFolder
 
 GROUP = "Make cities"
 
@@ -118,8 +118,8 @@ def import_(
         dressed=not plain,
     )
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.imports import import_city, with_usual_growth
         from cns_drake.scenarios import write_table
+        from worlds.imports import import_city, with_usual_growth
 
     options = with_usual_growth(path, options)
     with errors_at_option("--output", "output"):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import ended_by_interrupts, shared_options, terminal
+from evaluation.base import ended_by_interrupts, shared_options, terminal
 
 if TYPE_CHECKING:
     from cns_drake.scenarios import DriveRow

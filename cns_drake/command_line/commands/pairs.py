@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import ended_by_interrupts, note, shared_options, terminal
 from cns_drake.command_line import options
+from evaluation.base import ended_by_interrupts, note, shared_options, terminal
 
 GROUP = "Convert for other programs"
 
@@ -52,8 +52,8 @@ def pairs(
         cns-drake pairs riverside_01 riverside_02 --output pairs
     """
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.base import choose_cluster
         from cns_drake.training import ExportOptions, write_pairs
+        from evaluation.base import choose_cluster
 
     cluster = choose_cluster(jobs, scheduler)
     paths = write_pairs(

@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import (
+from cns_drake.command_line import options
+from evaluation.base import (
     InputError,
     ended_by_interrupts,
     note,
     shared_options,
     terminal,
 )
-from cns_drake.command_line import options
 from evaluation.recognition import RetrievalProtocol, with_protocols
 
 GROUP = "Study what change costs"
@@ -56,8 +56,8 @@ def reproduce(
         cns-drake reproduce metropolis --output study
     """
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.base import choose_cluster
         from cns_drake.studies import reproduce_maps
+        from evaluation.base import choose_cluster
         from evaluation.command_line import show_results
         from evaluation.results import PrintStyle
 

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cns_drake.base import (
+from cns_drake.command_line.fields import changed, field_options
+from evaluation.base import (
     InputError,
     ended_by_interrupts,
     note,
     shared_options,
     terminal,
 )
-from cns_drake.command_line.fields import changed, field_options
 
 if TYPE_CHECKING:
     from cns_drake.scenarios import Scenario

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from cns_drake.base import InputError, ended_by_interrupts, shared_options
 from cns_drake.command_line import options
 from cns_drake.command_line.fields import field_options
+from evaluation.base import InputError, ended_by_interrupts, shared_options
 
 GROUP = "Drive through them"
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     ended_by_interrupts,
     note,
@@ -104,8 +104,8 @@ def study(
     if output is None:
         raise InputError("--output: missing")
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.base import choose_cluster
         from cns_drake.studies import run_study
+        from evaluation.base import choose_cluster
         from evaluation.command_line import show_results
         from evaluation.results import PrintStyle
 

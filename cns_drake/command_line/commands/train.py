@@ -8,13 +8,13 @@ from typing import Annotated, Any
 
 import typer
 
-from cns_drake.base import (
+from cns_drake.command_line.fields import LIDAR_HELP
+from evaluation.base import (
     ended_by_interrupts,
     errors_at_option,
     shared_options,
     terminal,
 )
-from cns_drake.command_line.fields import LIDAR_HELP
 
 GROUP = "Study what change costs"
 
@@ -82,9 +82,9 @@ def train(
         cns-drake train --output mine.npz --minutes 10
     """
     with ended_by_interrupts("cns-drake"):
-        from cns_drake.base import choose_cluster
         from cns_drake.sensors import make_lidar_config
         from cns_drake.training import TrainingPlan, make_weights
+        from evaluation.base import choose_cluster
 
     cluster = choose_cluster(jobs, scheduler)
     # A preset by its name, a data sheet by its content.

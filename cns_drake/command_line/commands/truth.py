@@ -9,14 +9,14 @@ from typing import Annotated, Any
 
 import typer
 
-from cns_drake.base import (
+from cns_drake.command_line.suggestions import suggest_recognition
+from evaluation.base import (
     InputError,
     ended_by_interrupts,
     note,
     shared_options,
     terminal,
 )
-from cns_drake.command_line.suggestions import suggest_recognition
 from evaluation.recognition import RetrievalProtocol
 
 GROUP = "Convert for other programs"

@@ -31,7 +31,6 @@ from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 from cns_drake.scene import (
     GREY,
     PerceptionGeometry,
-    StructureTable,
     TriangleSurface,
     merge_triangles,
     read_perception_geometry,
@@ -45,6 +44,7 @@ from cns_drake.sensors.camera.renderer import (
     class_renderer,
     colour_renderer,
 )
+from worlds.shapes import StructureTable
 
 # Sides of the polygon in place of a circle: true to 0.1 % of the radius.
 _SIDES = 64

@@ -5,8 +5,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from cns_drake.base import Section
 from cns_drake.sensors.sensor_config import Angle, Triple
+from evaluation.base import Section
 
 # In Drake, the principal point of a single pixel lies on its edge: an error.
 _Pixels = Annotated[int, Field(ge=2, le=4096)]

@@ -178,7 +178,7 @@ def _signals(_rng: np.random.Generator) -> np.ndarray:
     return light
 
 
-# Name of a look, as in `cns_drake/scene/materials.yaml` -> the look.
+# Name of a look, as in `worlds/shapes/materials.yaml` -> the look.
 LOOKS = {
     "stop": Look(
         1.0, _sign_painter("white", _octagon(0.5), "#b01818", "STOP"), 0.6, True

@@ -18,8 +18,8 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, LeafSystem
 from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 
-from cns_drake.base import InputError, start_python
 from cns_drake.sensors.camera.looks import tiling_noise
+from evaluation.base import InputError, start_python
 
 # Direction towards the sun.
 SUN_W = np.array([-0.5, 0.55, 0.75]) / np.linalg.norm([-0.5, 0.55, 0.75])

@@ -7,19 +7,19 @@ from typing import Annotated
 
 from pydantic import Field
 
-from cns_drake.base import (
-    InputError,
-    Section,
-    read_yaml,
-    validated,
-    value_errors,
-)
 from cns_drake.sensors.imu.noise import ImuNoise
 from cns_drake.sensors.sensor_config import (
     Mount,
     Triple,
     check_rate,
     field_off_by_default,
+)
+from evaluation.base import (
+    InputError,
+    Section,
+    read_yaml,
+    validated,
+    value_errors,
 )
 
 # The name of the noise's file in a recording.

@@ -17,11 +17,11 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.sensors import Accelerometer, Gyroscope
 
-from cns_drake.base import check_type, is_real
-from cns_drake.drives import IMU_FRAME
 from cns_drake.sensors import carriers, system_names
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
 from cns_drake.sensors.imu.sampling import MEASUREMENTS, last_sample
+from evaluation.base import check_type, is_real
+from evaluation.drives import IMU_FRAME
 
 
 class NoisyImu(LeafSystem):

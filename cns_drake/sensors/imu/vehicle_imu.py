@@ -19,8 +19,6 @@ from pydrake.systems.framework import (
 )
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import product, rotated
-from cns_drake.drives import ImuSamples
 from cns_drake.motion import Trajectory
 from cns_drake.sensors import carriers
 from cns_drake.sensors.imu.config import ImuSection
@@ -31,6 +29,8 @@ from cns_drake.sensors.imu.sampling import (
     is_sample_time,
     last_sample,
 )
+from evaluation.base import product, rotated
+from evaluation.drives import ImuSamples
 
 # Samples that `VehicleImu` computes at a time.
 _BLOCK = 512

@@ -25,7 +25,6 @@ from pydrake.systems.framework import (
     ValueProducer,
 )
 
-from cns_drake.base import check_type, is_real, product, rotated
 from cns_drake.ray_casting import (
     EVERYWHERE,
     NOTHING_KNOWN,
@@ -45,6 +44,7 @@ from cns_drake.sensors.lidar.ray_queries import (
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE, set_points
 from cns_drake.sensors.lidar.scanner import MeasuredReturns, Scanner
 from cns_drake.sensors.lidar.seen_geometry import GeometryView, SeenGeometry
+from evaluation.base import check_type, is_real, product, rotated
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.

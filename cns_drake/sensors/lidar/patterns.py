@@ -10,8 +10,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.base import cos, sin
 from cns_drake.sensors.lidar.beams import BeamPattern, Beams, make_beams
+from evaluation.base import cos, sin
 
 
 @dataclass(frozen=True)

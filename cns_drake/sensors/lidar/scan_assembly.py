@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from pydrake.perception import PointCloud
 
-from cns_drake.base import compiled
 from cns_drake.sensors.lidar.beams import Beams
 from cns_drake.sensors.lidar.measurement import Returns
+from evaluation.base import compiled
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.

@@ -25,18 +25,16 @@ from pydrake.geometry import FrameId, GeometryId, QueryObject, Role
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import Frame, RigidBody
 
-from cns_drake.base import check_type, doing
 from cns_drake.ray_casting import Ball, KnownPoses, Motion, RayCastingScene
 from cns_drake.scene import (
-    MAX_INSTANCE,
     GeometryList,
-    Labels,
     PerceptionGeometry,
     list_geometry,
     number_structures,
     read_geometry,
     structure_name,
 )
+from evaluation.base import MAX_INSTANCE, check_type, doing
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.
@@ -52,8 +50,13 @@ Place: TypeAlias = FrameId | GeometryId | RigidBody | Frame
 class Structures(Protocol):
     """A table from which a LiDAR takes the labels and ids of what it hits."""
 
-    def labels(self, names: Sequence[str]) -> Labels:
-        """Returns the labels and instance ids of structures, by their names."""
+    def labels(
+        self, names: Sequence[str]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Returns the labels and instance ids of structures, by their names.
+
+        The arrays (G,) have the class, the class while it moves, and the id.
+        """
 
 
 @dataclass(frozen=True, kw_only=True)

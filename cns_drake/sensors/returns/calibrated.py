@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import cos, sin
 from cns_drake.ray_casting import RayCastingScene, SceneHits, rotate
-from cns_drake.scene import PerceptionGeometry, StructureTable
+from cns_drake.scene import PerceptionGeometry
 from cns_drake.sensors.lidar.beams import BeamPattern, Beams
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.returns.echoes import Receiver, Reported, report_echoes
@@ -25,7 +24,9 @@ from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
 from cns_drake.sensors.returns.surface_texture import with_texture
 from cns_drake.sensors.returns.tables import join
 from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
-from cns_drake.units import ReturnsSheet, find_sheet
+from evaluation.base import cos, sin
+from evaluation.lidar_sheets import ReturnsSheet, find_sheet
+from worlds.shapes import StructureTable
 
 CLEAR = Weather()
 

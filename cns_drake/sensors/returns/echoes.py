@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import compiled, log
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.link_budget import (
@@ -21,7 +20,8 @@ from cns_drake.sensors.returns.link_budget import (
 from cns_drake.sensors.returns.random_numbers import normal, uniform
 from cns_drake.sensors.returns.tables import join, select
 from cns_drake.sensors.returns.weather import Scattering
-from cns_drake.units import Response, ReturnsSheet
+from evaluation.base import compiled, log
+from evaluation.lidar_sheets import Response, ReturnsSheet
 
 # The index of the weather, in place of a geometry's.
 SCATTERED = -2

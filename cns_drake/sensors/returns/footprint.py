@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import compiled
 from cns_drake.sensors.returns.light import BeamHits, Shots
 from cns_drake.sensors.returns.random_numbers import uniform
+from evaluation.base import compiled
 
 # Numbers of a beam's random draws for the rays at its sides, two per ray.
 _SIDE_DRAW = 0

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import compiled
 from cns_drake.ray_casting import SceneHits
 from cns_drake.sensors.returns.materials import BEADS, RETRO, Materials
+from evaluation.base import compiled
 
 # The retro-reflective sheeting of signs and plates works up to this angle.
 _RETRO_COSINE = 0.5

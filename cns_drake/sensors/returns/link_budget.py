@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import erf
 
-from cns_drake.base import compiled
-from cns_drake.units import THRESHOLD_SNR, ReturnsSheet
+from evaluation.base import compiled
+from evaluation.lidar_sheets import THRESHOLD_SNR, ReturnsSheet
 
 _Value = TypeVar("_Value", float, np.ndarray)
 

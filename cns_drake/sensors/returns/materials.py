@@ -6,12 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.scene import (
-    Material,
     PerceptionGeometry,
-    StructureEntry,
-    StructureTable,
     Surface,
     is_closed,
+)
+from worlds.shapes import (
+    Material,
+    StructureEntry,
+    StructureTable,
 )
 
 # Kinds of materials.
@@ -72,7 +74,7 @@ def find_materials(
     "reflectivity") or, without this property, the value for its structure in
     the column `reflectivity` of `structures`. In both cases, the geometry is a
     smooth Lambertian reflector. Without either value, the reflectivity follows
-    from the material of the part, see `cns_drake.scene.materials`, and from the
+    from the material of the part, see `worlds.shapes.materials`, and from the
     colour.
 
     Args:

@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import compiled
 from cns_drake.sensors.returns.footprint import Sides
 from cns_drake.sensors.returns.light import (
     BeamHits,
@@ -28,6 +27,7 @@ from cns_drake.sensors.returns.light import (
 from cns_drake.sensors.returns.materials import GLASS, LEAVES, SPRAYS, Materials
 from cns_drake.sensors.returns.random_numbers import cell_number
 from cns_drake.sensors.returns.tables import join, select
+from evaluation.base import compiled
 
 # Refractive index of window glass near 900 nm.
 _GLASS_INDEX = 1.52

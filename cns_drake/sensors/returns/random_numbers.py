@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.base import compiled
+from evaluation.base import compiled
 
 # Room for the draws of one beam.
 DRAWS_PER_BEAM = 256

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.base import compiled
 from cns_drake.ray_casting import SurfaceFrames
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.materials import Materials
 from cns_drake.sensors.returns.random_numbers import cell_number
+from evaluation.base import compiled
 
 # Unit vectors along the axes of the hash cells, as the rows of a rotation
 # matrix. The axes are oblique to those of a surface's frame, so that walls and

@@ -27,8 +27,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import exp
 from cns_drake.sensors.returns import link_budget
+from evaluation.base import exp
 
 
 def _geometric_sequence(first: float, last: float, count: int) -> np.ndarray:

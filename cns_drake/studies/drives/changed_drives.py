@@ -8,19 +8,6 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from cns_drake.ageing import LAST_YEAR
-from cns_drake.base import (
-    InputError,
-    Section,
-    did_you_mean,
-    errors_at,
-    no_such,
-    poses,
-    read_records,
-    validated,
-    value_errors,
-)
-from cns_drake.roads import RoadNetwork, Route, draw_route, load_road_network
 from cns_drake.scenarios import (
     Scenario,
     check_files,
@@ -39,10 +26,23 @@ from cns_drake.studies.drives.viewpoints import (
     with_lidars_beside,
     with_lidars_moved,
 )
-from cns_drake.units import check_preset, is_sheet_file
+from evaluation.base import (
+    InputError,
+    Section,
+    did_you_mean,
+    errors_at,
+    no_such,
+    poses,
+    read_records,
+    validated,
+    value_errors,
+)
+from evaluation.lidar_sheets import check_preset, is_sheet_file
 from evaluation.map_update import MAINTAINERS, NOT_MAINTAINED
 from evaluation.results import LAST, OWN
 from evaluation.study import FLEET, SESSIONS, Changes
+from worlds.ageing import LAST_YEAR
+from worlds.roads import RoadNetwork, Route, draw_route, load_road_network
 
 # Fields that only the query can have: they change its scans.
 QUERY_FIELDS = ("turn_queries", "tilt_queries", "hide_sector")

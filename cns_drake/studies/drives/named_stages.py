@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from cns_drake.base import InputError, natural_key
 from cns_drake.scenarios import Scenario
+from evaluation.base import InputError, natural_key
 from evaluation.results import LAST, OWN
 
 # The first stage of a map.

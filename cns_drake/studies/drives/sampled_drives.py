@@ -5,9 +5,9 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from cns_drake.ageing import LAST_YEAR
-from cns_drake.base import Section
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS
+from evaluation.base import Section
+from worlds.ageing import LAST_YEAR
 
 _RouteLength = Annotated[float, Field(gt=0.0, le=100_000.0)]
 

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from cns_drake.base import InputError
 from cns_drake.scenarios import Scenario
+from evaluation.base import InputError
 
 # Named viewpoints of the database: offset to the left [m] and heading [deg].
 VIEWPOINTS: Mapping[str, tuple[float, float]] = {

@@ -6,18 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import InputError, errors_at, natural_key
 from cns_drake.scenarios import (
     Scenario,
     load_scenario,
-    recordable_map,
-    recordable_maps,
-    shipped_maps,
 )
-from cns_drake.scene import MapFolder
 from cns_drake.studies.maps.frozen_redraws import redraw_frozen
 from cns_drake.studies.maps.made_maps import made_map_step
 from cns_drake.studies.maps.map_step import make_maps
+from evaluation.base import InputError, errors_at, natural_key
 from evaluation.results import FROZEN_REDRAW
 from evaluation.study import (
     MadeMap,
@@ -25,6 +21,12 @@ from evaluation.study import (
     Study,
     drives_by_map,
     find_recordings,
+)
+from worlds.maps import (
+    MapFolder,
+    recordable_map,
+    recordable_maps,
+    shipped_maps,
 )
 
 

@@ -14,10 +14,6 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base import Cluster, InputError, read_records, read_yaml
-from cns_drake.city import make_city
-from cns_drake.scenarios import shipped_maps, worlds_folder
-from cns_drake.scene import MapFolder
 from cns_drake.studies.maps.map_step import make_maps
 from cns_drake.studies.maps.redrawing import (
     RedrawCity,
@@ -25,7 +21,14 @@ from cns_drake.studies.maps.redrawing import (
     redrawn_inputs,
 )
 from cns_drake.studies.maps.turned_inputs import turned_bounds, turned_content
+from evaluation.base import Cluster, InputError, read_records, read_yaml
 from evaluation.results import FROZEN_REDRAW
+from worlds.city import make_city
+from worlds.maps import (
+    MapFolder,
+    shipped_maps,
+    worlds_folder,
+)
 
 _COLUMNS = ("map", "number", "seed", "turn_deg", "stages")
 # The driver, frozen with the seeds.

@@ -6,14 +6,10 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from cns_drake.ageing import (
-    DEFAULT_RATES,
-    LAST_YEAR,
-    age_map,
-    check_rates,
-    read_rates,
-)
-from cns_drake.base import (
+from cns_drake.scenarios import Scenario, digest_file
+from cns_drake.studies.maps.map_step import MakeMap, make_maps
+from cns_drake.studies.maps.redrawing import RedrawCity, redrawn_city
+from evaluation.base import (
     Cluster,
     InputError,
     Reporter,
@@ -21,12 +17,16 @@ from cns_drake.base import (
     fingerprint,
     read_bytes,
 )
-from cns_drake.imports import ImportOptions, import_city, map_sources
-from cns_drake.scenarios import Scenario, digest_file
-from cns_drake.scene import MapFolder
-from cns_drake.studies.maps.map_step import MakeMap, make_maps
-from cns_drake.studies.maps.redrawing import RedrawCity, redrawn_city
 from evaluation.study import Experiment, MadeMap
+from worlds.ageing import (
+    DEFAULT_RATES,
+    LAST_YEAR,
+    age_map,
+    check_rates,
+    read_rates,
+)
+from worlds.imports import ImportOptions, import_city, map_sources
+from worlds.maps import MapFolder
 
 _FACTOR = "factor"
 # Seeds of redraws are below this number.

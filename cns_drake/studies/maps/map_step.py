@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 import shutil
 
-from cns_drake.base import (
+from evaluation.base import (
     Cluster,
     InputError,
     Job,

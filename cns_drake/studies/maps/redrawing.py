@@ -12,7 +12,8 @@ from pathlib import Path
 
 import yaml
 
-from cns_drake.base import (
+from cns_drake.studies.maps.map_step import MakeMap
+from evaluation.base import (
     Reporter,
     __version__,
     draft_folder,
@@ -20,9 +21,11 @@ from cns_drake.base import (
     read_yaml,
     user_errors,
 )
-from cns_drake.city import generate_city, load_plan
-from cns_drake.scene import STAGES_NAME, MapFolder
-from cns_drake.studies.maps.map_step import MakeMap
+from worlds.city import generate_city, load_plan
+from worlds.maps import (
+    STAGES_NAME,
+    MapFolder,
+)
 
 # Start of the first line of each input that is written here.
 _MARK = "# Of a city drawn anew by cns-drake"
@@ -65,7 +68,7 @@ class RedrawCity(MakeMap):
 
         Override this function for files that contain names of structures,
         because these names follow from the other input files. To find the
-        names, call `cns_drake.city.generation.city_structures.make_city` with
+        names, call `worlds.city.generation.city_structures.make_city` with
         `draft`.
 
         Args:

@@ -6,14 +6,6 @@ import math
 import re
 from typing import Any, NamedTuple
 
-from cns_drake.base import (
-    InputError,
-    errors_at,
-    fingerprint,
-    merged,
-    natural_key,
-    validated,
-)
 from cns_drake.scenarios import Scenario
 from cns_drake.studies.drives.changed_drives import (
     DATABASE_FIELDS,
@@ -30,6 +22,14 @@ from cns_drake.studies.drives.changed_drives import (
 from cns_drake.studies.drives.named_stages import MissingError, find_stage
 from cns_drake.studies.drives.sampled_drives import Fleet
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
+from evaluation.base import (
+    InputError,
+    errors_at,
+    fingerprint,
+    merged,
+    natural_key,
+    validated,
+)
 from evaluation.map_update import NOT_MAINTAINED
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
 from evaluation.results import CAUSE, LEVEL, NO_CAUSE, OWN

@@ -8,13 +8,13 @@ import tempfile
 
 import numpy as np
 
-from cns_drake.base import Reporter
 from cns_drake.ground_truth import (
     LabelledDrive,
     is_there,
     label_points,
     labelled_drive,
 )
+from evaluation.base import Reporter
 from evaluation.map_update import (
     TRUTH,
     Label,

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from cns_drake.base import Job, fingerprint
 from cns_drake.scenarios import Scenario
 from cns_drake.simulation import SimulationSource
 from cns_drake.studies.drives.named_stages import MissingError
@@ -16,6 +15,7 @@ from cns_drake.studies.pairs.map_upkeep import (
     update_maps,
 )
 from cns_drake.studies.recording import is_recorded
+from evaluation.base import Job, fingerprint
 from evaluation.map_update import NOT_MAINTAINED
 from evaluation.results import CAUSE
 from evaluation.study import (

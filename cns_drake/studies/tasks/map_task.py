@@ -4,9 +4,9 @@ from importlib.util import find_spec
 from pathlib import Path
 import tempfile
 
-from cns_drake.base import Reporter
 from cns_drake.ground_truth import labelled_drive, write_truth
 from cns_drake.simulation import SimulationSource
+from evaluation.base import Reporter
 from evaluation.map_update import BASELINES
 from evaluation.study import (
     TRUTH,

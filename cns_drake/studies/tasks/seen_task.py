@@ -7,8 +7,9 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from cns_drake.ageing import HISTORY_NAME, PUT_UP, TAKEN_DOWN
-from cns_drake.base import (
+from cns_drake.simulation import SimulatedDrive, SimulationSource
+from cns_drake.studies.pairs.map_upkeep import UpkeptSource
+from evaluation.base import (
     Reporter,
     fingerprint,
     is_there,
@@ -16,8 +17,6 @@ from cns_drake.base import (
     track,
     whole_number,
 )
-from cns_drake.simulation import SimulatedDrive, SimulationSource
-from cns_drake.studies.pairs.map_upkeep import UpkeptSource
 from evaluation.drives import sample_frames
 from evaluation.study import (
     OPENING_COST,
@@ -29,6 +28,7 @@ from evaluation.study import (
     Task,
     check_positive,
 )
+from worlds.ageing import HISTORY_NAME, PUT_UP, TAKEN_DOWN
 
 # Events in which a structure appears under its own name; in all others, the
 # successor appears.

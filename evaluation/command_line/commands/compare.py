@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     check_writable,
     shared_options,

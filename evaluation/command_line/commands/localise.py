@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import shared_options, terminal
+from evaluation.base import shared_options, terminal
 from evaluation.command_line import options
 from evaluation.command_line.printed_text import metric_rows
 
@@ -76,7 +76,7 @@ def localise(
         cns-eval localise drives/metropolis_01 \\
             drives/metropolis_04 --method gicp --start 1
     """
-    from cns_drake.base import choose_cluster
+    from evaluation.base import choose_cluster
     from evaluation.results import make_output
     from evaluation.study import method_settings
     from evaluation.verbs import localise as localise_scans

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import InputError, shared_options, terminal
+from evaluation.base import InputError, shared_options, terminal
 from evaluation.command_line import options
 from evaluation.command_line.printed_text import metric_rows
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     check_writable,
     errors_at_option,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import shared_options, terminal
+from evaluation.base import shared_options, terminal
 from evaluation.recognition import RetrievalProtocol, with_protocols
 
 GROUP = "Recognise places"
@@ -44,7 +44,7 @@ def report(
     Example:
         cns-eval report drives --output report
     """
-    from cns_drake.base import choose_cluster
+    from evaluation.base import choose_cluster
     from evaluation.command_line.suggestions import show_results
     from evaluation.results import PrintStyle
     from evaluation.verbs import report as report_of

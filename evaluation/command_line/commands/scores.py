@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import errors_at_option, shared_options, terminal
+from evaluation.base import errors_at_option, shared_options, terminal
 from evaluation.command_line import options
 from evaluation.recognition import RECORDED_PROTOCOL
 

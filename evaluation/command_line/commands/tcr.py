@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import shared_options, terminal
+from evaluation.base import shared_options, terminal
 from evaluation.command_line import options
 from evaluation.command_line.printed_text import metric_rows
 

@@ -11,7 +11,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cns_drake.base import InputError, font_settings
+from evaluation.base import InputError, font_settings
 from evaluation.recognition import METRICS
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.styles import MethodStyle

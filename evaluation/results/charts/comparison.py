@@ -8,7 +8,7 @@ import textwrap
 
 from matplotlib.figure import Figure
 
-from cns_drake.base import figure_style
+from evaluation.base import figure_style
 from evaluation.recognition import metric_named
 from evaluation.results.charts.chart import (
     ROW,

@@ -3,7 +3,7 @@
 from matplotlib.figure import Figure
 import numpy as np
 
-from cns_drake.base import InputError, repeated
+from evaluation.base import InputError, repeated
 from evaluation.results.charts.chart import Chart
 from evaluation.results.method_names import title
 from evaluation.results.table import Row

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.recognition import kept_share
 from evaluation.results.charts.chart import (
     ROW,

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cns_drake.base import InputError, figure_style, no_such
+from evaluation.base import InputError, figure_style, no_such
 from evaluation.recognition import METRICS, metric_named
 from evaluation.results.charts.chart import ROW, WIDE, Chart, PrintStyle
 from evaluation.results.charts.curves import draw_curves

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.recognition import metric_named
 from evaluation.results.charts.chart import Chart, start_at_zero
 from evaluation.results.charts.words import in_words

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from matplotlib.figure import Figure
 import numpy as np
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.results.charts.chart import Chart, FewPointsError, start_at_zero
 from evaluation.results.charts.words import in_words
 from evaluation.results.figure_text import escape_dollars

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 
-from cns_drake.base import figure_style
+from evaluation.base import figure_style
 from evaluation.recognition import Metric, metric_named
 from evaluation.results.charts.chart import (
     NARROW,

@@ -11,8 +11,8 @@ import warnings
 
 import numpy as np
 
-from cns_drake.base import to_jpeg
-from cns_drake.drives import Drive
+from evaluation.base import to_jpeg
+from evaluation.drives import Drive
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 import numpy as np
 
-from cns_drake.base import (
+from evaluation.base import (
     GONE_RGB,
     NEW_RGB,
     UNSEEN_RGB,

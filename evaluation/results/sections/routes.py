@@ -9,7 +9,7 @@ from markupsafe import Markup
 from matplotlib import image
 import numpy as np
 
-from cns_drake.base import distances_along
+from evaluation.base import distances_along
 from evaluation.drives import sample_frames
 from evaluation.results.page_frame import PageSection, page_section, rendered
 from evaluation.results.sections.camera_images import CameraImages

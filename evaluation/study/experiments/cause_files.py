@@ -17,7 +17,7 @@ from typing import Any
 
 from pydantic import Field
 
-from cns_drake.base import (
+from evaluation.base import (
     Family,
     InputError,
     Section,

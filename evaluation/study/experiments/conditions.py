@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_type_hints
 
 from pydantic import ConfigDict, create_model
 
-from cns_drake.base import InputError, merged, nested, no_such, validated
+from evaluation.base import InputError, merged, nested, no_such, validated
 from evaluation.recognition import (
     PROTOCOLS,
     ProtocolFieldError,

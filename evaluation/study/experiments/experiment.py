@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, PlainValidator, model_validator
 import yaml
 
-from cns_drake.base import InputError, Name, Section, validated
+from evaluation.base import InputError, Name, Section, validated
 from evaluation.results import FROZEN_REDRAW, SETTINGS
 from evaluation.study.experiments.conditions import Condition, conditions
 from evaluation.study.experiments.factors import (

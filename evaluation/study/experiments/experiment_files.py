@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     did_you_mean,
     errors_at,

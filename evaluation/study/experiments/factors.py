@@ -5,7 +5,7 @@ import json
 import math
 from typing import Any
 
-from cns_drake.base import merged, repeated
+from evaluation.base import merged, repeated
 
 # Name of a field -> its value, which can be a mapping of further fields.
 Changes = Mapping[str, Any]

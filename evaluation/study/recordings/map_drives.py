@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 
-from cns_drake.base import InputError, fingerprint, natural_key, read_text
-from cns_drake.drives import Drive, LidarField
 from evaluation.alignment import in_one_world
+from evaluation.base import InputError, fingerprint, natural_key, read_text
+from evaluation.drives import Drive, LidarField
 from evaluation.study.sources import DriveSource, Placement, RecordingSource
 from evaluation.study.tasks.pair import USUAL_LENGTH, NamedDrive
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
-from cns_drake.base import (
+from evaluation.base import (
     InputError,
     fingerprint,
     natural_key,

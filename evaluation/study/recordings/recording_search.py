@@ -7,9 +7,14 @@ import os
 from pathlib import Path
 import re
 
-from cns_drake.base import InputError, listed, natural_key, one_line
-from cns_drake.drives import SCENARIO, driven_way
-from evaluation.drives import find_data_sets, open_drive, travelled
+from evaluation.base import InputError, listed, natural_key, one_line
+from evaluation.drives import (
+    SCENARIO,
+    driven_way,
+    find_data_sets,
+    open_drive,
+    travelled,
+)
 from evaluation.study.recordings.map_drives import (
     RecordingInfo,
     scenario_digest,

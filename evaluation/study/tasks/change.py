@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from cns_drake.base import Reporter
+from evaluation.base import Reporter
 from evaluation.change import ChangeReport, change_of_maps
 from evaluation.study.features import DriveSummary
 from evaluation.study.tasks.jobs import Jobs

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
-from cns_drake.base import Job, fingerprint
+from evaluation.base import Job, fingerprint
 from evaluation.recognition import RetrievalProtocol, Role
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.features import FeatureExtraction, map_source

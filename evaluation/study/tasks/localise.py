@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cns_drake.base import (
+from evaluation.base import (
     Cluster,
     InputError,
     Job,
@@ -15,8 +15,7 @@ from cns_drake.base import (
     read_bytes,
     run_jobs,
 )
-from cns_drake.drives import Drive
-from evaluation.drives import NOT_FINITE, CountedDrive
+from evaluation.drives import NOT_FINITE, CountedDrive, Drive
 from evaluation.localisation import (
     KISS_MATCHER,
     METHODS,

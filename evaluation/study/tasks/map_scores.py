@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from cns_drake.base import InputError, Reporter, no_such
+from evaluation.base import InputError, Reporter, no_such
 from evaluation.map_update import (
     BASELINES,
     Label,

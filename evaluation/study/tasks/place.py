@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from cns_drake.base import Job, Reporter, Step
+from evaluation.base import Job, Reporter, Step
 from evaluation.recognition import (
     Number,
     PlaceOutcome,

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from cns_drake.base import InputError, no_such, repeated
+from evaluation.base import InputError, no_such, repeated
 from evaluation.recognition import Number, numbers_of
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import Pair, Result

@@ -13,7 +13,7 @@ import yaml
 
 from cns_drake.__main__ import main
 from cns_drake.command_line import run_script
-from cns_drake.scenarios import recordable_drives
+from worlds.maps import recordable_drives
 
 pytestmark = pytest.mark.slow
 

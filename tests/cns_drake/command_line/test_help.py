@@ -8,8 +8,8 @@ import typer
 
 import cns_drake
 from cns_drake import command_line as cli
-from cns_drake.units import LIDAR_PRESETS
 from evaluation import command_line as evaluation_cli
+from evaluation.lidar_sheets import LIDAR_PRESETS
 
 PROGRAMS = {
     "cns-drake": typer.main.get_command(cli.app),

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from cns_drake.base import terminal
+from evaluation.base import terminal
 
 
 @pytest.fixture(autouse=True)

@@ -6,13 +6,13 @@ import pytest
 from typer.testing import CliRunner
 import yaml
 
-from cns_drake.city import generate_city
 from cns_drake.command_line import app
 from evaluation import change_between
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.results import Results
+from worlds.city import generate_city
 
 pytestmark = pytest.mark.slow
 

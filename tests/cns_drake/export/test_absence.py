@@ -8,10 +8,10 @@ from helpers.small_map import box_visual, world_text
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.export import export_drive
-from cns_drake.scenarios import shipped_maps
 from evaluation import open_drive
+from evaluation.base import InputError
+from worlds.maps import shipped_maps
 
 # Instance -> name, class, its id, and its id if stage 01 lacks it. The ids are
 # those of semantic-kitti.yaml: moving-car, -person, -bus, -truck, and

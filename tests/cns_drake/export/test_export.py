@@ -19,10 +19,10 @@ from scipy.spatial.transform import Rotation
 import yaml
 
 from cns_drake.__main__ import main
-from cns_drake.base import InputError
-from cns_drake.base import InputError as ReadingError
 from cns_drake.export import export_drive
 from evaluation import open_drive
+from evaluation.base import InputError
+from evaluation.base import InputError as ReadingError
 from evaluation.study import drives_by_map, find_recordings
 
 

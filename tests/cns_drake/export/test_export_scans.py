@@ -4,9 +4,9 @@ from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.export import export_drive
 from evaluation import open_drive
+from evaluation.base import InputError
 
 NUM = 100
 

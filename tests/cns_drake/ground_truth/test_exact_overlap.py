@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cns_drake.__main__ import main
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.recognition import read_overlaps
 
 

@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from cns_drake.__main__ import main
-from cns_drake.base import InputError
 from cns_drake.ground_truth import write_truth
+from evaluation.base import InputError
 from evaluation.map_update import Label, read_pair
 
 

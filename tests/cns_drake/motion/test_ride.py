@@ -22,8 +22,8 @@ from cns_drake.motion import (
     load_suspension_rates,
     ride_on_springs,
 )
-from cns_drake.roads import Speeds
-from cns_drake.scenarios import vehicle_file
+from worlds.maps import vehicle_file
+from worlds.roads import Speeds
 
 
 class Level:

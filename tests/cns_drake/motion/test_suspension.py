@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.motion import Suspension, load_car_masses, load_suspension_rates
-from cns_drake.scenarios import vehicle_file
+from evaluation.base import InputError
+from worlds.maps import vehicle_file
 
 GRAVITY = 9.81
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from cns_drake.motion import Trajectory
-from cns_drake.roads import LanePath, Speeds
+from worlds.roads import LanePath, Speeds
 
 
 def motion(trajectory, t):

@@ -15,7 +15,7 @@ from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
 from cns_drake.motion import Trajectory, VehicleMotion
-from cns_drake.scenarios import vehicle_file
+from worlds.maps import vehicle_file
 
 WHEELS = {
     f"{end}_{side}_wheel": (x, y)

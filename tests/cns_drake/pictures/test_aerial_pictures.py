@@ -8,7 +8,8 @@ import pytest
 import yaml
 
 from cns_drake.pictures import draw_drives
-from cns_drake.scenarios import load_scenario, recordable_drives
+from cns_drake.scenarios import load_scenario
+from worlds.maps import recordable_drives
 
 pytestmark = pytest.mark.slow
 

@@ -10,12 +10,12 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
 from cns_drake import load_scenario
-from cns_drake.base import InputError
 from cns_drake.pictures import ShownStages, read_drive_page
 from cns_drake.recording import FRAME_PERIOD
 from cns_drake.scenarios import DrivePlan
 from cns_drake.scene import load_world
 from cns_drake.simulation import load_drive
+from evaluation.base import InputError
 
 PERIOD = 0.5
 NUM_FRAMES = 21

@@ -14,10 +14,11 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.pictures import ShownStages, height_rgb
-from cns_drake.scene import CLASS_RGB, load_world
+from cns_drake.scene import load_world
 from cns_drake.sensors import POINT_DTYPE
+from evaluation.base import InputError
+from worlds.shapes import CLASS_RGB
 
 PERIOD = 0.05
 NUM_FRAMES = 101

@@ -4,9 +4,9 @@ from matplotlib.image import imread
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.pictures import draw_stages, load_views
-from cns_drake.scenarios import shipped_maps
+from evaluation.base import InputError
+from worlds.maps import shipped_maps
 
 
 @pytest.mark.slow

@@ -13,9 +13,9 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 import yaml
 
-from cns_drake.base import InputError
-from cns_drake.drives import ODOMETRY, TF, make_message, serialize
 from cns_drake.recording import BagWriter, Topic
+from evaluation.base import InputError
+from evaluation.drives import ODOMETRY, TF, make_message, serialize
 
 START_NS = 1_700_000_000_000_000_000
 SCENARIO = {"map": "town", "stage": 1, "pair": [[1, 2], [1, 2]]}

@@ -5,7 +5,7 @@ import json
 import pytest
 from rosbags.highlevel import AnyReader
 
-from cns_drake.scenarios import worlds_folder
+from worlds.maps import worlds_folder
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ from mcap.reader import make_reader
 import pytest
 import yaml
 
-from cns_drake.base import InputError
 from cns_drake.simulation import simulate
+from evaluation.base import InputError
 
 pytestmark = pytest.mark.slow
 

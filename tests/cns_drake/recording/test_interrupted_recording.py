@@ -6,7 +6,7 @@ import signal
 from helpers.bag_recordings import contents, open_bag, record, write_frame
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 
 MCAP = "drive_01_0.mcap"
 

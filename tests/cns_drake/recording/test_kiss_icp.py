@@ -8,10 +8,10 @@ from mcap.reader import make_reader
 import numpy as np
 import pytest
 
-from cns_drake.base import poses
 from cns_drake.scenarios import load_scenario
 from cns_drake.simulation import simulate
 from evaluation import drives
+from evaluation.base import poses
 
 pytestmark = [pytest.mark.slow, pytest.mark.night]
 

@@ -13,7 +13,6 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError
 from cns_drake.recording import (
     BagWriter,
     McapRecorder,
@@ -21,6 +20,7 @@ from cns_drake.recording import (
     recording_topics,
 )
 from cns_drake.sensors import POINT_DTYPE
+from evaluation.base import InputError
 
 START_NS = 1_700_000_000_000_000_000
 PERIOD = 0.05

@@ -1,8 +1,8 @@
 import pytest
 
-from cns_drake.base import InputError
-from cns_drake.drives import TF
 from cns_drake.recording import BagWriter, Topic
+from evaluation.base import InputError
+from evaluation.drives import TF
 
 
 def test_stamps_are_not_before_the_epoch(tmp_path):

@@ -11,10 +11,10 @@ import subprocess
 import numpy as np
 import pytest
 
-from cns_drake.base import poses
 from cns_drake.recording import START_NS
 from cns_drake.scenarios import RideConfig, load_scenario, plan_drive
 from cns_drake.simulation import simulate
+from evaluation.base import poses
 
 # RKO-LIO requires other versions than users of this project get, so it has an
 # environment of its own.

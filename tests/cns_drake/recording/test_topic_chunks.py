@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from cns_drake.base import InputError
-from cns_drake.drives import STAMPED_RECORD
 from cns_drake.recording import BagWriter, Topic
-from evaluation.drives import open_drive
+from evaluation.base import InputError
+from evaluation.drives import STAMPED_RECORD, open_drive
 
 FRAMES = 40
 CLOUDS = "/lidar/points"

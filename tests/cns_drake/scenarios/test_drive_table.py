@@ -8,17 +8,19 @@ from helpers.small_map import write_small_map
 import pytest
 import yaml
 
-from cns_drake.base import InputError
 from cns_drake.scenarios import (
     count_frames,
     listed_drives,
     load_scenario,
     plan_drive,
-    recordable_drives,
-    shipped_maps,
     write_table,
 )
-from cns_drake.scene import MapFolder
+from evaluation.base import InputError
+from worlds.maps import (
+    MapFolder,
+    recordable_drives,
+    shipped_maps,
+)
 
 # A box has twelve triangles.
 BOX = 12

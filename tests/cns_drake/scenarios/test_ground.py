@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError
 from cns_drake.scenarios import ground_notes, load_scenario, plan_drive
+from evaluation.base import InputError
 
 BOX = (
     "<model name='{}'><static>1</static><pose>{} 0 0 0</pose><link name='l'>"

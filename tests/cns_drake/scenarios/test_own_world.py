@@ -10,9 +10,9 @@ import pytest
 from rosbags.highlevel import AnyReader
 import yaml
 
-from cns_drake.base import InputError
 from cns_drake.scenarios import load_scenario, plan_drive
 from cns_drake.simulation import simulate
+from evaluation.base import InputError
 from evaluation.drives import open_drive
 
 SPEEDS = {

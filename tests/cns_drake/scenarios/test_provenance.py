@@ -8,13 +8,13 @@ import tracemalloc
 from helpers.tiny_drive import tiny_scenario
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.scenarios import (
     combined_digest,
     dependency_versions,
     digest_file,
     digest_inputs,
 )
+from evaluation.base import InputError
 
 MODEL = """<sdf version="1.9"><!-- <uri>left_out.obj</uri> --><model name="m">
 <link name="l"><visual name="v"><geometry><mesh><uri>{}</uri></mesh></geometry>

@@ -6,7 +6,6 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 import yaml
 
-from cns_drake.base import InputError
 from cns_drake.command_line import run_drive
 from cns_drake.scenarios import (
     describe_scenario,
@@ -14,7 +13,6 @@ from cns_drake.scenarios import (
     load_scenario,
     make_scenario,
     plan_drive,
-    recordable_drives,
 )
 from cns_drake.sensors import (
     LidarSection,
@@ -22,6 +20,8 @@ from cns_drake.sensors import (
     make_pattern,
     sensor_pose,
 )
+from evaluation.base import InputError
+from worlds.maps import recordable_drives
 
 
 def test_shipped_drives_load():

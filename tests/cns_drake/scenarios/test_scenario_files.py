@@ -6,8 +6,12 @@ from helpers.small_map import scenario_values, write_small_map
 import pytest
 import yaml
 
-from cns_drake.base import InputError
-from cns_drake.scenarios import load_scenario, shipped_maps, write_scenarios
+from cns_drake.scenarios import (
+    load_scenario,
+    write_scenarios,
+)
+from evaluation.base import InputError
+from worlds.maps import shipped_maps
 
 
 def test_written_scenarios_are_the_same(tmp_path):

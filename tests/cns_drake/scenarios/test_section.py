@@ -2,8 +2,8 @@
 
 import pytest
 
-from cns_drake.base import InputError, Section, validated
 from cns_drake.sensors import field_off_by_default
+from evaluation.base import InputError, Section, validated
 
 
 class Weather(Section):

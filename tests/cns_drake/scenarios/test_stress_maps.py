@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from cns_drake.scenarios import (
-    load_scenario,
+from cns_drake.scenarios import load_scenario
+from worlds.maps import (
     recordable_drives,
     recordable_maps,
     shipped_cities,

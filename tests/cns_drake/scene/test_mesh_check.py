@@ -9,7 +9,7 @@ from helpers.mesh_worlds import notes_of, read_mesh, world_of
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 
 
 def write(tmp_path, change, suffix=".gltf"):

@@ -13,7 +13,7 @@ from helpers.mesh_texts import (
 from helpers.mesh_worlds import read_mesh
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 
 GLTF = gltf_text()[0]
 

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 
 FAR = np.array([350_000.0155, 4_020_000.12, 60.5])
 # Turned by 37 deg about z, in the middle of the places of nodes.

@@ -7,8 +7,8 @@ from helpers.small_map import box_visual, world_text
 from pydrake.geometry import ReadObjToTriangleSurfaceMesh
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.scene import load_world, read_perception_geometry
+from evaluation.base import InputError
 
 _SHAPES = {
     "sphere": "<sphere><radius>{}</radius></sphere>",

@@ -6,8 +6,8 @@ from helpers.mesh_texts import obj_text
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.scene import load_world, read_perception_geometry, structures_in
+from evaluation.base import InputError
 
 VISUAL = "<visual name='v'><geometry><box><size>1 1 1</size></box></geometry>"
 LINK = f"<link name='l'>{VISUAL}</visual></link>"

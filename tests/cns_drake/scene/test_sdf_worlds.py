@@ -10,7 +10,6 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.scene import (
     list_geometry,
     load_world,
@@ -19,6 +18,7 @@ from cns_drake.scene import (
 )
 from cns_drake.sensors import SpinningPattern
 from cns_drake.simulation import scan_world
+from evaluation.base import InputError
 
 AROUND = SpinningPattern((0.0, -0.5), 4, 0.05, 90.0, 0.1)
 BOX = "<geometry><box><size>1 1 2</size></box></geometry>"

@@ -4,11 +4,13 @@ from helpers.small_map import box_visual, world_text
 import pytest
 
 from cns_drake.scene import (
-    StructureEntry,
-    kind_in_name,
     load_world,
     read_perception_geometry,
     structure_name,
+)
+from worlds.shapes import (
+    StructureEntry,
+    kind_in_name,
 )
 
 

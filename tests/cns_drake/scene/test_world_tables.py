@@ -8,8 +8,8 @@ from helpers.world_variants import same_worlds
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.scene import load_world, merge_surfaces, read_perception_geometry
+from evaluation.base import InputError
 
 ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs" / "formats.md"

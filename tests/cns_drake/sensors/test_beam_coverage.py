@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cns_drake.drives import lidar_field
 from cns_drake.sensors import BeamCoverage, SpinningPattern, make_beam_pattern
-from cns_drake.units import LIDAR_PRESETS
+from evaluation.drives import lidar_field
+from evaluation.lidar_sheets import LIDAR_PRESETS
 
 
 def direction(azimuth_deg, elevation_deg):

@@ -18,7 +18,7 @@ from cns_drake.sensors import (
     make_beam_pattern,
     make_flash_pattern,
 )
-from cns_drake.units import LIDAR_PRESETS
+from evaluation.lidar_sheets import LIDAR_PRESETS
 
 LIVOX = ("mid-70", "avia", "mid-360")
 

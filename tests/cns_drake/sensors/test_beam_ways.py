@@ -9,13 +9,15 @@ from scipy import stats
 from scipy.special import erf
 
 from cns_drake.scene import (
-    StructureEntry,
-    StructureTable,
     TriangleSurface,
     is_closed,
 )
 from cns_drake.sensors import Echoes, make_beam_pattern
-from cns_drake.units import LIDAR_PRESETS
+from evaluation.lidar_sheets import LIDAR_PRESETS
+from worlds.shapes import (
+    StructureEntry,
+    StructureTable,
+)
 
 TREE = StructureTable([StructureEntry(1, "tree", "vegetation")])
 HOUSE = StructureTable(

@@ -15,8 +15,11 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.perception import PointCloud
 import pytest
 
-from cns_drake.scene import StructureEntry, StructureTable
 from cns_drake.sensors import POINT_DTYPE, MeasurementModel
+from worlds.shapes import (
+    StructureEntry,
+    StructureTable,
+)
 
 
 def test_box_room():

@@ -10,8 +10,11 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import LeafSystem
 import pytest
 
-from cns_drake.scene import StructureEntry, StructureTable
 from cns_drake.sensors import MeasurementModel
+from worlds.shapes import (
+    StructureEntry,
+    StructureTable,
+)
 
 POSE = {"geometry_query", "sweep", "frame_poses"}
 ALL = POSE | {"geometry", "moving_instances"}

@@ -6,9 +6,9 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 from scipy.special import lambertw
 
-from cns_drake.scene import CLASS_IDS
 from cns_drake.sensors import Weather
-from cns_drake.units import LIDAR_PRESETS
+from evaluation.lidar_sheets import LIDAR_PRESETS
+from worlds.shapes import CLASS_IDS
 
 ROWS = [
     (name, row) for name, s in LIDAR_PRESETS.items() for row in s.returns.rows

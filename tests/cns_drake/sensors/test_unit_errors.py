@@ -8,7 +8,6 @@ from pydrake.geometry import HalfSpace
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.scene import StructureEntry, StructureTable
 from cns_drake.sensors import (
     CalibratedReturns,
     describe_unit,
@@ -16,7 +15,11 @@ from cns_drake.sensors import (
     make_lidar_config,
     make_pattern,
 )
-from cns_drake.units import Response
+from evaluation.lidar_sheets import Response
+from worlds.shapes import (
+    StructureEntry,
+    StructureTable,
+)
 
 # Elevations of the first and the last laser of each block of an HDL-64E [deg].
 LIMITS = 2.0, -8.33, -8.83, -24.33

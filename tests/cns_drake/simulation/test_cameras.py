@@ -16,11 +16,11 @@ from PIL import Image
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError
-from cns_drake.drives import McapDrive
 from cns_drake.scenarios import load_scenario
 from cns_drake.sensors import check_renderer
 from cns_drake.simulation import simulate
+from evaluation.base import InputError
+from evaluation.drives import McapDrive
 
 LIDARS = {
     "lidar": {"preset": "os1-32", "columns": 600, "rate": 10, "resolution": 0}

@@ -9,9 +9,9 @@ import numpy as np
 from PIL import Image
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.scenarios import make_scenario
 from cns_drake.simulation import make_film
+from evaluation.base import InputError
 
 SIZE = (96, 54)
 # A scan costs little with it.

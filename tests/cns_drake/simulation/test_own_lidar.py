@@ -16,13 +16,13 @@ import yaml
 
 from cns_drake import ApplyLidarConfig, LidarConfig, add_lidar, load_scenario
 from cns_drake import command_line as cli
-from cns_drake.base import InputError
-from cns_drake.drives import read_scenario
 from cns_drake.export import export_drive
 from cns_drake.scenarios import digest_inputs, recording_fingerprint
 from cns_drake.sensors import make_pattern
 from cns_drake.simulation import simulate
 from evaluation import open_drive
+from evaluation.base import InputError
+from evaluation.drives import read_scenario
 
 SHEET = {
     "rings_deg": [[4.0, 1.0, 4], -2.0, [-5.0, -20.0, 6]],

@@ -5,11 +5,11 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.scene import load_world
 from cns_drake.sensors import make_beam_pattern
 from cns_drake.simulation import scan as take_scan
 from cns_drake.simulation import scan_world
+from evaluation.base import InputError
 
 X_WS = RigidTransform(RollPitchYaw(0.05, -0.1, 2.0), [3.0, -2.0, 1.7])
 

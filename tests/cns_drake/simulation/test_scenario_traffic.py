@@ -9,15 +9,16 @@ from helpers.tiny_drive import tiny_scenario, write_scenario
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.scenarios import (
     DrivePlan,
     TrafficConfig,
     load_scenario,
     plan_drive,
 )
-from cns_drake.scene import LocalMetres, read_perception_geometry
+from cns_drake.scene import read_perception_geometry
 from cns_drake.simulation import load_drive, plan_scenario_traffic
+from evaluation.base import InputError
+from worlds.maps import LocalMetres
 
 
 @pytest.fixture

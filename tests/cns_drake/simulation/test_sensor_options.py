@@ -8,14 +8,13 @@ from pydrake.math import RigidTransform
 import pytest
 from scipy.special import lambertw
 
-from cns_drake.drives import deskew
 from cns_drake.recording import FRAME_PERIOD
 from cns_drake.scenarios import DrivePlan, make_scenario, plan_drive
-from cns_drake.scene import CLASS_IDS
 from cns_drake.sensors import WeatherConfig, make_pattern, sensor_pose
 from cns_drake.simulation import load_drive, make_station, simulate
-from cns_drake.units import LIDAR_PRESETS
-from evaluation.drives import open_drive
+from evaluation.drives import deskew, open_drive
+from evaluation.lidar_sheets import LIDAR_PRESETS
+from worlds.shapes import CLASS_IDS
 
 # A tilted sensor off the vehicle's middle, so that no transform is trivial.
 MOUNT = {"xyz": [1.2, -0.4, 1.7], "rpy_deg": [3.0, -2.0, 40.0]}

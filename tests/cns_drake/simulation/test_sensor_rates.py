@@ -10,13 +10,13 @@ import pytest
 from rosbags.highlevel import AnyReader
 import yaml
 
-from cns_drake.base import InputError
-from cns_drake.drives import McapDrive
 from cns_drake.export import export_drive
 from cns_drake.recording import START_NS
 from cns_drake.scenarios import check_files, load_scenario
 from cns_drake.simulation import simulate
 from cns_drake.studies import is_recorded
+from evaluation.base import InputError
+from evaluation.drives import McapDrive
 
 KALIBR = {
     "accelerometer_noise_density": 0.01,

@@ -12,7 +12,6 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from cns_drake.drives import McapDrive
 from cns_drake.sensors import (
     ImuErrors,
     ImuNoise,
@@ -22,6 +21,7 @@ from cns_drake.sensors import (
     make_beam_pattern,
 )
 from cns_drake.simulation import add_mcap_recorder
+from evaluation.drives import McapDrive
 
 NOISE = ImuNoise(
     accelerometer_noise_density=0.02, gyroscope_random_walk=1e-3, seed=5

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import yaml
 
-from cns_drake.base import InputError
 from cns_drake.scenarios import load_scenario
 from cns_drake.simulation import SimulationSource, simulate
 from evaluation import map_drive
+from evaluation.base import InputError
 from evaluation.drives import open_drive
 
 

@@ -6,10 +6,10 @@ import pytest
 from rosbags.highlevel import AnyReader
 import yaml
 
-from cns_drake.base import Cluster, InputError
 from cns_drake.scenarios import load_scenario, make_scenario
 from cns_drake.simulation import load_stage, simulate
 from cns_drake.studies import is_recorded, record_all
+from evaluation.base import Cluster, InputError
 
 TOPICS = ("/lidar/points", "/imu/data", "/odometry", "/tf")
 

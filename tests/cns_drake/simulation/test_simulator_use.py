@@ -9,9 +9,9 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, EventStatus
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.sensors import add_lidar, add_odometry
 from cns_drake.simulation import add_mcap_recorder
+from evaluation.base import InputError
 from evaluation.drives import open_drive
 
 PERIOD = 0.125  # Exact, so that every frame falls where it is said.

@@ -12,8 +12,6 @@ from mcap.reader import make_reader
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
-from cns_drake.drives import McapDrive
 from cns_drake.export import export_drive
 from cns_drake.scenarios import (
     DrivePlan,
@@ -23,7 +21,9 @@ from cns_drake.scenarios import (
 )
 from cns_drake.simulation import SimulatedDrive, load_drive, simulate
 from evaluation import open_drive
+from evaluation.base import InputError
 from evaluation.change import temporal_change
+from evaluation.drives import McapDrive
 
 
 @pytest.fixture(scope="module")

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.drives import McapDrive
 from cns_drake.export import export_drive
-from cns_drake.scene import MOVING_IDS
 from cns_drake.simulation import simulate
+from evaluation.drives import McapDrive
+from worlds.shapes import MOVING_IDS
 
 pytestmark = pytest.mark.slow
 

@@ -15,9 +15,9 @@ from helpers.tiny_drive import (
 from mcap.reader import make_reader
 import pytest
 
-from cns_drake.base import Cluster, InputError
 from cns_drake.simulation import simulate
 from cns_drake.studies import is_recorded, record_all
+from evaluation.base import Cluster, InputError
 
 pytestmark = pytest.mark.slow
 

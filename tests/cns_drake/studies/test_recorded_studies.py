@@ -8,9 +8,9 @@ from helpers.small_towns import drive
 import numpy as np
 import pytest
 
-from cns_drake.base import Cluster, InputError
 from cns_drake.studies import run_study
 from evaluation import change_between
+from evaluation.base import Cluster, InputError
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition import RANDOM_YAW_PROTOCOL, RetrievalProtocol

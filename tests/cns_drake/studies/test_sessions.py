@@ -3,8 +3,8 @@
 from helpers.small_map import write_town
 import pytest
 
-from cns_drake.base import Cluster
 from cns_drake.studies import run_study
+from evaluation.base import Cluster
 from evaluation.results import Results
 from evaluation.study import Experiment, load_experiment
 

@@ -10,10 +10,10 @@ from helpers.small_map import write_town
 import numpy as np
 import pytest
 
-from cns_drake.base import Cluster, InputError
 from cns_drake.scenarios import load_scenario
 from cns_drake.simulation import SimulationSource
 from cns_drake.studies import run_study
+from evaluation.base import Cluster, InputError
 from evaluation.change import DriveMap
 from evaluation.maps import CELL_SIZE, VoxelAccumulator
 from evaluation.methods import make_method

@@ -6,10 +6,10 @@ from helpers.small_map import write_town
 import pytest
 import yaml
 
-from cns_drake.base import Cluster, InputError
 from cns_drake.scenarios import load_scenario
 from cns_drake.sensors import make_pattern
 from cns_drake.studies import study_drives
+from evaluation.base import Cluster, InputError
 from evaluation.study import Study, load_experiment
 
 # What a cause of the ladder may change, apart from the drive's name.

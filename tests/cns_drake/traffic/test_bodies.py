@@ -7,9 +7,9 @@ import pytest
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from cns_drake.base import InputError
-from cns_drake.scene import MAX_INSTANCE, read_perception_geometry
+from cns_drake.scene import read_perception_geometry
 from cns_drake.traffic import read_recorded, traffic_structures
+from evaluation.base import MAX_INSTANCE, InputError
 
 KINDS = [
     "city_car", "hatchback", "saloon", "estate", "suv", "van", "box_truck",

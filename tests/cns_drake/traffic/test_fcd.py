@@ -6,8 +6,8 @@ from helpers.traffic_diagrams import TrafficDiagram
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.traffic import EgoBox, play_trace, read_fcd
+from evaluation.base import InputError
 
 # Time step of the trace [s].
 DT = 0.1

@@ -4,9 +4,9 @@ from helpers.recorded_traffic import PERIOD, write_recorded, write_rounds
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
-from cns_drake.scenarios import shipped_maps
 from cns_drake.traffic import EgoBox, play_recorded, read_recorded
+from evaluation.base import InputError
+from worlds.maps import shipped_maps
 
 BOX = EgoBox(-1.0, 3.0, 1.0)
 

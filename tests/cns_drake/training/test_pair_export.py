@@ -2,8 +2,8 @@
 
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.training import ExportOptions, write_pairs
+from evaluation.base import InputError
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,11 @@ from helpers.transient_town import DRIVE, X_WT
 import numpy as np
 import pytest
 
-from cns_drake.city import turned_up, unit_normals
 from cns_drake.transient import GroundSurface
+from worlds.shapes import (
+    turned_up,
+    unit_normals,
+)
 
 
 def test_kerbs_and_heights_of_a_plane_road(changed):

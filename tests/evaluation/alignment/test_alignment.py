@@ -24,11 +24,10 @@ from helpers.towns import (
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError, poses, xyz
-from cns_drake.drives import Drive
 from evaluation.alignment import in_one_world, open_in_one_world
+from evaluation.base import InputError, poses, xyz
 from evaluation.change import temporal_change
-from evaluation.drives import Reading, open_drive
+from evaluation.drives import Drive, Reading, open_drive
 from evaluation.maps import map_drive
 from evaluation.study import RecordingInfo, RecordingSource, drives_by_map
 

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import poses
 from evaluation.alignment import make_surface, register
+from evaluation.base import poses
 from evaluation.maps import downsample
 
 

@@ -6,7 +6,7 @@ from helpers.measured_pairs import compare_maps
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError, from_xyz
+from evaluation.base import InputError, from_xyz
 from evaluation.change import DriveMap, map_source
 from evaluation.drives import open_drive
 from evaluation.maps import CELL_SIZE, voxelise

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cns_drake.base import from_xyz, poses
+from evaluation.base import from_xyz, poses
 from evaluation.change import (
     ChangeReport,
     DriveMap,

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from cns_drake.base import from_xyz
+from evaluation.base import from_xyz
 from evaluation.change import covered, lacks_counterpart, temporal_change
 from evaluation.maps import voxelise
 

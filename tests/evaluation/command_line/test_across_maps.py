@@ -7,7 +7,7 @@ from helpers.measured_pairs import place_outcome
 from helpers.small_towns import drive
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 

@@ -16,7 +16,7 @@ from mcap.writer import Writer
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError, poses, xyz
+from evaluation.base import InputError, poses, xyz
 from evaluation.drives import open_drive
 
 POINTS = "sensor_msgs/msg/PointCloud2"

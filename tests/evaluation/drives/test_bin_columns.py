@@ -4,9 +4,9 @@ from helpers.internal.eval_program import assert_refused, run
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.export import export_drive
 from evaluation import open_drive
+from evaluation.base import InputError
 from evaluation.clouds import read_cloud
 
 NUMBERS = np.random.default_rng(5).uniform(1.0, 9.0, (60, 30)).astype("<f4")

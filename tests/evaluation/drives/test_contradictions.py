@@ -9,7 +9,7 @@ from helpers.mcap_bytes import edit_summary
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.drives import open_drive
 
 
@@ -92,7 +92,7 @@ def test_a_channel_that_the_summary_does_not_name(recording):
 _READ = """
 import sys
 from evaluation.drives import (open_drive)
-from cns_drake.base.errors import InputError
+from evaluation.base.errors import InputError
 try:
     drive = open_drive(sys.argv[1])
     drive.X_WS, drive.imu, [len(scan) for scan in drive]

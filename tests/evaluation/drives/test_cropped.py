@@ -2,7 +2,7 @@ from helpers.drive_files import make_scan, yaw_pose
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.drives import cropped, cropped_with_fields
 
 

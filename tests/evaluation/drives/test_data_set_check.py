@@ -15,8 +15,8 @@ from helpers.drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError, poses
 from evaluation import check_data_set, data_set_checks, open_drive
+from evaluation.base import InputError, poses
 from evaluation.drives import data_sets
 
 NUM_SCANS = 8

@@ -4,9 +4,8 @@ from helpers.drive_files import T0_NS, write_recording, yaw_pose
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
-from cns_drake.drives import deskew
-from evaluation.drives import open_drive
+from evaluation.base import InputError
+from evaluation.drives import deskew, open_drive
 
 NUM = 200
 # A turn takes 100 ms, in which the vehicle drives 1 m.

@@ -19,7 +19,7 @@ from helpers.drive_files import make_scan, write_recording
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.drives import MovedDrive, open_drive
 from evaluation.study import RecordingSource
 

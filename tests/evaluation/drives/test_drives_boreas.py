@@ -6,7 +6,7 @@ from helpers.dataset_folders import stored, write_bytes
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.drives import open_drive
 from evaluation.study import find_recordings
 

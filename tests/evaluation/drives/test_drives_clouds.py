@@ -4,7 +4,7 @@ import warnings
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError, from_xyz, xyz
+from evaluation.base import InputError, from_xyz, xyz
 from evaluation.clouds import is_cloud, read_blocks, read_cloud
 
 RNG = np.random.default_rng(11)

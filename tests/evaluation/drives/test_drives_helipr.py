@@ -21,9 +21,8 @@ from helpers.helipr_drive import (
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
-from cns_drake.drives import ORIGIN, check_same_world
-from evaluation.drives import open_drive
+from evaluation.base import InputError
+from evaluation.drives import ORIGIN, check_same_world, open_drive
 
 FIELDS = {
     "Ouster": ("intensity", "t", "reflectivity", "ring", "ambient"),

@@ -9,9 +9,8 @@ from helpers.dataset_folders import (
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
-from cns_drake.drives import check_same_world
-from evaluation.drives import open_drive
+from evaluation.base import InputError
+from evaluation.drives import check_same_world, open_drive
 
 NUM_SCANS = 6
 # Forward, left, up of the LiDAR are -z... of the camera: roughly KITTI's.

@@ -15,10 +15,9 @@ import numpy as np
 import pytest
 import zstandard
 
-from cns_drake.base import InputError, poses
-from cns_drake.drives import check_same_world
 from evaluation import drives
-from evaluation.drives import open_drive
+from evaluation.base import InputError, poses
+from evaluation.drives import check_same_world, open_drive
 
 # A sensor that is turned as well as moved on its vehicle.
 P_BS = (0.3, -0.2, 1.6)

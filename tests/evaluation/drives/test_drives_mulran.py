@@ -12,9 +12,8 @@ from helpers.mulran_drive import NUM_SCANS, pose_table, scan_stamps, write_drive
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
-from cns_drake.drives import ORIGIN, check_same_world
-from evaluation.drives import open_drive
+from evaluation.base import InputError
+from evaluation.drives import ORIGIN, check_same_world, open_drive
 
 # calib_base2ouster: Rz Ry Rx of 0.0001, 0.0003 and 179.6654 degrees.
 X_BS = np.array(

@@ -9,7 +9,7 @@ from mcap.writer import CompressionType, IndexType
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.drives import open_drive
 
 NUM = 6

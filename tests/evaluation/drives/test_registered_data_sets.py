@@ -7,13 +7,13 @@ from helpers.towns import TownDrive, route
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from evaluation import (
     DataSet,
     data_set_checks,
     register_cause,
     register_data_set,
 )
+from evaluation.base import InputError
 
 SCAN = np.zeros(3, [(axis, "<f4") for axis in "xyz"])
 

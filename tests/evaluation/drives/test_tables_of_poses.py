@@ -5,7 +5,7 @@ from decimal import Decimal
 from helpers.dataset_folders import make_points, write_bytes, xyzi
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.drives import open_drive
 
 NAMES = "x,y,z,qx,qy,qz,qw"

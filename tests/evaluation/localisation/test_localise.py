@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError, from_xyz, poses
+from evaluation.base import InputError, from_xyz, poses
 from evaluation.drives import open_drive
 from evaluation.localisation import (
     METHODS,

@@ -10,8 +10,8 @@ from helpers.labelled_maps import clouds
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.command_line import main
+from evaluation.base import InputError
 from evaluation.map_update import (
     Label,
     PairLabels,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cns_drake.base import from_xyz
-from cns_drake.drives import Drive
+from evaluation.base import from_xyz
+from evaluation.drives import Drive
 from evaluation.map_update import (
     Label,
     PairLabels,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.base import from_xyz
+from evaluation.base import from_xyz
 from evaluation.maps import downsample, voxelise
 
 

@@ -3,7 +3,7 @@ from helpers.internal.listening import listening
 import numpy as np
 import pytest
 
-from cns_drake.base import from_xyz
+from evaluation.base import from_xyz
 from evaluation.drives import open_drive
 from evaluation.maps import VoxelAccumulator, map_drive, voxelise
 

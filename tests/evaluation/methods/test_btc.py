@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError, poses
+from evaluation.base import InputError, poses
 from evaluation.methods import make_method
 from evaluation.recognition import write_scores
 

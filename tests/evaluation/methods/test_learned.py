@@ -7,7 +7,7 @@ from helpers.learned_weights import weight_values
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.methods import LAYERS, SECTORS, TURNS, make_method, polar_image
 
 

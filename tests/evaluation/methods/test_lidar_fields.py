@@ -6,10 +6,9 @@ from helpers.internal.eval_program import make_block_scene, run
 import numpy as np
 import pytest
 
-from cns_drake.drives import LidarField, lidar_field
 from cns_drake.sensors import SpinningPattern, make_beam_pattern
-from cns_drake.units import LIDAR_PRESETS
-from evaluation.drives import open_drive
+from evaluation.drives import LidarField, lidar_field, open_drive
+from evaluation.lidar_sheets import LIDAR_PRESETS
 from evaluation.methods import make_method
 from evaluation.recognition import describe_drive
 

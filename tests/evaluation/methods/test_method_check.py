@@ -6,8 +6,8 @@ import sys
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from evaluation import check_method, method_checks
+from evaluation.base import InputError
 from evaluation.methods import (
     METHODS,
     Method,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.methods import make_method
 
 RINGS = 5

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.methods import Method, make_method
 
 

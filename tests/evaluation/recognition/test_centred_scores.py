@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from evaluation import make_method, open_drive, retrieve
+from evaluation.base import InputError
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.recognition import checked_keep, kept_places
 
 CELL = 5.0

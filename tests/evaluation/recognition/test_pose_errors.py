@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition import QueryOutcomes, pose_error

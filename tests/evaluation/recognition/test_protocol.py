@@ -8,7 +8,7 @@ from helpers.measured_pairs import place_outcome, values_of
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition import (

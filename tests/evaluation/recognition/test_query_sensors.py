@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import InputError, poses
+from evaluation.base import InputError, poses
 from evaluation.drives import QuerySensor, cloud_at, open_drive
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition import (

@@ -6,7 +6,7 @@ from helpers.measured_pairs import place_outcome, values_of
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.drives import cloud_at, open_drive, sample_frames, within_cube
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition import (

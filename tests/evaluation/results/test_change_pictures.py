@@ -6,7 +6,7 @@ from matplotlib.patches import Patch
 import numpy as np
 import pytest
 
-from cns_drake.base import GONE_RGB, NEW_RGB
+from evaluation.base import GONE_RGB, NEW_RGB
 from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.results import (
     LAST,

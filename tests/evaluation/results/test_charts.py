@@ -13,7 +13,7 @@ from matplotlib.text import Text
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.results import (
     PALE,
     Answers,

@@ -7,7 +7,7 @@ from helpers.result_keys import place_key
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.results import (
     Answers,
     Key,

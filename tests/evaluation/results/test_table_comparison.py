@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.stats import kendalltau
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.command_line import show_results
 from evaluation.recognition import RANDOM_YAW_PROTOCOL, RetrievalProtocol
 from evaluation.results import (

@@ -7,7 +7,7 @@ from helpers.internal import studies
 from helpers.small_towns import drive
 import pytest
 
-from cns_drake.base import file_name
+from evaluation.base import file_name
 from evaluation.study import MethodChoice
 
 STAGE = r"../../../../evil|$\frac{_%# <b>&"

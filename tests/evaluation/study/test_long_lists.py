@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.study import LongList, Part
 
 # Number of items that are written together.

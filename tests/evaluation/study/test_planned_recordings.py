@@ -6,7 +6,7 @@ import pickle
 from helpers.internal import studies
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.recognition import PROTOCOLS
 from evaluation.study import RecordingInfo, drives_by_map
 

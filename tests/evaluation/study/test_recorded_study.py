@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image
 import pytest
 
-from cns_drake.base import Cluster, InputError, run_jobs
+from evaluation.base import Cluster, InputError, run_jobs
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition import PROTOCOLS, RetrievalProtocol

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cns_drake.base import InputError, choose_cluster
+from evaluation.base import InputError, choose_cluster
 from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.results import check_output
 from evaluation.study import choose_methods, study_recordings

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import zstandard
 
-from cns_drake.base import InputError, fingerprint
+from evaluation.base import InputError, fingerprint
 from evaluation.study import Part
 
 INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}

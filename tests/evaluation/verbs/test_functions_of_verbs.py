@@ -8,7 +8,6 @@ from helpers.internal.eval_program import run
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError, json_values
 from evaluation import (
     change_between,
     localise,
@@ -17,6 +16,7 @@ from evaluation import (
     recognise,
     update_map,
 )
+from evaluation.base import InputError, json_values
 from evaluation.recognition import METRICS, RetrievalProtocol
 from evaluation.results import QueryRows, Results, compare_tables, draw_chart
 

@@ -79,10 +79,10 @@ def way(name, place, *readers, use, memory=MEMORY):
 
 def base(name):
     def use(folder):
-        import cns_drake.base
+        import evaluation.base
 
         (file,) = folder.iterdir()
-        return getattr(cns_drake.base, name)(file)
+        return getattr(evaluation.base, name)(file)
 
     return use
 
@@ -104,22 +104,22 @@ LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
 # Readers of YAML files of their own; the file is refused before its fields
 # count.
 YAML = {
-    "cns_drake.city.load_plan": (),
-    "cns_drake.city.load_stages": ((),),
-    "cns_drake.roads.load_road_network": (),
+    "worlds.city.load_plan": (),
+    "worlds.city.load_stages": ((),),
+    "worlds.roads.load_road_network": (),
     "cns_drake.scenarios.load_scenario": (),
     "cns_drake.pictures.load_views": (),
-    "cns_drake.units.read_sheet": (),
-    "cns_drake.units.find_sheet": (),
-    "cns_drake.ageing.read_rates": (),
+    "evaluation.lidar_sheets.read_sheet": (),
+    "evaluation.lidar_sheets.find_sheet": (),
+    "worlds.ageing.read_rates": (),
     "cns_drake.motion.load_suspension_rates": (),
     "evaluation.study.load_experiment": (),
-    "cns_drake.base.read_yaml": (),
+    "evaluation.base.read_yaml": (),
 }
 
 
 def all_yaml(folder):
-    from cns_drake.base import InputError
+    from evaluation.base import InputError
 
     faults = []
     for reader, arguments in YAML.items():
@@ -156,7 +156,7 @@ for _name, _text in {
 }.items():
 
     @way(
-        f"yaml: a word of {_name}", "x.yaml", "cns_drake.base.parse_yaml",
+        f"yaml: a word of {_name}", "x.yaml", "evaluation.base.parse_yaml",
         use=base("read_yaml"),
     )  # fmt: skip
     def _(folder, text=_text):
@@ -217,13 +217,13 @@ for _name, _text in FACTORS.items():
 
 
 def parse_changes(folder):
-    from cns_drake.base import parse_changes
+    from evaluation.base import parse_changes
 
     return parse_changes([(folder / "x.txt").read_text()])
 
 
 @way(
-    "experiment: an option", "both.years", "cns_drake.base.parse_changes",
+    "experiment: an option", "both.years", "evaluation.base.parse_changes",
     use=parse_changes,
 )  # fmt: skip
 def _(folder):
@@ -238,8 +238,8 @@ SHEETS = {
 for _name, _text in SHEETS.items():
 
     @way(
-        f"sheet: {_name}", "x.yaml", "cns_drake.units.read_sheet",
-        use=at_door("cns_drake.units", "read_sheet", "x.yaml"),
+        f"sheet: {_name}", "x.yaml", "evaluation.lidar_sheets.read_sheet",
+        use=at_door("evaluation.lidar_sheets", "read_sheet", "x.yaml"),
     )  # fmt: skip
     def _(folder, text=_text):
         text += "ranges: [1, 100]\nsource: a test\n"
@@ -247,7 +247,7 @@ for _name, _text in SHEETS.items():
 
 
 def lay_out(folder):
-    from cns_drake.city import make_city
+    from worlds.city import make_city
 
     return len(make_city(folder / "m").structures)
 
@@ -264,8 +264,8 @@ CITIES = {
 for _name, _change in CITIES.items():
 
     @way(
-        f"city: {_name}", "m", "cns_drake.city.load_plan",
-        "cns_drake.roads.load_road_network", use=lay_out,
+        f"city: {_name}", "m", "worlds.city.load_plan",
+        "worlds.roads.load_road_network", use=lay_out,
     )  # fmt: skip
     def _(folder, change=_change):
         from helpers.small_city import write_small_city
@@ -316,8 +316,8 @@ for _name, _change in SCENARIOS.items():
 
     @way(
         f"scenario: {_name}", "x.yaml" if _name != "far waypoints" else "t.csv",
-        "cns_drake.scenarios.load_scenario", "cns_drake.roads.read_waypoints",
-        "cns_drake.roads.load_waypoint_path",
+        "cns_drake.scenarios.load_scenario", "worlds.roads.read_waypoints",
+        "worlds.roads.load_waypoint_path",
         use=plan,
     )  # fmt: skip
     def _(folder, change=_change):
@@ -344,9 +344,9 @@ for _name, _change in SCENARIOS.items():
 
 
 def read_tables(folder):
-    from cns_drake.base import read_records, read_rows
-    from cns_drake.scene import load_structure_table
+    from evaluation.base import read_records, read_rows
     from evaluation.recognition import read_overlaps
+    from worlds.shapes import load_structure_table
 
     file = folder / "x.csv"
     read_rows(file)
@@ -355,8 +355,8 @@ def read_tables(folder):
     return load_structure_table(file)
 
 
-TABLES = ("cns_drake.base.read_rows", "cns_drake.base.read_records",
-          "cns_drake.base.parse_rows", "evaluation.recognition.read_overlaps",
+TABLES = ("evaluation.base.read_rows", "evaluation.base.read_records",
+          "evaluation.base.parse_rows", "evaluation.recognition.read_overlaps",
           "cns_drake.scene.load_structure_table",
           "cns_drake.scene.read_materials")  # fmt: skip
 
@@ -416,7 +416,7 @@ def weigh(folder):
 
 
 WEIGHTS = (
-    "cns_drake.base.read_npz",
+    "evaluation.base.read_npz",
     "evaluation.methods.make_method",
 )
 
@@ -471,7 +471,7 @@ def _(folder):
 
 
 def read_json(folder):
-    from cns_drake.base import parse_json, read_bytes, value_errors
+    from evaluation.base import parse_json, read_bytes, value_errors
 
     file = folder / "x.json"
     with value_errors(file):
@@ -485,19 +485,21 @@ for _name, _text in {
     "digits": "1" * 900_000,
 }.items():
 
-    @way(f"json: {_name}", "x.json", "cns_drake.base.parse_json", use=read_json)
+    @way(
+        f"json: {_name}", "x.json", "evaluation.base.parse_json", use=read_json
+    )
     def _(folder, text=_text):
         (folder / "x.json").write_text(text)
 
 
 # --- XML
 
-XML = {"cns_drake.base.read_elements": (), "cns_drake.traffic.read_fcd": ()}
+XML = {"evaluation.base.read_elements": (), "cns_drake.traffic.read_fcd": ()}
 
 
 def all_xml(folder):
-    from cns_drake.base import read_elements
     from cns_drake.traffic import read_fcd
+    from evaluation.base import read_elements
 
     file = folder / "x.xml"
     read_elements(file)
@@ -642,7 +644,7 @@ def png(width, height, mode=0, rows=9):
 
 
 def show(folder):
-    from cns_drake.base import to_jpeg, user_errors, value_errors
+    from evaluation.base import to_jpeg, user_errors, value_errors
     from evaluation.results.sections.camera_images import open_image
 
     file = folder / "x.png"
@@ -895,8 +897,8 @@ def _(folder):
 
 
 @way(
-    "a mesh of a city", "m.obj", "cns_drake.city.read_mesh",
-    use=at_door("cns_drake.city", "read_mesh", "m.obj"),
+    "a mesh of a city", "m.obj", "worlds.city.read_mesh",
+    use=at_door("worlds.city", "read_mesh", "m.obj"),
 )  # fmt: skip
 def _(folder):
     (folder / "m.obj").write_text("v 1 2 3\n" * 100_000)
@@ -907,7 +909,7 @@ def _(folder):
 
 def imported(file):
     def use(folder):
-        from cns_drake.imports import ImportOptions, import_city
+        from worlds.imports import ImportOptions, import_city
 
         return import_city(folder / file, folder / "out", ImportOptions())
 
@@ -946,7 +948,7 @@ for _name, _one in OSM.items():
 
     @way(
         f"osm: {_name}", "x.osm", "source OpenStreetMap",
-        "cns_drake.imports.import_city", use=imported("x.osm"),
+        "worlds.imports.import_city", use=imported("x.osm"),
     )  # fmt: skip
     def _(folder, one=_one):
         osm_ways(folder, one)
@@ -1106,7 +1108,7 @@ def chunk(size, level=19):
 
 
 @way("mcap: chunks", ".mcap", *DRIVES, "data set mcap",
-     "cns_drake.drives.read_stamp", use=drive)  # fmt: skip
+     "evaluation.drives.read_stamp", use=drive)  # fmt: skip
 def _(folder):
     # Records of a type that nobody reads.
     record = b"\x80" + struct.pack("<Q", (1 << 26) - 9)
@@ -1168,7 +1170,7 @@ def _(folder):
 
 
 @way("cns", "drive", *DRIVES, "data set cns",
-     "cns_drake.drives.read_scenario", use=drive)  # fmt: skip
+     "evaluation.drives.read_scenario", use=drive)  # fmt: skip
 def _(folder):
     from helpers import bent_drive
 
@@ -1233,13 +1235,13 @@ def _(folder):
 
 # Public names that look like readers, and read no file of a user by themselves.
 NO_FILES = {
-    "cns_drake.base.decode_text": "bytes that are in memory",
-    "cns_drake.base.import_modules": "modules of this project",
-    "cns_drake.base.read_bytes": "bounded by its limit",
-    "cns_drake.base.read_text": "bounded by its limit",
-    "cns_drake.base.read_only": "an array",
-    "cns_drake.base.start_python": "modules of this project",
-    "cns_drake.city.start_city": "reads by load_road_network",
+    "evaluation.base.decode_text": "bytes that are in memory",
+    "evaluation.base.import_modules": "modules of this project",
+    "evaluation.base.read_bytes": "bounded by its limit",
+    "evaluation.base.read_text": "bounded by its limit",
+    "evaluation.base.read_only": "an array",
+    "evaluation.base.start_python": "modules of this project",
+    "worlds.city.start_city": "reads by load_road_network",
     "cns_drake.motion.load_car_masses": "a shipped model",
     "cns_drake.pictures.read_drive_page": "bounded by the limit of a page",
     "cns_drake.scene.find_bus": "an object",
@@ -1258,15 +1260,15 @@ _READER = re.compile("(load|read|open|import|parse|find|decode|start)_")
 # Functions that unpack or decode a file whole -> modules that may use them.
 # Others go through these modules, which bound what is made.
 OPENERS = {
-    "zipfile.ZipFile": ("cns_drake.base.npz_archives",),
+    "zipfile.ZipFile": ("evaluation.base.npz_archives",),
     # The package's own archive of shipped cities.
-    "tarfile.open": ("cns_drake.scenarios.shipped",),
+    "tarfile.open": ("worlds.maps.shipped",),
     "gzip.open": (),
     "bz2.open": (),
     "lzma.open": (),
     # Only its header is read.
     "np.load": ("evaluation.clouds.npy_files",),
-    "np.lib.format.read_array": ("cns_drake.base.npz_archives",),
+    "np.lib.format.read_array": ("evaluation.base.npz_archives",),
     # Films are made of the program's own pictures.
     "Image.open": (
         "evaluation.results.sections.camera_images",
@@ -1275,19 +1277,19 @@ OPENERS = {
     "yaml.load": (),
     "yaml.safe_load": (),
     # After `read_yaml` of the same file.
-    "yaml.compose": ("cns_drake.city.generation.generate",),
+    "yaml.compose": ("worlds.city.generation.generate",),
     "json.load": (),
-    "zstandard.decompress": ("cns_drake.drives.mcap_file",),
+    "zstandard.decompress": ("evaluation.drives.mcap_file",),
     "zstandard.ZstdDecompressor": ("evaluation.study.parts",),
     "lz4.frame.decompress": (),
-    "lz4.frame.LZ4FrameDecompressor": ("cns_drake.drives.mcap_file",),
+    "lz4.frame.LZ4FrameDecompressor": ("evaluation.drives.mcap_file",),
     # What another process of this program has sent.
     "pickle.load": ("cns_drake.scene.foreign_meshes",),
     "pickle.loads": (
-        "cns_drake.base.jobs.processes",
+        "evaluation.base.jobs.processes",
         "evaluation.methods.method_check",
     ),
-    "osmium.FileProcessor": ("cns_drake.imports.openstreetmap.reading",),
+    "osmium.FileProcessor": ("worlds.imports.openstreetmap.reading",),
     "open3d.io.read_triangle_mesh": ("cns_drake.scene.foreign_meshes",),
     "open3d.io.read_triangle_model": ("cns_drake.scene.foreign_meshes",),
 }
@@ -1295,10 +1297,10 @@ OPENERS = {
 
 def offered_readers():
     """All readers that doors offer, and members of families of readers."""
-    from cns_drake.imports import map_sources
     from cns_drake.scene import mesh_check
     from evaluation.clouds import cloud_files
     from evaluation.drives import data_sets
+    from worlds.imports import map_sources
 
     found = set()
     for package in ("cns_drake", "evaluation"):
@@ -1431,7 +1433,7 @@ def _attempt(one, folder):
 
 def _read(one, folder):
     """Reads a way's file within its limits; returns how this ended."""
-    from cns_drake.base import InputError
+    from evaluation.base import InputError
 
     os.chdir(folder)
     pages = int(Path("/proc/self/statm").read_text().split()[0])

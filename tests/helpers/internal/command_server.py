@@ -30,10 +30,10 @@ import tempfile
 from _pytest.monkeypatch import MonkeyPatch
 
 import cns_drake
-from cns_drake.base.compilation import start_compiler
-from cns_drake.base.jobs import processes
-from cns_drake.base.jobs.processes import ALLOCATION
 from cns_drake.simulation import simulate
+from evaluation.base.compilation import start_compiler
+from evaluation.base.jobs import processes
+from evaluation.base.jobs.processes import ALLOCATION
 from evaluation.study import chosen_methods
 from helpers.internal.studies import leave_figures_unrendered
 from helpers.tiny_drive import tiny_scenario

@@ -6,8 +6,8 @@ import threading
 import numpy as np
 import pytest
 
-from cns_drake.base import progress_display
 from evaluation import command_line as cli
+from evaluation.base import progress_display
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.internal.signal_handlers import handlers_kept
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 import contextlib
 
-from cns_drake.base.progress import Listener, heard_by
+from evaluation.base.progress import Listener, heard_by
 
 
 class Heard(Listener):

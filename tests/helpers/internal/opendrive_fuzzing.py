@@ -2,15 +2,7 @@
 
 from pathlib import Path
 
-from cns_drake.base import InputError
-from cns_drake.imports.drives.search import find_drives
-from cns_drake.imports.faults import ImportFaults
-from cns_drake.imports.opendrive.band_graph import BandGraph
-from cns_drake.imports.opendrive.imported_streets import ImportedStreets
-from cns_drake.imports.opendrive.lanes import lane_bands
-from cns_drake.imports.opendrive.road_reader import read_roads
-from cns_drake.imports.opendrive.things import thing_structures
-from cns_drake.imports.opendrive.town import split_levels
+from evaluation.base import InputError
 from helpers.small_opendrive import (
     TWO_LANES,
     cubic,
@@ -19,6 +11,14 @@ from helpers.small_opendrive import (
     section,
     write_roads,
 )
+from worlds.imports.drives.search import find_drives
+from worlds.imports.faults import ImportFaults
+from worlds.imports.opendrive.band_graph import BandGraph
+from worlds.imports.opendrive.imported_streets import ImportedStreets
+from worlds.imports.opendrive.lanes import lane_bands
+from worlds.imports.opendrive.road_reader import read_roads
+from worlds.imports.opendrive.things import thing_structures
+from worlds.imports.opendrive.town import split_levels
 
 
 def write_opendrive(folder: Path) -> None:

@@ -4,8 +4,8 @@ import contextlib
 import signal
 import sys
 
-from cns_drake.base.interrupts import INTERRUPTED, interrupt_on_termination
 from cns_drake.simulation import simulate
+from evaluation.base.interrupts import INTERRUPTED, interrupt_on_termination
 
 
 def run_and_report(scenario, output, sender):

@@ -14,12 +14,16 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
-from cns_drake.base import fingerprint
-from cns_drake.city import City, Structure, make_city
-from cns_drake.city.generation import rendering
-from cns_drake.city.growth.stage_structures import GrowingCity
-from cns_drake.roads import RoadNetwork, load_road_network
-from cns_drake.scenarios import worlds_folder
+from evaluation.base import fingerprint
+from worlds.city import (
+    City,
+    make_city,
+)
+from worlds.city.generation import rendering
+from worlds.city.growth.stage_structures import GrowingCity
+from worlds.maps import worlds_folder
+from worlds.roads import RoadNetwork, load_road_network
+from worlds.shapes import Structure
 
 # Map -> its last stage, the whole city.
 LAST_STAGES = {

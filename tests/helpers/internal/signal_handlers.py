@@ -3,8 +3,8 @@
 import contextlib
 import signal
 
-from cns_drake.base import program, progress_display
-from cns_drake.base.interrupts import INTERRUPTED, SIGNALS
+from evaluation.base import program, progress_display
+from evaluation.base.interrupts import INTERRUPTED, SIGNALS
 
 
 @contextlib.contextmanager

@@ -1,6 +1,6 @@
 """Studies whose jobs run in the process of a test, one after the other.
 
-Tests of `cns_drake.base.jobs` cover other processes, which would only slow
+Tests of `evaluation.base.jobs` cover other processes, which would only slow
 these tests.
 """
 
@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 import numpy as np
 import pytest
 
-from cns_drake.base import Cluster, Reporter
-from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.pictures import StageScene
+from evaluation.base import Cluster, Reporter
+from evaluation.base.jobs.processes import nothing_left
 from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.study import (
     choose_methods,

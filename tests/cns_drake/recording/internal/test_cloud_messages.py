@@ -1,9 +1,9 @@
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from cns_drake.drives import POINT_CLOUD
 from cns_drake.recording.messages import encode_point_cloud
 from cns_drake.sensors import POINT_DTYPE
+from evaluation.drives import POINT_CLOUD
 
 STAMP_NS = 1_700_000_000_150_000_001
 

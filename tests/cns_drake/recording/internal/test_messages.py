@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
-from cns_drake.drives import serialize
 from cns_drake.recording import messages
+from evaluation.drives import serialize
 
 # The variance of a value without noise.
 EXACT = 1e-12

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cns_drake.drives import DETECTIONS_3D, SCENE_UPDATE
-from cns_drake.drives.ros_types import deserialize
 from cns_drake.recording.object_messages import (
     BoxMessages,
     marked_boxes,
     marked_detections,
 )
+from evaluation.drives import DETECTIONS_3D, SCENE_UPDATE
+from evaluation.drives.ros_types import deserialize
 
 CLASSES = ("car", "person", "bicyclist")
 STAMP_NS = 1_700_000_012_345_678_901

@@ -4,9 +4,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from cns_drake.base import InputError
-from cns_drake.scenarios.shipped import unpacked
+from evaluation.base import InputError
 from hatch_build import pack
+from worlds.maps.shipped import unpacked
 
 FILES = {"package.xml": "<package/>\n", "town/meshes/a.obj": "v 0 0 0\n"}
 

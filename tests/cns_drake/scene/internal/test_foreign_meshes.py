@@ -4,9 +4,9 @@ from helpers.small_map import world_text
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.scene import load_world, read_perception_geometry
 from cns_drake.scene.foreign_meshes import ForeignMeshes
+from evaluation.base import InputError
 
 VERTICES = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
 TRIANGLES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]

@@ -18,9 +18,9 @@ import numpy as np
 from pydrake.geometry import Mesh
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.mesh_files import MeshFiles
+from evaluation.base import InputError
 
 PAGE = Path(__file__).parents[4] / "docs" / "formats.md"
 

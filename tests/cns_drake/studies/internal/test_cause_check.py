@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from cns_drake.base import InputError
 from cns_drake.studies import causes
 from cns_drake.studies.cause_check import check_causes
+from evaluation.base import InputError
 from evaluation.study import Cause
 
 

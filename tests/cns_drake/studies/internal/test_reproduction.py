@@ -5,8 +5,8 @@ from helpers.internal import studies
 from helpers.small_map import write_town
 import pytest
 
-from cns_drake.base import Cluster
 from cns_drake.studies import reproduction
+from evaluation.base import Cluster
 from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.results import QueryRows, Results
 from evaluation.study import study

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from cns_drake.base import Cluster
 from cns_drake.studies import study
+from evaluation.base import Cluster
 from evaluation.study import Study, load_experiment
 
 

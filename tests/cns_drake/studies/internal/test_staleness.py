@@ -6,12 +6,12 @@ from helpers.internal import studies
 from helpers.small_map import write_town
 import pytest
 
-from cns_drake.base import Cluster
-from cns_drake.base.jobs import step
 from cns_drake.scenarios import provenance
 from cns_drake.simulation import simulated_drive
 from cns_drake.studies import reproduction
 from cns_drake.studies.recording import Record
+from evaluation.base import Cluster
+from evaluation.base.jobs import step
 from evaluation.methods import make_method
 from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.study import ChangeTask, PlaceTask, study

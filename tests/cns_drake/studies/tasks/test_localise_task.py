@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.base import Reporter
+from evaluation.base import Reporter
 from evaluation.drives import open_drive
 from evaluation.localisation import (
     QUERY,

@@ -5,8 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
-from cns_drake.roads import draw_route, load_road_network
 from cns_drake.scenarios import load_scenario
 from cns_drake.studies.maps.redrawing import marked_yaml
 from cns_drake.training import TrainingPlan, batches, descent
@@ -15,6 +13,7 @@ from cns_drake.training.descent import train
 from cns_drake.training.network import features, scores, start_parameters
 from cns_drake.training.sampled_city import SampledCity, draw_streets
 from cns_drake.training.weights import MAPS, write_weights
+from evaluation.base import InputError
 from evaluation.methods import SECTORS
 from evaluation.methods.learned import (
     CHANNELS,
@@ -23,6 +22,7 @@ from evaluation.methods.learned import (
     LearnedConfig,
     LearnedScan,
 )
+from worlds.roads import draw_route, load_road_network
 
 
 def toy_scans(num_cities=2, num_drives=2, length=60):

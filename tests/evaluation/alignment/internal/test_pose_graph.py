@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import poses
 from evaluation.alignment.pose_graph import Ties, optimise
+from evaluation.base import poses
 
 EYE = np.eye(4)
 

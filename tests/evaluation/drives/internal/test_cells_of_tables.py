@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.drives.text_tables import parse_seconds
 from evaluation.drives.trajectories import read_quaternions
 

@@ -5,9 +5,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError, from_xyz
-from cns_drake.drives import Drive
-from evaluation.drives import JoinedDrive
+from evaluation.base import InputError, from_xyz
+from evaluation.drives import Drive, JoinedDrive
 from evaluation.localisation import Settings, make_map
 from evaluation.localisation.localisation_map import map_frames
 from evaluation.recognition import DescribedScans, joined_scans

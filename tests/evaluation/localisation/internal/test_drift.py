@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base import from_xyz, poses
+from evaluation.base import from_xyz, poses
 from evaluation.drives import travelled
 from evaluation.localisation import (
     Localiser,

@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 import small_gicp
 
-from cns_drake.base import poses
 from evaluation.alignment import make_surface
+from evaluation.base import poses
 from evaluation.localisation import Settings, map_of
 from evaluation.localisation.estimators import _gauss_newton_step
 from evaluation.localisation.localiser import fit_at

@@ -12,8 +12,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 import pytest
 from scipy.ndimage import map_coordinates
 
-from cns_drake.base import InputError
 from evaluation import check_method
+from evaluation.base import InputError
 from evaluation.methods import make_method
 from evaluation.methods.bevplace import (
     SHAPES,

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from cns_drake.base import poses
+from evaluation.base import poses
 from evaluation.methods.btc import align, find_motion, plane_overlap
 from evaluation.methods.btc_planes import Planes
 

@@ -4,7 +4,7 @@ from helpers.drive_files import yaw_pose
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.geometric_verification import (
     NUM_VERIFIED,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.results import (
     QUERIES,
     RESULTS,

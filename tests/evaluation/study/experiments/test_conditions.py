@@ -5,7 +5,7 @@ import itertools
 import pytest
 import yaml
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 
 
 def factors(experiment):

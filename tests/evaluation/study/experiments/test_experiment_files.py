@@ -3,7 +3,7 @@
 import pytest
 import yaml
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.methods import shipped_methods
 from evaluation.study import Experiment, load_experiment, shipped_experiments
 

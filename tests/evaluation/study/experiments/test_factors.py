@@ -1,6 +1,6 @@
 """Nested fields and their paths."""
 
-from cns_drake.base import merged
+from evaluation.base import merged
 
 
 def test_mappings_are_merged_and_all_else_is_replaced():

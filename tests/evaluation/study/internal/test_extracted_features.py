@@ -7,7 +7,7 @@ from helpers.small_towns import drive
 import numpy as np
 import pytest
 
-from cns_drake.base import InputError
+from evaluation.base import InputError
 from evaluation.change import map_source
 from evaluation.drives import open_drive
 from evaluation.recognition import PAPER_PROTOCOL

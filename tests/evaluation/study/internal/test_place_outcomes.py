@@ -6,7 +6,7 @@ from helpers.small_towns import drive
 import numpy as np
 import pytest
 
-from cns_drake.base import Reporter
+from evaluation.base import Reporter
 from evaluation.drives import open_drive
 from evaluation.recognition import RetrievalProtocol
 from evaluation.study import (

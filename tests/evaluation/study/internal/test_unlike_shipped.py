@@ -6,12 +6,10 @@ from pathlib import Path
 import pytest
 
 from cns_drake import load_scenario
-from cns_drake.scenarios import (
-    describe_scenario,
-    recordable_drives,
-)
+from cns_drake.scenarios import describe_scenario
 from evaluation.study import RecordingInfo, scenario_digest
 from evaluation.study.recordings.map_drives import unlike_shipped
+from worlds.maps import recordable_drives
 
 
 def recording(name, **changes):

@@ -3,7 +3,7 @@
 from helpers.small_towns import ROUTES, drive
 import pytest
 
-from cns_drake.drives import driven_way
+from evaluation.drives import driven_way
 from evaluation.study import drives_by_map, find_recordings
 
 LEGS = ROUTES["a"]

@@ -6,12 +6,12 @@ from pydrake.math import RigidTransform
 import pytest
 from scipy import integrate
 
-from cns_drake.scene import CLASS_IDS
 from cns_drake.sensors import Weather
 from cns_drake.sensors.returns.link_budget import fit_link_budget
 from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
 from cns_drake.sensors.returns.weather import tabulate_scattering
-from cns_drake.units import LIDAR_PRESETS
+from evaluation.lidar_sheets import LIDAR_PRESETS
+from worlds.shapes import CLASS_IDS
 
 OUTLIER = CLASS_IDS["outlier"]
 

@@ -8,7 +8,7 @@ from cns_drake.sensors.returns.echoes import Receiver, report_echoes
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.link_budget import fit_link_budget
 from cns_drake.sensors.returns.random_numbers import frame_key
-from cns_drake.units import LIDAR_PRESETS, Response
+from evaluation.lidar_sheets import LIDAR_PRESETS, Response
 
 BEAMS = 300
 # More are not processed.

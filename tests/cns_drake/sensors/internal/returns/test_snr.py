@@ -9,7 +9,7 @@ from cns_drake.sensors.returns.link_budget import (
     fit_link_budget,
     target_snr,
 )
-from cns_drake.units import LIDAR_PRESETS, ReturnsSheet
+from evaluation.lidar_sheets import LIDAR_PRESETS, ReturnsSheet
 
 
 def test_two_rows_fix_scale_and_extinction():

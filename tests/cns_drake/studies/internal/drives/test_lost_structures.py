@@ -8,11 +8,12 @@ from helpers.small_map import box_visual, scenario_values, write_small_map
 import pytest
 import yaml
 
-from cns_drake.base import InputError, validated
-from cns_drake.scenarios import load_scenario, shipped_maps
+from cns_drake.scenarios import load_scenario
 from cns_drake.scene import load_world, structures_in
 from cns_drake.studies import Losses
 from cns_drake.studies.drives.changed_drives import lost_structures
+from evaluation.base import InputError, validated
+from worlds.maps import shipped_maps
 
 SOURCE = "mine.yaml: database"
 

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 import yaml
 
-from cns_drake.base import Reporter
-from cns_drake.roads import load_road_network
 from cns_drake.scenarios import load_scenario
-from cns_drake.scene import MapFolder
 from cns_drake.studies.maps.frozen_redraws import RedrawFrozen
 from cns_drake.studies.maps.turned_inputs import turned_content
+from evaluation.base import Reporter
+from worlds.maps import MapFolder
+from worlds.roads import load_road_network
 
 
 def test_a_quarter_turn():

@@ -9,14 +9,14 @@ from helpers.internal import studies
 from helpers.small_city import write_small_city
 import pytest
 
-from cns_drake.ageing import DEFAULT_RATES
-from cns_drake.base import InputError, Reporter, draft_folder
-from cns_drake.city import generate_city
-from cns_drake.scene import MapFolder
 from cns_drake.studies.maps import map_step
 from cns_drake.studies.maps.made_maps import AgeCity, made_map_step
 from cns_drake.studies.maps.map_step import MakeMap
+from evaluation.base import InputError, Reporter, draft_folder
 from evaluation.study import Experiment, MadeMap
+from worlds.ageing import DEFAULT_RATES
+from worlds.city import generate_city
+from worlds.maps import MapFolder
 
 DRIVE = """
 map: .

@@ -7,11 +7,11 @@ from helpers.internal import studies
 from helpers.small_city import ROADS, write_small_city
 import pytest
 
-from cns_drake.base import Cluster
-from cns_drake.city import generate_city, load_plan, load_stages, make_city
-from cns_drake.roads import load_road_network
 from cns_drake.studies.maps import map_step
 from cns_drake.studies.maps.redrawing import RedrawCity, redrawn_inputs
+from evaluation.base import Cluster
+from worlds.city import generate_city, load_plan, load_stages, make_city
+from worlds.roads import load_road_network
 
 pytestmark = pytest.mark.slow
 

@@ -6,8 +6,7 @@ from helpers.recorded_traffic import write_rounds
 from helpers.small_map import scenario_values, write_small_map
 import pytest
 
-from cns_drake.base import Cluster, InputError, fingerprint
-from cns_drake.scenarios import make_scenario, worlds_folder
+from cns_drake.scenarios import make_scenario
 from cns_drake.studies.maps.experiment_maps import pairs_by_map
 from cns_drake.studies.pairs.comparisons import ChangedPair, DatedDrive
 from cns_drake.studies.pairs.simulated_pairs import changed_pairs
@@ -17,8 +16,10 @@ from cns_drake.studies.study import (
     frozen_drives,
     plan_study,
 )
+from evaluation.base import Cluster, InputError, fingerprint
 from evaluation.recognition import RECORDED_PROTOCOL
 from evaluation.study import Condition, Study, load_experiment
+from worlds.maps import worlds_folder
 
 TABLE = "levels.csv"
 

@@ -1,7 +1,7 @@
 """Drives in maps that later drives update."""
 
-from cns_drake.base import Cluster
 from cns_drake.studies.pairs.simulated_pairs import with_upkept_maps
+from evaluation.base import Cluster
 from evaluation.study import Experiment, NamedDrive, RecordingSource, Study
 
 

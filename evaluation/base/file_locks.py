@@ -1,0 +1,90 @@
+"""File locks, with which only one process at a time does a piece of work."""
+
+from collections.abc import Callable, Iterator
+import contextlib
+import fcntl
+import os
+from pathlib import Path
+
+from evaluation.base.files import make_folder, user_errors
+
+
+@contextlib.contextmanager
+def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
+    """Locks a file, so that one process at a time runs the block.
+
+    During the block, `<path>.lock` is locked, also for other machines if the
+    file system supports locks. The lock is released even if the process
+    crashes. If another process holds the lock, `on_wait` is called before
+    waiting.
+
+    Raises:
+        InputError: if the lock cannot be written.
+    """
+    make_folder(path.parent)
+    with contextlib.ExitStack() as stack:
+        with user_errors(path.with_name(f"{path.name}.lock")):
+            lock_file(path, stack, on_wait)
+        yield
+
+
+def remove_lock(path: Path) -> None:
+    """Removes the lock file `<path>.lock` that a killed process left behind.
+
+    A lock that a running process holds stays.
+    """
+    if path.with_name(f"{path.name}.lock").is_file():
+        # A file that cannot be locked is in use, or is not one of our locks.
+        with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
+            lock_file(path, stack, _refuse_to_wait)
+
+
+def _refuse_to_wait() -> None:
+    raise BlockingIOError
+
+
+def lock_file(
+    path: Path, stack: contextlib.ExitStack, on_wait: Callable[[], None]
+) -> None:
+    """Locks `<path>.lock` until a stack of contexts is closed.
+
+    Args:
+        path: file to which the lock belongs.
+        stack: stack that releases the lock when it is closed.
+        on_wait: called if another process holds the lock, before waiting.
+
+    Raises:
+        OSError: the lock cannot be written.
+    """
+    lock = path.with_name(f"{path.name}.lock")
+    while True:
+        descriptor = open_plain(lock, os.O_WRONLY)
+        stream = stack.enter_context(os.fdopen(descriptor, "w"))
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            on_wait()
+            fcntl.flock(stream, fcntl.LOCK_EX)
+        except OSError:
+            pass  # Some network file systems have no locks.
+        # Its former owner may have removed it, and another process made a new
+        # one.
+        with contextlib.suppress(FileNotFoundError):
+            if os.path.samestat(os.stat(lock), os.fstat(stream.fileno())):
+                stack.callback(lock.unlink, missing_ok=True)
+                return
+
+
+def open_plain(path: Path, flags: int) -> int:
+    """Opens a file for writing, and returns its file descriptor.
+
+    The file is created if it does not exist. Symbolic links are not followed,
+    because they may lead to another user's file. If the path is a pipe, the
+    function does not wait for a reader.
+
+    Args:
+        path: the file.
+        flags: further flags of `os.open`, such as `os.O_WRONLY`.
+    """
+    flags |= os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
+    return os.open(path, flags, 0o666)

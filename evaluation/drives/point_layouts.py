@@ -1,0 +1,205 @@
+"""Conversion of points between the layouts (fields) of several programs.
+
+`cns` is the layout of this project. `ouster` is the layout of Ouster's driver
+with `ring` as uint8, as LIO-SAM and FAST-LIO2 read it; `velodyne` is
+PointXYZIRT of Velodyne's ROS 2 driver; `autoware` is PointXYZIRCAEDT. Only
+`cns` has fields for labels and instances; with the other layouts, labels and
+instances are recorded in a second message.
+"""
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+from numpy.lib.recfunctions import repack_fields
+
+from evaluation.base import NS_PER_S
+
+LayoutName = Literal["cns", "ouster", "velodyne", "autoware"]
+_MM_PER_M = 1e3
+# Limit of times that are stored as uint32 [ns].
+_LONGEST_NS = 2.0**32
+# The latest time in a scan, if it is in nanoseconds: in seconds it would be
+# later than any scan ends, and before 2001.
+_NS_OF_A_SCAN = (1e6, 1e9)
+# Autoware's type of the only, and strongest, return of a beam.
+_SINGLE_STRONGEST = 1
+# The greatest intensity of calibrated returns, and of a byte.
+_FULL = 255.0
+
+
+def _make_dtype(
+    names: str, formats: str, offsets: list[int], size: int
+) -> np.dtype:
+    return np.dtype(
+        {
+            "names": names.split(),
+            "formats": [f"<{form}" for form in formats.split()],
+            "offsets": offsets,
+            "itemsize": size,
+        }
+    )
+
+
+_LAYOUTS = {
+    # PCL pads a position to 16 bytes, and a point to a multiple of that.
+    "ouster": _make_dtype(
+        "x y z intensity t reflectivity ring ambient range",
+        "f4 f4 f4 f4 u4 u2 u1 u2 u4",
+        [0, 4, 8, 16, 20, 24, 26, 28, 32],
+        48,
+    ),
+    "velodyne": _make_dtype(
+        "x y z intensity ring time",
+        "f4 f4 f4 f4 u2 f4",
+        [0, 4, 8, 12, 16, 18],
+        22,
+    ),
+    "autoware": _make_dtype(
+        "x y z intensity return_type channel azimuth elevation distance"
+        " time_stamp",
+        "f4 f4 f4 u1 u1 u2 f4 f4 f4 u4",
+        [0, 4, 8, 12, 13, 14, 16, 20, 24, 28],
+        32,
+    ),
+}
+
+
+def to_layout(
+    points: np.ndarray,
+    layout: str,
+    num_rings: int | None = None,
+    is_calibrated: bool = False,
+) -> np.ndarray:
+    """Returns points with the fields of another layout, such as Ouster's.
+
+    Args:
+        points: (N,) with the fields x y z intensity ring t.
+        layout: a `LayoutName`; `cns` is the layout that the points
+            have.
+        num_rings: number of rings of the LiDAR. If given, the layout `velodyne`
+            counts rings from the lowest ring, as Velodyne's driver does.
+        is_calibrated: whether the intensities are calibrated. Calibrated
+            intensities are from 0 to 255, all others from 0 to 1.
+
+    Returns:
+        (N,) records. Ranges of `ouster` are in millimetres. `t` and
+        `time_stamp` count nanoseconds since the message's stamp, and `time`
+        counts seconds since the stamp. Azimuths are from 0 to 2 pi, and
+        increase from x to y. `reflectivity` and the intensity of `autoware` are
+        from 0 to 255.
+    """
+    if layout == "cns":
+        return points
+    x, y, z = (points[axis].astype(float) for axis in "xyz")
+    distance = np.sqrt(x * x + y * y + z * z)
+    full = _FULL if is_calibrated else 1.0
+    brightness = np.rint(_FULL * np.clip(points["intensity"] / full, 0.0, 1.0))
+    columns = {name: points[name] for name in points.dtype.names or ()}
+    columns |= {
+        "reflectivity": brightness,
+        "ambient": np.zeros(len(points)),
+        "range": np.rint(_MM_PER_M * distance),
+        "time": points["t"] / NS_PER_S,
+        "time_stamp": points["t"],
+        "return_type": np.full(len(points), _SINGLE_STRONGEST),
+        "channel": points["ring"],
+        "azimuth": np.arctan2(y, x) % (2.0 * np.pi),
+        "elevation": np.arctan2(z, np.hypot(x, y)),
+        "distance": distance,
+    }
+    if layout == "autoware":
+        columns["intensity"] = brightness
+    if layout == "velodyne" and num_rings is not None:
+        columns["ring"] = num_rings - 1 - points["ring"].astype(int)
+    dtype = _LAYOUTS[layout]
+    made = np.zeros(len(points), dtype)
+    for name in dtype.names or ():
+        made[name] = columns[name]
+    return made
+
+
+def to_labels(points: np.ndarray) -> np.ndarray:
+    """Returns only the labels and instances of points, (N,)."""
+    return repack_fields(points[["label", "instance"]])
+
+
+def from_layout(
+    points: np.ndarray,
+    labels: np.ndarray | None = None,
+    is_ideal: Callable[[], bool] = lambda: False,
+) -> np.ndarray:
+    """Converts points of any layout to the fields of the layout `cns`.
+
+    Args:
+        points: (N,) in any layout.
+        labels: (N,) records with further fields of the same points, such as
+            `label`; by default none.
+        is_ideal: function that returns whether intensities of the `autoware`
+            layout are 255 times ideal ones, as cns-drake records them. All
+            others stay as they are.
+
+    Returns:
+        (N,) points; `points` itself if nothing changes. Fields that `cns` does
+        not have are kept. In `velodyne`, `time` [s] becomes `t` [ns]. In
+        `autoware`, `time_stamp` and `channel` become `t` and `ring`, and ideal
+        intensities are scaled to 0 to 1. A floating-point `t` in seconds or
+        nanoseconds becomes whole nanoseconds; a `t` whose values fit neither
+        unit stays unchanged.
+
+    Raises:
+        ValueError: the numbers of labels and points differ.
+    """
+    names = points.dtype.names or ()
+    columns = {name: points[name] for name in names}
+    if {"time_stamp", "channel", "intensity"} <= set(names):
+        columns["t"] = columns.pop("time_stamp")
+        columns["ring"] = columns.pop("channel")
+        full = np.float32(_FULL if is_ideal() else 1.0)
+        columns["intensity"] = points["intensity"] / full
+    elif "time_stamp" in names and "t" not in names:
+        columns["t"] = columns.pop("time_stamp")
+    else:
+        timed = next((name for name in ("t", "time") if name in names), "t")
+        t_ns = _nanoseconds(columns.get(timed))
+        if t_ns is not None:
+            columns["t"] = t_ns
+            columns.pop("time", None)
+    if labels is not None:
+        if len(labels) != len(points):
+            raise ValueError(f"{len(points)} points, but {len(labels)} labels")
+        columns |= {name: labels[name] for name in labels.dtype.names or ()}
+    fields = [
+        (name, column.dtype, column.shape[1:])
+        for name, column in columns.items()
+    ]
+    if fields == [
+        (name, points[name].dtype, points[name].shape[1:]) for name in names
+    ]:
+        return points
+    made = np.empty(len(points), fields)
+    for name, column in columns.items():
+        made[name] = column
+    return made
+
+
+def _nanoseconds(times: np.ndarray | None) -> np.ndarray | None:
+    """Returns times as nanoseconds since the stamp, if the unit is certain.
+
+    Some drivers count backwards from the last point, or since 1970.
+
+    Args:
+        times: (N,) times of the points; None if the points have no such field.
+
+    Returns:
+        (N,) uint32 [ns]; None without such a field, or if its unit is not
+        certain.
+    """
+    if times is None or times.dtype.kind != "f":
+        return None
+    t_ns = times.astype(float)
+    if not _NS_OF_A_SCAN[0] <= t_ns.max(initial=0.0) < _NS_OF_A_SCAN[1]:
+        t_ns = t_ns * NS_PER_S
+    if not ((t_ns >= 0.0) & (t_ns < _LONGEST_NS)).all():
+        return None
+    return np.rint(t_ns).astype(np.uint32)

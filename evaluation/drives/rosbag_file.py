@@ -1,0 +1,153 @@
+"""Messages of bags that `McapFile` does not read, by the package rosbags.
+
+These are rosbag2 with SQLite, of several files or compressed, and ROS 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import contextlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rosbags.highlevel import AnyReader
+
+from evaluation.base import InputError, listed
+from evaluation.drives import ros_types
+from evaluation.drives.mcap_file import LOCATION
+
+# How to read a damaged bag of ROS 1, for error messages.
+_ADVICE = " (rosbag reindex FILE, of ROS 1, saves what is intact)"
+
+
+class RosbagFile:
+    """A bag, open for reading single messages, like `McapFile`.
+
+    The locations of a topic's messages are found by reading the topic once. In
+    a location, `offset` is the number of the message in its topic, and
+    `channel_id` is the number of the topic.
+
+    Attributes:
+        path: the bag, for messages.
+        files: its files.
+        library: name of the program that wrote it, which is unknown.
+    """
+
+    library = ""
+
+    def __init__(self, paths: Sequence[Path]):
+        """Opens a bag.
+
+        Args:
+            paths: the folder or file of rosbag2, or the files of ROS 1.
+
+        Raises:
+            InputError: there is no readable bag.
+        """
+        self.path = paths[0] if len(paths) == 1 else paths[0].parent
+        self.files = (
+            tuple(listed(self.path)) if self.path.is_dir() else tuple(paths)
+        )
+        with self._faults():
+            self._reader = AnyReader(
+                paths, default_typestore=ros_types.known_types()
+            )
+            self._reader.open()
+        self._connections: dict[str, list[Any]] = {}
+        for one in self._reader.connections:
+            self._connections.setdefault(one.topic, []).append(one)
+        self._names = sorted(self._connections)
+        self._locations: dict[str, np.ndarray] = {}
+
+    def __del__(self) -> None:
+        """Closes the bag, and removes what was uncompressed for it."""
+        with contextlib.suppress(Exception):
+            self._reader.close()
+
+    @property
+    def topics(self) -> dict[str, list[str]]:
+        """Maps topics with messages to types, as `McapFile.topics`."""
+        return {
+            topic: sorted({f"{one.msgtype} in cdr" for one in connections})
+            for topic, connections in self._connections.items()
+            if any(one.msgcount for one in connections)
+        }
+
+    @property
+    def empty_topics(self) -> list[str]:
+        """Topics without a message."""
+        used = self.topics
+        return [one for one in self._names if one not in used]
+
+    def locate(self, topic: str) -> np.ndarray:
+        """Returns the locations (N,) of a topic's messages, in their order."""
+        if topic not in self._locations:
+            with self._faults():
+                times = [
+                    time_ns
+                    for _, time_ns, _ in self._reader.messages(
+                        self._connections[topic]
+                    )
+                ]
+            found = np.zeros(len(times), LOCATION)
+            found["offset"] = np.arange(len(times))
+            found["log_time_ns"] = times
+            found["channel_id"] = self._names.index(topic)
+            self._locations[topic] = found
+        return self._locations[topic]
+
+    def read(self, location: np.void) -> memoryview:
+        """Returns the message at a location, in CDR."""
+        ((_, data),) = self.visit(np.array([location], LOCATION))
+        return data
+
+    def visit(self, locations: np.ndarray) -> Iterator[tuple[int, memoryview]]:
+        """Yields messages in the bag's order, as `McapFile.visit`."""
+        for number in np.unique(locations["channel_id"]).tolist():
+            topic = self._names[number]
+            rows = np.flatnonzero(locations["channel_id"] == number)
+            row_of = {int(locations["offset"][row]): int(row) for row in rows}
+            times_ns = self.locate(topic)["log_time_ns"]
+            start = int(locations["log_time_ns"][rows].min())
+            stop = int(locations["log_time_ns"][rows].max()) + 1
+            within = (times_ns >= start) & (times_ns < stop)
+            offsets = np.flatnonzero(within).tolist()
+            with self._faults():
+                found = self._reader.messages(
+                    self._connections[topic], start, stop
+                )
+                for offset, (connection, _, data) in zip(
+                    offsets, found, strict=True
+                ):
+                    if offset not in row_of:
+                        continue
+                    if self._reader.is2:
+                        yield row_of[offset], memoryview(data)
+                        continue
+                    message = self._reader.deserialize(data, connection.msgtype)
+                    packed = ros_types.serialize(message)
+                    yield row_of[offset], memoryview(packed)
+
+    def attachment(self, name: str) -> bytes | None:
+        """Returns None: such bags have no attachments."""
+        return None
+
+    def metadata(self, name: str) -> list[dict[str, str]]:
+        """Returns nothing: such bags have no records of metadata."""
+        return []
+
+    @contextlib.contextmanager
+    def _faults(self) -> Iterator[None]:
+        """Turns the errors of a damaged bag into an InputError of one line."""
+        try:
+            yield
+        except InputError:
+            raise
+        except Exception as error:
+            # rosbags, SQLite and the compression raise errors of any class.
+            is_1 = any(file.suffix == ".bag" for file in self.files)
+            raise InputError(
+                f"{self.path}: the bag cannot be read"
+                f" ({type(error).__name__}: {error}){_ADVICE if is_1 else ''}"
+            ) from error

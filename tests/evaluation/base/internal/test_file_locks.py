@@ -1,0 +1,22 @@
+"""Locks that are no plain files are refused."""
+
+import os
+
+import pytest
+
+from evaluation.base import InputError
+from evaluation.base.file_locks import exclusive
+
+
+def test_a_lock_that_is_a_link_or_a_pipe_is_refused(tmp_path):
+    mine = tmp_path / "mine"
+    mine.write_text("mine")
+    (tmp_path / "a.lock").symlink_to(mine)
+    os.mkfifo(tmp_path / "b.lock")
+    for name in "ab":
+        with (
+            pytest.raises(InputError, match=rf"{name}\.lock: "),
+            exclusive(tmp_path / name, lambda: None),
+        ):
+            raise AssertionError("locked")
+    assert mine.read_text() == "mine"

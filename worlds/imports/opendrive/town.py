@@ -1,0 +1,717 @@
+"""Builds a town on an imported road network, and writes its files."""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+import shapely
+from shapely import GEOSException
+from shapely.geometry import LineString, MultiLineString
+from shapely.geometry.base import BaseGeometry
+
+from evaluation.base import InputError, distances_along, doing, value_errors
+from worlds.city import (
+    City,
+    CityPlan,
+    CityStreets,
+    Draft,
+    Stages,
+    build_along,
+    place_car,
+    render_stages,
+    starter_plan,
+    starter_stages,
+    street_surfaces,
+)
+from worlds.imports import map_files, overview
+from worlds.imports.drives import search, steerable_drives
+from worlds.imports.drives.steerable_drives import WaypointRoute
+from worlds.imports.faults import ImportFaults
+from worlds.imports.imported_objects import ImportedObject, make_object
+from worlds.imports.opendrive.band_graph import BandGraph
+from worlds.imports.opendrive.imported_streets import ImportedStreets
+from worlds.imports.opendrive.lanes import (
+    LEAST_WIDTH,
+    LaneBand,
+    is_raised,
+    lane_bands,
+    lane_class,
+    lane_polygon,
+)
+from worlds.imports.opendrive.road_heights import KerbHeights, RoadHeights
+from worlds.imports.opendrive.road_marks import road_marks
+from worlds.imports.opendrive.road_model import RoadMap
+from worlds.imports.opendrive.road_reader import read_roads
+from worlds.imports.opendrive.things import thing_structures
+from worlds.imports.options import ImportOptions
+from worlds.imports.report import ImportReport
+from worlds.maps import MESH_FOLDER
+from worlds.shapes import (
+    GROUND_CLASSES,
+    Structure,
+    surface_mesh,
+)
+
+# Height of sidewalks above the road if the file states none [m].
+_KERB_HEIGHT = 0.1
+# Least and greatest height of sidewalks above the road [m].
+_KERB_HEIGHTS = (0.03, 0.3)
+# Greatest area that the generator fills with ground [m^2].
+_LARGEST_AREA = 8e6
+# Greatest extent of this area along x or y [m].
+_LONGEST_SIDE = 9000.0
+# Least and greatest length of a bay of a parking lane [m].
+_BAY_LENGTHS = (5.8, 7.4)
+# Share of the bays that are taken.
+_TAKEN_SHARE = 0.6
+# Least width of a parking lane [m].
+_LEAST_PARKING = 1.9
+# The underside of a bridge is this far below its upper side [m].
+_DECK_DEPTH = np.array([0.0, 0.0, 0.8])
+# Triangles are dropped if twice their area is not greater than this [m^2].
+_LEAST_TWICE_AREA = 1e-6
+# How far the end of a bridge extends to both sides: wider than a kerb [m].
+_END_REACH = 0.2
+# A road at least this far above another one is a bridge [m].
+_HEADROOM = 3.0
+# Places are above one another if they are at most this far apart, as seen from
+# above [m].
+_ABOVE_WITHIN = 2.5
+# A bridge extends this far to both sides of the road that it crosses [m].
+_BRIDGE_REACH = 8.0
+# About the radius of a tree's crown, in pictures [m].
+_CROWN_RADIUS = 1.5
+# Side of the squares into which footprints are divided, in pictures [m].
+_TILE = 20.0
+# Least and greatest speed of a drive [m/s].
+_SPEEDS = (3.0, 12.0)
+# Classes that the picture from above shows; small things could not be seen.
+_SHOWN_CLASSES = (
+    "road",
+    "parking",
+    "sidewalk",
+    "other-ground",
+    "building",
+    "vegetation",
+)
+# The arrays of a band, with one row for each place along the road.
+_ARRAYS = (
+    "inner", "outer", "middle", "heading", "roll", "grade", "rise", "s",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Town:
+    """A town built on an imported road network, in all its stages.
+
+    Attributes:
+        roads: the imported roads.
+        seed: seed of all random draws.
+        city: the whole town.
+        stages: how the town looked in each stage.
+        streets: areas of the streets, except bridges.
+        drives: the proposed drives, at most two.
+        kinds: kind of structure -> number of structures.
+        faults: the repaired and omitted parts of the file, by kind of fault.
+    """
+
+    roads: RoadMap
+    seed: int
+    city: City
+    stages: Stages
+    streets: ImportedStreets
+    drives: list[WaypointRoute]
+    kinds: dict[str, int]
+    faults: ImportFaults
+
+
+def build_town(
+    source: Path,
+    options: ImportOptions,
+    own: Sequence[WaypointRoute] | None = None,
+) -> Town:
+    """Returns a town, built at random along the roads of an OpenDRIVE file.
+
+    Args:
+        source: the file.
+        options: options of the import. `seed` is the seed of all random draws.
+            `dressed` says whether to paint the road marks of the file. `grow`
+            is the share of the buildings that the first stage lacks, beginning
+            in the east. `within` is the greatest distance of structures from
+            the drives [m].
+        own: drives that replace the proposed drives; None to use the proposed
+            drives.
+
+    Raises:
+        InputError: the file cannot be used, or no drive was found for `within`.
+    """
+    faults = ImportFaults()
+    roads = read_roads(source, faults)
+    try:
+        return _build(source, roads, faults, options, own)
+    except GEOSException as error:
+        raise InputError(
+            f"{source}: an area cannot be used: {error}"
+        ) from error
+
+
+def _build(
+    source: Path,
+    roads: RoadMap,
+    faults: ImportFaults,
+    options: ImportOptions,
+    own: Sequence[WaypointRoute] | None,
+) -> Town:
+    streets = _read_streets(source, roads, faults)
+    of_file = _structures_of_file(roads, streets, options.dressed, faults)
+    doing(f"building along {len(roads.roads)} roads")
+    city = _city_along(source, streets, of_file, options.seed)
+    drives = (
+        search.find_drives(BandGraph(streets.bands))
+        if own is None
+        else steerable_drives.with_ground_heights(
+            own, streets.surface.heights, faults
+        )
+    )
+    if options.within is not None:
+        city = _near_drives(city, drives, options.within, faults)
+    imported = {one.name for some in of_file for one in some}
+    generated = [one for one in city.structures if one.name not in imported]
+    return Town(
+        roads=roads,
+        seed=options.seed,
+        city=city,
+        stages=_make_stages(City(tuple(generated), city.cars), options.grow),
+        streets=streets.on_ground,
+        drives=drives,
+        kinds=_counts_by_kind(roads, of_file, generated),
+        faults=faults,
+    )
+
+
+def _bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
+    """Yields the structures of bridges: their upper sides and undersides.
+
+    `bands` contains the lanes on bridges.
+    """
+    of_road: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
+    for band in bands:
+        # The sides of parts without a lane are closed as well.
+        semantic_class = lane_class(band.kind) or "other-ground"
+        left, right = band.inner, band.outer
+        if band.lane.number > 0:
+            left, right = right, left
+        upper = _triangles_between(right, left)
+        of_road[band.road.name, semantic_class].append(upper)
+        low_left, low_right = left - _DECK_DEPTH, right - _DECK_DEPTH
+        of_road[band.road.name, "other-structure"] += [
+            _triangles_between(low_left, low_right),
+            _triangles_between(low_right, right),
+            _triangles_between(left, low_left),
+        ]
+    for (road, semantic_class), pieces in of_road.items():
+        triangles = np.concatenate(pieces)
+        edges = np.cross(
+            triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+        )
+        triangles = triangles[np.linalg.norm(edges, axis=1) > _LEAST_TWICE_AREA]
+        if len(triangles):
+            yield make_object(
+                f"bridge_{road}_{semantic_class}",
+                semantic_class,
+                "Bridge",
+                {"deck": triangles},
+                {},
+            ).structure
+
+
+def bridge_ends(bands: Sequence[LaneBand]) -> BaseGeometry:
+    """Returns narrow strips across the lanes at both ends of bridges, in W [m].
+
+    `bands` contains the lanes on bridges.
+    """
+    lines = [
+        LineString([band.inner[k, :2], band.outer[k, :2]])
+        for band in bands
+        for k in (0, -1)
+    ]
+    return shapely.union_all(lines).buffer(_END_REACH, cap_style="flat")
+
+
+def _triangles_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Returns triangles between two lines (N, 3).
+
+    The triangles look upwards if line `b` is to the left of line `a`.
+    """
+    return np.concatenate(
+        [
+            np.stack([a[:-1], a[1:], b[1:]], axis=1),
+            np.stack([a[:-1], b[1:], b[:-1]], axis=1),
+        ]
+    )
+
+
+class _TownStreets(NamedTuple):
+    """The streets of a town, as the file determines them.
+
+    Attributes:
+        bands: all lanes.
+        ground: the lanes on the ground.
+        raised: the lanes on bridges.
+        bridge_ends: strips across the lanes at both ends of bridges, in W.
+        on_ground: areas of the streets on the ground.
+        surface: heights of these streets.
+        kerbs: heights of their kerbs.
+    """
+
+    bands: list[LaneBand]
+    ground: list[LaneBand]
+    raised: list[LaneBand]
+    bridge_ends: BaseGeometry
+    on_ground: ImportedStreets
+    surface: RoadHeights
+    kerbs: KerbHeights
+
+
+def _read_streets(
+    source: Path, roads: RoadMap, faults: ImportFaults
+) -> _TownStreets:
+    """Returns the streets of a town.
+
+    Raises:
+        InputError: a lane cannot be used, or the lanes on the ground have no
+            area or are too far apart.
+    """
+    with value_errors(source):
+        bands = [band for road in roads.roads for band in lane_bands(road)]
+    for band in bands:
+        if band.is_inverted:
+            kind = "lane of negative width, without width there"
+            faults.add(kind, band.road.name)
+    ground, raised = split_levels(bands)
+    _count_raised_kerbs(raised, faults)
+    ends = bridge_ends(raised)
+    on_ground = ImportedStreets(ground, ends)
+    _check_extent(source, on_ground.areas.carriageway)
+    return _TownStreets(
+        bands,
+        ground,
+        raised,
+        ends,
+        on_ground,
+        RoadHeights(ground),
+        KerbHeights(ground, _median_kerb_height(ground)),
+    )
+
+
+def _make_stages(generated: City, grow: float | None) -> Stages:
+    """Returns the stages of a town.
+
+    Args:
+        generated: the structures that may be missing in the first stage.
+        grow: share of the buildings that the first stage lacks; None for the
+            usual share.
+    """
+    missing = {} if grow is None else {"missing": grow}
+    return Stages.model_validate(starter_stages(generated, **missing))
+
+
+class _StructuresOfFile(NamedTuple):
+    """Structures of a town that the file determines.
+
+    Attributes:
+        decks: decks of bridges.
+        things: signals and objects.
+        marks: road marks.
+    """
+
+    decks: list[Structure]
+    things: list[Structure]
+    marks: list[Structure]
+
+
+def _structures_of_file(
+    roads: RoadMap, streets: _TownStreets, dressed: bool, faults: ImportFaults
+) -> _StructuresOfFile:
+    """Returns the structures of a town that the file determines.
+
+    Args:
+        roads: the roads of the file.
+        streets: the streets of the town.
+        dressed: whether the town has road marks.
+        faults: counts parts that are left out.
+    """
+    areas, raised = streets.on_ground.areas, streets.raised
+    things = [
+        one
+        for road in roads.roads
+        for one in thing_structures(road, areas.lane_area, faults)
+    ]
+    marks: list[Structure] = []
+    if dressed:
+        _count_spans(roads, {band.road.name for band in raised}, faults)
+        marks += road_marks(
+            "marks", streets.ground, streets.surface.heights, areas.carriageway
+        )
+        marks += road_marks("bridge_marks", raised)
+    return _StructuresOfFile(list(_bridge_decks(raised)), things, marks)
+
+
+def _city_along(
+    source: Path, streets: _TownStreets, of_file: _StructuresOfFile, seed: int
+) -> City:
+    """Returns a city along the streets of a town, sampled at random.
+
+    Args:
+        source: the file, named in error messages.
+        streets: the streets.
+        of_file: the structures that the file determines, which the city also
+            contains.
+        seed: seed of the city.
+    """
+    on_ground, kerbs = streets.on_ground, streets.kerbs
+    plan = CityPlan.model_validate(starter_plan(on_ground.areas, seed))
+    surfaces = street_surfaces(
+        on_ground.areas,
+        streets.surface,
+        kerbs if kerbs.differ else kerbs.usual,
+        on_ground.coverings,
+        streets.bridge_ends,
+    )
+    return build_along(
+        CityStreets(
+            areas=on_ground.areas,
+            surface=streets.surface,
+            kerb_height=kerbs.usual,
+            kerbs=kerbs if kerbs.differ else None,
+            junctions=on_ground.junctions,
+            margins=on_ground.margins,
+            # Nothing is built below bridges, nor on things of the file.
+            reserved=shapely.union_all(
+                [
+                    *map(lane_polygon, streets.raised),
+                    *(one.footprint_W for one in of_file.things),
+                ]
+            ),
+            structures=(
+                *surfaces,
+                *of_file.decks,
+                *of_file.things,
+                *of_file.marks,
+            ),
+            furnish=lambda draft: None,
+            park=lambda draft: _park_cars(draft, streets.ground, plan.cars),
+        ),
+        plan,
+        str(source),
+    )
+
+
+def _check_extent(source: Path, carriageway: BaseGeometry) -> None:
+    """Checks that an area is not too large to be filled with a town.
+
+    Raises:
+        InputError: `carriageway` is empty or too large.
+    """
+    if carriageway.is_empty:
+        raise InputError(f"{source}: no lane in it has an area")
+    x0, y0, x1, y1 = carriageway.bounds
+    sides = x1 - x0, y1 - y0
+    if sides[0] * sides[1] > _LARGEST_AREA or max(sides) > _LONGEST_SIDE:
+        raise InputError(
+            f"{source}: roads of {sides[0]:.0f} m by {sides[1]:.0f} m; cut out"
+            f" a piece of at most {_LARGEST_AREA / 1e6:.0f} km^2 and"
+            f" {_LONGEST_SIDE / 1000:.0f} km"
+        )
+
+
+def _near_drives(
+    city: City,
+    drives: Sequence[WaypointRoute],
+    distance: float,
+    faults: ImportFaults,
+) -> City:
+    """Returns a city without structures farther than `distance` from drives.
+
+    The ground is kept.
+
+    Raises:
+        InputError: there is no drive.
+    """
+    if not drives:
+        raise InputError("--within: no drive was found; give one with --along")
+    ways = MultiLineString([drive.path for drive in drives])
+    shapely.prepare(ways)
+    kept = []
+    for one in city.structures:
+        # The ground is kept whole.
+        if one.semantic_class in GROUND_CLASSES or shapely.dwithin(
+            ways, one.footprint_W, distance
+        ):
+            kept.append(one)
+        else:
+            kind = "structure far from the drives, left out"
+            faults.add(kind, one.name)
+    return City(tuple(kept), city.cars)
+
+
+def _count_raised_kerbs(
+    raised: Sequence[LaneBand], faults: ImportFaults
+) -> None:
+    """Counts kerbs on bridges, which are not built."""
+    for band in raised:
+        if band.lane.inner_height and is_raised(band.kind, band.lane.height):
+            faults.add("kerb on a bridge, level with its road", band.road.name)
+
+
+def _count_spans(
+    roads: RoadMap, raised: Set[str], faults: ImportFaults
+) -> None:
+    """Counts the bridges and tunnels of a file that the town lacks.
+
+    `raised` contains the roads that pass over others. The town has the decks of
+    these roads.
+    """
+    for road in roads.roads:
+        for span in road.spans:
+            if span == "tunnel":
+                faults.add("tunnel, its road left open", road.name)
+            elif road.name not in raised:
+                kind = "bridge over no other road, laid on the ground"
+                faults.add(kind, road.name)
+
+
+def _median_kerb_height(bands: Sequence[LaneBand]) -> float:
+    """Returns the height of sidewalks above the road [m].
+
+    The height is the median of the heights in the file, within usual limits.
+    """
+    kerbs = [
+        band.lane.height
+        for band in bands
+        if band.kind == "sidewalk" and band.lane.height > 0.0
+    ]
+    return (
+        float(np.clip(np.median(kerbs), *_KERB_HEIGHTS))
+        if kerbs
+        else _KERB_HEIGHT
+    )
+
+
+def _park_cars(
+    draft: Draft, bands: Sequence[LaneBand], cars: dict[str, float]
+) -> None:
+    """Parks cars in parking lanes, facing in the direction of traffic."""
+    for band in bands:
+        if band.kind != "parking" or band.width.min() < _LEAST_PARKING:
+            continue
+        rng = draft.task(
+            "parking", band.road.name, band.section, band.lane.number
+        )
+        along = distances_along(band.middle)
+        place = float(rng.uniform(*_BAY_LENGTHS)) / 2.0
+        backwards = (band.lane.number > 0) != band.road.keeps_left
+        while place < along[-1] - _BAY_LENGTHS[0] / 2.0:
+            x, y = (np.interp(place, along, band.middle[:, k]) for k in (0, 1))
+            nearest = int(np.abs(along - place).argmin())
+            yaw = float(band.heading[nearest]) + (np.pi if backwards else 0.0)
+            taken = rng.uniform() < _TAKEN_SHARE
+            if taken:
+                place_car(draft, cars, (float(x), float(y)), yaw, rng, ("bay",))
+            place += float(rng.uniform(*_BAY_LENGTHS))
+
+
+def _counts_by_kind(
+    roads: RoadMap,
+    of_file: _StructuresOfFile,
+    generated: Sequence[Structure],
+) -> dict[str, int]:
+    junctions = [
+        road.junction for road in roads.roads if road.junction is not None
+    ]
+    drawn = Counter(one.semantic_class for one in generated)
+    kinds = {
+        "roads": len(roads.roads) - len(junctions),
+        "roads in junctions": len(junctions),
+        "junctions": len(set(junctions)),
+        "signals": sum("signal" in one.tags for one in of_file.things),
+        "objects": sum("object" in one.tags for one in of_file.things),
+        "bridges": sum(one.semantic_class == "road" for one in of_file.decks),
+        "roads with marks": len(of_file.marks),
+        "buildings, sampled at random": drawn["building"],
+        "plants, sampled at random": drawn["vegetation"],
+    }
+    return {kind: number for kind, number in kinds.items() if number}
+
+
+def split_levels(
+    bands: Sequence[LaneBand],
+) -> tuple[list[LaneBand], list[LaneBand]]:
+    """Returns the lanes on the ground and the lanes on bridges.
+
+    A lane that leads onto a bridge is cut at the bridge's end.
+    """
+    raised = _raised_places(bands)
+    ground: list[LaneBand] = []
+    bridges: list[LaneBand] = []
+    for band in bands:
+        above = raised.get(band.road.name)
+        if above is None:
+            ground.append(band)
+            continue
+        low, high = np.searchsorted(
+            above, [band.s - _BRIDGE_REACH, band.s + _BRIDGE_REACH]
+        )
+        is_bridge = high > low
+        for run, carried in _stretches_of_one_level(is_bridge):
+            parts = {name: getattr(band, name)[run] for name in _ARRAYS}
+            level = bridges if carried else ground
+            level.append(replace(band, **parts))
+    return ground, bridges
+
+
+def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
+    """Returns where each road passes over another road.
+
+    The result maps the name of a road to increasing distances along it [m].
+    """
+    # Roads are numbered by one of their bands.
+    number_of = {band.road.name: number for number, band in enumerate(bands)}
+    rows = [np.zeros((0, 5))]
+    for band in bands:
+        wide = band.width > LEAST_WIDTH
+        for edge in (band.inner, band.middle, band.outer):
+            numbers = np.full(len(band.s), number_of[band.road.name])
+            rows.append(np.column_stack([edge, band.s, numbers])[wide])
+    places = np.concatenate(rows)
+    xy = places[:, :2]
+    z, s, number = places[:, 2:].T
+    if len(places) == 0 or np.ptp(z) < _HEADROOM:
+        return {}
+    tree = cKDTree(xy)
+    raised: dict[str, list[float]] = {}
+    high = np.flatnonzero(z > z.min() + _HEADROOM)
+    for place, near in zip(
+        high, tree.query_ball_point(xy[high], _ABOVE_WITHIN), strict=True
+    ):
+        is_below = z[near] < z[place] - _HEADROOM
+        if (is_below & (number[near] != number[place])).any():
+            road = bands[int(number[place])].road.name
+            raised.setdefault(road, []).append(float(s[place]))
+    return {road: np.unique(along) for road, along in raised.items()}
+
+
+def _stretches_of_one_level(
+    is_bridge: np.ndarray,
+) -> Iterator[tuple[slice, bool]]:
+    """Yields stretches of a lane with one level, and whether it is a bridge.
+
+    `is_bridge` (N,) says which places along the lane are on a bridge.
+    Neighbouring stretches share a place.
+    """
+    starts = np.flatnonzero(np.diff(is_bridge.astype(int), prepend=-1))
+    for a, b in zip(starts, [*starts[1:], len(is_bridge)], strict=True):
+        last = min(b + 1, len(is_bridge))
+        if last - a > 1:
+            yield slice(int(a), int(last)), bool(is_bridge[a])
+
+
+def write_town(
+    draft: Path, source: Path, town: Town
+) -> tuple[ImportReport, dict[str, tuple[int, int]]]:
+    """Writes all files of a town to a map folder.
+
+    Returns:
+        What was imported, and name of a stage -> counts of its structures and
+        of its triangles.
+
+    Raises:
+        InputError: the town has more structures than there are instance ids.
+    """
+    stages = town.stages.stages
+    files, sizes = render_stages(
+        draft.name,
+        town.city,
+        town.stages,
+        stages,
+        source,
+        origin=f"Imported by cns-drake from {source.name}.",
+    )
+    (draft / MESH_FOLDER).mkdir(exist_ok=True)
+    for name, text in files.items():
+        (draft / name).write_text(text, "utf-8")
+    map_files.write_facts(
+        draft,
+        source,
+        {
+            "reference_system": town.roads.reference_system or "unknown",
+            "origin": list(town.roads.origin),
+            "seed": town.seed,
+            "stages": {name: plan.story for name, plan in stages.items()},
+        },
+        town.faults,
+        "# Where the roads of this map come from; all else is random."
+        "\n# A place of the map plus the origin is one of the system [m].\n",
+    )
+    _write_drives(draft, town)
+    overview.draw_overview(
+        draft / "from_above.png",
+        list(_seen_from_above(town.city.structures)),
+        None,
+        town.drives,
+    )
+    return _report_of(town, sizes), sizes
+
+
+def _write_drives(draft: Path, town: Town) -> None:
+    """Writes the drives of a town, at the speed limit of their roads."""
+    stages = list(town.stages.stages)
+    map_files.write_drives(
+        draft,
+        {
+            stage: "" if stage == stages[-1] else ", not all of it built"
+            for stage in stages
+        },
+        [drive.waypoints for drive in town.drives],
+        [
+            float(np.clip(drive.limit or _SPEEDS[1], *_SPEEDS))
+            for drive in town.drives
+        ],
+    )
+
+
+def _report_of(
+    town: Town, sizes: Mapping[str, tuple[int, int]]
+) -> ImportReport:
+    return ImportReport(
+        kinds=town.kinds,
+        triangles=sum(
+            structure.model.num_triangles for structure in town.city.structures
+        ),
+        stages={stage: size[0] for stage, size in sizes.items()},
+        undated=0,
+        dated=0,
+        drives=tuple(drive.length for drive in town.drives),
+        faults=town.faults.rows(),
+        parts=town.faults.parts(),
+    )
+
+
+def _seen_from_above(
+    structures: Iterable[Structure],
+) -> Iterable[ImportedObject]:
+    """Yields the footprints of structures as flat triangles."""
+    for structure in structures:
+        if structure.semantic_class not in _SHOWN_CLASSES:
+            continue
+        area = structure.footprint_W
+        if structure.semantic_class == "vegetation":
+            area = area.buffer(_CROWN_RADIUS)
+        mesh = surface_mesh(area, 0.0, _TILE)
+        if mesh.num_triangles:
+            triangles = mesh.vertices[mesh.triangles()]
+            yield ImportedObject(structure, "", None, triangles)

@@ -1,0 +1,49 @@
+"""The report of an import: what was imported, and its faults."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from worlds.imports.faults import FaultCount
+
+# File in the map's folder that lists all counts of an import.
+REPORT_NAME = "import.txt"
+
+
+@dataclass(frozen=True)
+class ImportReport:
+    """The result of an import.
+
+    Attributes:
+        kinds: type of object -> number of structures.
+        triangles: number of triangles.
+        stages: name of a stage -> number of its structures.
+        undated: number of buildings without a year.
+        dated: number of buildings with a year.
+        drives: lengths of the proposed drives [m].
+        faults: counts of the repaired and omitted parts of the file, most
+            frequent first.
+        parts: lines on the parts of elements that are read, or that change no
+            shape.
+        shares: kind of fault -> share of the volume of all buildings that the
+            buildings with this fault have, from 0 to 1.
+    """
+
+    kinds: dict[str, int]
+    triangles: int
+    stages: dict[str, int]
+    undated: int
+    dated: int
+    drives: tuple[float, ...]
+    faults: list[FaultCount]
+    parts: list[str]
+    shares: Mapping[str, float] = field(default_factory=dict)
+
+    def told(self, fault: FaultCount) -> str:
+        """Returns the number of a fault in words, with its share."""
+        share = self.shares.get(fault.kind)
+        if share is None:
+            return str(fault.number)
+        part = (
+            f"{float(f'{100 * share:.2g}'):g} % of the volume of all buildings"
+        )
+        return f"{fault.number}, {part}"

@@ -1,0 +1,178 @@
+"""Finds the worlds that ship with cns-drake.
+
+A wheel contains them as one archive.
+"""
+
+from collections.abc import Mapping
+import functools
+import hashlib
+from pathlib import Path
+import shutil
+import tarfile
+import tempfile
+from types import MappingProxyType
+
+from evaluation.base import InputError, cache_folder, did_you_mean
+from worlds.maps import (
+    MapFolder,
+    drive_name,
+    no_drives,
+)
+
+
+@functools.cache
+def worlds_folder() -> Path:
+    """Returns the folder of shipped maps.
+
+    In a source checkout, this is the package `worlds` itself. A wheel contains
+    the maps as an archive, which is unpacked to the user's cache.
+
+    Raises:
+        InputError: there is no cache, or it cannot be written.
+    """
+    package = Path(__file__).resolve().parents[1]
+    archive = package / "maps.tar.xz"
+    return unpacked(archive) if archive.exists() else package
+
+
+def vehicle_file() -> Path:
+    """Returns the SDF file of the vehicle."""
+    return worlds_folder() / "vehicle.sdf"
+
+
+def suspension_file() -> Path:
+    """Returns the YAML file of the vehicle's springs."""
+    return worlds_folder() / "suspension.yaml"
+
+
+@functools.cache
+def shipped_cities() -> Mapping[str, Path]:
+    """Returns name -> folder of each of the paper's four cities."""
+    return _maps_in(worlds_folder())
+
+
+@functools.cache
+def shipped_maps() -> Mapping[str, Path]:
+    """Returns name -> folder of each shipped map.
+
+    The maps are the cities, and after these the maps for stress tests, which
+    nothing uses unless it is asked for them by name.
+    """
+    stress = _maps_in(worlds_folder() / "stress")
+    return MappingProxyType({**shipped_cities(), **stress})
+
+
+def _maps_in(folder: Path) -> Mapping[str, Path]:
+    folders = {
+        path.name: path
+        for path in sorted(folder.iterdir())
+        if MapFolder(path).roads.exists()
+    }
+    return MappingProxyType(folders)
+
+
+def recordable_maps() -> list[str]:
+    """Returns the names of the cities with a drive that can be recorded.
+
+    A drive can be recorded if the map has the stage through which it goes.
+    """
+    return [
+        name
+        for name, folder in shipped_cities().items()
+        if MapFolder(folder).recordable_drives()
+    ]
+
+
+def recordable_map(name: str) -> Path:
+    """Returns the folder of a map whose drives can be recorded.
+
+    Args:
+        name: a shipped map, or a folder.
+
+    Raises:
+        InputError: there is no such map, or the map has no drive that can be
+            recorded.
+    """
+    folder = shipped_maps().get(name, Path(name))
+    if not folder.is_dir():
+        maps = recordable_maps()
+        raise InputError(
+            f"unknown map '{name}'; there are: {', '.join(maps)}; or give a "
+            f"folder{did_you_mean(name, maps)}"
+        )
+    if not MapFolder(folder).recordable_drives():
+        raise no_drives(folder)
+    return folder
+
+
+def shipped_drives() -> dict[str, Path]:
+    """Returns name (`<map>_<NN>`) -> file of each shipped drive."""
+    return {
+        drive_name(path): path
+        for folder in shipped_maps().values()
+        for path in MapFolder(folder).drives()
+    }
+
+
+def recordable_drives() -> dict[str, Path]:
+    """Returns name -> scenario file of each recordable drive of a city.
+
+    A drive is recordable if its map has the stage through which it goes.
+    """
+    return {
+        drive_name(path): path
+        for folder in shipped_cities().values()
+        for path in MapFolder(folder).recordable_drives()
+    }
+
+
+def unpacked(archive: Path) -> Path:
+    """Returns a folder with the files of an archive, unpacked only once.
+
+    The folder is in the user's cache. The folder's name contains a digest of
+    the archive, so that each release has a folder of its own.
+
+    Several processes may call the function at the same time: each unpacks to a
+    temporary folder and then renames it, so that the folder is always whole,
+    and the first process to finish provides it.
+
+    Raises:
+        InputError: if the cache cannot be written.
+    """
+    cache = cache_folder()
+    if cache is None:
+        raise InputError(
+            "XDG_CACHE_HOME: name a folder, in which the shipped worlds are "
+            "unpacked; you have no home folder"
+        )
+    digest = hashlib.sha256(archive.read_bytes()).hexdigest()[:16]
+    folder = cache / f"{archive.name.partition('.')[0]}-{digest}"
+    if not folder.is_dir():
+        try:
+            _unpack(archive, folder)
+        except OSError as error:
+            raise InputError(
+                f"{folder}: {error.strerror or error}; the shipped worlds are "
+                "unpacked there: name another folder in XDG_CACHE_HOME"
+            ) from error
+    return folder
+
+
+def _unpack(archive: Path, folder: Path) -> None:
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    part = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
+    try:
+        with tarfile.open(archive) as tar:
+            # Python 3.11.2, which Debian 12 has, lacks filters.
+            tar.extraction_filter = getattr(
+                tarfile, "data_filter", lambda member, _: member
+            )
+            tar.extractall(part)
+        part.chmod(0o755)
+        try:
+            part.rename(folder)
+        except OSError:
+            if not folder.is_dir():  # Otherwise another process was faster.
+                raise
+    finally:
+        shutil.rmtree(part, ignore_errors=True)

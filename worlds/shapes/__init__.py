@@ -1,0 +1,8 @@
+"""Shapes: meshes, polygons, and structures with classes and materials.
+
+A kit for what builds or changes a world; nothing here imports Drake.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
