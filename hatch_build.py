@@ -82,7 +82,7 @@ class WorldsHook(BuildHookInterface):
         self._folder = tempfile.TemporaryDirectory()
         archive = Path(self._folder.name) / ARCHIVE
         pack(Path(self.root) / "worlds", archive)
-        build_data["force_include"][str(archive)] = f"cns_drake/{ARCHIVE}"
+        build_data["force_include"][str(archive)] = f"worlds/{ARCHIVE}"
 
     def finalize(self, *_: Any) -> None:
         """Removes what `initialize` wrote."""
@@ -91,13 +91,21 @@ class WorldsHook(BuildHookInterface):
 
 
 def pack(folder: Path, archive: Path) -> None:
-    """Packs the files of a folder; the same files give the same bytes.
+    """Packs the maps in a folder; the same files give the same bytes.
 
     Args:
-        folder: what is packed, by paths from there.
+        folder: what is packed, by paths from there, but for Python's packages.
         archive: the tar file to write.
     """
-    paths = [path for path in folder.rglob("*") if path.is_file()]
+    packages = {path.parent for path in folder.glob("*/__init__.py")}
+    paths = [
+        path
+        for path in folder.rglob("*")
+        if path.is_file()
+        and packages.isdisjoint(path.parents)
+        and not path.name.startswith(("__init__", "py.typed"))
+        and "__pycache__" not in path.parts
+    ]
     # Meshes of one name are nearly the same in all maps: side by side.
     paths.sort(key=lambda path: (path.suffix, path.name, path.as_posix()))
     with (

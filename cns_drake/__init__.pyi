@@ -5,12 +5,15 @@ from .pictures import save_meshcat_page as save_meshcat_page
 from .recording import BagWriter as BagWriter
 from .recording import McapRecorder as McapRecorder
 from .recording import recording_topics as recording_topics
+from .scenarios import InputError as InputError
 from .scenarios import Scenario as Scenario
+from .scenarios import __version__ as __version__
 from .scenarios import load_scenario as load_scenario
 from .scenarios import make_scenario as make_scenario
 from .scenarios import plan_drive as plan_drive
 from .scene import World as World
 from .scene import load_world as load_world
+from .sensors import LIDAR_PRESETS as LIDAR_PRESETS
 from .sensors import ApplyImuConfig as ApplyImuConfig
 from .sensors import ApplyLidarConfig as ApplyLidarConfig
 from .sensors import ApplyOdometryConfig as ApplyOdometryConfig
@@ -38,9 +41,6 @@ from .sensors import add_lidar_view as add_lidar_view
 from .sensors import add_odometry as add_odometry
 from .sensors import make_beam_pattern as make_beam_pattern
 from .sensors import make_flash_pattern as make_flash_pattern
-from .shared import LIDAR_PRESETS as LIDAR_PRESETS
-from .shared import InputError as InputError
-from .shared import __version__ as __version__
 from .simulation import FinishedSimulation as FinishedSimulation
 from .simulation import add_mcap_recorder as add_mcap_recorder
 from .simulation import make_station as make_station

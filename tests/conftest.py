@@ -57,7 +57,8 @@ def _look(event, arguments):
     elif event == "open":
         path = str(arguments[0])
         name = os.path.basename(path)
-        if path.startswith(_WORLDS) and name.startswith("stage_"):
+        is_stage = name.startswith("stage_") and name.endswith(".sdf")
+        if is_stage and path.startswith(_WORLDS):
             _seen.append(f"reads {path.removeprefix(_WORLDS)}")
 
 

@@ -1,15 +1,7 @@
 from .ageing import age_map as age_map
 from .city import generate_city as generate_city
-from .city import load_plan as load_plan
-from .city import make_city as make_city
-from .city import start_city as start_city
 from .imports import ImportOptions as ImportOptions
 from .imports import import_city as import_city
-from .imports import map_sources as map_sources
 from .maps import MapFolder as MapFolder
-from .maps import shipped_cities as shipped_cities
 from .maps import shipped_maps as shipped_maps
-from .roads import RoadNetwork as RoadNetwork
 from .roads import load_road_network as load_road_network
-from .shapes import StructureTable as StructureTable
-from .shapes import load_structure_table as load_structure_table

@@ -9,6 +9,7 @@ from .planning import load_scenario_world as load_scenario_world
 from .planning import plan_drive as plan_drive
 from .provenance import INPUTS_KEY as INPUTS_KEY
 from .provenance import SIMULATION_VERSION as SIMULATION_VERSION
+from .provenance import __version__ as __version__
 from .provenance import combined_digest as combined_digest
 from .provenance import dependency_versions as dependency_versions
 from .provenance import digest_file as digest_file
@@ -20,6 +21,7 @@ from .scenario import RideConfig as RideConfig
 from .scenario import Scenario as Scenario
 from .scenario import TrafficConfig as TrafficConfig
 from .scenario import TransientConfig as TransientConfig
+from .scenario_files import InputError as InputError
 from .scenario_files import check_files as check_files
 from .scenario_files import check_written_scenarios as check_written_scenarios
 from .scenario_files import describe_scenario as describe_scenario

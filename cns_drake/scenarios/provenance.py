@@ -10,7 +10,9 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene import FileWatch, referenced_files
 from cns_drake.sensors import KALIBR_FILE
 from evaluation.base import (
-    __version__,
+    __version__ as __version__,
+)
+from evaluation.base import (
     check_regular,
     fingerprint,
     installed_versions,

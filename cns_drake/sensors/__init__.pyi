@@ -35,6 +35,7 @@ from .lidar.scan_assembly import POINT_DTYPE as POINT_DTYPE
 from .lidar_adding import add_lidar as add_lidar
 from .lidar_adding import add_lidar_view as add_lidar_view
 from .lidar_adding import connect_lidar as connect_lidar
+from .lidar_config import LIDAR_PRESETS as LIDAR_PRESETS
 from .lidar_config import LidarSection as LidarSection
 from .lidar_config import WeatherConfig as WeatherConfig
 from .lidar_config import describe_unit as describe_unit

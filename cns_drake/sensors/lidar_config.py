@@ -27,7 +27,6 @@ from evaluation.base import InputError, Section, validated
 from evaluation.drives import LayoutName
 from evaluation.lidar_sheets import (
     DEFAULT_PRESET,
-    LIDAR_PRESETS,
     MOST_BEAMS,
     MOST_RINGS,
     LidarSheet,
@@ -37,6 +36,9 @@ from evaluation.lidar_sheets import (
     is_sheet_file,
     make_sheet,
     read_sheet,
+)
+from evaluation.lidar_sheets import (
+    LIDAR_PRESETS as LIDAR_PRESETS,
 )
 
 if TYPE_CHECKING:

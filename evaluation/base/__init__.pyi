@@ -120,7 +120,7 @@ from .units import NS_PER_S as NS_PER_S
 from .units import wrapped as wrapped
 from .version import __version__ as __version__
 from .version import installed_versions as installed_versions
-from .working_folder import leave_out_folder as leave_out_folder
+from .working_folder import leave_working_folder as leave_working_folder
 from .working_folder import start_python as start_python
 from .xml_elements import Element as Element
 from .xml_elements import read_elements as read_elements

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 import contextlib
 import importlib.metadata
 
-__version__ = "4.0.0"
+__version__ = "5.0.0"
 
 
 def installed_versions(packages: Iterable[str]) -> dict[str, str]:

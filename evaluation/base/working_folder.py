@@ -43,6 +43,20 @@ def leave_out_folder(search_path: list[str]) -> None:
         ]
 
 
+def leave_working_folder() -> None:
+    """Removes the working folder from `sys.path`.
+
+    The process ends with a line on stderr if the folder is not there any more.
+    """
+    try:
+        leave_out_folder(sys.path)
+    except FileNotFoundError:
+        print(
+            "error: the working folder is not there any more", file=sys.stderr
+        )
+        sys.exit(2)
+
+
 def start_python(module: str) -> subprocess.Popen[bytes]:
     """Runs a module in a Python of its own, which works in the root folder.
 

@@ -8,29 +8,45 @@ import pytest
     ("test", "file", "expected"),
     [
         # Far away within a package, through a door and three modules.
-        ("cns_drake/scene/test_sdf_worlds.py", "scene/obj_check.py", True),
-        ("worlds/roads/test_route.py", "scene/obj_check.py", False),
+        (
+            "cns_drake/scene/test_sdf_worlds.py",
+            "cns_drake/scene/obj_check.py",
+            True,
+        ),
+        ("worlds/roads/test_route.py", "cns_drake/scene/obj_check.py", False),
         # In another package, through its door alone.
-        ("cns_drake/sensors/test_lidar.py", "ray_casting/rays.py", False),
+        (
+            "cns_drake/sensors/test_lidar.py",
+            "cns_drake/ray_casting/rays.py",
+            False,
+        ),
         (
             "cns_drake/ray_casting/test_ray_casting.py",
-            "scene/surfaces.py",
+            "cns_drake/scene/surfaces.py",
             True,
         ),
         # Members of families, which nothing imports.
-        ("cns_drake/transient/test_snow.py", "transient/snow.py", True),
-        ("worlds/roads/test_towns.py", "transient/snow.py", False),
+        (
+            "cns_drake/transient/test_snow.py",
+            "cns_drake/transient/snow.py",
+            True,
+        ),
+        ("worlds/roads/test_towns.py", "cns_drake/transient/snow.py", False),
         # One in a folder without tests of its own.
-        ("worlds/city/test_buildings.py", "city/buildings/barn.py", True),
+        (
+            "worlds/city/test_buildings.py",
+            "worlds/city/buildings/barn.py",
+            True,
+        ),
     ],
 )
 def test_a_change_concerns_what_imports_it(test, file, expected):
-    assert concerns(f"tests/{test}", [f"cns_drake/{file}"]) is expected
+    assert concerns(f"tests/{test}", [file]) is expected
 
 
 def test_pages_concern_the_tests_of_documents():
     assert concerns("tests/documents/test_links.py", ["docs/city.md"])
-    assert not concerns("tests/cns_drake/roads/test_towns.py", ["docs/city.md"])
+    assert not concerns("tests/worlds/roads/test_towns.py", ["docs/city.md"])
 
 
 @pytest.mark.slow
@@ -39,7 +55,7 @@ def test_every_module_concerns_a_test():
         str(path.relative_to(ROOT))
         for path in (ROOT / "tests").rglob("test_*.py")
     ]
-    for package in ("cns_drake", "evaluation"):
+    for package in ("cns_drake", "evaluation", "worlds"):
         for path in (ROOT / package).rglob("*.py"):
             if path.name != "__init__.py":
                 file = str(path.relative_to(ROOT))

@@ -88,7 +88,7 @@ def _imported_anywhere() -> frozenset[str]:
     """Returns the files of the packages that one of them imports."""
     files = itertools.chain.from_iterable(
         (ROOT / package).rglob("*.py")
-        for package in ("cns_drake", "evaluation")
+        for package in ("cns_drake", "evaluation", "worlds")
     )
     names = (str(file.relative_to(ROOT)) for file in files)
     return frozenset().union(*map(imported_files, names))

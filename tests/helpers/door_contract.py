@@ -1,8 +1,8 @@
 """The contract of import-linter that others import packages by their doors.
 
-A package is a folder directly below `cns_drake` or `evaluation`. Its door is
-its `__init__`: the stub `__init__.pyi` lists the names that others may import.
-All other modules of the package are its own.
+A package is a folder directly below a house: `cns_drake`, `evaluation` or
+`worlds`. Its door is its `__init__`: the stub `__init__.pyi` lists the names
+that others may import. All other modules of the package are its own.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import grimp
 
 ROOT = Path(__file__).parents[2]
-ROOTS = ("cns_drake", "evaluation")
+ROOTS = ("cns_drake", "evaluation", "worlds")
 
 
 def package_of(module: str) -> str | None:

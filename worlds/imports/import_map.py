@@ -68,8 +68,8 @@ Finish = Callable[[Path, Mapping[str, tuple[int, int]]], None]
 # run, so more threads would only wait for each other.
 @threadpool_limits.wrap(limits=1)  # type: ignore[untyped-decorator]
 def import_city(
-    source: Path,
-    output: Path,
+    source: Path | str,
+    output: Path | str,
     options: ImportOptions,
     finish: Finish = lambda folder, sizes: None,
 ) -> ImportReport:
@@ -90,7 +90,13 @@ def import_city(
     Raises:
         InputError: if the file or the options cannot be used, or the folder
             exists or cannot be written.
+
+    Example:
+        from worlds import ImportOptions, import_city
+
+        report = import_city("delft.city.json", "delft", ImportOptions())
     """
+    source, output = Path(source), Path(output)
     kind = source_of(source)
     _check_options(kind, source, output, options)
     own = None if options.along is None else [drive_along(options.along)]

@@ -36,6 +36,11 @@ class ImportOptions:
             stage.
         dressed: whether to add details, such as windows and parked cars, that
             are not in the file.
+
+    Example:
+        from worlds import ImportOptions
+
+        options = ImportOptions(years=(1980, 2020), dressed=True)
     """
 
     years: tuple[int, ...] = ()

@@ -37,6 +37,11 @@ class MapFolder:
             figures.
         meshes: the folder of the meshes that the stages name.
         views: the camera views from which pictures of the map are made.
+
+    Example:
+        from worlds import MapFolder, shipped_maps
+
+        print(*MapFolder(shipped_maps()["riverside"]).stages())
     """
 
     def __init__(self, path: Path):

@@ -31,7 +31,7 @@ def worlds_folder() -> Path:
         InputError: there is no cache, or it cannot be written.
     """
     package = Path(__file__).resolve().parents[1]
-    archive = package / "maps.tar.xz"
+    archive = package / "worlds.tar.xz"
     return unpacked(archive) if archive.exists() else package
 
 
@@ -57,6 +57,11 @@ def shipped_maps() -> Mapping[str, Path]:
 
     The maps are the cities, and after these the maps for stress tests, which
     nothing uses unless it is asked for them by name.
+
+    Example:
+        from worlds import shipped_maps
+
+        print(*shipped_maps())
     """
     stress = _maps_in(worlds_folder() / "stress")
     return MappingProxyType({**shipped_cities(), **stress})

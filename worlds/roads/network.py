@@ -242,6 +242,12 @@ def load_road_network(path: Path | str) -> RoadNetwork:
             junction, a junction has fewer than two roads, a road has no lanes,
             a corner or junction does not fit, or roads cross without a
             junction. The message names file, field and fault.
+
+    Example:
+        from worlds import load_road_network, shipped_maps
+
+        path = shipped_maps()["suburbia"] / "roads.yaml"
+        print(sorted(load_road_network(path).roads))
     """
     path = Path(path)
     file = read_roads_file(path)

@@ -293,7 +293,7 @@ def test_jobs_import_nothing_from_the_current_folder(tmp_path):
         "run_process(pickle.dumps(step), print, lambda: True)\n"
     )
     here.mkdir()
-    for name in ("cns_drake", "evaluation", "selectors", "yaml"):
+    for name in ("cns_drake", "evaluation", "worlds", "selectors", "yaml"):
         (here / f"{name}.py").write_text("raise SystemExit('not this one')\n")
     subprocess.run(
         [sys.executable, script],

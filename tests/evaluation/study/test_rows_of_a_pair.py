@@ -87,7 +87,7 @@ def test_tcr_has_the_rows_of_a_report(capsys, towns, report, tmp_path):
 def test_both_tables_are_written_in_one_place():
     users = {
         path.as_posix()
-        for package in ("evaluation", "cns_drake")
+        for package in ("evaluation", "worlds", "cns_drake")
         for path in (documents.ROOT / package).rglob("*.py")
         if {"RESULTS", "QUERIES", "write_csv"}
         <= set(re.findall(r"\w+", path.read_text()))

@@ -1303,7 +1303,7 @@ def offered_readers():
     from worlds.imports import map_sources
 
     found = set()
-    for package in ("cns_drake", "evaluation"):
+    for package in ("cns_drake", "evaluation", "worlds"):
         for door in sorted((ROOT / package).glob("*/__init__.pyi")):
             home = f"{package}.{door.parent.name}"
             names = filter(_READER.match, listed(home))
@@ -1333,8 +1333,10 @@ def test_every_reader_has_a_way():
 def test_archives_are_opened_in_one_place():
     found = {}
     ends = {name.rpartition(".")[2] for name in OPENERS}
-    for path in sorted(ROOT.glob("cns_drake/**/*.py")) + sorted(
-        ROOT.glob("evaluation/**/*.py")
+    for path in sorted(
+        path
+        for house in ("cns_drake", "evaluation", "worlds")
+        for path in (ROOT / house).rglob("*.py")
     ):
         module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):

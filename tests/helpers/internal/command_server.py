@@ -131,7 +131,9 @@ def _serve(listener: socket.socket) -> None:
         assert _TESTS.parent not in Path(cns_drake.__file__).parents
     gc.set_threshold(50_000)
     os.fsync = os.fstat  # As in the process of the tests.
-    for package in map(importlib.import_module, ("cns_drake", "evaluation")):
+    for package in map(
+        importlib.import_module, ("cns_drake", "evaluation", "worlds")
+    ):
         prefix = f"{package.__name__}."
         for found in pkgutil.walk_packages(package.__path__, prefix):
             if "map_closures" not in found.name:  # It needs an extra.

@@ -36,7 +36,7 @@ from worlds.shapes import (
 
 
 def generate_city(
-    world: Path,
+    world: Path | str,
     progress: Callable[[str], None] = lambda line: None,
     *,
     repair_stages: bool = False,
@@ -60,6 +60,11 @@ def generate_city(
             a structure in `stages.yaml` has another name now and
             `repair_stages` is false; or if a structure in `stages.yaml` no
             longer exists.
+
+    Example:
+        from worlds import generate_city
+
+        generate_city("maps/my_town")  # with roads.yaml, city.yaml, stages.yaml
     """
     world = Path(world)
     if (world / MESH_FOLDER).is_symlink():
