@@ -8,40 +8,24 @@ import pytest
     ("test", "file", "expected"),
     [
         # Far away within a package, through a door and three modules.
-        (
-            "cns_drake/scene/test_sdf_worlds.py",
-            "cns_drake/scene/obj_check.py",
-            True,
-        ),
-        ("worlds/roads/test_route.py", "cns_drake/scene/obj_check.py", False),
+        ("cns_drake/scene/test_sdf_worlds", "cns_drake/scene/obj_check", True),
+        ("worlds/roads/test_route", "cns_drake/scene/obj_check", False),
         # In another package, through its door alone.
+        ("cns_drake/sensors/test_lidar", "cns_drake/ray_casting/rays", False),
         (
-            "cns_drake/sensors/test_lidar.py",
-            "cns_drake/ray_casting/rays.py",
-            False,
-        ),
-        (
-            "cns_drake/ray_casting/test_ray_casting.py",
-            "cns_drake/scene/surfaces.py",
+            "cns_drake/ray_casting/test_ray_casting",
+            "cns_drake/scene/surfaces",
             True,
         ),
         # Members of families, which nothing imports.
-        (
-            "cns_drake/transient/test_snow.py",
-            "cns_drake/transient/snow.py",
-            True,
-        ),
-        ("worlds/roads/test_towns.py", "cns_drake/transient/snow.py", False),
+        ("cns_drake/transient/test_snow", "cns_drake/transient/snow", True),
+        ("worlds/roads/test_towns", "cns_drake/transient/snow", False),
         # One in a folder without tests of its own.
-        (
-            "worlds/city/test_buildings.py",
-            "worlds/city/buildings/barn.py",
-            True,
-        ),
+        ("worlds/city/test_buildings", "worlds/city/buildings/barn", True),
     ],
 )
 def test_a_change_concerns_what_imports_it(test, file, expected):
-    assert concerns(f"tests/{test}", [file]) is expected
+    assert concerns(f"tests/{test}.py", [f"{file}.py"]) is expected
 
 
 def test_pages_concern_the_tests_of_documents():
