@@ -25,8 +25,7 @@ from .mcap_drive import McapDrive as McapDrive
 from .mcap_drive import holds_mcap as holds_mcap
 from .mcap_messages import STAMPED_RECORD as STAMPED_RECORD
 from .mcap_messages import read_stamp as read_stamp
-from .mulran_frames import ORIGIN as ORIGIN
-from .mulran_frames import X_BS as X_BS
+from .mulran import X_BS as X_BS
 from .opening import Reading as Reading
 from .opening import data_sets as data_sets
 from .opening import find_data_sets as find_data_sets
@@ -66,3 +65,4 @@ from .sensor_names import check_sensor_name as check_sensor_name
 from .sensor_names import check_sensor_names as check_sensor_names
 from .stamped_poses import StampedPoses as StampedPoses
 from .trajectories import read_poses as read_poses
+from .utm_poses import ORIGIN as ORIGIN

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 import contextlib
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 import re
 from typing import Any, NamedTuple, NoReturn
@@ -23,6 +23,7 @@ from evaluation.base import (
     xyz,
 )
 from evaluation.drives import mcap_messages, ros_types
+from evaluation.drives.data_set import DataSet
 from evaluation.drives.drive import (
     ODOMETRY_DTYPE,
     Drive,
@@ -53,6 +54,7 @@ from evaluation.drives.point_cloud2 import (
 from evaluation.drives.point_layouts import from_layout
 from evaluation.drives.rosbag_file import RosbagFile
 from evaluation.drives.stamped_poses import PosedScans, StampedPoses
+from evaluation.drives.trajectories import read_trajectory
 
 _IMU_TOPIC = "/imu/data"
 _TF_TOPIC = "/tf"
@@ -890,3 +892,27 @@ def _lidar_name(topic: str) -> str:
     """Returns NAME for the topic /NAME/points, and other topics as they are."""
     name = topic.removeprefix("/").removesuffix("/points")
     return name if topic == f"/{name}/points" else topic
+
+
+def _open(
+    path: Path,
+    lidar: str | None = None,
+    odometry: str | None = None,
+    poses: Path | None = None,
+) -> McapDrive:
+    """Opens a bag; the arguments are those of `open_drive`."""
+    given = None if poses is None else partial(read_trajectory, Path(poses))
+    return McapDrive(path, lidar, odometry, given)
+
+
+DATA_SET = DataSet(
+    "MCAP",
+    holds_mcap,
+    _open,
+    (
+        "the bag: an `.mcap`, `.db3` or `.bag` file, or the folder with it:"
+        " recordings of cns-drake, and others with a topic of `PointCloud2`"
+        " and one of poses"
+    ),
+    has_lidars=True,
+)

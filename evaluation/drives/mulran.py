@@ -10,15 +10,15 @@ the base is on the ground. Times are whole nanoseconds.
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from evaluation.base import InputError
+from evaluation.base import InputError, poses
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.drive import as_given
 from evaluation.drives.drive_scenario import (
     SCENARIO,
     read_scenario,
 )
-from evaluation.drives.mulran_frames import X_BS
 from evaluation.drives.scan_files import (
     BinDrive,
     PosedFiles,
@@ -29,6 +29,18 @@ from evaluation.drives.scan_files import (
 )
 from evaluation.drives.trajectories import read_matrices
 from evaluation.drives.utm_poses import DATUM, is_local, to_world
+
+# Pose of the LiDAR on the vehicle, from the data set's calib_base2ouster. Read
+# as its name says, it puts the LiDAR above the base. Other programs apply its
+# inverse. Since it turns by almost 180 degrees, the inverse puts the LiDAR
+# within a centimetre of the same horizontal position, but 1.8 m below the
+# ground.
+X_BS = poses.make_pose(
+    Rotation.from_euler(
+        "xyz", [0.0001, 0.0003, 179.6654], degrees=True
+    ).as_matrix(),
+    np.array([1.7042, -0.021, 1.8047]),
+)
 
 _POSES = "global_pose.csv"
 _FOLDERS = ("sensor_data/Ouster", "Ouster")

@@ -12,7 +12,7 @@ from evaluation.base import Family, doing, errors_at, import_modules, listed
 from evaluation.base import InputError as InputError
 from evaluation.clouds import is_cloud
 from evaluation.drives.data_set import DataSet, check_interface
-from evaluation.drives.drive import Drive as Drive
+from evaluation.drives.drive import Drive
 from evaluation.drives.posed_drive import PosedDrive
 
 

@@ -5,10 +5,13 @@ from pathlib import Path
 import numpy as np
 
 from evaluation.base import InputError
-from evaluation.drives.mulran_frames import ORIGIN
 
 # The zone of MulRan and HeLiPR.
 DATUM = "utm-52n"
+# Easting, northing and height of the origin of W [m]. It is in Daejeon. Its
+# coordinates are multiples of the voxel size, so that voxels have the same
+# borders as on the UTM grid.
+ORIGIN = (350_000.0, 4_020_000.0, 0.0)
 # Ranges of easting and northing on the northern half of the Earth.
 _LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))
 

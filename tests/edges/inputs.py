@@ -74,7 +74,8 @@ with open(__file__.rpartition("/")[0] + "/{SPRUNG}", "w"):
 """
 # Modules that the programs and their processes import.
 _MODULES = (*sys.stdlib_module_names, "cns_drake", "evaluation", "worlds",
-            "matplotlib", "numba", "numpy", "open3d", "pydrake", "yaml")  # fmt: skip
+            "matplotlib", "numba", "numpy", "open3d", "pydrake",
+            "yaml")  # fmt: skip
 
 
 def write_traps(folder):
