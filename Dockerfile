@@ -2,7 +2,7 @@
 # docker run --rm -v "$PWD/output:/output" cns-drake reproduce metropolis --output /output
 FROM python:3.12-slim-bookworm AS wheel
 COPY . /source
-RUN pip wheel --quiet --no-deps --wheel-dir /wheel /source
+RUN pip wheel --quiet --no-deps --wheel-dir /wheel /source/evaluation /source
 
 FROM python:3.12-slim-bookworm
 # Shared libraries of the wheels of Drake and Open3D.

@@ -215,7 +215,7 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
         except ImportError as error:
             raise InputError(
                 "--method kiss-matcher: the package is not installed"
-                " (pip install 'cns-drake[kiss-matcher]')"
+                " (pip install 'cns-eval[kiss-matcher]')"
             ) from error
         return partial(_by_kiss_matcher, kiss_matcher, settings)
     if not method.endswith(".py"):

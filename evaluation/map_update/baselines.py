@@ -318,7 +318,7 @@ def _py4dgeo() -> Any:
     except ImportError as error:
         raise InputError(
             f"--baseline: m3c2 needs py4dgeo ({error}); pip install "
-            "'cns-drake[map-update]'"
+            "'cns-eval[map-update]'"
         ) from None
     # Without this, py4dgeo would write to stdout and to a file in the current
     # folder.

@@ -106,7 +106,7 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
         except ImportError as error:
             raise InputError(
                 "map-closures: not installed; run pip install "
-                "'cns-drake[map-closures]' (NumPy below 2.3)"
+                "'cns-eval[map-closures]' (NumPy below 2.3)"
             ) from error
         settings = self.config.model_dump(exclude={"sensor_height", "place"})
         values = package_config.MapClosuresConfig(**settings)

@@ -56,6 +56,14 @@ def concerns(test: str, changed: Iterable[str]) -> bool:
     )
 
 
+def needs_simulator(test: str) -> bool:
+    """Returns whether a test file imports more of ours than `evaluation`."""
+    houses = ("cns_drake/", "worlds/", "diagrams/")
+    return any(
+        file.startswith(houses) for layer in _layers(test) for file in layer
+    )
+
+
 @functools.cache
 def _layers(test: str) -> list[set[str]]:
     """Returns the files that a test reaches by 0, 1, 2, ... imports."""

@@ -372,9 +372,13 @@ RECIPES = {
         makes=("tutorial.html",),
     ),
     "a look first": Recipe(
-        "python3 -m venv .venv && .venv/bin/pip install .\n",
+        "python3 -m venv .venv && .venv/bin/pip install ./evaluation .\n",
         changes=(
-            ("python3 -m venv .venv && .venv/bin/pip install .\n", ""),
+            (
+                "python3 -m venv .venv && "
+                ".venv/bin/pip install ./evaluation .\n",
+                "",
+            ),
             ("--frames 200", "--frames 2"),
             ("riverside_01", "town/sequence_01.yaml"),
         ),
@@ -848,8 +852,9 @@ NOT_RUN = {
     "the same",
     "python3 -m venv .venv && .venv/bin/pip install -e": "installs from the "
     "network and runs these tests; `.ci/run` takes this very line",
-    "python3 -m venv .venv && .venv/bin/pip install . &&": "installs from the "
-    "network; `.ci/run` installs the wheel",
+    "python3 -m venv .venv && .venv/bin/pip install ./evaluation . &&": (
+        "installs from the network; `.ci/run` installs the wheels"
+    ),
     "apt install": "changes the system; `.ci/run` installs the same packages",
     ".venv/bin/cns-drake simulate suburbia_01 --frames 200": (
         "simulates a shipped city for minutes; the workflow `site.yml` runs it"
@@ -867,7 +872,7 @@ NOT_RUN = {
     ".venv/bin/mypy && .venv/bin/lint-imports": (
         "these read this project, not an example; `.ci/run` runs them"
     ),
-    ".venv/bin/pip install -e '.[docs]'": "installs from the network",
+    ".venv/bin/pip install -e ./evaluation -e": "installs from the network",
     ".venv/bin/pip install pre-commit": "installs from the network and changes"
     " the repository's hooks",
     ".venv/bin/pip install nbconvert": "installs from the network and changes"
@@ -912,9 +917,9 @@ NOT_RUN = {
     ".venv/bin/cns-drake train": "needs that extra, too",
     "pip install '.[train]'": "installs it",
     "import pickle": "needs a trainer's class; test_pair_export has it",
-    "pip install '.[map-closures]'": "installs that extra",
-    "pip install '.[kiss-matcher]'": "installs another extra",
-    "pip install '.[map-update]'": "installs another extra",
+    "pip install './evaluation[map-closures]'": "installs that extra",
+    "pip install './evaluation[kiss-matcher]'": "installs another extra",
+    "pip install './evaluation[map-update]'": "installs another extra",
     "pip install pandas": "installs from the network",
     "python -m pydrake.visualization.meldis": "a server, which does not end; "
     "test_example_diagrams runs the scenario",

@@ -150,7 +150,7 @@ def checked_maintainer(value: Any, num_drives: int, where: str) -> str:
     if value == "m3c2" and find_spec("py4dgeo") is None:
         raise InputError(
             f"{where}: m3c2 needs the extra map-update (pip install"
-            " 'cns-drake[map-update]')"
+            " 'cns-eval[map-update]')"
         )
     return str(value)
 

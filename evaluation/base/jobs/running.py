@@ -409,10 +409,16 @@ def _dask_workers(address: str, hear: _Hear) -> Iterator[_Connected]:
     """Yields the executor of the Dask scheduler at an address.
 
     Raises:
-        InputError: if the scheduler does not answer.
+        InputError: if Dask is not installed, or the scheduler does not answer.
     """
     # Slow to import, and not needed to print help.
-    from distributed import Client
+    try:
+        from distributed import Client
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"--scheduler: {address}: Dask is not installed; run pip install"
+            " 'cns-eval[dask]'"
+        ) from error
 
     # What happens to jobs is reported here, in our own words.
     for name in ("distributed", "distributed.client"):

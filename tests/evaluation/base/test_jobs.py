@@ -347,3 +347,11 @@ def test_commands_that_need_no_cluster_do_not_load_it():
         "assert not {'dask', 'distributed'} & sys.modules.keys()\n"
     )
     subprocess.run([sys.executable, "-c", script], check=True, cwd=ROOT)
+
+
+def test_a_scheduler_without_dask(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    step = Call(job_functions.join, ([],), tmp_path / "output")
+    with pytest.raises(InputError, match=r"pip install 'cns-eval\[dask\]'"):
+        run_jobs([Job("one", step)], Cluster(scheduler="tcp://127.0.0.1:1"))
+    assert not (tmp_path / "output").exists()

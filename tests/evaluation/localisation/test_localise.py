@@ -503,7 +503,7 @@ def test_bad_input(streets, tmp_path, capsys, monkeypatch):
         capsys,
         ["localise", *pair, "--method", "kiss-matcher"],
         "not installed",
-        "cns-drake[kiss-matcher]",
+        "cns-eval[kiss-matcher]",
     )
 
 
