@@ -22,7 +22,7 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("cns_drake", "evaluation")
+PACKAGES = ("cns_drake", "evaluation", "worlds")
 # Root pages are below this folder of the site.
 _PROJECT = "project"
 # What a visitor can look at: page below `live` in the site -> its link. The

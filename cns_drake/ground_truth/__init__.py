@@ -1,4 +1,4 @@
-"""Exact ground truth of simulated drives, from rays cast in worlds."""
+"""Exact ground truth of simulated drives, a public noun, from rays in worlds."""
 
 import lazy_loader
 

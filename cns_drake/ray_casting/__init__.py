@@ -1,4 +1,4 @@
-"""Ray casting on the geometry of a SceneGraph."""
+"""Ray casting on a SceneGraph's geometry: a wall around Embree."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Trains the method `learned` on scans of randomly generated cities.
+"""Trains the method `learned` on scans of drawn cities: a wall around JAX.
 
 In a batch, scans of one drive are queries for places of another drive through
 the same city. The training compares queries and places in the same way as the

@@ -1,4 +1,4 @@
-"""What the simulator and the evaluation share: a wall, it knows neither.
+"""What two houses or more need: a wall, it knows none of them.
 
 Errors, files, numbers, jobs, progress and the frame of command lines. Nothing
 here imports Drake.

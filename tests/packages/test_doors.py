@@ -2,6 +2,7 @@
 
 import importlib
 from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -34,6 +35,13 @@ def test_a_door_offers_what_its_stub_lists(package):
             assert getattr(door, name) is getattr(
                 importlib.import_module(home), name
             )
+
+
+@pytest.mark.parametrize("package", DOORS)
+def test_a_door_says_why_the_package_ends_there(package):
+    """CONTRIBUTING.md has the three reasons."""
+    first, _, _ = importlib.import_module(package).__doc__.partition("\n")
+    assert re.search(r"\ba (wall|family)\b|\b(a )?public nouns?\b", first)
 
 
 @pytest.mark.parametrize("package", DOORS)
