@@ -1,4 +1,4 @@
-"""Exact ground truth of simulated drives, a public noun, from rays in worlds."""
+"""Exact ground truth of simulated drives, by rays in worlds: a public noun."""
 
 import lazy_loader
 
