@@ -39,7 +39,7 @@ def test_a_python_of_its_own_is_not_in_the_working_folder(
 @pytest.mark.slow
 def test_a_working_folder_that_is_gone_is_named(tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "cns_drake", "list"],
+        [sys.executable, "-m", "evaluation", "--version"],
         cwd=tmp_path,
         preexec_fn=lambda: os.rmdir(tmp_path),
         capture_output=True,

@@ -100,7 +100,7 @@ def test_other_names_are_refused(name, fault):
 def test_without_its_package_one_line_names_the_command(monkeypatch):
     monkeypatch.setitem(sys.modules, PACKAGE, None)
     with pytest.raises(
-        InputError, match=r"'cns-drake\[map-closures\]'"
+        InputError, match=r"'cns-eval\[map-closures\]'"
     ) as refusal:
         make_method(NAME, {})
     assert "\n" not in str(refusal.value)
