@@ -860,6 +860,8 @@ NOT_RUN = {
         "simulates a shipped city for minutes; the workflow `site.yml` runs it"
     ),
     "[build-system]\nrequires": "test_plugins installs it",
+    "pip install ./evaluation": "installs from the network",
+    "pip uninstall cns-drake": "takes away what the tests test",
     "pip install ./mine": "test_plugins installs it",
     "cns-eval pr --method mean-heights": "test_plugins finds the method",
     "pip uninstall mine": "test_plugins uninstalls it",
