@@ -23,6 +23,8 @@ from evaluation.base import (
     Cluster,
     InputError,
     Job,
+    MakePart,
+    Part,
     Reporter,
     Space,
     make_folder,
@@ -32,8 +34,6 @@ from evaluation.drives import driven_way
 from evaluation.recognition import RetrievalProtocol
 from evaluation.results import PrintStyle
 from evaluation.study import (
-    MakePart,
-    Part,
     RecordingInfo,
     choose_methods,
     scenario_digest,

@@ -26,6 +26,8 @@ from evaluation.base import (
     Cluster,
     InputError,
     Job,
+    MakePart,
+    Part,
     Reporter,
     completing,
     make_folder,
@@ -41,7 +43,6 @@ from evaluation.recognition import (
     compared_frames,
     write_overlaps,
 )
-from evaluation.study import MakePart, Part
 from worlds.shapes import (
     CLASS_IDS,
     GROUND_CLASSES,

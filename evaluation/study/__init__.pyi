@@ -20,9 +20,6 @@ from .experiments.factors import FLEET as FLEET
 from .experiments.factors import SESSIONS as SESSIONS
 from .experiments.factors import Case as Case
 from .experiments.factors import Changes as Changes
-from .parts import LongList as LongList
-from .parts import MakePart as MakePart
-from .parts import Part as Part
 from .place_measurements import PlaceComparison as PlaceComparison
 from .place_measurements import measure_places as measure_places
 from .recorded_city import ShownCity as ShownCity

@@ -7,7 +7,13 @@ from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 
-from evaluation.base import InputError, did_you_mean, no_such, repeated
+from evaluation.base import (
+    InputError,
+    did_you_mean,
+    file_digests,
+    no_such,
+    repeated,
+)
 from evaluation.methods import (
     Method,
     MethodConfig,
@@ -18,7 +24,6 @@ from evaluation.methods import (
     shipped_methods,
 )
 from evaluation.results import SETTINGS
-from evaluation.study.digests import file_digests
 
 # The value of a parameter, as text.
 Setting = str | tuple[str, ...]

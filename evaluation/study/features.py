@@ -12,6 +12,8 @@ from numpy.lib.recfunctions import repack_fields
 
 from evaluation.base import (
     InputError,
+    LongList,
+    Part,
     Reporter,
     Step,
     doing,
@@ -45,7 +47,6 @@ from evaluation.recognition import (
     describe_drive,
 )
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.parts import LongList, Part
 from evaluation.study.sources import DriveSource
 from evaluation.study.study_files import FeatureFiles
 

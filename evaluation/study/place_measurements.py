@@ -8,7 +8,12 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from evaluation.base import Reporter, track
+from evaluation.base import (
+    LongList,
+    Part,
+    Reporter,
+    track,
+)
 from evaluation.drives import Drive, cloud_at
 from evaluation.methods import Method
 from evaluation.recognition import (
@@ -31,7 +36,6 @@ from evaluation.recognition import (
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.features import KeptScans, describe_recording
-from evaluation.study.parts import LongList, Part
 
 # A function that opens a drive, such as a `DriveSource`; or the parts of its
 # scans and of its descriptors by each method.

@@ -7,7 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from evaluation.base import Job, Reporter, doing, make_folder
+from evaluation.base import (
+    Job,
+    MakePart,
+    Part,
+    Reporter,
+    doing,
+    make_folder,
+)
 from evaluation.recognition import (
     RANDOM_YAW_PROTOCOL,
     PlaceOutcome,
@@ -25,7 +32,6 @@ from evaluation.results import (
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.features import FeatureExtraction, Further, described_key
-from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import DescribedSource
 from evaluation.study.recordings.map_drives import MapDrives
 from evaluation.study.sources import DriveSource, RecordingSource

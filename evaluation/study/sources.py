@@ -12,8 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
+from evaluation.base import file_digests
 from evaluation.drives import Drive, JoinedDrive, MovedDrive, open_drive
-from evaluation.study.digests import file_digests
 
 
 class DriveSource(Protocol):

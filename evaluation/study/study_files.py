@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import os
 from pathlib import Path
 
-from evaluation.base import InputError, file_name, user_errors
+from evaluation.base import InputError, Part, file_name, user_errors
 from evaluation.results import check_output
-from evaluation.study.parts import Part
 
 # Longest name of a file without its ending; file systems allow 255 [bytes].
 _LONGEST_BYTES = 200

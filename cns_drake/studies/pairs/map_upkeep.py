@@ -14,7 +14,7 @@ from cns_drake.ground_truth import (
     label_points,
     labelled_drive,
 )
-from evaluation.base import Reporter
+from evaluation.base import Part, Reporter
 from evaluation.map_update import (
     TRUTH,
     Label,
@@ -27,7 +27,7 @@ from evaluation.map_update import (
     run_baseline,
     write_session,
 )
-from evaluation.study import DriveSource, Part
+from evaluation.study import DriveSource
 
 # Counts the changes of how maps are updated. Raise it with each such change.
 UPKEEP_VERSION = 1

@@ -15,13 +15,12 @@ from cns_drake.studies.pairs.map_upkeep import (
     update_maps,
 )
 from cns_drake.studies.recording import is_recorded
-from evaluation.base import Job, fingerprint
+from evaluation.base import Job, MakePart, fingerprint
 from evaluation.map_update import NOT_MAINTAINED
 from evaluation.results import CAUSE
 from evaluation.study import (
     OPENING_COST,
     ChangeTask,
-    MakePart,
     NamedDrive,
     Pair,
     RecordingSource,

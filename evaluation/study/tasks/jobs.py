@@ -3,11 +3,15 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
-from evaluation.base import Job, fingerprint
+from evaluation.base import (
+    Job,
+    MakePart,
+    Part,
+    fingerprint,
+)
 from evaluation.recognition import RetrievalProtocol, Role
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.features import FeatureExtraction, map_source
-from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import DescribedSource
 from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result

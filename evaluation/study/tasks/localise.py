@@ -11,6 +11,8 @@ from evaluation.base import (
     Cluster,
     InputError,
     Job,
+    MakePart,
+    Part,
     Reporter,
     read_bytes,
     run_jobs,
@@ -38,7 +40,6 @@ from evaluation.localisation import (
     track_drive,
 )
 from evaluation.recognition import KEEP_ALL, Number, numbers_of
-from evaluation.study.parts import MakePart, Part
 from evaluation.study.sources import JoinedSource
 from evaluation.study.tasks.jobs import OPENING_COST, Jobs
 from evaluation.study.tasks.pair import Pair, Result
