@@ -32,8 +32,6 @@ from .recordings.map_drives import drives_by_map as drives_by_map
 from .recordings.map_drives import scenario_digest as scenario_digest
 from .recordings.recorded_pairs import recorded_pairs as recorded_pairs
 from .recordings.recording_search import find_recordings as find_recordings
-from .sources import DriveSource as DriveSource
-from .sources import RecordingSource as RecordingSource
 from .study import Study as Study
 from .study_files import StudyFiles as StudyFiles
 from .tasks.change import ChangeTask as ChangeTask

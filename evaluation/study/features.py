@@ -24,6 +24,7 @@ from evaluation.base import (
 from evaluation.change import DriveMap
 from evaluation.drives import (
     Drive,
+    DriveSource,
     RecentScans,
     cropped,
     sample_frames,
@@ -47,7 +48,6 @@ from evaluation.recognition import (
     describe_drive,
 )
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.sources import DriveSource
 from evaluation.study.study_files import FeatureFiles
 
 # Fields of the points of kept scans, where a drive has them.

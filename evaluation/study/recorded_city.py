@@ -15,6 +15,10 @@ from evaluation.base import (
     doing,
     make_folder,
 )
+from evaluation.drives import (
+    DriveSource,
+    RecordingSource,
+)
 from evaluation.recognition import (
     RANDOM_YAW_PROTOCOL,
     PlaceOutcome,
@@ -34,7 +38,6 @@ from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.features import FeatureExtraction, Further, described_key
 from evaluation.study.place_measurements import DescribedSource
 from evaluation.study.recordings.map_drives import MapDrives
-from evaluation.study.sources import DriveSource, RecordingSource
 from evaluation.study.study import Study
 from evaluation.study.study_files import FeatureFiles
 from evaluation.study.tasks.change import ChangeTask

@@ -15,6 +15,7 @@ from cns_drake.ground_truth import (
     labelled_drive,
 )
 from evaluation.base import Part, Reporter
+from evaluation.drives import DriveSource
 from evaluation.map_update import (
     TRUTH,
     Label,
@@ -27,7 +28,6 @@ from evaluation.map_update import (
     run_baseline,
     write_session,
 )
-from evaluation.study import DriveSource
 
 # Counts the changes of how maps are updated. Raise it with each such change.
 UPKEEP_VERSION = 1

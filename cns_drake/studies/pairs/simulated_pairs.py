@@ -16,6 +16,7 @@ from cns_drake.studies.pairs.map_upkeep import (
 )
 from cns_drake.studies.recording import is_recorded
 from evaluation.base import Job, MakePart, fingerprint
+from evaluation.drives import RecordingSource
 from evaluation.map_update import NOT_MAINTAINED
 from evaluation.results import CAUSE
 from evaluation.study import (
@@ -23,7 +24,6 @@ from evaluation.study import (
     ChangeTask,
     NamedDrive,
     Pair,
-    RecordingSource,
     Study,
     StudyFiles,
     condition_protocol,

@@ -7,6 +7,7 @@ import tempfile
 from cns_drake.ground_truth import labelled_drive, write_truth
 from cns_drake.simulation import SimulationSource
 from evaluation.base import Reporter
+from evaluation.drives import RecordingSource
 from evaluation.map_update import BASELINES
 from evaluation.study import (
     TRUTH,
@@ -14,7 +15,6 @@ from evaluation.study import (
     MapScores,
     MapTask,
     Pair,
-    RecordingSource,
     Result,
     score_methods,
 )

@@ -17,7 +17,7 @@ from evaluation.base import (
     read_bytes,
     run_jobs,
 )
-from evaluation.drives import NOT_FINITE, CountedDrive, Drive
+from evaluation.drives import NOT_FINITE, CountedDrive, Drive, JoinedSource
 from evaluation.localisation import (
     KISS_MATCHER,
     METHODS,
@@ -40,7 +40,6 @@ from evaluation.localisation import (
     track_drive,
 )
 from evaluation.recognition import KEEP_ALL, Number, numbers_of
-from evaluation.study.sources import JoinedSource
 from evaluation.study.tasks.jobs import OPENING_COST, Jobs
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Answered, Task, check_positive

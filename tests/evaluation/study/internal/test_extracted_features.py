@@ -9,9 +9,9 @@ import pytest
 
 from evaluation.base import InputError
 from evaluation.change import map_source
-from evaluation.drives import open_drive
+from evaluation.drives import RecordingSource, open_drive
 from evaluation.recognition import PAPER_PROTOCOL
-from evaluation.study import RecordingSource, choose_methods
+from evaluation.study import choose_methods
 from evaluation.study.features import extract_features
 
 pytestmark = pytest.mark.slow

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from evaluation.base import Reporter
-from evaluation.drives import open_drive
+from evaluation.drives import RecordingSource, open_drive
 from evaluation.recognition import RetrievalProtocol
 from evaluation.study import (
     MethodChoice,
-    RecordingSource,
     parts,
     place_measurements,
 )

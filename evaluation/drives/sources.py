@@ -13,7 +13,10 @@ from typing import Protocol
 import numpy as np
 
 from evaluation.base import file_digests
-from evaluation.drives import Drive, JoinedDrive, MovedDrive, open_drive
+from evaluation.drives.drive import Drive
+from evaluation.drives.drive_views import MovedDrive
+from evaluation.drives.joined_drive import JoinedDrive
+from evaluation.drives.opening import open_drive
 
 
 class DriveSource(Protocol):
