@@ -1,3 +1,9 @@
+from .chosen_methods import STANDARD as STANDARD
+from .chosen_methods import MethodChoice as MethodChoice
+from .chosen_methods import choose_method as choose_method
+from .chosen_methods import choose_methods as choose_methods
+from .chosen_methods import expanded_names as expanded_names
+from .chosen_methods import method_settings as method_settings
 from .describing import DescribingCost as DescribingCost
 from .describing import Request as Request
 from .describing import Role as Role
@@ -5,6 +11,11 @@ from .describing import describe_drive as describe_drive
 from .descriptors import DescribedScans as DescribedScans
 from .descriptors import DriveDescriptors as DriveDescriptors
 from .descriptors import joined_scans as joined_scans
+from .features import DriveSummary as DriveSummary
+from .features import FeatureExtraction as FeatureExtraction
+from .features import FeatureFiles as FeatureFiles
+from .features import Further as Further
+from .features import described_key as described_key
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .metrics import Mode as Mode
@@ -20,6 +31,11 @@ from .overlap_truth import overlap_matrix as overlap_matrix
 from .overlap_truth import overlaps_with_best_match as overlaps_with_best_match
 from .overlap_truth import read_overlaps as read_overlaps
 from .overlap_truth import write_overlaps as write_overlaps
+from .place_measurements import DescribedSource as DescribedSource
+from .place_measurements import PlaceComparison as PlaceComparison
+from .place_measurements import ScansOf as ScansOf
+from .place_measurements import measure_places as measure_places
+from .place_measurements import shown_overlaps as shown_overlaps
 from .place_outcome import PlaceOutcome as PlaceOutcome
 from .place_outcome import QueryDrive as QueryDrive
 from .place_outcome import check_has_match as check_has_match

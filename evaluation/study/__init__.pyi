@@ -1,7 +1,3 @@
-from .chosen_methods import MethodChoice as MethodChoice
-from .chosen_methods import choose_method as choose_method
-from .chosen_methods import choose_methods as choose_methods
-from .chosen_methods import method_settings as method_settings
 from .experiments.cause_files import Cause as Cause
 from .experiments.cause_files import causes as causes
 from .experiments.cause_files import register_cause as register_cause
@@ -20,8 +16,6 @@ from .experiments.factors import FLEET as FLEET
 from .experiments.factors import SESSIONS as SESSIONS
 from .experiments.factors import Case as Case
 from .experiments.factors import Changes as Changes
-from .place_measurements import PlaceComparison as PlaceComparison
-from .place_measurements import measure_places as measure_places
 from .recorded_city import ShownCity as ShownCity
 from .recorded_city import add_city as add_city
 from .recorded_study import recorded_sections as recorded_sections

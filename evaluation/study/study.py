@@ -16,10 +16,15 @@ from evaluation.base import (
     no_such,
     run_jobs,
 )
-from evaluation.methods import known_methods, optional_methods
-from evaluation.recognition import RetrievalProtocol, choose_metrics
+from evaluation.methods import SETTINGS, known_methods, optional_methods
+from evaluation.recognition import (
+    STANDARD,
+    MethodChoice,
+    RetrievalProtocol,
+    choose_methods,
+    choose_metrics,
+)
 from evaluation.results import (
-    SETTINGS,
     Answers,
     PageSection,
     PrintStyle,
@@ -34,11 +39,6 @@ from evaluation.results import (
     make_output,
     write_page,
     write_tables,
-)
-from evaluation.study.chosen_methods import (
-    STANDARD,
-    MethodChoice,
-    choose_methods,
 )
 from evaluation.study.experiments.conditions import (
     Condition,

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_type_hints
 from pydantic import ConfigDict, create_model
 
 from evaluation.base import InputError, merged, nested, no_such, validated
+from evaluation.methods import SETTINGS
 from evaluation.recognition import (
     PROTOCOLS,
     ProtocolFieldError,
     RetrievalProtocol,
 )
-from evaluation.results import CAUSE, FROZEN_REDRAW, LEVEL, NO_CAUSE, SETTINGS
+from evaluation.results import CAUSE, FROZEN_REDRAW, LEVEL, NO_CAUSE
 from evaluation.study.experiments.factors import (
     SIDES,
     Case,

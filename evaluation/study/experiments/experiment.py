@@ -17,7 +17,8 @@ from pydantic import BeforeValidator, Field, PlainValidator, model_validator
 import yaml
 
 from evaluation.base import InputError, Name, Section, validated
-from evaluation.results import FROZEN_REDRAW, SETTINGS
+from evaluation.methods import SETTINGS
+from evaluation.results import FROZEN_REDRAW
 from evaluation.study.experiments.conditions import Condition, conditions
 from evaluation.study.experiments.factors import (
     SIDES,

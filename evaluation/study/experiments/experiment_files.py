@@ -22,8 +22,9 @@ from evaluation.base import (
     validated,
     value_errors,
 )
-from evaluation.results import SETTINGS, as_factor, chart_factors, check_factors
-from evaluation.study.chosen_methods import expanded_names
+from evaluation.methods import SETTINGS
+from evaluation.recognition import expanded_names
+from evaluation.results import as_factor, chart_factors, check_factors
 from evaluation.study.experiments.cause_files import ALL, with_cases
 from evaluation.study.experiments.conditions import levels_by_case
 from evaluation.study.experiments.experiment import (

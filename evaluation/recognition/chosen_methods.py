@@ -1,4 +1,4 @@
-"""Chooses the methods that a study runs: shipped methods and your own."""
+"""Chooses the methods that are measured: shipped methods and your own."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from evaluation.base import (
     repeated,
 )
 from evaluation.methods import (
+    SETTINGS,
     Method,
     MethodConfig,
     known_methods,
@@ -23,7 +24,6 @@ from evaluation.methods import (
     optional_methods,
     shipped_methods,
 )
-from evaluation.results import SETTINGS
 
 # The value of a parameter, as text.
 Setting = str | tuple[str, ...]
