@@ -5,7 +5,6 @@ from .chosen_methods import choose_methods as choose_methods
 from .chosen_methods import expanded_names as expanded_names
 from .chosen_methods import method_settings as method_settings
 from .describing import DescribingCost as DescribingCost
-from .describing import Request as Request
 from .describing import Role as Role
 from .describing import describe_drive as describe_drive
 from .descriptors import DescribedScans as DescribedScans
@@ -61,7 +60,6 @@ from .query_outcomes import judge as judge
 from .query_outcomes import pose_error as pose_error
 from .retrieval import Retrieval as Retrieval
 from .retrieval import compare_at_radii as compare_at_radii
-from .retrieval import matches_within_radius as matches_within_radius
 from .retrieval import query_batches as query_batches
 from .retrieval import retrieve as retrieve
 from .scan_folders import write_scores as write_scores

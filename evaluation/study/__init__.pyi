@@ -33,14 +33,8 @@ from .tasks.jobs import OPENING_COST as OPENING_COST
 from .tasks.jobs import SCAN_COST as SCAN_COST
 from .tasks.jobs import Jobs as Jobs
 from .tasks.jobs import job_name as job_name
-from .tasks.localise import NOT_LOCALISED as NOT_LOCALISED
 from .tasks.localise import LocaliseTask as LocaliseTask
-from .tasks.localise import measure_localisation as measure_localisation
-from .tasks.map_scores import GIVEN as GIVEN
-from .tasks.map_scores import TRUTH as TRUTH
-from .tasks.map_scores import MapScores as MapScores
-from .tasks.map_scores import MapTask as MapTask
-from .tasks.map_scores import score_methods as score_methods
+from .tasks.map import MapTask as MapTask
 from .tasks.pair import USUAL_LENGTH as USUAL_LENGTH
 from .tasks.pair import NamedDrive as NamedDrive
 from .tasks.pair import Pair as Pair

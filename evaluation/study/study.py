@@ -52,7 +52,7 @@ from evaluation.study.experiments.method_variants import method_variants
 from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.jobs import Jobs
-from evaluation.study.tasks.map_scores import MapTask
+from evaluation.study.tasks.map import MapTask
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 from evaluation.study.tasks.place import CostTask, PlaceTask, PoseTask
 from evaluation.study.tasks.task import Task

@@ -14,13 +14,11 @@ from evaluation.localisation import (
     localise,
     make_estimator,
     make_map,
+    measure_localisation,
     read_queries,
 )
 from evaluation.recognition import numbers_of
-from evaluation.study import (
-    LocaliseTask,
-    measure_localisation,
-)
+from evaluation.study import LocaliseTask
 
 STARTS = (Starts(0.5, 5.0), Starts(2.0, 10.0))
 
