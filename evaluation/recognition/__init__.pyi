@@ -41,7 +41,6 @@ from .place_outcome import check_has_match as check_has_match
 from .place_selection import KEEP_ALL as KEEP_ALL
 from .place_selection import checked_keep as checked_keep
 from .place_selection import kept_places as kept_places
-from .precision_recall import weighted_metrics as weighted_metrics
 from .protocol import PAPER_PROTOCOL as PAPER_PROTOCOL
 from .protocol import PROTOCOL_NAMES as PROTOCOL_NAMES
 from .protocol import PROTOCOLS as PROTOCOLS
@@ -58,6 +57,7 @@ from .query_outcomes import auroc as auroc
 from .query_outcomes import common_blocks as common_blocks
 from .query_outcomes import judge as judge
 from .query_outcomes import pose_error as pose_error
+from .query_outcomes import weighted_metrics as weighted_metrics
 from .retrieval import Retrieval as Retrieval
 from .retrieval import compare_at_radii as compare_at_radii
 from .retrieval import query_batches as query_batches
