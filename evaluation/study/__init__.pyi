@@ -2,11 +2,11 @@ from .experiments.cause_files import Cause as Cause
 from .experiments.cause_files import causes as causes
 from .experiments.cause_files import register_cause as register_cause
 from .experiments.cause_files import source_of_cause as source_of_cause
-from .experiments.conditions import Condition as Condition
-from .experiments.conditions import condition_protocol as condition_protocol
-from .experiments.conditions import protocol_from_fields as protocol_from_fields
+from .experiments.experiment import Condition as Condition
 from .experiments.experiment import Experiment as Experiment
 from .experiments.experiment import MadeMap as MadeMap
+from .experiments.experiment import condition_protocol as condition_protocol
+from .experiments.experiment import protocol_from_fields as protocol_from_fields
 from .experiments.experiment_files import experiment_text as experiment_text
 from .experiments.experiment_files import load_experiment as load_experiment
 from .experiments.experiment_files import (

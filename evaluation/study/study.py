@@ -40,13 +40,13 @@ from evaluation.results import (
     write_page,
     write_tables,
 )
-from evaluation.study.experiments.conditions import (
+from evaluation.study.experiments.experiment import (
     Condition,
+    Experiment,
     baseline_values,
     condition_protocol,
     levels_by_case,
 )
-from evaluation.study.experiments.experiment import Experiment
 from evaluation.study.experiments.factors import FLEET, SESSIONS
 from evaluation.study.experiments.method_variants import method_variants
 from evaluation.study.study_files import StudyFiles

@@ -26,10 +26,10 @@ from evaluation.methods import SETTINGS
 from evaluation.recognition import expanded_names
 from evaluation.results import as_factor, chart_factors, check_factors
 from evaluation.study.experiments.cause_files import ALL, with_cases
-from evaluation.study.experiments.conditions import levels_by_case
 from evaluation.study.experiments.experiment import (
     Experiment,
     in_long_form,
+    levels_by_case,
     named_programs,
 )
 from evaluation.study.experiments.factors import Changes
