@@ -12,6 +12,7 @@ from .experiments.experiment_files import load_experiment as load_experiment
 from .experiments.experiment_files import (
     shipped_experiments as shipped_experiments,
 )
+from .experiments.experiment_run import ExperimentRun as ExperimentRun
 from .experiments.factors import FLEET as FLEET
 from .experiments.factors import SESSIONS as SESSIONS
 from .experiments.factors import Case as Case

@@ -33,7 +33,6 @@ from evaluation.study.experiments.experiment import (
     named_programs,
 )
 from evaluation.study.experiments.factors import Changes
-from evaluation.study.tasks.place import CostTask
 
 _FOLDER = Path(__file__).parent
 
@@ -243,7 +242,7 @@ class _Measured(NamedTuple):
     @classmethod
     def of(cls, experiment: Experiment) -> _Measured:
         # The task `cost` is added to some studies.
-        tasks = (*experiment.tasks, CostTask.name)
+        tasks = (*experiment.tasks, "cost")
         values: dict[str, dict[Any, None]] = {"task": dict.fromkeys(tasks)}
         for condition in experiment.conditions:
             for name, value in condition.factors.items():
