@@ -17,15 +17,24 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import functools
 import math
+from pathlib import Path
 
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cns_drake.export import claim_folder
 from cns_drake.ray_casting import RayCastingScene
+from cns_drake.scenarios import Scenario
 from cns_drake.sensors import BeamCoverage, BeamPattern
-from cns_drake.simulation import SimulatedDrive
+from cns_drake.simulation import SimulatedDrive, SimulationSource
 from evaluation.drives import Drive, check_same_world, within_cube
-from evaluation.recognition import TOLERANCE, RetrievalProtocol, overlap_matrix
+from evaluation.recognition import (
+    TOLERANCE,
+    RetrievalProtocol,
+    compared_frames,
+    overlap_matrix,
+    write_overlaps,
+)
 
 
 @dataclass(frozen=True)
@@ -155,3 +164,35 @@ def exact_overlaps(
         protocol,
         lambda frame: VisibleSurfaces(look(frame), protocol.half_extent),
     )
+
+
+def write_overlap_table(
+    database: Scenario,
+    query: Scenario,
+    output: Path,
+    protocol: RetrievalProtocol,
+) -> Path:
+    """Writes the exact overlap of each query with each place, as CSV.
+
+    The overlap is the share of a query's points that the LiDAR at the place
+    sees. The file is `<output>/overlaps.csv`.
+
+    Args:
+        database: the drive of the places, in whose city rays are cast.
+        query: the drive of the queries.
+        output: the folder, which is created if it does not exist.
+        protocol: protocol that determines queries, places and range.
+
+    Raises:
+        InputError: the drives are through different maps or cannot be
+            simulated, or the folder contains anything but an earlier table, or
+            cannot be written.
+    """
+    content = {"overlaps.csv": "overlap of each query with each place"}
+    claim_folder(output, "overlap-table", content)
+    places, queries = (SimulationSource(one)() for one in (database, query))
+    found = exact_overlaps(places, queries, protocol)
+    path = output / "overlaps.csv"
+    frames = compared_frames(places, queries, protocol)
+    write_overlaps(path, *frames, found)
+    return path

@@ -21,8 +21,14 @@ from cns_drake.simulation import (
     still_scene,
 )
 from evaluation.base import InputError, validated
-from evaluation.drives import Drive, McapDrive, find_data_sets, holds_mcap
-from evaluation.study import DriveSource, RecordingSource
+from evaluation.drives import (
+    Drive,
+    DriveSource,
+    McapDrive,
+    RecordingSource,
+    find_data_sets,
+    holds_mcap,
+)
 
 # Recorded poses are those of the scenario up to this [m, or without a unit].
 _SAME_POSE = 1e-6

@@ -1,6 +1,7 @@
 from .cause_check import causes as causes
 from .cause_check import register_cause as register_cause
 from .chosen_drives import named_drives as named_drives
+from .chosen_drives import study_drives as study_drives
 from .drives.changed_drives import Losses as Losses
 from .drives.sampled_drives import DrawnRoute as DrawnRoute
 from .drives.sampled_drives import Fleet as Fleet
@@ -13,4 +14,3 @@ from .recording import record_all as record_all
 from .reproduction import reproduce_maps as reproduce_maps
 from .study import TASKS as TASKS
 from .study import run_study as run_study
-from .study import study_drives as study_drives

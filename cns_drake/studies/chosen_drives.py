@@ -9,9 +9,10 @@ from cns_drake.scenarios import (
     load_scenario,
     write_scenarios,
 )
-from cns_drake.studies.study import study_drives
-from evaluation.base import Cluster, note
-from evaluation.study import Study, load_experiment
+from cns_drake.studies.maps.experiment_maps import pairs_by_map
+from cns_drake.studies.pairs.changed_pairs import changed_pairs
+from evaluation.base import Cluster, InputError, note
+from evaluation.study import ExperimentRun, load_experiment
 from worlds.maps import recordable_drives
 
 
@@ -48,7 +49,32 @@ def _varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
     unused = {"tasks": {"place": {}}, "methods": {"solid": {}}, "charts": []}
     experiment = load_experiment(vary, list(unused.items()))
     check_written_scenarios(output / "scenarios")
-    study = Study(experiment, output.absolute(), vary, cluster, note)
-    members = study_drives(study)
+    run = ExperimentRun(experiment, output.absolute(), vary, cluster, note)
+    members = study_drives(run)
     write_scenarios(members, output / "scenarios")
     return members
+
+
+def study_drives(
+    run: ExperimentRun, maps: Sequence[str] = ()
+) -> list[Scenario]:
+    """Returns all drives that an experiment compares, after making its maps.
+
+    Args:
+        run: the experiment, and where it runs.
+        maps: names or folders of maps that replace the experiment's maps.
+
+    Raises:
+        InputError: a map cannot be used, no drive of it can be simulated, or
+            two drives have the same name.
+    """
+    found = list(pairs_by_map(run, maps))
+    drives: dict[str, Scenario] = {}
+    for changed in changed_pairs(run, found):
+        for one in changed:
+            for drive in one.drives:
+                if drives.setdefault(drive.name, drive) != drive:
+                    raise InputError(
+                        f"{run.source}: two drives are named {drive.name}"
+                    )
+    return list(drives.values())

@@ -21,6 +21,7 @@ from evaluation.base import (
     Cluster,
     InputError,
     Job,
+    Part,
     Reporter,
     Step,
     make_folder,
@@ -29,7 +30,6 @@ from evaluation.base import (
     run_jobs,
     user_errors,
 )
-from evaluation.study import Part
 
 # Expected time to load a stage [s].
 _LOADING = 4.0

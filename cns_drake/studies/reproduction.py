@@ -23,27 +23,18 @@ from evaluation.base import (
     Cluster,
     InputError,
     Job,
+    MakePart,
+    Part,
     Reporter,
     Space,
     make_folder,
     natural_key,
 )
 from evaluation.drives import driven_way
-from evaluation.recognition import RetrievalProtocol
+from evaluation.recognition import RetrievalProtocol, choose_methods
 from evaluation.results import PrintStyle
-from evaluation.study import (
-    MakePart,
-    Part,
-    RecordingInfo,
-    choose_methods,
-    scenario_digest,
-    study_recordings,
-)
-from worlds.maps import (
-    MapFolder,
-    recordable_map,
-    recordable_maps,
-)
+from evaluation.study import RecordingInfo, scenario_digest, study_recordings
+from worlds.maps import MapFolder, recordable_map, recordable_maps
 
 # Mean size of a page.
 _PAGE_BYTES = 18e6

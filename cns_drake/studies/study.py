@@ -19,9 +19,9 @@ from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
 from cns_drake.studies.maps.experiment_maps import MapPairs, pairs_by_map
 from cns_drake.studies.maps.map_step import make_maps
 from cns_drake.studies.maps.redrawing import redrawn_city
+from cns_drake.studies.pairs.changed_pairs import changed_pairs
 from cns_drake.studies.pairs.comparisons import ChangedPair
 from cns_drake.studies.pairs.simulated_pairs import (
-    changed_pairs,
     simulated_drive,
     simulated_pair,
 )
@@ -53,16 +53,14 @@ from evaluation.study import (
     add_city,
     causes,
     condition_protocol,
+    drives_by_map,
+    find_recordings,
     load_experiment,
     recorded_pairs,
     recorded_sections,
     shipped_experiments,
 )
-from worlds.maps import (
-    MapFolder,
-    shipped_cities,
-    worlds_folder,
-)
+from worlds.maps import MapFolder, shipped_cities, worlds_folder
 
 TASKS: Mapping[str, type[Task]] = {
     task.name: task
@@ -191,7 +189,15 @@ def plan_study(study: Study, maps: Sequence[str] = ()) -> list[ShownCity]:
     if experiment.frozen is not None:
         with errors_at(f"{study.source}: frozen"):
             frozen_drives(experiment.frozen)
-    found = list(pairs_by_map(study, maps))
+    found = list(
+        pairs_by_map(
+            study,
+            maps,
+            lambda folder: drives_by_map(
+                find_recordings(folder, study.on_note), study.on_note
+            ),
+        )
+    )
     doing("looking at all conditions")
     changed = changed_pairs(study, found)
     cities: list[ShownCity] = []
@@ -228,33 +234,6 @@ def plan_study(study: Study, maps: Sequence[str] = ()) -> list[ShownCity]:
     if experiment.frozen is not None:
         _check_drives_are_frozen(experiment.frozen, found, changed)
     return cities
-
-
-def study_drives(study: Study, maps: Sequence[str] = ()) -> list[Scenario]:
-    """Returns all drives that a study compares, after making their maps.
-
-    Args:
-        study: the experiment, and where it runs.
-        maps: names or folders of maps that replace the experiment's maps.
-
-    Raises:
-        InputError: a map cannot be used, or its drives are recordings.
-    """
-    found = list(pairs_by_map(study, maps))
-    for some in found:
-        if some.city is not None:
-            raise InputError(
-                f"{study.source}: {some.map_name}: its drives are recorded"
-            )
-    drives: dict[str, Scenario] = {}
-    for changed in changed_pairs(study, found):
-        for one in changed:
-            for drive in one.drives:
-                if drives.setdefault(drive.name, drive) != drive:
-                    raise InputError(
-                        f"{study.source}: two drives are named {drive.name}"
-                    )
-    return list(drives.values())
 
 
 # Number of drives after which a note reports the search for places elsewhere.

@@ -1,5 +1,4 @@
 from .pair_export import ExportOptions as ExportOptions
-from .pair_export import write_overlap_table as write_overlap_table
 from .pair_export import write_pairs as write_pairs
 from .weights import TrainingPlan as TrainingPlan
 from .weights import make_weights as make_weights

@@ -14,9 +14,8 @@ from cns_drake.training.network import (
     scores,
     start_parameters,
 )
-from evaluation.base import InputError, track
+from evaluation.base import InputError, Part, track
 from evaluation.methods import WEIGHTS_VERSION
-from evaluation.study import Part
 
 # Divides the similarities before the softmax of the loss.
 _TEMPERATURE = 0.05

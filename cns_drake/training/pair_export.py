@@ -18,14 +18,15 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.export import claim_folder
-from cns_drake.ground_truth import exact_overlaps
-from cns_drake.scenarios import Scenario, load_scenario
+from cns_drake.scenarios import load_scenario
 from cns_drake.simulation import SimulationSource
 from cns_drake.studies import named_drives
 from evaluation.base import (
     Cluster,
     InputError,
     Job,
+    MakePart,
+    Part,
     Reporter,
     completing,
     make_folder,
@@ -36,16 +37,7 @@ from evaluation.base import (
 )
 from evaluation.drives import cloud_at, sample_frames
 from evaluation.maps import downsample
-from evaluation.recognition import (
-    RetrievalProtocol,
-    compared_frames,
-    write_overlaps,
-)
-from evaluation.study import MakePart, Part
-from worlds.shapes import (
-    CLASS_IDS,
-    GROUND_CLASSES,
-)
+from worlds.shapes import CLASS_IDS, GROUND_CLASSES
 
 # File or folder of a set of training data -> content.
 _EXPLAINED = {
@@ -78,38 +70,6 @@ class ExportOptions:
     spacing: float = 10.0
     scans: int = 1
     half_extent: float = 50.0
-
-
-def write_overlap_table(
-    database: Scenario,
-    query: Scenario,
-    output: Path,
-    protocol: RetrievalProtocol,
-) -> Path:
-    """Writes the exact overlap of each query with each place, as CSV.
-
-    The overlap is the share of a query's points that the LiDAR at the place
-    sees. The file is `<output>/overlaps.csv`.
-
-    Args:
-        database: the drive of the places, in whose city rays are cast.
-        query: the drive of the queries.
-        output: the folder, which is created if it does not exist.
-        protocol: protocol that determines queries, places and range.
-
-    Raises:
-        InputError: the drives are through different maps or cannot be
-            simulated, or the folder contains anything but an earlier table, or
-            cannot be written.
-    """
-    content = {"overlaps.csv": "overlap of each query with each place"}
-    claim_folder(output, "overlap-table", content)
-    places, queries = (SimulationSource(one)() for one in (database, query))
-    found = exact_overlaps(places, queries, protocol)
-    path = output / "overlaps.csv"
-    frames = compared_frames(places, queries, protocol)
-    write_overlaps(path, *frames, found)
-    return path
 
 
 def write_pairs(

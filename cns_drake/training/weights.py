@@ -21,6 +21,8 @@ from evaluation.base import (
     Cluster,
     InputError,
     Job,
+    MakePart,
+    Part,
     Reporter,
     __version__,
     check_writable,
@@ -35,7 +37,6 @@ from evaluation.base import (
 )
 from evaluation.drives import cloud_at, sample_frames
 from evaluation.methods import SEEN_SHARES, WEIGHTS_VERSION, polar_image
-from evaluation.study import MakePart, Part
 
 # The streets of the cities, in turn. Metropolis is kept for tests.
 MAPS = ("riverside", "suburbia", "downtown")

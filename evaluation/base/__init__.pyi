@@ -26,6 +26,7 @@ from .csv_files import read_records as read_records
 from .csv_files import read_rows as read_rows
 from .csv_files import unquoted_cell as unquoted_cell
 from .csv_files import write_csv as write_csv
+from .digests import file_digests as file_digests
 from .elementary import arcsin as arcsin
 from .elementary import arctan2 as arctan2
 from .elementary import cos as cos
@@ -73,6 +74,9 @@ from .input_models import Section as Section
 from .interrupts import ended_by_interrupts as ended_by_interrupts
 from .interrupts import interrupts_wait as interrupts_wait
 from .interrupts import uninterrupted as uninterrupted
+from .jobs.parts import LongList as LongList
+from .jobs.parts import MakePart as MakePart
+from .jobs.parts import Part as Part
 from .jobs.processes import JobError as JobError
 from .jobs.processes import ProcessDiedError as ProcessDiedError
 from .jobs.processes import run_process as run_process

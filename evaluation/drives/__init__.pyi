@@ -63,6 +63,10 @@ from .sensor_names import IMU_FRAME as IMU_FRAME
 from .sensor_names import MAP_FRAME as MAP_FRAME
 from .sensor_names import check_sensor_name as check_sensor_name
 from .sensor_names import check_sensor_names as check_sensor_names
+from .sources import DriveSource as DriveSource
+from .sources import JoinedSource as JoinedSource
+from .sources import Placement as Placement
+from .sources import RecordingSource as RecordingSource
 from .stamped_poses import StampedPoses as StampedPoses
 from .trajectories import read_poses as read_poses
 from .utm_poses import ORIGIN as ORIGIN

@@ -2,7 +2,6 @@ from .estimators import make_estimator as make_estimator
 from .initial_poses import InitialPose as InitialPose
 from .initial_poses import Starts as Starts
 from .localisation_map import FEWEST_POINTS as FEWEST_POINTS
-from .localisation_map import LocalisationMap as LocalisationMap
 from .localisation_map import OneScan as OneScan
 from .localisation_map import make_map as make_map
 from .localisation_map import map_of as map_of
@@ -10,8 +9,9 @@ from .localiser import Localiser as Localiser
 from .localiser import Query as Query
 from .localiser import localise as localise
 from .localiser import mapped_frames as mapped_frames
-from .localiser import query_frames as query_frames
 from .localiser import read_queries as read_queries
+from .measurements import NOT_LOCALISED as NOT_LOCALISED
+from .measurements import measure_localisation as measure_localisation
 from .results import QUERY as QUERY
 from .results import RIGHT_TRANSLATION as RIGHT_TRANSLATION
 from .results import Localised as Localised

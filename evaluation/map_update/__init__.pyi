@@ -4,7 +4,10 @@ from .labels import SIDES as SIDES
 from .labels import Label as Label
 from .labels import PairLabels as PairLabels
 from .nearest_points import nearest_distances as nearest_distances
+from .scores import GIVEN as GIVEN
+from .scores import MapScores as MapScores
 from .scores import score as score
+from .scores import score_methods as score_methods
 from .sessions import SPACING as SPACING
 from .sessions import Session as Session
 from .sessions import SessionPair as SessionPair

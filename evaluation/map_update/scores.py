@@ -24,18 +24,26 @@ B's map, and from B's map to the updated map.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 import itertools
 import math
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from evaluation.base import InputError, json_values
+from evaluation.base import InputError, Reporter, json_values
+from evaluation.map_update.baselines import run_baseline
 from evaluation.map_update.labels import SIDES, Label, PairLabels
 from evaluation.map_update.nearest_points import nearest_distances
-from evaluation.map_update.sessions import SessionPair
-from evaluation.map_update.structures import verdicts
+from evaluation.map_update.sessions import (
+    SessionPair,
+    read_labels,
+    read_pair,
+    read_truth,
+)
+from evaluation.map_update.structures import class_names, verdicts
+from evaluation.map_update.upkeep import TRUTH
 
 # Class of a point -> its labels in both maps.
 _CLASSES = {
@@ -52,6 +60,8 @@ _TOLERANCES = {"within_02m": 0.2, "within_05m": 0.5}
 _AGREES_WITHIN = 0.2
 # Limits of the classes of distance from the other drive [m].
 _DISTANCES = (0.0, 10.0, 20.0, 40.0, math.inf)
+# Name of labels that the user gives.
+GIVEN = "labels"
 
 
 def score(
@@ -305,3 +315,93 @@ def _scores_by_distance(both: _Labelled) -> dict:
 
 def _ratio(numerator: float, denominator: float) -> float:
     return float(numerator / denominator) if denominator else math.nan
+
+
+class MapScores(NamedTuple):
+    """The scores of a change detector.
+
+    Attributes:
+        scores: name of a score -> its value, see `score`.
+        gone, new: numbers of points with the exact labels gone and new.
+        labels: the detector's labels of both maps.
+    """
+
+    scores: dict[str, Any]
+    gone: int
+    new: int
+    labels: PairLabels
+
+    def score(self, *keys: str) -> float:
+        """Returns a score by its keys in `scores`; NaN if it is undefined."""
+        value: Any = self.scores
+        for key in keys:
+            value = value[key]
+        return math.nan if value is None else float(value)
+
+    @property
+    def num_changed(self) -> int:
+        """Number of points with the exact label gone or new."""
+        return self.gone + self.new
+
+
+def score_methods(
+    reporter: Reporter,
+    maps: Path,
+    methods: tuple[str, ...],
+    given: tuple[Path, ...] = (),
+) -> dict[str, MapScores]:
+    """Scores the labels of change detectors against exact labels.
+
+    Args:
+        reporter: unused.
+        maps: folder with the maps of two drives and their exact labels.
+        methods: names of change detectors. The name `TRUTH` scores the exact
+            labels themselves.
+        given: files with labels of the older and of the newer map. These labels
+            are scored under the name `GIVEN`.
+
+    Returns:
+        Method -> its scores.
+
+    Raises:
+        InputError: the folder cannot be read, or a detector cannot run.
+    """
+    pair = read_pair(maps)
+    truth = read_truth(pair)
+    number = {
+        "gone": int((truth.A == Label.GONE).sum()),
+        "new": int((truth.B == Label.NEW).sum()),
+    }
+    found = {}
+    for method in (*methods, *((GIVEN,) if given else ())):
+        labels = _choose_labels(method, pair, truth, given)
+        scores = score(pair, truth, labels, class_names(maps))
+        found[method] = MapScores(scores, **number, labels=labels)
+    return found
+
+
+def _choose_labels(
+    method: str, pair: SessionPair, truth: PairLabels, given: Sequence[Path]
+) -> PairLabels:
+    """Returns the labels that are scored under the name of a method.
+
+    Args:
+        method: name of a change detector, `TRUTH` or `GIVEN`.
+        pair: the two maps.
+        truth: the exact labels of these maps.
+        given: files with the labels for `GIVEN`, of the older and of the newer
+            map.
+
+    Raises:
+        InputError: a file cannot be read, or the detector cannot run.
+    """
+    if method == TRUTH:
+        return truth
+    if method == GIVEN:
+        return PairLabels(
+            *(
+                read_labels(path, session, truth=False)
+                for path, session in zip(given, pair, strict=True)
+            )
+        )
+    return run_baseline(method, pair)

@@ -9,6 +9,7 @@ from .learned import SEEN_SHARES as SEEN_SHARES
 from .learned import TURNS as TURNS
 from .learned import WEIGHTS_VERSION as WEIGHTS_VERSION
 from .learned import polar_image as polar_image
+from .method import SETTINGS as SETTINGS
 from .method import Method as Method
 from .method import MethodConfig as MethodConfig
 from .method import PlaceScan as PlaceScan

@@ -17,6 +17,9 @@ from evaluation.drives import LidarField
 Descriptor = TypeVar("Descriptor")
 Database = TypeVar("Database")
 
+# The beginning of a factor that is a setting of a method.
+SETTINGS = "methods."
+
 # Which of a place's merged scans stands for the place and gives its pose.
 PlaceScan = Literal["middle", "first"]
 

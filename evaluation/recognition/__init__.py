@@ -2,7 +2,8 @@
 
 A `RetrievalProtocol` says which scans are places and queries. Methods describe
 them; `retrieve` ranks the places of each query; a `PlaceOutcome` holds the
-answers, from which metrics are computed.
+answers, from which metrics are computed. `measure_places` does all of this for
+one pair of drives and several methods.
 """
 
 import lazy_loader

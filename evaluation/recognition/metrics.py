@@ -21,11 +21,12 @@ import numpy as np
 
 from evaluation.base import Family, InputError, errors_at, no_such
 from evaluation.methods import as_users_code, run_module
-from evaluation.recognition.precision_recall import (
+from evaluation.recognition.query_outcomes import (
+    FAULTS,
+    QueryOutcomes,
     WeightedMetrics,
     weighted_metrics,
 )
-from evaluation.recognition.query_outcomes import FAULTS, QueryOutcomes
 from evaluation.recognition.sign_flips import (
     UNKNOWN,
     Interval,

@@ -12,7 +12,6 @@ from .keys import LEVEL as LEVEL
 from .keys import NO_CAUSE as NO_CAUSE
 from .keys import OWN as OWN
 from .keys import PROTOCOL_BASE as PROTOCOL_BASE
-from .keys import SETTINGS as SETTINGS
 from .keys import STAGE as STAGE
 from .keys import Key as Key
 from .keys import check_metric_names as check_metric_names

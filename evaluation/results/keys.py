@@ -15,10 +15,9 @@ from operator import itemgetter
 from typing import Any
 
 from evaluation.base import InputError, __version__, did_you_mean
+from evaluation.methods import SETTINGS
 from evaluation.recognition import Metric, RetrievalProtocol
 
-# The beginning of a factor that is a setting of a method.
-SETTINGS = "methods."
 _BEFORE_FACTORS = ("experiment", "map", "database", "query", "seed")
 _AFTER_FACTORS = ("task", "method", "verified", "protocol")
 # Columns of a key that every table has.

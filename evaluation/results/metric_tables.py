@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from evaluation.base import InputError
+from evaluation.methods import SETTINGS
 from evaluation.recognition import METRICS, PROTOCOLS, metric_named
-from evaluation.results.keys import PROTOCOL_BASE, SETTINGS
+from evaluation.results.keys import PROTOCOL_BASE
 from evaluation.results.table import (
     QUERIES,
     RESULTS,

@@ -4,9 +4,10 @@ from collections.abc import Iterator, Sequence
 import math
 from typing import Any
 
+from evaluation.methods import SETTINGS
 from evaluation.recognition import METRICS, Metric, metric_named
 from evaluation.results.charts.words import in_words, value_words
-from evaluation.results.keys import CAUSE, LEVEL, SETTINGS
+from evaluation.results.keys import CAUSE, LEVEL
 from evaluation.results.method_names import in_table_order
 from evaluation.results.method_names import title as title_of
 from evaluation.results.page_frame import value_text

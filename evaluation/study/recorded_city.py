@@ -7,12 +7,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from evaluation.base import Job, Reporter, doing, make_folder
+from evaluation.base import Job, MakePart, Part, Reporter, doing, make_folder
+from evaluation.drives import DriveSource, RecordingSource
 from evaluation.recognition import (
     RANDOM_YAW_PROTOCOL,
+    DescribedSource,
+    FeatureExtraction,
+    FeatureFiles,
+    Further,
+    MethodChoice,
     PlaceOutcome,
     RetrievalProtocol,
     Role,
+    described_key,
 )
 from evaluation.results import (
     OWN,
@@ -23,14 +30,8 @@ from evaluation.results import (
     make_page_drive,
     nearest_images,
 )
-from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.features import FeatureExtraction, Further, described_key
-from evaluation.study.parts import MakePart, Part
-from evaluation.study.place_measurements import DescribedSource
 from evaluation.study.recordings.map_drives import MapDrives
-from evaluation.study.sources import DriveSource, RecordingSource
 from evaluation.study.study import Study
-from evaluation.study.study_files import FeatureFiles
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.jobs import STARTING_COST, Jobs
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result

@@ -12,6 +12,7 @@ from evaluation.paper import paper, paper_section
 from evaluation.recognition import (
     PAPER_PROTOCOL,
     PROTOCOLS,
+    MethodChoice,
     RetrievalProtocol,
 )
 from evaluation.results import (
@@ -32,7 +33,6 @@ from evaluation.results import (
     page_section,
     routes_section,
 )
-from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.experiments.experiment import Experiment
 from evaluation.study.experiments.experiment_files import load_experiment
 from evaluation.study.recorded_city import ShownCity, add_city

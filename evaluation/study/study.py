@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from evaluation.base import (
-    Cluster,
     InputError,
     Job,
     Space,
@@ -16,10 +15,15 @@ from evaluation.base import (
     no_such,
     run_jobs,
 )
-from evaluation.methods import known_methods, optional_methods
-from evaluation.recognition import RetrievalProtocol, choose_metrics
+from evaluation.methods import SETTINGS, known_methods, optional_methods
+from evaluation.recognition import (
+    STANDARD,
+    MethodChoice,
+    RetrievalProtocol,
+    choose_methods,
+    choose_metrics,
+)
 from evaluation.results import (
-    SETTINGS,
     Answers,
     PageSection,
     PrintStyle,
@@ -35,24 +39,20 @@ from evaluation.results import (
     write_page,
     write_tables,
 )
-from evaluation.study.chosen_methods import (
-    STANDARD,
-    MethodChoice,
-    choose_methods,
-)
-from evaluation.study.experiments.conditions import (
+from evaluation.study.experiments.experiment import (
     Condition,
+    Experiment,
     baseline_values,
     condition_protocol,
     levels_by_case,
 )
-from evaluation.study.experiments.experiment import Experiment
+from evaluation.study.experiments.experiment_run import ExperimentRun
 from evaluation.study.experiments.factors import FLEET, SESSIONS
 from evaluation.study.experiments.method_variants import method_variants
 from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.jobs import Jobs
-from evaluation.study.tasks.map_scores import MapTask
+from evaluation.study.tasks.map import MapTask
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 from evaluation.study.tasks.place import CostTask, PlaceTask, PoseTask
 from evaluation.study.tasks.task import Task
@@ -62,19 +62,13 @@ _LONG = 60.0
 
 
 @dataclass
-class Study:
+class Study(ExperimentRun):
     """An experiment that is run.
 
     First call `choose`, then add the pairs of each map with `add`, and then
     call `measure`.
 
     Attributes:
-        experiment: the experiment.
-        output: folder of the results.
-        source: file of the experiment, for errors.
-        cluster: runs the jobs.
-        on_note: is called with notes on what is left out, and on how long the
-            study takes.
         tasks: name -> task.
         methods: key of a method -> the method, and the columns of its
             settings.
@@ -85,11 +79,6 @@ class Study:
         results: pair -> name of a task -> its results, as files or in memory.
     """
 
-    experiment: Experiment
-    output: Path
-    source: str
-    cluster: Cluster
-    on_note: Callable[[str], None] = lambda text: None
     tasks: dict[str, Task] = field(default_factory=dict)
     methods: dict[str, tuple[MethodChoice, Mapping[str, Any]]] = field(
         default_factory=dict

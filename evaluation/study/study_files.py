@@ -5,61 +5,12 @@ from dataclasses import dataclass
 import os
 from pathlib import Path
 
-from evaluation.base import InputError, file_name, user_errors
+from evaluation.base import InputError, Part, file_name, user_errors
+from evaluation.recognition import FeatureFiles
 from evaluation.results import check_output
-from evaluation.study.parts import Part
 
 # Longest name of a file without its ending; file systems allow 255 [bytes].
 _LONGEST_BYTES = 200
-
-
-@dataclass(frozen=True)
-class FeatureFiles:
-    """The files (`Part`) with all that a study needs of a recording.
-
-    The files contain the drive's poses and map, the scans at places and
-    queries, and, in one file for each method, the descriptors of these scans.
-
-    Attributes:
-        folder: folder of the files.
-    """
-
-    folder: Path
-
-    @property
-    def drive(self) -> Part:
-        """The file with the drive's poses and map, a `DriveSummary`."""
-        return Part(self.folder / "drive.data")
-
-    @property
-    def fine(self) -> Part:
-        """The file with the cloud for pictures, an array (K, 3)."""
-        return Part(self.folder / "fine.data")
-
-    @property
-    def scans(self) -> Part:
-        """The file with the drive's scans at places and queries.
-
-        For a drive with a map, the file contains a `KeptScans`; otherwise a
-        list of scans (N, 3).
-        """
-        return Part(self.folder / "scans.data")
-
-    def described(self, key: str) -> Part:
-        """Returns the file with a method's descriptors of the drive.
-
-        The file contains a `DriveDescriptors`.
-
-        Args:
-            key: `MethodChoice.key` of the method; for descriptors by a second
-                protocol, the result of
-                `evaluation.study.features.described_key`.
-        """
-        return Part(self.folder / f"described_{file_name(key)}.data")
-
-    def cost(self, key: str) -> Part:
-        """Returns the file with the `DescribingCost` of these descriptors."""
-        return Part(self.folder / f"cost_{file_name(key)}.data")
 
 
 @dataclass(frozen=True)

@@ -15,16 +15,18 @@ from evaluation.base import InputError, json_values, note
 from evaluation.drives import Drive, Reading
 from evaluation.localisation import (
     FEWEST_POINTS,
+    NOT_LOCALISED,
     OneScan,
     Starts,
     default_settings,
     localisation_columns,
     localised,
     make_estimator,
+    measure_localisation,
 )
 from evaluation.recognition import RANDOM_YAW_PROTOCOL, numbers_of
 from evaluation.results import Answers, QueryRows, Results
-from evaluation.study import NOT_LOCALISED, LocaliseTask, measure_localisation
+from evaluation.study import LocaliseTask
 from evaluation.verbs.measured import (
     Measured,
     map_of,

@@ -7,10 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from evaluation.base import InputError, Reporter, json_values, no_such, one_line
-from evaluation.map_update import BASELINES, PairLabels, read_pair
+from evaluation.map_update import (
+    BASELINES,
+    GIVEN,
+    PairLabels,
+    read_pair,
+    score_methods,
+)
 from evaluation.recognition import numbers_of
 from evaluation.results import QueryRows, Results
-from evaluation.study import GIVEN, score_methods
 from evaluation.verbs.measured import Measured, pair_key, rows_of
 
 

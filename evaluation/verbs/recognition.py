@@ -23,12 +23,16 @@ from evaluation.drives import NOT_FINITE, CountedDrive, Drive, Reading
 from evaluation.methods import Method
 from evaluation.recognition import (
     PROTOCOLS,
+    MethodChoice,
     Mode,
+    PlaceComparison,
     PlaceOutcome,
     RetrievalProtocol,
     check_has_match,
+    choose_method,
     compared_frames,
     load_metrics,
+    measure_places,
     overlap_matrix,
     read_overlaps,
 )
@@ -38,12 +42,6 @@ from evaluation.results import (
     Results,
     as_factor,
     check_metric_names,
-)
-from evaluation.study import (
-    MethodChoice,
-    PlaceComparison,
-    choose_method,
-    measure_places,
 )
 from evaluation.verbs.measured import (
     Measured,

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from evaluation.base import Cluster, choose_cluster, note
-from evaluation.recognition import PROTOCOLS, RetrievalProtocol
+from evaluation.recognition import PROTOCOLS, RetrievalProtocol, choose_methods
 from evaluation.results import PrintStyle
-from evaluation.study import choose_methods, find_recordings, study_recordings
+from evaluation.study import find_recordings, study_recordings
 
 
 def report(

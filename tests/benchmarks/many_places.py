@@ -31,6 +31,10 @@ import time
 import numpy as np
 from processes import in_process
 
+from evaluation.base import (
+    LongList,
+    Part,
+)
 from evaluation.methods import Method, make_method
 from evaluation.recognition import (
     MOST_BYTES,
@@ -42,7 +46,6 @@ from evaluation.recognition import (
     compare_at_radii,
     query_batches,
 )
-from evaluation.study import LongList, Part
 
 METHODS = ("scan-context++", "solid", "ring++", "btc", "layered-overlap")
 PLACES = (300, 3000)

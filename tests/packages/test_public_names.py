@@ -56,7 +56,10 @@ def test_importing_a_package_loads_nothing_heavy(package):
     ("module", "slow"),
     [
         ("cns_drake.simulation.simulation", {"scipy.stats", "scipy.signal"}),
-        ("evaluation.study.place_measurements", {"scipy.stats", "matplotlib"}),
+        (
+            "evaluation.recognition.place_measurements",
+            {"scipy.stats", "matplotlib"},
+        ),
         ("cns_drake.scenarios.drive_table", {"scipy", "numba", "pydrake"}),
     ],
 )

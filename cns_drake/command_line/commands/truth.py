@@ -94,8 +94,8 @@ def _write_overlaps(
 ) -> None:
     """Writes the overlaps between a database and a query drive."""
     with ended_by_interrupts("cns-drake"):
+        from cns_drake.ground_truth import write_overlap_table
         from cns_drake.scenarios import load_scenario
-        from cns_drake.training import write_overlap_table
 
     drives = [load_scenario(word) for word in words]
     table = write_overlap_table(drives[0], drives[1], output, protocol)

@@ -1,33 +1,24 @@
 """The maps of an experiment, with the drives that are compared on each map."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cns_drake.scenarios import (
-    Scenario,
-    load_scenario,
-)
+from cns_drake.scenarios import Scenario, load_scenario
 from cns_drake.studies.maps.frozen_redraws import redraw_frozen
 from cns_drake.studies.maps.made_maps import made_map_step
 from cns_drake.studies.maps.map_step import make_maps
 from evaluation.base import InputError, errors_at, natural_key
 from evaluation.results import FROZEN_REDRAW
-from evaluation.study import (
-    MadeMap,
-    MapDrives,
-    Study,
-    drives_by_map,
-    find_recordings,
-)
-from worlds.maps import (
-    MapFolder,
-    recordable_map,
-    recordable_maps,
-    shipped_maps,
-)
+from evaluation.study import ExperimentRun, MadeMap
+from worlds.maps import MapFolder, recordable_map, recordable_maps, shipped_maps
+
+if TYPE_CHECKING:
+    from evaluation.study import MapDrives
 
 
 @dataclass(frozen=True)
@@ -47,12 +38,18 @@ class MapPairs:
     city: MapDrives | None = None
 
 
-def pairs_by_map(study: Study, maps: Sequence[str]) -> Iterator[MapPairs]:
+def pairs_by_map(
+    run: ExperimentRun,
+    maps: Sequence[str],
+    recorded: Callable[[Path], Iterable[MapDrives]] | None = None,
+) -> Iterator[MapPairs]:
     """Yields the pairs of all maps; makes aged and imported maps.
 
     Args:
-        study: the experiment, and where it runs.
+        run: the experiment, and where it runs.
         maps: names or folders of maps that replace the experiment's maps.
+        recorded: reads the maps of a folder of recordings; None if only drives
+            that can be simulated are of use.
 
     Raises:
         InputError: a map cannot be used, or two maps or drives have the same
@@ -60,28 +57,28 @@ def pairs_by_map(study: Study, maps: Sequence[str]) -> Iterator[MapPairs]:
     """
     made = {
         one.name: one
-        for one in study.experiment.maps or ()
+        for one in run.experiment.maps or ()
         if isinstance(one, MadeMap)
     }
     wanted: Sequence[str | MadeMap] = [made.get(one, one) for one in maps]
     if not maps:
-        wanted = study.experiment.maps or recordable_maps()
-    place = "" if maps else f"{study.source}: maps"
+        wanted = run.experiment.maps or recordable_maps()
+    place = "" if maps else f"{run.source}: maps"
     known: set[str] = set()
     for one in wanted:
         # A wrong name is found before any map is made.
-        if study.experiment.frozen_redraws and (
+        if run.experiment.frozen_redraws and (
             isinstance(one, MadeMap) or one not in shipped_maps()
         ):
             raise InputError(
-                f"{study.source}: {FROZEN_REDRAW}:"
+                f"{run.source}: {FROZEN_REDRAW}:"
                 f" {getattr(one, 'name', one)}: no shipped map"
             )
         if isinstance(one, str) and not Path(one).is_dir():
             with errors_at(place) if place else nullcontext():
                 recordable_map(one)
     for one in wanted:
-        for some in _pairs_of(study, one, place):
+        for some in _pairs_of(run, one, place, recorded):
             names = {one.name for pair in some.pairs for one in pair}
             if some.city is not None:
                 names = {one.name for one in some.city.recordings}
@@ -97,26 +94,29 @@ def pairs_by_map(study: Study, maps: Sequence[str]) -> Iterator[MapPairs]:
 
 
 def _pairs_of(
-    study: Study, one: str | MadeMap, place: str
+    run: ExperimentRun,
+    one: str | MadeMap,
+    place: str,
+    recorded: Callable[[Path], Iterable[MapDrives]] | None,
 ) -> Iterator[MapPairs]:
     """Yields the pairs of a map; `place` is the field for errors, or ""."""
-    kind = study.experiment.drives
+    kind = run.experiment.drives
     if isinstance(one, MadeMap):
-        folder = study.output / "cities" / one.name
-        with errors_at(f"{study.source}: maps"):
-            step = made_map_step(one, study.experiment, folder, shipped_maps())
-        make_maps([step], folder.parent, study.cluster)
+        folder = run.output / "cities" / one.name
+        with errors_at(f"{run.source}: maps"):
+            step = made_map_step(one, run.experiment, folder, shipped_maps())
+        make_maps([step], folder.parent, run.cluster)
         yield MapPairs(one.name, {}, _drive_pairs(folder, kind))
         return
     path = shipped_maps().get(one, Path(one))
-    versions = study.experiment.frozen_redraws
+    versions = run.experiment.frozen_redraws
     if versions:
         cities = redraw_frozen(
             [one],
             versions,
-            study.output / "cities",
-            study.cluster,
-            study.source,
+            run.output / "cities",
+            run.cluster,
+            run.source,
         )
         for number, folder in zip(sorted(versions), cities, strict=True):
             yield MapPairs(
@@ -125,10 +125,10 @@ def _pairs_of(
         return
     if path.is_dir() and not MapFolder(path).drives():
         with errors_at(place) if place else nullcontext():
-            recorded = drives_by_map(
-                find_recordings(path, study.on_note), study.on_note
-            )
-        for city in recorded:
+            if recorded is None:
+                raise InputError(f"{path}: no drive that can be simulated")
+            found = recorded(path)
+        for city in found:
             yield MapPairs(city.name, {}, city=city)
         return
     yield MapPairs(path.name, {}, _drive_pairs(recordable_map(one), kind))

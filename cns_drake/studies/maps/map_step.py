@@ -11,6 +11,7 @@ from evaluation.base import (
     Cluster,
     InputError,
     Job,
+    Part,
     Reporter,
     Step,
     make_folder,
@@ -18,7 +19,6 @@ from evaluation.base import (
     run_jobs,
     user_errors,
 )
-from evaluation.study import Part
 
 # The file in its folder with the fingerprint of a map.
 _PART = "drawn.data"

@@ -14,7 +14,8 @@ from cns_drake.ground_truth import (
     label_points,
     labelled_drive,
 )
-from evaluation.base import Reporter
+from evaluation.base import Part, Reporter
+from evaluation.drives import DriveSource
 from evaluation.map_update import (
     TRUTH,
     Label,
@@ -27,7 +28,6 @@ from evaluation.map_update import (
     run_baseline,
     write_session,
 )
-from evaluation.study import DriveSource, Part
 
 # Counts the changes of how maps are updated. Raise it with each such change.
 UPKEEP_VERSION = 1

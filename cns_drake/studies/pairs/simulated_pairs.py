@@ -1,30 +1,26 @@
-"""Pairs of simulated drives, changed as the conditions of an experiment say."""
+"""Pairs of simulated drives, as a study measures them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from cns_drake.scenarios import Scenario
 from cns_drake.simulation import SimulationSource
-from cns_drake.studies.drives.named_stages import MissingError
 from cns_drake.studies.maps.experiment_maps import MapPairs
-from cns_drake.studies.maps.made_maps import MadeMaps
-from cns_drake.studies.pairs.comparisons import ChangedPair, PairMaker
+from cns_drake.studies.pairs.comparisons import ChangedPair
 from cns_drake.studies.pairs.map_upkeep import (
     UPKEEP_VERSION,
     UpkeptSource,
     update_maps,
 )
 from cns_drake.studies.recording import is_recorded
-from evaluation.base import Job, fingerprint
+from evaluation.base import Job, MakePart, fingerprint
+from evaluation.drives import RecordingSource
 from evaluation.map_update import NOT_MAINTAINED
-from evaluation.results import CAUSE
 from evaluation.study import (
     OPENING_COST,
     ChangeTask,
-    MakePart,
     NamedDrive,
     Pair,
-    RecordingSource,
     Study,
     StudyFiles,
     condition_protocol,
@@ -33,75 +29,6 @@ from evaluation.study import (
 
 # Expected time to update a map by a usual drive, once it is open [s].
 _UPKEEP_COST = 20.0
-
-
-def changed_pairs(
-    study: Study, maps: Sequence[MapPairs]
-) -> list[list[ChangedPair]]:
-    """Returns the pairs of each map, changed as its conditions say.
-
-    All pairs are built before a city is made, because faults come before
-    slow work. Only the pairs of a map whose drives need new cities are
-    then built anew.
-
-    Raises:
-        InputError: a field of a condition cannot be used, or a city cannot
-            be made.
-    """
-    made = MadeMaps(study.output / "cities")
-    found = []
-    for some in maps:
-        before = made.num_requests
-        built = _built(study, some, made)
-        found.append((some, *built, made.num_requests > before))
-    made.make(study.cluster)
-    pairs = []
-    for some, changed, notes, lacks_cities in found:
-        if lacks_cities:
-            changed, notes = _built(study, some, made)
-        for text in notes:
-            study.on_note(f"{some.map_name}: {text}")
-        pairs.append(changed)
-    return pairs
-
-
-def _built(
-    study: Study, some: MapPairs, made: MadeMaps
-) -> tuple[list[ChangedPair], Iterable[str]]:
-    """Returns a map's pairs in each possible condition, and notes.
-
-    Args:
-        some: the pairs of the map.
-        made: the maps that conditions need.
-    """
-    experiment, source = study.experiment, study.source
-    noted: dict[str, None] = {}
-    found = []
-    for database, query in some.pairs:
-        pair = PairMaker(
-            database,
-            query,
-            experiment.drives == "same-route",
-            source,
-            made.aged,
-            made.redrawn,
-            noted.setdefault,
-        )
-        known: set[str] = set()
-        for condition in experiment.conditions:
-            for seed in experiment.seeds:
-                try:
-                    changed = pair.build(condition, seed)
-                except MissingError as error:
-                    label = condition.factors.get(CAUSE, "a condition")
-                    noted.setdefault(f"{label} left out: {error}")
-                    break
-                # A condition without random numbers is measured once.
-                key = f"{condition.factors} {changed.fingerprint()}"
-                if key not in known:
-                    known.add(key)
-                    found.append(changed)
-    return found, noted
 
 
 def simulated_pair(study: Study, some: MapPairs, one: ChangedPair) -> Pair:

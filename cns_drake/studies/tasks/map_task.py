@@ -7,17 +7,9 @@ import tempfile
 from cns_drake.ground_truth import labelled_drive, write_truth
 from cns_drake.simulation import SimulationSource
 from evaluation.base import Reporter
-from evaluation.map_update import BASELINES
-from evaluation.study import (
-    TRUTH,
-    Jobs,
-    MapScores,
-    MapTask,
-    Pair,
-    RecordingSource,
-    Result,
-    score_methods,
-)
+from evaluation.drives import RecordingSource
+from evaluation.map_update import BASELINES, TRUTH, MapScores, score_methods
+from evaluation.study import Jobs, MapTask, Pair, Result
 
 _COST = 25.0
 

@@ -17,11 +17,10 @@ from evaluation.base import (
     track,
     whole_number,
 )
-from evaluation.drives import sample_frames
+from evaluation.drives import DriveSource, sample_frames
 from evaluation.study import (
     OPENING_COST,
     SCAN_COST,
-    DriveSource,
     Jobs,
     Pair,
     Result,

@@ -77,8 +77,8 @@ def localise(
             drives/metropolis_04 --method gicp --start 1
     """
     from evaluation.base import choose_cluster
+    from evaluation.recognition import method_settings
     from evaluation.results import make_output
-    from evaluation.study import method_settings
     from evaluation.verbs import localise as localise_scans
 
     name = Path(method).stem

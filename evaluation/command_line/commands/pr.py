@@ -100,9 +100,8 @@ def pr(
         cns-eval pr drives/metropolis_01 drives/metropolis_04 \\
             --method scan-context++
     """
-    from evaluation.recognition import write_overlaps
+    from evaluation.recognition import choose_method, write_overlaps
     from evaluation.results import make_output
-    from evaluation.study import choose_method
     from evaluation.verbs import recognise
 
     overlap = options.overlap_of(truth)

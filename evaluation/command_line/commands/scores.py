@@ -46,8 +46,7 @@ def scores(
             kitti/sequences/04/velodyne --method solid \\
             --output scores.csv
     """
-    from evaluation.recognition import write_scores
-    from evaluation.study import choose_method
+    from evaluation.recognition import choose_method, write_scores
 
     choice = choose_method(method, parameter or ()).at_height(sensor_height)
     with errors_at_option("--method", "name"):

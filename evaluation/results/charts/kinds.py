@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from evaluation.base import InputError, figure_style, no_such
+from evaluation.methods import SETTINGS
 from evaluation.recognition import METRICS, metric_named
 from evaluation.results.charts.chart import ROW, WIDE, Chart, PrintStyle
 from evaluation.results.charts.curves import draw_curves
@@ -23,7 +24,7 @@ from evaluation.results.charts.scatter import draw_scatter
 from evaluation.results.charts.words import in_words
 from evaluation.results.figure_files import PRINTED, figure_svg, save_figure
 from evaluation.results.figure_text import escape_dollars
-from evaluation.results.keys import RESERVED, SETTINGS
+from evaluation.results.keys import RESERVED
 from evaluation.results.method_names import in_table_order, title
 from evaluation.results.styles import FIGURE_STYLE, MethodStyle, method_styles
 from evaluation.results.table import Answers, QueryRows, Results, Row

@@ -22,17 +22,17 @@ from evaluation.base import (
     validated,
     value_errors,
 )
-from evaluation.results import SETTINGS, as_factor, chart_factors, check_factors
-from evaluation.study.chosen_methods import expanded_names
+from evaluation.methods import SETTINGS
+from evaluation.recognition import expanded_names
+from evaluation.results import as_factor, chart_factors, check_factors
 from evaluation.study.experiments.cause_files import ALL, with_cases
-from evaluation.study.experiments.conditions import levels_by_case
 from evaluation.study.experiments.experiment import (
     Experiment,
     in_long_form,
+    levels_by_case,
     named_programs,
 )
 from evaluation.study.experiments.factors import Changes
-from evaluation.study.tasks.place import CostTask
 
 _FOLDER = Path(__file__).parent
 
@@ -242,7 +242,7 @@ class _Measured(NamedTuple):
     @classmethod
     def of(cls, experiment: Experiment) -> _Measured:
         # The task `cost` is added to some studies.
-        tasks = (*experiment.tasks, CostTask.name)
+        tasks = (*experiment.tasks, "cost")
         values: dict[str, dict[Any, None]] = {"task": dict.fromkeys(tasks)}
         for condition in experiment.conditions:
             for name, value in condition.factors.items():

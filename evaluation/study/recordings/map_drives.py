@@ -10,8 +10,13 @@ from pathlib import Path
 
 from evaluation.alignment import in_one_world
 from evaluation.base import InputError, fingerprint, natural_key, read_text
-from evaluation.drives import Drive, LidarField
-from evaluation.study.sources import DriveSource, Placement, RecordingSource
+from evaluation.drives import (
+    Drive,
+    DriveSource,
+    LidarField,
+    Placement,
+    RecordingSource,
+)
 from evaluation.study.tasks.pair import USUAL_LENGTH, NamedDrive
 
 _GUESSED = (

@@ -12,7 +12,7 @@ from evaluation.base import (
 )
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
 from evaluation.results import CAUSE, LAST, OWN, STAGE
-from evaluation.study.experiments.conditions import Condition
+from evaluation.study.experiments.experiment import Condition
 from evaluation.study.experiments.factors import SESSIONS, SIDES
 from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
 from evaluation.study.tasks.pair import Pair

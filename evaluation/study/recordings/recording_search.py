@@ -10,6 +10,7 @@ import re
 from evaluation.base import InputError, listed, natural_key, one_line
 from evaluation.drives import (
     SCENARIO,
+    RecordingSource,
     driven_way,
     find_data_sets,
     open_drive,
@@ -19,7 +20,6 @@ from evaluation.study.recordings.map_drives import (
     RecordingInfo,
     scenario_digest,
 )
-from evaluation.study.sources import RecordingSource
 
 # Names of drives that state map and stage. The first form ends in a date, as in
 # NCLT, Boreas and rosbag2; the last form ends in a number, as in MulRan.

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from evaluation.base import Reporter
-from evaluation.change import ChangeReport, change_of_maps
-from evaluation.study.features import DriveSummary
+from evaluation.change import ChangeReport, DriveMap, change_of_maps
+from evaluation.recognition import DriveSummary
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 from evaluation.study.tasks.task import Task, check_positive
@@ -70,6 +70,9 @@ def measure_change(
     """
     maps = (part.read() for part in (first, second))
     a, b = (
-        one.drive_map if isinstance(one, DriveSummary) else one for one in maps
+        DriveMap(one.name, one.coarse, one.X_WS[:, :3, 3])
+        if isinstance(one, DriveSummary)
+        else one
+        for one in maps
     )
     return change_of_maps(a, b)

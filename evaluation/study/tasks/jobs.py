@@ -3,12 +3,17 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
-from evaluation.base import Job, fingerprint
-from evaluation.recognition import RetrievalProtocol, Role
-from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.features import FeatureExtraction, map_source
-from evaluation.study.parts import MakePart, Part
-from evaluation.study.place_measurements import DescribedSource
+from evaluation.base import Job, MakePart, Part, Reporter, fingerprint
+from evaluation.change import DriveMap
+from evaluation.drives import DriveSource, sample_frames
+from evaluation.maps import CELL_SIZE, map_drive
+from evaluation.recognition import (
+    DescribedSource,
+    FeatureExtraction,
+    MethodChoice,
+    RetrievalProtocol,
+    Role,
+)
 from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 
@@ -208,6 +213,26 @@ class Jobs:
         step = MakePart(part, function, arguments, version)
         self.jobs[name] = Job(name, step, tuple(needs), cost, title)
         return part
+
+
+def map_source(
+    reporter: Reporter, source: DriveSource, spacing: float | None
+) -> DriveMap:
+    """Returns the voxel map of a drive, to compute the change ratio (TCR).
+
+    Args:
+        reporter: reports progress.
+        source: function that opens the drive.
+        spacing: distance along the path between two scans in the map [m]; None
+            for all scans.
+    """
+    drive = source()
+    positions = drive.X_WS[:, :3, 3]
+    frames = None
+    if spacing is not None:
+        frames = sample_frames(positions, spacing).tolist()
+    voxels = map_drive(drive, CELL_SIZE, frames)
+    return DriveMap(drive.name, voxels, positions)
 
 
 def num_described(

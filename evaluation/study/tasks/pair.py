@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import math
 from typing import Any, Protocol
 
+from evaluation.drives import DriveSource
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, Role
-from evaluation.study.sources import DriveSource
 
 # Length of a drive through a shipped city, about [m].
 USUAL_LENGTH = 1400.0

@@ -4,18 +4,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from evaluation.base import Job, Reporter, Step
+from evaluation.base import Job, MakePart, Part, Reporter, Step
 from evaluation.recognition import (
     Number,
-    PlaceOutcome,
-    SearchCost,
-    numbers_of,
-)
-from evaluation.study.parts import MakePart, Part
-from evaluation.study.place_measurements import (
     PlaceComparison,
+    PlaceOutcome,
     ScansOf,
+    SearchCost,
     measure_places,
+    numbers_of,
     shown_overlaps,
 )
 from evaluation.study.study_files import StudyFiles

@@ -13,9 +13,13 @@ from evaluation import change_between
 from evaluation.base import Cluster, InputError
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
-from evaluation.recognition import RANDOM_YAW_PROTOCOL, RetrievalProtocol
+from evaluation.recognition import (
+    RANDOM_YAW_PROTOCOL,
+    MethodChoice,
+    RetrievalProtocol,
+)
 from evaluation.results import Results
-from evaluation.study import Experiment, MethodChoice
+from evaluation.study import Experiment
 
 
 @pytest.fixture(scope="module")

@@ -27,9 +27,12 @@ import pytest
 from evaluation.alignment import in_one_world, open_in_one_world
 from evaluation.base import InputError, poses, xyz
 from evaluation.change import temporal_change
-from evaluation.drives import Drive, Reading, open_drive
+from evaluation.drives import Drive, Reading, RecordingSource, open_drive
 from evaluation.maps import map_drive
-from evaluation.study import RecordingInfo, RecordingSource, drives_by_map
+from evaluation.study import (
+    RecordingInfo,
+    drives_by_map,
+)
 
 pytestmark = pytest.mark.slow
 

@@ -20,8 +20,7 @@ import numpy as np
 import pytest
 
 from evaluation.base import InputError
-from evaluation.drives import MovedDrive, open_drive
-from evaluation.study import RecordingSource
+from evaluation.drives import MovedDrive, RecordingSource, open_drive
 
 MATRIX = "matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1.6, 0, 0, 0, 1]\n"
 _opened: list[str] | None = None

@@ -12,7 +12,7 @@ import pytest
 
 from evaluation.base import InputError
 from evaluation.methods import known_methods, make_method, shipped_methods
-from evaluation.study import choose_methods
+from evaluation.recognition import choose_methods
 
 NAME = "map-closures"
 PACKAGE = "map_closures"

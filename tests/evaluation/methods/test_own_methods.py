@@ -10,7 +10,7 @@ import pytest
 
 from evaluation import check_method, judge, open_drive, retrieve
 from evaluation.methods import load_method
-from evaluation.study import choose_methods
+from evaluation.recognition import choose_methods
 
 pytestmark = pytest.mark.usefixtures("own_methods")
 

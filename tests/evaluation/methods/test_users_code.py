@@ -140,7 +140,7 @@ def test_a_property_runs_as_the_users_code(tmp_path):
 
 
 def test_two_commands_of_one_stem_are_two_methods(tmp_path):
-    from evaluation.study import choose_methods
+    from evaluation.recognition import choose_methods
 
     paths = [write(tmp_path / str(k), f"stem_{k}") for k in range(2)]
     found = choose_methods(paths)

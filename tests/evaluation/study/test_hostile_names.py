@@ -8,7 +8,7 @@ from helpers.small_towns import drive
 import pytest
 
 from evaluation.base import file_name
-from evaluation.study import MethodChoice
+from evaluation.recognition import MethodChoice
 
 STAGE = r"../../../../evil|$\frac{_%# <b>&"
 MAP = "..|[x](y)_$"

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from evaluation import QueryRows, Results
-from evaluation.recognition import route_blocks
+from evaluation.recognition import choose_methods, route_blocks
 from evaluation.results import OWN, STAGE
-from evaluation.study import choose_methods
 
 pytestmark = pytest.mark.slow
 

@@ -19,9 +19,9 @@ import pytest
 from evaluation.base import Cluster, InputError, run_jobs
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
-from evaluation.recognition import PROTOCOLS, RetrievalProtocol
+from evaluation.recognition import PROTOCOLS, RetrievalProtocol, choose_methods
 from evaluation.results import QueryRows, Results
-from evaluation.study import choose_methods, drives_by_map, find_recordings
+from evaluation.study import drives_by_map, find_recordings
 
 pytestmark = pytest.mark.slow
 

@@ -3,9 +3,9 @@
 import pytest
 
 from evaluation.base import InputError, choose_cluster
-from evaluation.recognition import RANDOM_YAW_PROTOCOL
+from evaluation.recognition import RANDOM_YAW_PROTOCOL, choose_methods
 from evaluation.results import check_output
-from evaluation.study import choose_methods, study_recordings
+from evaluation.study import study_recordings
 
 PROTOCOLS = {"random-yaw": RANDOM_YAW_PROTOCOL}
 

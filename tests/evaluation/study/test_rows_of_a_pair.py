@@ -8,8 +8,8 @@ from helpers.internal.eval_program import run
 import numpy as np
 import pytest
 
+from evaluation.recognition import choose_methods
 from evaluation.results import QueryRows, Results
-from evaluation.study import choose_methods
 
 pytestmark = pytest.mark.slow
 METHODS = ("solid", "ring++")

@@ -4,9 +4,8 @@ from helpers.internal import studies
 from helpers.small_towns import drive
 import pytest
 
-from evaluation.recognition import RetrievalProtocol
+from evaluation.recognition import MethodChoice, RetrievalProtocol
 from evaluation.results import Results
-from evaluation.study import MethodChoice
 
 pytestmark = [
     pytest.mark.slow,

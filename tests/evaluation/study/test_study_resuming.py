@@ -5,7 +5,7 @@ from helpers.small_towns import drive
 import pytest
 
 from evaluation.methods import make_method
-from evaluation.study import choose_methods
+from evaluation.recognition import choose_methods
 
 pytestmark = pytest.mark.slow
 

@@ -34,7 +34,7 @@ from cns_drake.simulation import simulate
 from evaluation.base.compilation import start_compiler
 from evaluation.base.jobs import processes
 from evaluation.base.jobs.processes import ALLOCATION
-from evaluation.study import chosen_methods
+from evaluation.recognition import chosen_methods
 from helpers.internal.studies import leave_figures_unrendered
 from helpers.tiny_drive import tiny_scenario
 

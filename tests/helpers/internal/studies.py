@@ -13,14 +13,12 @@ import pytest
 from cns_drake.pictures import StageScene
 from evaluation.base import Cluster, Reporter
 from evaluation.base.jobs.processes import nothing_left
-from evaluation.recognition import RANDOM_YAW_PROTOCOL
-from evaluation.study import (
+from evaluation.recognition import (
+    RANDOM_YAW_PROTOCOL,
     choose_methods,
     chosen_methods,
-    find_recordings,
-    study,
-    study_recordings,
 )
+from evaluation.study import find_recordings, study, study_recordings
 
 
 def do(jobs):

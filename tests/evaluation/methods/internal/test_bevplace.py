@@ -21,7 +21,7 @@ from evaluation.methods.bevplace import (
     count_image,
     describe_image,
 )
-from evaluation.study import choose_methods
+from evaluation.recognition import choose_methods
 
 # As large as an image must be for all scales.
 SIZE = 63

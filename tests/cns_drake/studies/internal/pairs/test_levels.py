@@ -8,8 +8,8 @@ import pytest
 
 from cns_drake.scenarios import make_scenario
 from cns_drake.studies.maps.experiment_maps import pairs_by_map
+from cns_drake.studies.pairs.changed_pairs import changed_pairs
 from cns_drake.studies.pairs.comparisons import ChangedPair, DatedDrive
-from cns_drake.studies.pairs.simulated_pairs import changed_pairs
 from cns_drake.studies.study import (
     check_frozen,
     drives_fingerprint,

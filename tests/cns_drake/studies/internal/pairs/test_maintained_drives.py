@@ -2,7 +2,12 @@
 
 from cns_drake.studies.pairs.simulated_pairs import with_upkept_maps
 from evaluation.base import Cluster
-from evaluation.study import Experiment, NamedDrive, RecordingSource, Study
+from evaluation.drives import RecordingSource
+from evaluation.study import (
+    Experiment,
+    NamedDrive,
+    Study,
+)
 
 
 def test_their_maps_differ_and_nothing_else(tmp_path):

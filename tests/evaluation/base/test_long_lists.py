@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from evaluation.base import InputError
-from evaluation.study import LongList, Part
+from evaluation.base import (
+    InputError,
+    LongList,
+    Part,
+)
 
 # Number of items that are written together.
 BLOCK = 64

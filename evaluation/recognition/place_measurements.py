@@ -8,30 +8,24 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from evaluation.base import Reporter, track
+from evaluation.base import LongList, Part, Reporter, track
 from evaluation.drives import Drive, cloud_at
 from evaluation.methods import Method
-from evaluation.recognition import (
-    KEEP_ALL,
-    MOST_BYTES,
-    DriveDescriptors,
-    PlaceOutcome,
-    QueryDrive,
-    RetrievalProtocol,
-    Role,
-    Search,
-    SearchCost,
-    StoredDrives,
+from evaluation.recognition.chosen_methods import MethodChoice
+from evaluation.recognition.describing import Role
+from evaluation.recognition.descriptors import DriveDescriptors, joined_scans
+from evaluation.recognition.features import KeptScans, describe_recording
+from evaluation.recognition.overlap_truth import overlaps_with_best_match
+from evaluation.recognition.place_outcome import PlaceOutcome, QueryDrive
+from evaluation.recognition.place_selection import KEEP_ALL, kept_places
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.retrieval import (
     compare_at_radii,
-    joined_scans,
-    kept_places,
     matches_within_radius,
-    overlaps_with_best_match,
     query_batches,
 )
-from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.features import KeptScans, describe_recording
-from evaluation.study.parts import LongList, Part
+from evaluation.recognition.search import Search, SearchCost
+from evaluation.recognition.stored_places import MOST_BYTES, StoredDrives
 
 # A function that opens a drive, such as a `DriveSource`; or the parts of its
 # scans and of its descriptors by each method.

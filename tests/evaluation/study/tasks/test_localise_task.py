@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evaluation.base import Reporter
-from evaluation.drives import open_drive
+from evaluation.drives import RecordingSource, open_drive
 from evaluation.localisation import (
     QUERY,
     Localised,
@@ -14,10 +14,11 @@ from evaluation.localisation import (
     localise,
     make_estimator,
     make_map,
+    measure_localisation,
     read_queries,
 )
 from evaluation.recognition import numbers_of
-from evaluation.study import LocaliseTask, RecordingSource, measure_localisation
+from evaluation.study import LocaliseTask
 
 STARTS = (Starts(0.5, 5.0), Starts(2.0, 10.0))
 

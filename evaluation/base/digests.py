@@ -15,7 +15,8 @@ import os
 from pathlib import Path
 import time
 
-from evaluation.base import cache_folder, check_regular, user_errors, write_text
+from evaluation.base.complete_files import write_text
+from evaluation.base.files import cache_folder, check_regular, user_errors
 
 _BLOCK_BYTES = 1 << 20
 # A file that was changed so recently may change again without another time:

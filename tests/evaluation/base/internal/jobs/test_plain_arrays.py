@@ -3,7 +3,7 @@ import contextlib
 import numpy as np
 import pytest
 
-from evaluation.study.parts import decode, encode
+from evaluation.base.jobs.parts import decode, encode
 
 
 def arrays():

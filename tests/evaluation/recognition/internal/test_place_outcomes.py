@@ -7,22 +7,19 @@ import numpy as np
 import pytest
 
 from evaluation.base import Reporter
-from evaluation.drives import open_drive
-from evaluation.recognition import RetrievalProtocol
-from evaluation.study import (
+from evaluation.base.jobs import parts
+from evaluation.drives import RecordingSource, open_drive
+from evaluation.recognition import (
+    FeatureExtraction,
+    FeatureFiles,
     MethodChoice,
-    RecordingSource,
-    parts,
-    place_measurements,
-)
-from evaluation.study.features import FeatureExtraction
-from evaluation.study.place_measurements import (
     PlaceComparison,
+    RetrievalProtocol,
     ScansOf,
     measure_places,
+    place_measurements,
     shown_overlaps,
 )
-from evaluation.study.study_files import FeatureFiles
 
 METHODS = (
     MethodChoice("solid"),

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 import zstandard
 
-from evaluation.base import InputError, fingerprint
-from evaluation.study import Part
+from evaluation.base import InputError, Part, fingerprint
 
 INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
 

@@ -1,4 +1,4 @@
-"""Chooses the methods that a study runs: shipped methods and your own."""
+"""Chooses the methods that are measured: shipped methods and your own."""
 
 from __future__ import annotations
 
@@ -7,8 +7,15 @@ from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 
-from evaluation.base import InputError, did_you_mean, no_such, repeated
+from evaluation.base import (
+    InputError,
+    did_you_mean,
+    file_digests,
+    no_such,
+    repeated,
+)
 from evaluation.methods import (
+    SETTINGS,
     Method,
     MethodConfig,
     known_methods,
@@ -17,8 +24,6 @@ from evaluation.methods import (
     optional_methods,
     shipped_methods,
 )
-from evaluation.results import SETTINGS
-from evaluation.study.digests import file_digests
 
 # The value of a parameter, as text.
 Setting = str | tuple[str, ...]

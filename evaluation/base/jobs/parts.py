@@ -30,16 +30,11 @@ import weakref
 import numpy as np
 import zstandard
 
-from evaluation.base import (
-    InputError,
-    Reporter,
-    Step,
-    check_regular,
-    completing,
-    fingerprint,
-    make_folder,
-    user_errors,
-)
+from evaluation.base.complete_files import completing
+from evaluation.base.errors import InputError
+from evaluation.base.files import check_regular, make_folder, user_errors
+from evaluation.base.jobs.step import Reporter, Step
+from evaluation.base.json_text import fingerprint
 
 _MAGIC = b"cns-eval part 3\n"
 _LEVEL = 1
@@ -246,7 +241,7 @@ def _compressed(plain: bytes) -> bytes:
 
 @dataclass(frozen=True)
 class Part:
-    """An intermediate result of a study, in a file that names its inputs.
+    """An intermediate result, in a file that names its inputs.
 
     Attributes:
         path: path of the file.

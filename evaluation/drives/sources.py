@@ -12,8 +12,11 @@ from typing import Protocol
 
 import numpy as np
 
-from evaluation.drives import Drive, JoinedDrive, MovedDrive, open_drive
-from evaluation.study.digests import file_digests
+from evaluation.base import file_digests
+from evaluation.drives.drive import Drive
+from evaluation.drives.drive_views import MovedDrive
+from evaluation.drives.joined_drive import JoinedDrive
+from evaluation.drives.opening import open_drive
 
 
 class DriveSource(Protocol):

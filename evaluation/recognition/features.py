@@ -12,42 +12,37 @@ from numpy.lib.recfunctions import repack_fields
 
 from evaluation.base import (
     InputError,
+    LongList,
+    Part,
     Reporter,
     Step,
     doing,
+    file_name,
     fingerprint,
     make_folder,
     xyz,
 )
-from evaluation.change import DriveMap
 from evaluation.drives import (
     Drive,
+    DriveSource,
     RecentScans,
     cropped,
-    sample_frames,
     within_cube,
 )
-from evaluation.maps import (
-    CELL_SIZE,
-    MappedDrive,
-    VoxelMap,
-    map_drive,
-    thumbnail,
-)
+from evaluation.maps import MappedDrive, VoxelMap, thumbnail
 from evaluation.methods import MethodConfig
-from evaluation.recognition import (
-    RANDOM_YAW_PROTOCOL,
+from evaluation.recognition.chosen_methods import MethodChoice
+from evaluation.recognition.describing import (
     DescribingCost,
-    DriveDescriptors,
     Request,
-    RetrievalProtocol,
     Role,
     describe_drive,
 )
-from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.parts import LongList, Part
-from evaluation.study.sources import DriveSource
-from evaluation.study.study_files import FeatureFiles
+from evaluation.recognition.descriptors import DriveDescriptors
+from evaluation.recognition.protocol import (
+    RANDOM_YAW_PROTOCOL,
+    RetrievalProtocol,
+)
 
 # Fields of the points of kept scans, where a drive has them.
 _KEPT_FIELDS = ("x", "y", "z", "instance")
@@ -75,16 +70,6 @@ class DriveSummary:
     coarse: VoxelMap
     frames: np.ndarray
     thumbnails: list[np.ndarray]
-
-    @property
-    def positions(self) -> np.ndarray:
-        """(N, 3) positions of the sensor in the world [m]."""
-        return self.X_WS[:, :3, 3]
-
-    @property
-    def drive_map(self) -> DriveMap:
-        """The voxel map of the drive, with the drive's name and positions."""
-        return DriveMap(self.name, self.coarse, self.positions)
 
 
 @dataclass(frozen=True)
@@ -273,26 +258,6 @@ def extract_features(
     return MappedFeatures(described, costs, summary, fine, scans)
 
 
-def map_source(
-    reporter: Reporter, source: DriveSource, spacing: float | None
-) -> DriveMap:
-    """Returns the voxel map of a drive, to compute the change ratio (TCR).
-
-    Args:
-        reporter: reports progress.
-        source: function that opens the drive.
-        spacing: distance along the path between two scans in the map [m]; None
-            for all scans.
-    """
-    drive = source()
-    positions = drive.X_WS[:, :3, 3]
-    frames = None
-    if spacing is not None:
-        frames = sample_frames(positions, spacing).tolist()
-    voxels = map_drive(drive, CELL_SIZE, frames)
-    return DriveMap(drive.name, voxels, positions)
-
-
 def describe_recording(
     recording: Drive,
     roles: Set[Role],
@@ -344,6 +309,54 @@ def _described(
         dict(zip(asked, found, strict=True)),
         dict(zip(asked, costs, strict=True)),
     )
+
+
+@dataclass(frozen=True)
+class FeatureFiles:
+    """The files (`Part`) with all that is needed of a recording.
+
+    The files contain the drive's poses and map, the scans at places and
+    queries, and, in one file for each method, the descriptors of these scans.
+
+    Attributes:
+        folder: folder of the files.
+    """
+
+    folder: Path
+
+    @property
+    def drive(self) -> Part:
+        """The file with the drive's poses and map, a `DriveSummary`."""
+        return Part(self.folder / "drive.data")
+
+    @property
+    def fine(self) -> Part:
+        """The file with the cloud for pictures, an array (K, 3)."""
+        return Part(self.folder / "fine.data")
+
+    @property
+    def scans(self) -> Part:
+        """The file with the drive's scans at places and queries.
+
+        For a drive with a map, the file contains a `KeptScans`; otherwise a
+        list of scans (N, 3).
+        """
+        return Part(self.folder / "scans.data")
+
+    def described(self, key: str) -> Part:
+        """Returns the file with a method's descriptors of the drive.
+
+        The file contains a `DriveDescriptors`.
+
+        Args:
+            key: `MethodChoice.key` of the method; for descriptors by a second
+                protocol, the result of `described_key`.
+        """
+        return Part(self.folder / f"described_{file_name(key)}.data")
+
+    def cost(self, key: str) -> Part:
+        """Returns the file with the `DescribingCost` of these descriptors."""
+        return Part(self.folder / f"cost_{file_name(key)}.data")
 
 
 @dataclass(frozen=True)

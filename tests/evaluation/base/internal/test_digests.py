@@ -4,8 +4,8 @@ import hashlib
 import io
 import os
 
-from evaluation.study import digests
-from evaluation.study.digests import file_digests
+from evaluation.base import digests
+from evaluation.base.digests import file_digests
 
 
 def test_digests_are_kept_until_a_file_changes(tmp_path, monkeypatch):
