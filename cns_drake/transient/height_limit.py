@@ -15,17 +15,15 @@ from cns_drake.transient.structure_geometry import (
     StructureGeometry,
 )
 from cns_drake.transient.surroundings import Surroundings, change_rng
-from worlds.city import (
-    STOREY,
-    lowered,
-    top_of,
-)
 from worlds.shapes import (
     OBJECT_MESHES,
+    STOREY,
     Mesh,
     MeshShape,
     Model,
     Part,
+    lowered,
+    top_of,
 )
 
 # Cause of these changes in the structure table.

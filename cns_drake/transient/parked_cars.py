@@ -13,9 +13,9 @@ from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.structure_geometry import StructureGeometry
 from cns_drake.transient.surroundings import Surroundings
 from evaluation.base import product
-from worlds.city import PARKED_CARS
 from worlds.shapes import (
     GROUND_CLASSES,
+    PARKED_CARS,
     Model,
     part_mesh,
 )

@@ -15,8 +15,7 @@ from cns_drake.transient.kerb_stretches import straight_kerbs
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings, change_rng
 from evaluation.base import parse_yaml
-from worlds.city import OBJECTS
-from worlds.shapes import GROUND_CLASSES
+from worlds.shapes import GROUND_CLASSES, OBJECTS
 
 # Cell size of the grid, in W, of kerb stretches [m].
 _CELL = 6.5

@@ -9,14 +9,12 @@ from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.kerb_stretches import KerbStretch, straight_kerbs
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings
-from worlds.city import (
-    OBJECTS,
-    pick_key,
-)
 from worlds.shapes import (
     GROUND_CLASSES,
+    OBJECTS,
     assemble,
     block,
+    pick_key,
 )
 
 # Cell size of the grid, in W, of kerb stretches [m].

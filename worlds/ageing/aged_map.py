@@ -46,7 +46,6 @@ from worlds.city import (
     triangles_in,
     use_by_size,
     world_sdf,
-    younger_plant,
 )
 from worlds.imports import YEAR_COLUMN
 from worlds.maps import (
@@ -67,6 +66,7 @@ from worlds.shapes import (
     Structure,
     material_word,
     read_materials,
+    younger_plant,
 )
 
 HISTORY_NAME = "history.csv"

@@ -12,10 +12,10 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.transient import scaffold
 from worlds.ageing.plots import Plot
-from worlds.city import Rgb
 from worlds.shapes import (
     MeshShape,
     Part,
+    Rgb,
     Structure,
     assemble,
     block,

@@ -12,12 +12,8 @@ from worlds.ageing import kinds
 from worlds.ageing.old_world import OldWorld
 from worlds.ageing.standing_structures import StandingStructures
 from worlds.ageing.yearly_draws import YearlyDraws
-from worlds.city import (
-    SPECIES,
-    scaled_plant,
-)
 from worlds.imports import random_generator
-from worlds.shapes import Structure
+from worlds.shapes import SPECIES, Structure, scaled_plant
 
 # Least and greatest growth of a tree in a year [m].
 _GROWTH = (0.3, 0.5)

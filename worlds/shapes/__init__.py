@@ -1,4 +1,4 @@
-"""Shapes: meshes, polygons, and structures with classes and materials.
+"""Shapes: meshes, areas, objects, and structures with classes and materials.
 
 A kit for what builds or changes a world; nothing here imports Drake.
 """

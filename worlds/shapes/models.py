@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from worlds.shapes import MATERIALS
+from worlds.shapes.materials import MATERIALS
 from worlds.shapes.mesh import Mesh, box_mesh
 
 # Number of sides of the prisms that stand for round shapes.

@@ -20,8 +20,7 @@ import pytest
 import shapely
 
 from cns_drake.transient import triangle_corners
-from worlds.city import lowered
-from worlds.shapes import part_mesh
+from worlds.shapes import lowered, part_mesh
 
 DRIVE = shapely.LineString([(X_WT @ [x, -1, 0])[:2] for x in (-60, 60)])
 # The parapet of a new roof, and the highest equipment on it [m].
