@@ -8,7 +8,6 @@ from pathlib import Path
 import subprocess
 import sys
 import tempfile
-from types import SimpleNamespace
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -22,6 +21,7 @@ from cns_drake import Scenario, load_scenario, make_station
 from cns_drake.pictures import (
     StageScene,
     View,
+    air_view,
     draw_drives,
     draw_stages,
     load_views,
@@ -52,7 +52,6 @@ from evaluation.results import (
     title,
     unit_rgb,
 )
-from worlds.ageing import air_view
 from worlds.maps import MapFolder, shipped_maps
 from worlds.shapes import CLASS_IDS
 
@@ -121,7 +120,7 @@ def towns(
             folder = _imported(file, options, draft)
             drive = load_scenario(folder.drives()[-1])
             scene = StageScene(drive.world_file)
-            view = air_view(SimpleNamespace(trajectory=plan_drive(drive)))
+            view = air_view(plan_drive(drive))
             picture = scene.photograph(view, 640, 480, haze_length=np.inf)
             pictures.append(with_name(picture, name, 20 * len(files)))
     write_tiles([pictures], path, 640)
@@ -145,7 +144,7 @@ def quarter(path: Path, file: str, time: float, options: str = "") -> None:
             scene = StageScene(world)
             axes.imshow(scene.photograph(view, *TILE))
             axes.set_title(f"stage {stage}", loc="left")
-        wide = air_view(SimpleNamespace(trajectory=trajectory))
+        wide = air_view(trajectory)
         air.imshow(scene.photograph(wide, *TILE))
         scan, X_WS = scans_at(drive, np.array([time]))[0]
     p_W = X_WS @ np.stack([scan[axis] for axis in "xyz"])

@@ -1,4 +1,6 @@
 from .aerial_pictures import draw_drives as draw_drives
+from .aged_pictures import air_view as air_view
+from .aged_pictures import draw_aged_city as draw_aged_city
 from .camera_views import View as View
 from .camera_views import load_views as load_views
 from .drive_page import read_drive_page as read_drive_page

@@ -1,3 +1,4 @@
+from .city_ageing import age_city as age_city
 from .city_building import build_city as build_city
 from .drive_table import DriveRow as DriveRow
 from .drive_table import listed_drives as listed_drives

@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
-import shapely
-from shapely import STRtree
 
 from cns_drake.motion import (
     Suspension,
@@ -45,6 +43,7 @@ from worlds.roads import (
     load_road_network,
     load_waypoint_path,
     make_lane_path,
+    obstacle_points,
     read_waypoints,
 )
 
@@ -174,7 +173,7 @@ class DrivePlan:
         return driven_path(
             path,
             POINT_SPACING,
-            _obstacles_beside(self.scenario, path.points)
+            obstacle_points(_obstacles_beside(self.scenario, path.points))
             if self.scenario.waypoints is not None or self.network is None
             else kerbs(self.network),
             source,
@@ -231,8 +230,8 @@ def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
     return scenario.frames or available
 
 
-def _obstacles_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
-    """Returns the points of obstacles beside a path in the world.
+def _obstacles_beside(scenario: Scenario, points: np.ndarray) -> np.ndarray:
+    """Returns the points (N, 2) of obstacles beside a path in the world [m].
 
     Rays in all directions, from near the ground to the height of the car, find
     kerbs and walls. An edge at which the ground only falls is not found.
@@ -240,9 +239,6 @@ def _obstacles_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
     Args:
         scenario: the scenario, whose world is loaded.
         points: (N, 3) points of the path, which must be close together [m].
-
-    Returns:
-        Points of the obstacles, seen from above.
 
     Raises:
         InputError: the world cannot be loaded.
@@ -256,8 +252,7 @@ def _obstacles_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
     p_WQ = np.tile(p_WR, (len(_AROUND), 1))[steep]
     p_WQ += hits.ranges[steep, None] * d_W[steep]
     # One point per centimetre is enough.
-    xy = np.unique(np.round(p_WQ[:, :2], 2), axis=0)
-    return STRtree(np.asarray(shapely.points(xy)))
+    return np.unique(np.round(p_WQ[:, :2], 2), axis=0)
 
 
 def ground_notes(scenario: Scenario, trajectory: Trajectory) -> tuple[str, ...]:

@@ -18,6 +18,9 @@ from .perception_geometry import (
     read_perception_geometry as read_perception_geometry,
 )
 from .sdf_worlds import InSight as InSight
+from .structure_geometry import ScenePart as ScenePart
+from .structure_geometry import SceneStructure as SceneStructure
+from .structure_geometry import geometry_by_structure as geometry_by_structure
 from .structure_names import structure_name as structure_name
 from .surfaces import LARGEST_SIZE as LARGEST_SIZE
 from .surfaces import MOST_COPIED_TRIANGLES as MOST_COPIED_TRIANGLES

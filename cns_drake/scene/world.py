@@ -35,10 +35,8 @@ from evaluation.base import (
     read_bytes,
     value_errors,
 )
-from worlds.maps import (
-    MapFolder,
-)
 from worlds.shapes import (
+    STRUCTURES_NAME,
     StructureTable,
     load_structure_table,
 )
@@ -140,7 +138,7 @@ def load_world(
         vehicle_model = _parse_models(plant, Path(vehicle))[0]
     plant.Finalize()
 
-    file = MapFolder(sdf.parent).structures
+    file = sdf.parent / STRUCTURES_NAME
     table = StructureTable(())
     if is_there(file):
         table = load_structure_table(file)

@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import shapely
 
 from cns_drake.motion import Trajectory
 from cns_drake.scenarios import (
@@ -15,7 +14,7 @@ from cns_drake.scenarios import (
     check_files,
     count_frames,
 )
-from cns_drake.scene import World
+from cns_drake.scene import World, geometry_by_structure
 from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.traffic import (
     EgoBox,
@@ -29,12 +28,14 @@ from cns_drake.traffic import (
     read_recorded,
     traffic_structures,
 )
-from cns_drake.transient import GroundSurface, geometry_by_structure
 from evaluation.base import InputError, arctan2
 from worlds.maps import metres_on_map
 from worlds.shapes import (
     GROUND_CLASSES,
     MOVING_IDS,
+    GroundSurface,
+    Obstacles,
+    Way,
 )
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
@@ -160,12 +161,11 @@ def _ground_around(world: World, trace: FcdTrace) -> GroundSurface:
     places = np.concatenate(
         [one.xy for one in (*trace.vehicles, *trace.persons)]
     )
-    near = shapely.box(*places.min(axis=0), *places.max(axis=0))
     ground = geometry_by_structure(
         world,
         lambda name: world.structures[name].semantic_class in GROUND_CLASSES,
     )
-    return GroundSurface(ground, near.buffer(_AROUND_TRACE))
+    return GroundSurface.around(ground, places, _AROUND_TRACE)
 
 
 def things_in_the_way(
@@ -190,16 +190,13 @@ def things_in_the_way(
             and not world.structures[name].causes
         ),
     )
-    ways = [
-        shapely.LineString(rows[:, :2]).buffer(kind.size[1] / 2)
-        for kind, rows in zip(
-            plan.kinds, np.moveaxis(plan.vehicles.values, 1, 0), strict=True
-        )
-    ]
-    feet = [structure.footprint for structure in parked.values()]
-    met, _ = shapely.STRtree(ways).query(feet, "intersects")
-    names = list(parked)
-    return [names[k] for k in np.unique(met).tolist()]
+    feet = Obstacles((name, one.footprint) for name, one in parked.items())
+    met = set()
+    for kind, rows in zip(
+        plan.kinds, np.moveaxis(plan.vehicles.values, 1, 0), strict=True
+    ):
+        met |= feet.touched_by(Way(rows[:, :2]).area(kind.size[1] / 2))
+    return sorted(met)
 
 
 def with_traffic(

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import shapely
-from shapely.geometry.base import BaseGeometry
 
 from cns_drake.scenarios import (
     DrivePlan,
@@ -18,6 +16,7 @@ from cns_drake.sensors import make_lidar_model
 from cns_drake.transient import change_world
 from evaluation.base import doing
 from worlds.maps import vehicle_file
+from worlds.shapes import Way
 
 # Distance from the car's middle line to its sides, with a margin [m].
 _HALF_WIDTH = 1.3
@@ -54,13 +53,8 @@ def sight_along(plan: DrivePlan, *, with_page: bool) -> InSight | None:
         reach = max(reach, measured.reach(model.pattern.max_range))
     frames = count_frames(scenario, plan.trajectory)
     times = np.arange(frames + 1) * scenario.frame_period
-    path = shapely.LineString(plan.trajectory.poses(times)[1][:, :2])
-
-    def in_sight(boxes: np.ndarray) -> np.ndarray:
-        flat = shapely.box(*boxes[:, 0, :2].T, *boxes[:, 1, :2].T)
-        return shapely.dwithin(flat, path, reach + _FAR_MOUNT)
-
-    return in_sight
+    way = Way(plan.trajectory.poses(times)[1][:, :2])
+    return lambda boxes: way.is_near(boxes, reach + _FAR_MOUNT)
 
 
 def load_stage(
@@ -98,8 +92,8 @@ def load_stage(
     trajectory = plan.trajectory
     doing("making the temporary changes")
     times = np.arange(0.0, trajectory.duration, 0.1)
-    drive = shapely.LineString(trajectory.poses(times)[1][:, :2])
-    driven: BaseGeometry = drive.buffer(_HALF_WIDTH)
+    drive = Way(trajectory.poses(times)[1][:, :2])
+    driven = drive.area(_HALF_WIDTH)
     if plan.network is not None:
         driven = driven.union(plan.network.areas.lane_area)
     return change_world(world, scenario.transient, drive, driven)

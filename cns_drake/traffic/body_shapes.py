@@ -8,12 +8,7 @@ from pydrake.geometry import Box, Capsule, Cylinder, Mesh, Shape
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cns_drake.traffic.traffic_plan import VehicleKind
-from worlds.city import (
-    PAINTS,
-    TRIM,
-    WHITE,
-)
-from worlds.shapes import OBJECT_MESHES
+from worlds.shapes import OBJECT_MESHES, PAINTS, TRIM, WHITE
 
 Rgb = tuple[float, float, float]
 Point = tuple[float, float, float]

@@ -4,11 +4,11 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import shapely
 
 from cns_drake.traffic.traffic_plan import Tracks
 from evaluation.base import cos, sin
 from worlds.roads import outlines
+from worlds.shapes import overlap
 
 # Greatest time between two comparisons of road users with the ego car [s]: they
 # notice everything that crosses its path.
@@ -91,9 +91,6 @@ def meets_ego(
         ahead = np.column_stack([cos(own[:, 3]), sin(own[:, 3])])
         long, wide = half[body, :1], half[body, 1:]
         bodies = outlines(own[:, :2], ahead, long, long, wide)
-        overlap = shapely.intersects(
-            np.asarray(shapely.polygons(box.corners(xy[time], yaw[time]))),
-            np.asarray(shapely.polygons(bodies)),
-        )
-        met[body[overlap]] = True
+        own_car = box.corners(xy[time], yaw[time])
+        met[body[overlap(own_car, bodies)]] = True
     return met

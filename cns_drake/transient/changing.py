@@ -3,22 +3,20 @@
 import functools
 import itertools
 
-from shapely.geometry.base import BaseGeometry
-
 from cns_drake.scenarios import TransientConfig
-from cns_drake.scene import World
+from cns_drake.scene import World, geometry_by_structure
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.scene_editing import SceneEditing
-from cns_drake.transient.structure_geometry import geometry_by_structure
 from cns_drake.transient.surroundings import Surroundings
 from evaluation.base import import_modules
+from worlds.shapes import Area, Way
 
 
 def change_world(
     world: World,
     config: TransientConfig,
-    drive: BaseGeometry,
-    kept_free: BaseGeometry,
+    drive: Way,
+    kept_free: Area,
 ) -> World:
     """Applies the temporary changes of a scenario to a world.
 

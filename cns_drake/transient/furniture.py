@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
-import shapely
 
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.surroundings import Surroundings
-from worlds.shapes import GROUND_CLASSES
+from worlds.shapes import GROUND_CLASSES, placed
 
 # Cause of these changes in the structure table.
 _CAUSE = "furniture"
@@ -45,7 +44,7 @@ def move_furniture(around: Surroundings, share: float) -> None:
             offset = by * np.array([math.cos(angle), math.sin(angle)])
             rise = around.ground.rise(middle, middle + offset)
             if abs(rise) < _KERB and obstacles.is_free(
-                shapely.affinity.translate(foot, *offset), (piece.name,)
+                placed(foot, offset.tolist(), 0.0), (piece.name,)
             ):
                 X_new = (
                     RigidTransform([*(middle + offset), rise])

@@ -1,31 +1,21 @@
 """Lowers buildings and plants of a world, as if they had not yet grown."""
 
-from pathlib import Path
-
 import numpy as np
-from pydrake.geometry import Mesh as DrakeMesh
 from pydrake.math import RigidTransform
-from shapely.geometry import box
 
-from cns_drake.scene import tessellate
+from cns_drake.scene import ScenePart, SceneStructure, tessellate
 from cns_drake.transient.effect import Effect, Phase
-from cns_drake.transient.scene_editing import SceneEditing
-from cns_drake.transient.structure_geometry import (
-    PartGeometry,
-    StructureGeometry,
-)
 from cns_drake.transient.surroundings import Surroundings, change_rng
-from worlds.city import (
-    STOREY,
-    lowered,
-    top_of,
-)
 from worlds.shapes import (
     OBJECT_MESHES,
+    STOREY,
     Mesh,
     MeshShape,
     Model,
     Part,
+    hull_of,
+    lowered,
+    top_of,
 )
 
 # Cause of these changes in the structure table.
@@ -55,7 +45,7 @@ def limit_heights(around: Surroundings, limit: float) -> None:
     for building in around.of_classes({"building"}):
         if building.top - building.bottom < limit + STOREY:
             continue
-        model, X_WS = _as_model(building, editing)
+        model, X_WS = _as_model(building)
         rng = change_rng(around.seed, _CAUSE, building.name)
         low = lowered(model, limit, building.name, int(rng.integers(2**31)))
         if low is not model:
@@ -77,9 +67,7 @@ def limit_heights(around: Surroundings, limit: float) -> None:
 EFFECT = Effect("height_limit", Phase.SHAPES, limit_heights)
 
 
-def _as_model(
-    building: StructureGeometry, editing: SceneEditing
-) -> tuple[Model, RigidTransform]:
+def _as_model(building: SceneStructure) -> tuple[Model, RigidTransform]:
     """Returns a model with the parts of a building, and the pose X_WS.
 
     The frame S is parallel to W, with its origin at the height of the
@@ -91,37 +79,32 @@ def _as_model(
     parts = []
     meshes = {}
     for number, part in enumerate(building.parts):
-        mesh = f"{_object_mesh(part, editing)}/{number}"
+        mesh = f"{_object_mesh(part)}/{number}"
         meshes[mesh] = _mesh_in_S(part, p_WS)
         parts.append(
             Part(
                 str(number),
                 MeshShape(mesh),
-                rgb=part.geometry.rgb,
+                rgb=part.rgb,
                 material=part.material.name,
             )
         )
-    low = (building.p_WPs - p_WS)[:, :2].min(axis=0)
-    high = (building.p_WPs - p_WS)[:, :2].max(axis=0)
-    return Model(tuple(parts), meshes, box(*low, *high)), RigidTransform(p_WS)
+    ground = hull_of((building.p_WPs - p_WS)[:, :2])
+    return Model(tuple(parts), meshes, ground), RigidTransform(p_WS)
 
 
-def _object_mesh(part: PartGeometry, editing: SceneEditing) -> str:
+def _object_mesh(part: ScenePart) -> str:
     """Returns the name of a part's mesh, such as `roof_vents`.
 
     The result is "" if the mesh is none of the generator's meshes of objects.
     """
-    shape = editing.shape(part)
-    if isinstance(shape, DrakeMesh) and shape.source().is_path():
-        name = Path(shape.source().path()).stem
-        if (OBJECT_MESHES / f"{name}.obj").is_file():
-            return name
-    return ""
+    name = getattr(part.shape, "mesh", "")
+    return name if (OBJECT_MESHES / f"{name}.obj").is_file() else ""
 
 
-def _mesh_in_S(part: PartGeometry, p_WS: np.ndarray) -> Mesh:
+def _mesh_in_S(part: ScenePart, p_WS: np.ndarray) -> Mesh:
     """Returns the triangles of a part, in S [m]; round shapes become prisms."""
     surface = tessellate(part.geometry.surface)
-    R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()
+    R, p = part.X_WG[:3, :3], part.X_WG[:3, 3]
     vertices = surface.p_GVset @ R.T + p - p_WS
     return Mesh(vertices, tuple(map(tuple, surface.triangles.tolist())))

@@ -4,16 +4,10 @@ import math
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
-import shapely
-from shapely.geometry.base import BaseGeometry
 
-from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.surroundings import FARTHEST, Surroundings
 from evaluation.base import length_of
-from worlds.shapes import (
-    Model,
-    placed,
-)
+from worlds.shapes import GroundFrame, GroundSurface, Model
 
 # Distance between points along a kerb [m].
 _SPACING = 1.0
@@ -21,7 +15,7 @@ _SPACING = 1.0
 _MOST_BENT = 1.05
 
 
-class KerbStretch:
+class KerbStretch(GroundFrame):
     """A straight piece of kerb.
 
     The frame of a stretch has its origin at the middle of the piece. Its x axis
@@ -31,8 +25,6 @@ class KerbStretch:
         name: name of the stretch, unique in the world.
         cause: field of the scenario's section `transient` that asks for objects
             along the stretch.
-        middle: (2,) origin of the frame in W [m].
-        yaw: heading of the x axis in W [rad].
         length: distance between the two ends [m].
     """
 
@@ -51,41 +43,13 @@ class KerbStretch:
             points: (N, 2) points along the kerb in W [m].
             outward: (2,) direction away from the carriageway.
         """
+        super().__init__(
+            middle=(points[0] + points[-1]) / 2,
+            yaw=math.atan2(outward[1], outward[0]) - np.pi / 2,
+        )
         self.name = f"{cause}_{cell[0]:+d}_{cell[1]:+d}"
         self.cause = cause
-        chord = points[-1] - points[0]
-        self.middle = (points[0] + points[-1]) / 2
-        self.length = math.hypot(*chord)
-        self.yaw = math.atan2(outward[1], outward[0]) - np.pi / 2
-
-    def place(self, x: float, y: float) -> np.ndarray:
-        """Converts a point (x, y) from the stretch's frame to W, (2,) [m]."""
-        c, s = math.cos(self.yaw), math.sin(self.yaw)
-        return self.middle + np.array([c * x - s * y, s * x + c * y])
-
-    def rectangle(
-        self, x: float, length: float, y0: float, y1: float
-    ) -> shapely.Polygon:
-        """Returns a rectangle of the stretch's frame, as a polygon in W [m].
-
-        It is `length` long along the kerb, with its middle at `x`. Across the
-        kerb, it extends from `y0` to `y1`.
-        """
-        x0, x1 = x - length / 2, x + length / 2
-        return shapely.Polygon(
-            [self.place(*at) for at in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
-        )
-
-    def footprint(
-        self, model: Model, x: float, y: float, turn: float = 0.0
-    ) -> BaseGeometry:
-        """Returns the footprint of a model in W [m].
-
-        `x` and `y` [m] are the place of the model in the frame of the stretch,
-        and `turn` [rad] is its heading in this frame.
-        """
-        at = self.place(x, y).tolist()
-        return placed(model.footprint, at, turn + self.yaw)
+        self.length = math.hypot(*(points[-1] - points[0]))
 
     def put(
         self,
@@ -178,7 +142,7 @@ def straight_kerbs(
     found = [
         stretch
         for _, stretch in sorted(best.items())
-        if around.drive.distance(shapely.Point(stretch.middle)) < FARTHEST
+        if around.drive.distances(stretch.middle[None])[0] < FARTHEST
     ]
     if not found:
         around.editing.note(

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from cns_drake.scene import TriangleSurface
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.surroundings import Surroundings, change_rng
 
@@ -23,16 +22,13 @@ def thin_leaves(around: Surroundings, share: float) -> None:
         leafy = [
             part
             for part in plant.parts
-            if part.material.kind == "leaves"
-            and isinstance(part.geometry.surface, TriangleSurface)
+            if part.material.kind == "leaves" and len(part.triangles)
         ]
         left = share
         if len(leafy) == len(plant.parts):
             left = max(share, _TWIGS)
         for part in leafy:
-            surface = part.geometry.surface
-            assert isinstance(surface, TriangleSurface)
-            count = len(surface.triangles)
+            count = len(part.triangles)
             # The key is the size of the mesh, not its path, so that the result
             # does not depend on where the file is.
             order = change_rng(around.seed, _CAUSE, str(count)).permutation(

@@ -1,22 +1,18 @@
 """Temporary changes to parked cars: some leave, move or are replaced."""
 
-import math
-
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
-import shapely
-from shapely import Polygon
 
+from cns_drake.scene import SceneStructure
 from cns_drake.transient.effect import Effect, Phase
-from cns_drake.transient.ground_surface import GroundSurface
-from cns_drake.transient.obstacles import Obstacles
-from cns_drake.transient.structure_geometry import StructureGeometry
 from cns_drake.transient.surroundings import Surroundings
-from evaluation.base import product
-from worlds.city import PARKED_CARS
 from worlds.shapes import (
     GROUND_CLASSES,
+    PARKED_CARS,
+    Bay,
+    GroundSurface,
     Model,
+    grown_bays,
     part_mesh,
 )
 
@@ -27,14 +23,6 @@ _PARKED = frozenset({"car", "truck", "bus"})
 _GONE = 0.3
 # Share of the changed bays whose car has moved. All others get another car.
 _MOVED = 0.2
-# Greatest free length of a bay in front of a car and behind it [m].
-_LENGTHWISE = 0.5
-# Greatest free width of a bay beside a car [m].
-_SIDEWAYS = 0.25
-# Greatest turn of a car relative to its bay [rad].
-_SKEW = 0.03
-# Distance between cars and all other objects [m].
-_GAP = 0.05
 # Least distance between the new and the old place of a moved car [m].
 _LEAST_MOVE = 0.1
 _CAR_TRIES = 12
@@ -50,116 +38,6 @@ _FORMS = {
 }
 
 
-class Bay:
-    """The free rectangle around a parked car; bays do not overlap.
-
-    Attributes:
-        middle: (2,) middle of the car [m].
-        yaw: heading of the bay's long axis [rad].
-        reach: (4,) distances from the middle to the front, back, left and right
-            end of the bay [m].
-    """
-
-    def __init__(self, car: StructureGeometry):
-        """Makes a bay of the size of the car."""
-        hull = shapely.MultiPoint(car.p_WPs[:, :2])
-        corners = shapely.get_coordinates(hull.minimum_rotated_rectangle)[:4]
-        sides = np.diff(corners, axis=0)[:2]
-        lengths = np.linalg.norm(sides, axis=1)
-        along = sides[int(lengths.argmax())]
-        self.middle = corners.mean(axis=0)
-        self.yaw = math.atan2(along[1], along[0])
-        self.reach = np.repeat([lengths.max() / 2, lengths.min() / 2], 2)
-
-    def box(self, beyond: np.ndarray | float = 0.0) -> Polygon:
-        """Returns the rectangle of the bay as seen from above, enlarged [m].
-
-        Args:
-            beyond: lengths by which the bay is enlarged at the front, back,
-                left and right, (4,), or one length for all sides [m].
-        """
-        front, back, left, right = self.reach + beyond
-        c, s = math.cos(self.yaw), math.sin(self.yaw)
-        corners = np.array(
-            [(front, left), (-back, left), (-back, -right), (front, -right)]
-        )
-        return Polygon(
-            product(corners, np.array([[c, s], [-s, c]])) + self.middle
-        )
-
-    def grow(
-        self, car: StructureGeometry, cars: Obstacles, others: Obstacles
-    ) -> None:
-        """Enlarges the bay up to other objects, and halfway to other cars.
-
-        The bay grows by at most 0.5 m in front and behind, and by at most 0.25
-        m on each side.
-        """
-        own = (car.name,)
-        box = self.box()
-        growth = np.zeros(4)
-        for k, most in enumerate((_LENGTHWISE,) * 2 + (_SIDEWAYS,) * 2):
-            reach = np.zeros(4)
-            reach[k] = 2 * most + _GAP
-            around = self.box(reach)
-            room = min(
-                cars.distance(box, around, own) / 2,
-                others.distance(box, around, own),
-                most + _GAP,
-            )
-            growth[k] = max(room - _GAP, 0.0)
-        self.reach = self.reach + growth
-
-    def place(
-        self, half_size: np.ndarray, rng: np.random.Generator
-    ) -> tuple[np.ndarray, float] | None:
-        """Returns a random place for a car in the bay.
-
-        Args:
-            half_size: (2,) half the length and half the width of the car [m].
-            rng: the random generator.
-
-        Returns:
-            The middle (2,) [m] and yaw [rad] of the car; None if the car is too
-            big for the bay.
-        """
-        skew = float(rng.uniform(-_SKEW, _SKEW))
-        across = rng.uniform(size=2)
-        turned = rng.uniform() < 0.5
-        c, s = math.cos(skew), abs(math.sin(skew))
-        half = half_size * c + half_size[::-1] * s
-        low, high = half - self.reach[1::2], self.reach[::2] - half
-        if (low > high).any():
-            return None
-        c, s = math.cos(self.yaw), math.sin(self.yaw)
-        x, y = low + across * (high - low)
-        offset = np.array([c * x - s * y, s * x + c * y])
-        yaw = self.yaw + skew + np.pi * turned
-        return self.middle + offset, float(yaw)
-
-
-def make_bays(around: Surroundings) -> dict[str, Bay]:
-    """Returns name -> bay, for all parked cars near a drive."""
-    cars = {car.name: car for car in around.of_classes(_PARKED)}
-    bays = {name: Bay(car) for name, car in cars.items()}
-    if not bays:
-        return {}
-    standing = Obstacles((n, bay.box()) for n, bay in bays.items())
-    others = around.obstacles_except(_PARKED | GROUND_CLASSES)
-    grown = {}
-    for name, car in cars.items():
-        grown[name] = Bay(car)
-        grown[name].grow(car, standing, others)
-    # Two bays that meet at a corner both keep their size.
-    boxes = [bay.box() for bay in grown.values()]
-    names = list(grown)
-    first, second = shapely.STRtree(boxes).query(boxes, "intersects")
-    for a, b in zip(first, second, strict=True):
-        if a != b:
-            grown[names[a]] = bays[names[a]]
-    return grown
-
-
 def change_parked_cars(around: Surroundings, share: float) -> None:
     """Changes some of the parked cars.
 
@@ -170,10 +48,11 @@ def change_parked_cars(around: Surroundings, share: float) -> None:
         share: share of the cars that are changed, from 0 to 1.
     """
     editing = around.editing
-    bays = make_bays(around)
-    if not bays:
+    cars = around.of_classes(_PARKED)
+    if not cars:
         editing.note("parked_cars: the world has no car, truck or bus")
-    cars = [around.structures[name] for name in bays]
+    others = around.obstacles_except(_PARKED | GROUND_CLASSES)
+    bays = grown_bays({car.name: car for car in cars}, others)
     for car, rng in around.chosen(_CAUSE, cars, share):
         bay = bays[car.name]
         fate = rng.uniform()
@@ -191,7 +70,7 @@ EFFECT = Effect("parked_cars", Phase.OBJECTS, change_parked_cars, order=1)
 
 def _random_move(
     bay: Bay,
-    car: StructureGeometry,
+    car: SceneStructure,
     ground: GroundSurface,
     rng: np.random.Generator,
 ) -> RigidTransform:
@@ -216,7 +95,7 @@ def _random_move(
 
 def _replace_car(
     around: Surroundings,
-    car: StructureGeometry,
+    car: SceneStructure,
     bay: Bay,
     rng: np.random.Generator,
 ) -> None:

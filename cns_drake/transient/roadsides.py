@@ -7,16 +7,12 @@ import math
 from pathlib import Path
 
 import numpy as np
-import shapely
-from shapely.geometry.base import BaseGeometry
 
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.kerb_stretches import straight_kerbs
-from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings, change_rng
 from evaluation.base import parse_yaml
-from worlds.city import OBJECTS
-from worlds.shapes import GROUND_CLASSES
+from worlds.shapes import GROUND_CLASSES, OBJECTS, Area, Obstacles
 
 # Cell size of the grid, in W, of kerb stretches [m].
 _CELL = 6.5
@@ -70,8 +66,7 @@ def fill_roadsides(around: Surroundings, density: float) -> None:
     """
     stretches = straight_kerbs(around, "roadsides", _CELL, _SHORTEST)
     standing = around.obstacles_except(GROUND_CLASSES)
-    taken = [around.ground.carriageway]
-    shapely.prepare(taken[0])
+    standing.add("", around.ground.carriageway)
     for earlier, (name, row) in product(
         range(math.ceil(density)), _ROWS.items()
     ):
@@ -98,13 +93,12 @@ def fill_roadsides(around: Surroundings, density: float) -> None:
                     for y, x in places
                 ),
                 standing,
-                taken,
             )
             if found is None:
                 continue
             x, y, area = found
             # Objects that a lower density leaves out take up room as well.
-            taken.append(area)
+            standing.add(name, area)
             if is_put_up:
                 stretch.put(
                     around,
@@ -122,21 +116,17 @@ EFFECT = Effect("roadsides", Phase.MORE_OBJECTS, fill_roadsides)
 
 
 def _first_free(
-    places: Iterable[tuple[float, float, BaseGeometry]],
+    places: Iterable[tuple[float, float, Area]],
     standing: Obstacles,
-    taken: Sequence[BaseGeometry],
-) -> tuple[float, float, BaseGeometry] | None:
+) -> tuple[float, float, Area] | None:
     """Returns the first place whose area is free; None if there is none.
 
     Args:
         places: x and y of each place in the frame of the stretch, and the area
             in W that the object would take there [m].
-        standing: structures of the world, which the area must not touch.
-        taken: further areas in W that the area must not touch.
+        standing: what the area must not touch.
     """
     for x, y, area in places:
-        if standing.is_free(area) and not (
-            shapely.intersects(taken, area).any()
-        ):
+        if standing.is_free(area):
             return x, y, area
     return None

@@ -3,20 +3,18 @@
 from dataclasses import dataclass
 
 import numpy as np
-from shapely.geometry.base import BaseGeometry
 
 from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.kerb_stretches import KerbStretch, straight_kerbs
-from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings
-from worlds.city import (
-    OBJECTS,
-    pick_key,
-)
 from worlds.shapes import (
     GROUND_CLASSES,
+    OBJECTS,
+    Area,
+    Obstacles,
     assemble,
     block,
+    pick_key,
 )
 
 # Cell size of the grid, in W, of kerb stretches [m].
@@ -115,7 +113,7 @@ class _Site:
             )
         self._add_machines(standing, middle)
         stones = self.stretch.rectangle(x, length, -_KERB_WIDTH, 0.0)
-        if not stones.intersects(self.around.drive.buffer(1.3)):
+        if not stones.intersects(self.around.drive.area(1.3)):
             size = (length, _KERB_WIDTH, 2 * _KERB_HEIGHT)
             model = assemble(block("stones", size, (0, 0, 0), rgb=_KERB_RGB))
             y = -_KERB_WIDTH / 2
@@ -125,7 +123,7 @@ class _Site:
 
     def _add_machines(self, standing: Obstacles, y: float) -> None:
         shares = _WIDE if self.width > 4.0 else _NARROW
-        taken: list[BaseGeometry] = []
+        taken: list[Area] = []
         for _ in range(_TRIES):
             name = pick_key(shares, self.rng)
             x = self.x + float(self.rng.uniform(-0.4, 0.4)) * self.length

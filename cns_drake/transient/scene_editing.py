@@ -11,15 +11,7 @@ from pydrake import geometry
 from pydrake.common import MemoryFile
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cns_drake.scene import (
-    GREY,
-    TriangleSurface,
-    World,
-)
-from cns_drake.transient.structure_geometry import (
-    PartGeometry,
-    StructureGeometry,
-)
+from cns_drake.scene import GREY, ScenePart, SceneStructure, World
 from evaluation.base import MAX_INSTANCE, InputError, product
 from worlds.shapes import (
     OBJECT_MESHES,
@@ -93,7 +85,7 @@ class SceneEditing:
         """
         self._table.add_cause(name, cause)
 
-    def remove(self, structure: StructureGeometry, cause: str) -> None:
+    def remove(self, structure: SceneStructure, cause: str) -> None:
         """Removes a structure, and records why.
 
         Args:
@@ -107,7 +99,7 @@ class SceneEditing:
 
     def move(
         self,
-        structure: StructureGeometry,
+        structure: SceneStructure,
         X_new: RigidTransform,
         name: str,
         cause: str,
@@ -126,8 +118,8 @@ class SceneEditing:
             self._register(
                 name,
                 part.name,
-                X_new @ part.X_WG,
-                self.shape(part),
+                X_new @ _pose_of(part),
+                self._shape(part),
                 self._part_properties(part),
             )
         self.remove(structure, cause)
@@ -137,14 +129,14 @@ class SceneEditing:
         self.record_cause(name, cause)
 
     def cover_part(
-        self, part: PartGeometry, p_W: np.ndarray, look: SurfaceLook
+        self, part: ScenePart, p_W: np.ndarray, look: SurfaceLook
     ) -> None:
         """Moves a part by p_W (3,) [m] in W and gives it another look."""
         self._add_part(
             part.geometry.structure,
             f"{part.name}_covered",
-            RigidTransform(p_W) @ part.X_WG,
-            self.shape(part),
+            RigidTransform(p_W) @ _pose_of(part),
+            self._shape(part),
             look,
         )
         self._remove_part(part)
@@ -174,13 +166,13 @@ class SceneEditing:
         self._table.add_structure(StructureEntry(0, name, semantic_class))
         self.record_cause(name, cause)
 
-    def shape(self, part: PartGeometry) -> geometry.Shape:
+    def _shape(self, part: ScenePart) -> geometry.Shape:
         """Returns the Drake shape of a part."""
         inspector = self._world.scene_graph.model_inspector()
         return inspector.GetShape(part.geometry.geometry_id)
 
     def shrink(
-        self, structure: StructureGeometry, share: float, cause: str
+        self, structure: SceneStructure, share: float, cause: str
     ) -> None:
         """Scales a structure down about the middle of its foot.
 
@@ -195,18 +187,16 @@ class SceneEditing:
         x, y = (feet[:, :2].min(axis=0) + feet[:, :2].max(axis=0)) / 2
         p_WS = np.array([x, y, structure.bottom])
         for part in structure.parts:
-            X_WG = RigidTransform(
-                part.X_WG.rotation(),
-                p_WS + share * (part.X_WG.translation() - p_WS),
-            )
+            X_WG = _pose_of(part)
+            X_WG.set_translation(p_WS + share * (X_WG.translation() - p_WS))
             self._replace_part(
-                part, X_WG, _scaled_shape(self.shape(part), share)
+                part, X_WG, _scaled_shape(self._shape(part), share)
             )
         self.record_cause(structure.name, cause)
 
     def rebuild(
         self,
-        structure: StructureGeometry,
+        structure: SceneStructure,
         before: Model,
         after: Model,
         X_WS: RigidTransform,
@@ -249,29 +239,27 @@ class SceneEditing:
                 self._remove_part(one)
         self.record_cause(structure.name, cause)
 
-    def keep_triangles(self, part: PartGeometry, kept: np.ndarray) -> None:
+    def keep_triangles(self, part: ScenePart, kept: np.ndarray) -> None:
         """Removes all triangles of a part except those with indices `kept`."""
-        surface = part.geometry.surface
-        assert isinstance(surface, TriangleSurface)
-        triangles = surface.triangles[kept]
+        triangles = part.triangles[kept]
         if len(triangles) == 0:
             self._remove_part(part)
             return
         # The mesh is unscaled, so that parts that shared a mesh share one
         # again.
-        shape = self.shape(part)
+        shape = self._shape(part)
         scale = np.ones(3)
         # Of the shapes with triangles, only boxes and cones have no scale.
         if isinstance(shape, geometry.Mesh | geometry.Convex):
             scale = np.array(shape.scale3())
         if np.prod(scale) < 0.0:
             triangles = triangles[:, ::-1]
-        mesh = _memory_mesh(surface.p_GVset / scale, triangles, scale)
-        self._replace_part(part, part.X_WG, mesh)
+        mesh = _memory_mesh(part.p_GPs / scale, triangles, scale)
+        self._replace_part(part, _pose_of(part), mesh)
 
     def add_triangles(
         self,
-        part: PartGeometry,
+        part: ScenePart,
         name: str,
         p_WVs: np.ndarray,
         triangles: np.ndarray,
@@ -286,9 +274,10 @@ class SceneEditing:
             triangles: (M, 3) indices of vertices.
             look: colour, reflectivity and material of the new part.
         """
-        R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()
+        X_WG = _pose_of(part)
+        R, p = X_WG.rotation().matrix(), X_WG.translation()
         mesh = _memory_mesh(product(p_WVs - p, R), triangles)
-        self._add_part(part.geometry.structure, name, part.X_WG, mesh, look)
+        self._add_part(part.geometry.structure, name, X_WG, mesh, look)
 
     def add_mesh(
         self,
@@ -344,7 +333,7 @@ class SceneEditing:
             self._table.set_material(structure, part, look.material)
 
     def _replace_part(
-        self, part: PartGeometry, X_WG: RigidTransform, shape: geometry.Shape
+        self, part: ScenePart, X_WG: RigidTransform, shape: geometry.Shape
     ) -> None:
         """Gives a part another pose and shape; its look stays the same."""
         # The old part is removed first, since the new one may have its name.
@@ -353,14 +342,14 @@ class SceneEditing:
         structure = part.geometry.structure
         self._register(structure, part.name, X_WG, shape, properties)
 
-    def _remove_part(self, part: PartGeometry) -> None:
+    def _remove_part(self, part: ScenePart) -> None:
         self._names.discard(part.geometry.name)
         self._world.scene_graph.RemoveGeometry(
             self._source, part.geometry.geometry_id
         )
 
     def _part_properties(
-        self, part: PartGeometry
+        self, part: ScenePart
     ) -> list[geometry.GeometryProperties]:
         inspector = self._world.scene_graph.model_inspector()
         geometry_id = part.geometry.geometry_id
@@ -394,6 +383,11 @@ class SceneEditing:
         )
         for one in properties:
             scene_graph.AssignRole(self._source, geometry_id, one)
+
+
+def _pose_of(part: ScenePart) -> RigidTransform:
+    """Returns the pose X_WG of a part as Drake's."""
+    return RigidTransform(part.X_WG)
 
 
 def _pose_in_model(part: Part) -> RigidTransform:

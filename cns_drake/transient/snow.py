@@ -3,21 +3,15 @@
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-import shapely
 
+from cns_drake.scene import ScenePart
 from cns_drake.transient.effect import Effect, Phase
-from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.scene_editing import SceneEditing, SurfaceLook
-from cns_drake.transient.structure_geometry import (
-    PartGeometry,
-    triangle_corners,
-)
 from cns_drake.transient.surroundings import Surroundings, change_rng
 from evaluation.base import sin
 from worlds.shapes import (
     GROUND_CLASSES,
-    from_above,
-    quartered,
+    GroundSurface,
     turned_up,
     unit_normals,
 )
@@ -70,7 +64,7 @@ def lay_snow(around: Surroundings, depth: float) -> None:
             continue
         changed = False
         for part in structure.parts:
-            if is_ground and not _is_below_road(part, ground):
+            if is_ground and not ground.is_below_road(part):
                 editing.cover_part(part, np.array([0.0, 0.0, depth]), _LOOK)
                 changed = True
             else:
@@ -91,20 +85,9 @@ def lay_snow(around: Surroundings, depth: float) -> None:
 EFFECT = Effect("snow", Phase.COVER, lay_snow)
 
 
-def _is_below_road(part: PartGeometry, ground: GroundSurface) -> bool:
-    """Returns whether a piece of ground continues below a carriageway."""
-    corners = turned_up(triangle_corners(part))
-    corners = corners[unit_normals(corners)[:, 2] > 0.0]
-    inner = ground.carriageway.buffer(-0.5)
-    if inner.is_empty or len(corners) == 0:
-        return False
-    shapely.prepare(inner)
-    return bool(shapely.intersects(from_above(corners), inner).any())
-
-
 def _cover_with_snow(
     editing: SceneEditing,
-    part: PartGeometry,
+    part: ScenePart,
     ground: GroundSurface,
     depth: float,
     is_ground: bool,
@@ -114,12 +97,12 @@ def _cover_with_snow(
     Returns:
         Whether there are such faces.
     """
-    corners = triangle_corners(part)
+    corners = part.triangle_corners
     if is_ground:
         corners = turned_up(corners)
     corners = corners[unit_normals(corners)[:, 2] > _LEAST_UP]
     if is_ground:
-        corners = _triangles_beside(corners, ground)
+        corners = ground.triangles_beside_road(corners, _FINE)
     if len(corners) == 0:
         return False
     vertices, triangles = _merge_corners(corners)
@@ -152,29 +135,6 @@ def _slab(
     return np.concatenate([vertices, risen]), slab
 
 
-def _triangles_beside(corners: np.ndarray, ground: GroundSurface) -> np.ndarray:
-    """Returns the triangles beside the carriageway, finer along its edge."""
-    corners = corners[shapely.intersects(from_above(corners), ground.near)]
-    road = ground.carriageway
-    shapely.prepare(road)
-    done = [np.zeros((0, 3, 3))]
-    while len(corners):
-        areas = from_above(corners)
-        meets = shapely.intersects(areas, road)
-        done.append(corners[~meets])
-        corners = corners[meets]
-        corners = corners[~shapely.covers(road, areas[meets])]
-        sides = np.linalg.norm(
-            corners - np.roll(corners, -1, axis=1), axis=2
-        ).max(axis=1)
-        fine = sides <= _FINE
-        last = corners[fine]
-        middles = last[:, :, :2].mean(axis=1)
-        done.append(last[~shapely.contains_xy(road, middles)])
-        corners = quartered(corners[~fine])
-    return np.concatenate(done)
-
-
 def _merge_corners(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns vertices and triangles; equal corners become one vertex."""
     rounded = np.round(corners.reshape(-1, 3), 4)
@@ -202,8 +162,6 @@ def _lay_banks(
 ) -> None:
     """Adds banks of snow along all kerbs, except where the vehicle drives."""
     phases = change_rng(around.seed, _CAUSE, "banks").uniform(0, 2 * np.pi, 4)
-    way = around.drive.buffer(1.4 + _BANK_ON_ROAD)
-    shapely.prepare(way)
     meshes = []
     for kerb in ground.kerbs(_SPACING):
         xy, out = kerb.points, kerb.outwards
@@ -229,7 +187,7 @@ def _lay_banks(
             ],
             axis=1,
         )
-        free = np.isfinite(road) & ~shapely.contains_xy(way, xy)
+        free = np.isfinite(road) & ~around.drive.covers(xy, 1.4 + _BANK_ON_ROAD)
         use = np.flatnonzero(free[:-1] & free[1:])
         here, there = profile[use], profile[use + 1]
         for k in range(3):

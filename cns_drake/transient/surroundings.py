@@ -9,12 +9,10 @@ import hashlib
 from typing import Protocol, TypeVar
 
 import numpy as np
-from shapely.geometry.base import BaseGeometry
 
-from cns_drake.transient.ground_surface import GroundSurface
-from cns_drake.transient.obstacles import Obstacles
+from cns_drake.scene import SceneStructure
 from cns_drake.transient.scene_editing import SceneEditing
-from cns_drake.transient.structure_geometry import StructureGeometry
+from worlds.shapes import Area, GroundSurface, Obstacles, Way
 
 # Fronts and kerbs farther from the drive than this get no new objects [m].
 FARTHEST = 30.0
@@ -46,9 +44,9 @@ class Surroundings:
     """
 
     editing: SceneEditing
-    structures: Mapping[str, StructureGeometry]
-    drive: BaseGeometry
-    kept_free: BaseGeometry
+    structures: Mapping[str, SceneStructure]
+    drive: Way
+    kept_free: Area
     seed: int
     bare: Surroundings | None = None
 
@@ -60,9 +58,9 @@ class Surroundings:
     @cached_property
     def ground(self) -> GroundSurface:
         """The ground near the drive."""
-        return GroundSurface(self.structures, self.drive.buffer(_NEAR))
+        return GroundSurface(self.structures, self.drive.area(_NEAR))
 
-    def of_classes(self, classes: Collection[str]) -> list[StructureGeometry]:
+    def of_classes(self, classes: Collection[str]) -> list[SceneStructure]:
         """Returns the structures of some classes."""
         return [
             one
@@ -90,7 +88,7 @@ class Surroundings:
             if one.semantic_class not in ignored
         )
 
-    def _obstacles(self, standing: Iterable[StructureGeometry]) -> Obstacles:
+    def _obstacles(self, standing: Iterable[SceneStructure]) -> Obstacles:
         feet = [(one.name, one.footprint) for one in standing]
         return Obstacles([("", self.kept_free), *feet])
 

@@ -8,7 +8,8 @@ import pytest
 from cns_drake.scenarios import Scenario
 from docs import reference_pages
 from docs.reference_pages import CITY, EXPERIMENT, LIDAR, METHODS, SCENARIO
-from worlds.city import ARCHETYPES, OBJECTS
+from worlds.city import ARCHETYPES
+from worlds.shapes import OBJECTS
 
 NAMES = sorted(path.name for path in reference_pages.FOLDER.iterdir())
 # Each once, in one order for all processes of a run.

@@ -7,9 +7,9 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 
 from cns_drake.scenarios import TransientConfig
-from cns_drake.scene import load_world
-from cns_drake.transient import change_world, geometry_by_structure
-from worlds.shapes import OBJECT_MESHES
+from cns_drake.scene import geometry_by_structure, load_world
+from cns_drake.transient import change_world
+from worlds.shapes import OBJECT_MESHES, Way
 
 _WORLD = """<?xml version="1.0"?>
 <sdf version="1.9">
@@ -41,9 +41,7 @@ LANES = shapely.Polygon(
 
 def drive_along_street(x_from, x_to):
     """The path of a vehicle, from above, between two x of the town [m]."""
-    return shapely.LineString(
-        [(X_WT @ [x, -0.5, 0])[:2] for x in (x_from, x_to)]
-    )
+    return Way([(X_WT @ [x, -0.5, 0])[:2] for x in (x_from, x_to)])
 
 
 DRIVE = drive_along_street(-60, 80)

@@ -1,8 +1,7 @@
 from .aged_map import HISTORY_NAME as HISTORY_NAME
 from .aged_map import LAST_YEAR as LAST_YEAR
+from .aged_map import AgedMap as AgedMap
 from .aged_map import age_map as age_map
-from .aged_pictures import air_view as air_view
-from .aged_pictures import draw_pictures as draw_pictures
 from .events import PUT_UP as PUT_UP
 from .events import TAKEN_DOWN as TAKEN_DOWN
 from .rates import DEFAULT_RATES as DEFAULT_RATES

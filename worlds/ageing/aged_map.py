@@ -9,24 +9,13 @@ import shutil
 
 import numpy as np
 import shapely
-from shapely.geometry.base import BaseGeometry
-import yaml
 
-from cns_drake.motion import Trajectory
-from cns_drake.scenarios import (
-    describe_scenario,
-    load_scenario,
-    make_paths_absolute,
-    plan_drive,
-    write_table,
-)
 from evaluation.base import (
     MAX_INSTANCE,
     InputError,
     doing,
     draft_folder,
     is_there,
-    read_yaml,
     user_errors,
     write_csv,
 )
@@ -34,7 +23,7 @@ from worlds.ageing import kinds
 from worlds.ageing.buildings import Buildings
 from worlds.ageing.events import TAKEN_DOWN, Event
 from worlds.ageing.lots import find_lots
-from worlds.ageing.old_world import OldWorld
+from worlds.ageing.old_world import GeometryReader, OldWorld
 from worlds.ageing.standing_structures import StandingStructures
 from worlds.ageing.street_renewal import StreetRenewal
 from worlds.ageing.trees import Trees
@@ -46,14 +35,12 @@ from worlds.city import (
     triangles_in,
     use_by_size,
     world_sdf,
-    younger_plant,
 )
 from worlds.imports import YEAR_COLUMN
 from worlds.maps import (
     IMPORT_NAME,
     MESH_FOLDER,
     ROADS_NAME,
-    STRUCTURES_NAME,
     TRAFFIC_NAME,
     MapFolder,
     check_new_map,
@@ -61,12 +48,16 @@ from worlds.maps import (
     stage_name,
 )
 from worlds.shapes import (
+    STRUCTURES_NAME,
     USUAL_MATERIALS,
+    Area,
     Mesh,
     MeshShape,
     Structure,
+    Way,
     material_word,
     read_materials,
+    younger_plant,
 )
 
 HISTORY_NAME = "history.csv"
@@ -74,8 +65,6 @@ RATES_NAME = "rates.csv"
 _MAX_SEED = 2**63
 # Half the width of the car with its mirrors, and some room [m].
 _HALF_CAR = 1.3
-# Distance between the places along a drive [m].
-_SPACING = 0.5
 # In each past year, a tree was lower by this height [m].
 _GROWTH = 0.4
 # Trees were never lower than this [m].
@@ -88,17 +77,15 @@ class AgedMap:
 
     Attributes:
         years: stage -> its year; 0 is today.
-        structures: stage -> number of structures.
+        sizes: stage -> number of its structures, and number of its triangles.
         events: event -> how often it happened.
         changed: (N, 3) places of changed buildings in W [m].
-        trajectory: the trajectory of the map's last drive.
     """
 
     years: Mapping[str, int]
-    structures: Mapping[str, int]
+    sizes: Mapping[str, tuple[int, int]]
     events: Mapping[str, int]
     changed: np.ndarray
-    trajectory: Trajectory
 
 
 def age_map(
@@ -107,9 +94,13 @@ def age_map(
     seed: int,
     rates: Mapping[str, float],
     output: Path,
+    read_geometry: GeometryReader,
+    plan_ways: Callable[[Sequence[Path]], Sequence[Way]],
     finish: Callable[[Path, AgedMap], None] = lambda folder, aged: None,
 ) -> AgedMap:
     """Writes a map folder in which a city ages by given numbers of years.
+
+    The drives of the map are not written.
 
     Args:
         source: the folder of the map; its last stage is today.
@@ -119,9 +110,12 @@ def age_map(
         seed: the seed of all random numbers, not negative.
         rates: event -> rate per year, see `worlds.ageing.rates.read_rates`.
         output: the folder to write, which must not exist yet.
-        finish: function that can add files of your own. It is called with the
-            folder and the result when all other work is done, before the folder
-            gets its final name.
+        read_geometry: function that reads the geometry of a stage.
+        plan_ways: function that returns where the car drives, given the
+            scenario files of the map's drives. Nothing is built there.
+        finish: function that can add files, such as drives. It is called with
+            the folder and the result when all other work is done, before the
+            folder gets its final name.
 
     Returns:
         The stages and the events.
@@ -138,8 +132,8 @@ def age_map(
     if not drives:
         raise no_drives(source)
     doing(f"reading {folder.name}")
-    ways = [plan_drive(load_scenario(path)) for path in drives]
-    world = OldWorld(folder)
+    ways = plan_ways(drives)
+    world = OldWorld(folder, read_geometry)
     if min(wanted) < 0 and world.today is None:
         raise InputError(
             f"{source}: --years: {min(wanted)}: no building has a year in "
@@ -147,11 +141,11 @@ def age_map(
             "past needs"
         )
     doing("looking for lots")
-    kept_free = shapely.union_all([*map(_swept_area, ways)])
+    kept_free = shapely.union_all([way.area(_HALF_CAR) for way in ways])
     city = AgeingCity(world, rates, seed, kept_free)
     with draft_folder(output) as draft:
-        aged = _write_map(draft, world, city, wanted, seed, drives, ways[-1])
-        del world, city  # The pictures need their memory.
+        aged = _write_map(draft, world, city, wanted, seed)
+        del world, city  # Pictures need their memory.
         finish(draft, aged)
     return aged
 
@@ -173,7 +167,7 @@ class AgeingCity:
         world: OldWorld,
         rates: Mapping[str, float],
         seed: int,
-        kept_free: BaseGeometry,
+        kept_free: Area,
     ) -> None:
         """Begins with the city of today.
 
@@ -213,8 +207,6 @@ def _write_map(
     city: AgeingCity,
     years: Sequence[int],
     seed: int,
-    drives: Sequence[Path],
-    trajectory: Trajectory,
 ) -> AgedMap:
     """Writes all files of an aged map, except those of `finish`.
 
@@ -224,28 +216,23 @@ def _write_map(
         city: the same city, which ages up to the last year.
         years: ascending years relative to today.
         seed: the seed of the ageing.
-        drives: scenario files of the drives of today's map.
-        trajectory: the trajectory of the last of these drives.
     """
     # Today is the first stage.
     others = [year for year in years if year != 0]
     stages = {f"{k:02d}": year for k, year in enumerate([0, *others], start=1)}
     (draft / MESH_FOLDER).mkdir()
-    _copy_inputs(world.folder, drives, draft)
+    _copy_inputs(world.folder, draft)
     writing = _StageWriter(world, draft, seed)
     events = _write_stages(writing, world, city, stages)
     writing.table(city.standing.new)
     names = [field.name for field in fields(Event)]
     write_csv(draft / HISTORY_NAME, names, map(astuple, events))
     (draft / RATES_NAME).write_text(city.tally.to_csv(), "utf-8")
-    _write_drives(world.folder, drives, draft, stages, seed)
-    write_table(draft, sizes=writing.sizes)
     return AgedMap(
         stages,
-        {stage: number for stage, (number, _) in writing.sizes.items()},
+        writing.sizes,
         Counter(one.event for one in events),
         _changed_places(city.standing),
-        trajectory,
     )
 
 
@@ -433,22 +420,8 @@ def _write_stages(
     return events + city.standing.events
 
 
-def _swept_area(trajectory: Trajectory) -> BaseGeometry:
-    """Returns the area that the car covers on a drive, in W [m]."""
-    number = max(2, int(trajectory.length / _SPACING))
-    times = np.linspace(0.0, trajectory.duration, number)
-    _, p_WB = trajectory.poses(times)
-    return shapely.LineString(p_WB[:, :2]).buffer(_HALF_CAR)
-
-
-def _copy_inputs(
-    folder: MapFolder, drives: Iterable[Path], draft: Path
-) -> None:
-    """Copies roads, traffic, views and the waypoints of drives."""
-    for path in drives:
-        way = load_scenario(path).waypoints
-        if way is not None:
-            shutil.copyfile(way, draft / _way_name(path))
+def _copy_inputs(folder: MapFolder, draft: Path) -> None:
+    """Copies roads, traffic and views."""
     for name in (
         ROADS_NAME,
         TRAFFIC_NAME,
@@ -457,55 +430,6 @@ def _copy_inputs(
     ):
         if is_there(folder.path / name):
             shutil.copyfile(folder.path / name, draft / name)
-
-
-def _way_name(drive: Path) -> str:
-    """Returns a name for the copy of a drive's waypoints.
-
-    The copies of different drives have different names, and no copy has the
-    name of the map's own waypoint file.
-    """
-    return f"waypoints_{drive.stem.removeprefix('sequence_')}.csv"
-
-
-def _write_drives(
-    folder: MapFolder,
-    drives: Sequence[Path],
-    draft: Path,
-    stages: Mapping[str, int],
-    seed: int,
-) -> None:
-    """Writes a drive through each stage.
-
-    The drive through today's stage has the route of the map's first drive. All
-    other drives have the route of the map's last drive, which is the query.
-    """
-    for stage, year in stages.items():
-        path = drives[0] if stage == _TODAY else drives[-1]
-        values = read_yaml(path)
-        if "base" in values:
-            scenario = load_scenario(path)
-            values = describe_scenario(scenario, folder.path)
-        # Other files, such as traces of SUMO, are not copied.
-        make_paths_absolute(values, path)
-        kept = {
-            key: value
-            for key, value in values.items()
-            if key not in ("name", "map", "stage", "title", "without", "base")
-        }
-        if "waypoints" in kept:
-            kept["waypoints"] = _way_name(path)
-        when = "today" if year == 0 else f"in year {year} of seed {seed}"
-        text = yaml.safe_dump(
-            {
-                "map": ".",
-                "stage": stage,
-                "title": f"{folder.name.capitalize()} {when}",
-                **kept,
-            },
-            sort_keys=False,
-        )
-        MapFolder(draft).drive(stage).write_text(text, "utf-8")
 
 
 def _changed_places(city: StandingStructures) -> np.ndarray:

@@ -10,12 +10,13 @@ import shapely
 from shapely.geometry import box
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.transient import scaffold
 from worlds.ageing.plots import Plot
-from worlds.city import Rgb
 from worlds.shapes import (
+    HIGHEST_SCAFFOLD,
+    LONGEST_SCAFFOLD,
     MeshShape,
     Part,
+    Rgb,
     Structure,
     assemble,
     block,
@@ -23,15 +24,12 @@ from worlds.shapes import (
     largest_rectangle,
     placed,
     polygons_of,
+    scaffold,
     unit_normals,
 )
 
 # Height of a storey [m].
 _STOREY = 3.0
-# Greatest length of a scaffold [m].
-_LONGEST_SCAFFOLD = 25.0
-# Greatest height of a scaffold [m].
-_HIGHEST_SCAFFOLD = 16.0
 # Thickness of an insulation layer [m].
 _INSULATION = 0.15
 # Random places at which an annex is tried.
@@ -260,10 +258,10 @@ def scaffold_before(
         rng: random generator for the scaffold.
     """
     x0, y0, x1, _ = plot.inside(plot.area).bounds
-    length = min(x1 - x0, _LONGEST_SCAFFOLD)
+    length = min(x1 - x0, LONGEST_SCAFFOLD)
     xy = plot.place((x0 + x1) / 2, y0)
     moved = Plot(plot.area, xy, round(plot.yaw + math.pi, 5), plot.z)
-    model = scaffold(length, min(height, _HIGHEST_SCAFFOLD), rng)
+    model = scaffold(length, min(height, HIGHEST_SCAFFOLD), rng)
     return moved.structure(name, "other-structure", model)
 
 

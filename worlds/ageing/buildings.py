@@ -19,21 +19,21 @@ from worlds.ageing.trees import Trees
 from worlds.ageing.yearly_draws import YearlyDraws
 from worlds.city import (
     ARCHETYPES,
-    OBJECTS,
     building_site,
     lot_objects,
-    lowered,
     sample,
-    top_of,
     use_by_size,
 )
 from worlds.shapes import (
+    OBJECTS,
     Model,
     Structure,
     from_above,
     largest_rectangle,
+    lowered,
     placed,
     polygons_of,
+    top_of,
 )
 
 # Share of the demolished buildings that are replaced by others.

@@ -1,32 +1,20 @@
 """The city of today: the last stage of a map, prepared for ageing."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 import re
 from xml.etree import ElementTree
 
 import numpy as np
-from pydrake.geometry import Box, Cylinder, Mesh, Sphere
-from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
-from shapely.geometry.base import BaseGeometry
 
-from cns_drake.scene import (
-    LARGEST_SIZE,
-    load_world,
-)
-from cns_drake.transient import (
-    GroundSurface,
-    PartGeometry,
-    StructureGeometry,
-    geometry_by_structure,
-    triangle_corners,
-)
 from evaluation.base import (
     InputError,
     check_regular,
     is_there,
+    poses,
+    product,
     read_elements,
     read_records,
     read_rows,
@@ -41,20 +29,25 @@ from worlds.maps import (
 )
 from worlds.roads import load_road_network
 from worlds.shapes import (
-    BoxShape,
-    CylinderShape,
+    Area,
+    GroundSurface,
     MeshShape,
     Model,
     Part,
     Shape,
-    SphereShape,
     Structure,
+    StructureGeometry,
     from_above,
     ground_footprint,
     read_mesh,
+    roll_pitch_yaw,
     triple,
 )
 
+# Reads the SDF file of a stage: name of each structure -> its geometry.
+GeometryReader = Callable[[Path], Mapping[str, StructureGeometry]]
+# Places farther than this from the origin are no places of a city [m].
+_FARTHEST = 1e7
 # The height of the ground is known this far around buildings [m].
 _AROUND = 40.0
 # Colour in the aged map of parts without one.
@@ -82,8 +75,12 @@ class OldWorld:
         path: the SDF file of the stage.
     """
 
-    def __init__(self, folder: MapFolder):
+    def __init__(self, folder: MapFolder, read_geometry: GeometryReader):
         """Reads the last stage of a map.
+
+        Args:
+            folder: the folder of the map.
+            read_geometry: function that reads the geometry of a stage.
 
         Raises:
             InputError: the map has no stage; or the last stage cannot be
@@ -97,8 +94,7 @@ class OldWorld:
         self.path = stages[-1]
         self._read_table()
         self.visuals = _read_visuals(self.path)
-        self._world = load_world(self.path)
-        self.geometry = geometry_by_structure(self._world)
+        self.geometry = read_geometry(self.path)
         if self.geometry.keys() != self.visuals.keys():
             raise InputError(_not_one_model(self.path))
         self.built = {
@@ -120,7 +116,7 @@ class OldWorld:
                 if name != YEAR_COLUMN or row.get(name):
                     whole_number(row[name], f"{where}: {name}")
             for name in real:
-                _number_within(row[name], LARGEST_SIZE, f"{where}: {name}")
+                _number_within(row[name], _FARTHEST, f"{where}: {name}")
         self.rows = {row["name"]: row for _, row in records}
 
     def of_class(self, *classes: str) -> list[StructureGeometry]:
@@ -145,14 +141,14 @@ class OldWorld:
             raise InputError(f"{self.folder.structures}: no row for {name}")
         xyz = triple(float(row[axis]) for axis in "xyz")
         yaw = float(row["yaw"])
-        X_SW = RigidTransform(RollPitchYaw(0, 0, yaw), xyz).inverse()
+        X_SW = poses.inverse(poses.yaw_pose(yaw, *xyz))
         parts = []
         meshes = {}
         geometry = self.geometry[name]
         materials = geometry.entry.materials
         for one in geometry.parts:
-            X_SG = X_SW @ one.X_WG
-            shape = self._shape(one)
+            X_SG = product(X_SW, one.X_WG)
+            shape = one.shape
             if shape is None:
                 raise InputError(
                     f"{self.path}: {name}/{one.name}: a shape that ageing "
@@ -171,10 +167,10 @@ class OldWorld:
                 Part(
                     one.name,
                     shape,
-                    triple(X_SG.translation().round(4)),
-                    triple(X_SG.rotation().ToRollPitchYaw().vector().round(5)),
-                    # Drake has colours in single precision.
-                    triple(np.round(one.geometry.rgb or _GREY, 6)),
+                    triple(X_SG[:3, 3].round(4)),
+                    triple(np.round(roll_pitch_yaw(X_SG[:3, :3]), 5)),
+                    # Colours are read in single precision.
+                    triple(np.round(one.rgb or _GREY, 6)),
                     materials.get(one.name, materials.get("")),
                 )
             )
@@ -196,28 +192,13 @@ class OldWorld:
         Shapes of kinds that the city generator does not use are left out.
         """
         return {
-            name: [s for p in one.parts if (s := self._shape(p)) is not None]
+            name: [p.shape for p in one.parts if p.shape is not None]
             for name, one in self.geometry.items()
         }
 
-    def _shape(self, part: PartGeometry) -> Shape | None:
-        """Returns a part's shape; None if the city generator lacks its kind."""
-        inspector = self._world.scene_graph.model_inspector()
-        shape = inspector.GetShape(part.geometry.geometry_id)
-        if isinstance(shape, Mesh) and shape.source().is_path():
-            name = Path(shape.source().path()).stem
-            return MeshShape(name, triple(shape.scale3()))
-        if isinstance(shape, Box):
-            return BoxShape(triple(shape.size()))
-        if isinstance(shape, Cylinder):
-            return CylinderShape(shape.radius(), shape.length())
-        if isinstance(shape, Sphere):
-            return SphereShape(shape.radius())
-        return None
-
     def triangles(self, name: str) -> np.ndarray:
         """Returns the triangles (M, 3, 3) of a structure in W [m]."""
-        found = [triangle_corners(part) for part in self.geometry[name].parts]
+        found = [one.triangle_corners for one in self.geometry[name].parts]
         return np.concatenate([np.zeros((0, 3, 3)), *found])
 
     @cached_property
@@ -228,18 +209,18 @@ class OldWorld:
         return GroundSurface(self.geometry, near)
 
     @cached_property
-    def streets(self) -> BaseGeometry:
+    def streets(self) -> Area:
         """Area of carriageways, adjacent car parks and sidewalks, in W [m]."""
         return shapely.union_all(
             [self.ground.carriageway, self.area(self._is_street)]
         )
 
     @cached_property
-    def open_ground(self) -> BaseGeometry:
+    def open_ground(self) -> Area:
         """Area of the ground outside streets, parks and water, in W [m]."""
         return self.area(_is_open).difference(self.streets)
 
-    def area(self, wanted: Callable[[StructureGeometry], bool]) -> BaseGeometry:
+    def area(self, wanted: Callable[[StructureGeometry], bool]) -> Area:
         """Returns the area that selected structures cover in W [m].
 
         The structures are seen from above.
@@ -248,7 +229,7 @@ class OldWorld:
             wanted: function that returns whether a structure is selected.
         """
         found = [
-            from_above(triangle_corners(part))
+            from_above(part.triangle_corners)
             for one in self.geometry.values()
             if wanted(one)
             for part in one.parts
@@ -261,7 +242,7 @@ class OldWorld:
         is_bay = one.kind == kinds.PARKING_BAYS
         return one.semantic_class == "sidewalk" or is_bay
 
-    def junctions(self) -> dict[str, BaseGeometry]:
+    def junctions(self) -> dict[str, Area]:
         """Returns junctions' areas in W by name; empty without `roads.yaml`."""
         if not is_there(self.folder.roads):
             return {}

@@ -8,7 +8,6 @@ from shapely import affinity
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.transient import StructureGeometry
 from worlds.ageing import kinds
 from worlds.ageing.old_world import OldWorld
 from worlds.ageing.rates import MOVED
@@ -18,6 +17,7 @@ from worlds.shapes import (
     MATERIALS,
     Part,
     Structure,
+    StructureGeometry,
     assemble,
     block,
 )

@@ -7,17 +7,17 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.transient import StructureGeometry
 from worlds.ageing import kinds
 from worlds.ageing.old_world import OldWorld
 from worlds.ageing.standing_structures import StandingStructures
 from worlds.ageing.yearly_draws import YearlyDraws
-from worlds.city import (
+from worlds.imports import random_generator
+from worlds.shapes import (
     SPECIES,
+    Structure,
+    StructureGeometry,
     scaled_plant,
 )
-from worlds.imports import random_generator
-from worlds.shapes import Structure
 
 # Least and greatest growth of a tree in a year [m].
 _GROWTH = (0.3, 0.5)

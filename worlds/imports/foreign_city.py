@@ -15,7 +15,7 @@ class SmallObject:
     Attributes:
         source: id of the object in the file.
         element: type of the object in the file.
-        kind: a key of `worlds.city.placement.objects.OBJECTS`.
+        kind: a key of `worlds.shapes.OBJECTS`.
         xy: position in W [m].
         yaw: heading in W [rad]; None if unknown.
         height: height of a tree [m]; None if unknown, or for other objects.

@@ -18,14 +18,8 @@ from worlds.imports.foreign_city import ForeignCity
 from worlds.imports.options import ImportOptions
 from worlds.imports.report import REPORT_NAME, ImportReport
 from worlds.imports.staged_city import StagedCity
-from worlds.maps import (
-    IMPORT_NAME,
-    MESH_FOLDER,
-    STRUCTURES_NAME,
-    MapFolder,
-    stage_name,
-)
-from worlds.shapes import Structure
+from worlds.maps import IMPORT_NAME, MESH_FOLDER, MapFolder, stage_name
+from worlds.shapes import STRUCTURES_NAME, Structure
 
 # Column of the structure table: the year in which a building was built.
 YEAR_COLUMN = "built"

@@ -2,7 +2,6 @@ from .map_folder import IMPORT_NAME as IMPORT_NAME
 from .map_folder import MESH_FOLDER as MESH_FOLDER
 from .map_folder import ROADS_NAME as ROADS_NAME
 from .map_folder import STAGES_NAME as STAGES_NAME
-from .map_folder import STRUCTURES_NAME as STRUCTURES_NAME
 from .map_folder import TRAFFIC_NAME as TRAFFIC_NAME
 from .map_folder import MapFolder as MapFolder
 from .map_folder import check_new_map as check_new_map

@@ -5,11 +5,11 @@ from pathlib import Path
 import re
 
 from evaluation.base import InputError, check_regular, listed
+from worlds.shapes import STRUCTURES_NAME
 
 ROADS_NAME = "roads.yaml"
 PLAN_NAME = "city.yaml"
 STAGES_NAME = "stages.yaml"
-STRUCTURES_NAME = "structures.csv"
 IMPORT_NAME = "import.yaml"
 TRAFFIC_NAME = "traffic.npz"
 MESH_FOLDER = "meshes"

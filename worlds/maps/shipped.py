@@ -13,11 +13,7 @@ import tempfile
 from types import MappingProxyType
 
 from evaluation.base import InputError, cache_folder, did_you_mean
-from worlds.maps import (
-    MapFolder,
-    drive_name,
-    no_drives,
-)
+from worlds.maps.map_folder import MapFolder, drive_name, no_drives
 
 
 @functools.cache

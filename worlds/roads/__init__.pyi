@@ -5,11 +5,13 @@ from .centreline import sample_stations as sample_stations
 from .driver_offsets import FINE_SPACING as FINE_SPACING
 from .driver_offsets import driven_path as driven_path
 from .driver_offsets import kerbs as kerbs
+from .driver_offsets import obstacle_points as obstacle_points
 from .lane_path import POINT_SPACING as POINT_SPACING
 from .lane_path import LanePath as LanePath
 from .network import Connection as Connection
 from .network import RoadNetwork as RoadNetwork
 from .network import load_road_network as load_road_network
+from .queue_lanes import lanes_between_stop_lines as lanes_between_stop_lines
 from .road import ENDS as ENDS
 from .road import Arm as Arm
 from .road import Direction as Direction

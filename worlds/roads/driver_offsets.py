@@ -61,6 +61,11 @@ def kerbs(network: RoadNetwork) -> STRtree:
     return STRtree(shapely.linestrings(pairs[line[:-1] == line[1:]]))
 
 
+def obstacle_points(xy: np.ndarray) -> STRtree:
+    """Returns an index of the points (N, 2) of obstacles [m]."""
+    return STRtree(np.asarray(shapely.points(xy)))
+
+
 def driven_path(
     path: LanePath,
     spacing: float,

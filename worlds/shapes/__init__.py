@@ -1,4 +1,4 @@
-"""Shapes, a public noun: meshes, polygons, structures, with their materials.
+"""Shapes, a public noun: meshes, areas, objects, and structures of these.
 
 A kit for what builds or changes a world; nothing here imports Drake.
 """

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from worlds.shapes import MATERIALS
+from worlds.shapes.materials import MATERIALS
 from worlds.shapes.mesh import Mesh, box_mesh
 
 # Number of sides of the prisms that stand for round shapes.
@@ -178,6 +179,55 @@ def rotation(rpy: tuple[float, float, float]) -> np.ndarray:
             [-sp, cp * sr, cp * cr],
         ]
     )
+
+
+def roll_pitch_yaw(R: np.ndarray) -> tuple[float, float, float]:
+    """Returns roll, pitch and yaw of a rotation matrix (3, 3), as in SDF [rad].
+
+    This is the inverse of `rotation`. Roll and yaw are from -pi to pi, and the
+    pitch is from -pi/2 to pi/2. The formulas are those of Drake's class
+    `RollPitchYaw`, which are accurate near a pitch of +-pi/2, too.
+    """
+    squares = R[[2, 2, 1, 0], [2, 1, 0, 0]] ** 2
+    size = math.sqrt(sum(squares.tolist()) / 2)
+    w, x, y, z = _quaternion(R)
+    sum_angle = _angle(x + z, w - y)
+    difference = _angle(z - x, w + y)
+    roll, yaw = sum_angle - difference, sum_angle + difference
+    return _wrapped(roll), math.atan2(-R[2, 0], size), _wrapped(yaw)
+
+
+def _angle(y: float, x: float) -> float:
+    """Returns the direction of a vector [rad]; 0 for a vector of no length."""
+    is_zero = max(abs(x), abs(y)) <= np.finfo(float).eps
+    return 0.0 if is_zero else math.atan2(y, x)
+
+
+def _wrapped(angle: float) -> float:
+    """Returns an angle from -2 pi to 2 pi as one from -pi to pi [rad]."""
+    if abs(angle) <= math.pi:
+        return angle
+    return angle - math.copysign(2 * math.pi, angle)
+
+
+def _quaternion(R: np.ndarray) -> tuple[float, float, float, float]:
+    """Returns the unit quaternion w, x, y, z, with w >= 0, of a rotation."""
+    (a, b, c), (d, e, f), (g, h, i) = R.tolist()
+    # Sums are in the order in which Drake adds, for the same last bits: these
+    # choose between -pi and pi.
+    trace = a + (e + i)
+    if trace >= max(a, e, i):
+        q = (1 + trace, h - f, c - g, d - b)
+    elif a >= max(e, i):
+        q = (h - f, 1 - (trace - 2 * a), b + d, c + g)
+    elif e >= i:
+        q = (c - g, b + d, 1 - (trace - 2 * e), f + h)
+    else:
+        q = (d - b, c + g, f + h, 1 - (trace - 2 * i))
+    w, x, y, z = q
+    size = math.sqrt((x * x + z * z) + (y * y + w * w))
+    scale = (-1.0 if w < 0.0 else 1.0) / size
+    return scale * w, scale * x, scale * y, scale * z
 
 
 def _round_mesh(radius: float, length: float) -> Mesh:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 import math
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 import shapely
@@ -10,6 +10,8 @@ from shapely.affinity import affine_transform
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+# An area seen from above, in W or in the frame of what it is the ground of [m].
+Area: TypeAlias = BaseGeometry
 Shape = TypeVar("Shape", bound=BaseGeometry)
 # Polygons are rounded to millimetres like the meshes, so that shapes that share
 # an edge keep sharing it [m].

@@ -1,4 +1,4 @@
-"""Rectangles within polygons."""
+"""Rectangles: the largest within polygons, and which of many meet."""
 
 import numpy as np
 import shapely
@@ -47,3 +47,29 @@ def _evenly_chosen(values: np.ndarray) -> np.ndarray:
         return values
     kept = np.linspace(0, len(values) - 1, _MOST_LINES).round().astype(int)
     return values[kept]
+
+
+def overlap(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Returns (N,) bool: which pairs of rectangles overlap.
+
+    `first` and `second` (N, 4, 2) contain their corners [m].
+    """
+    pairs = (np.asarray(shapely.polygons(one)) for one in (first, second))
+    return np.asarray(shapely.intersects(*pairs))
+
+
+def close_pairs(
+    first: np.ndarray, second: np.ndarray, distance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns which rectangles are within a distance of which others.
+
+    Args:
+        first, second: (N, 4, 2) and (M, 4, 2) corners of rectangles [m].
+        distance: the distance [m].
+
+    Returns:
+        (K,) indices in `first`, and (K,) in `second`, of all such pairs.
+    """
+    tree = shapely.STRtree(np.asarray(shapely.polygons(second)))
+    one, other = tree.query(shapely.polygons(first), "dwithin", distance)
+    return one, other

@@ -23,6 +23,9 @@ from evaluation.base import (
 from worlds.shapes.materials import MATERIALS, USUAL_MATERIALS, Material
 from worlds.shapes.semantics import CLASS_IDS, moving_id
 
+# Name of the file of a structure table, beside the world.
+STRUCTURES_NAME = "structures.csv"
+
 
 @dataclass(frozen=True)
 class StructureEntry:

@@ -10,14 +10,14 @@ import numpy as np
 from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
-from worlds.shapes import (
-    USUAL_MATERIALS,
+from worlds.shapes.materials import USUAL_MATERIALS
+from worlds.shapes.models import Model, part_mesh, rotation, triple
+from worlds.shapes.polygons import placed
+from worlds.shapes.structure_table import (
     StructureEntry,
     kind_in_name,
     shortened,
 )
-from worlds.shapes.models import Model, part_mesh, rotation, triple
-from worlds.shapes.polygons import placed
 
 
 @dataclass(frozen=True)

@@ -116,19 +116,19 @@ def age(
     if len(maps) != 1:
         raise InputError(f"give one map, not {' '.join(maps) or 'none'}")
     with ended_by_interrupts("cns-drake"):
-        from worlds.ageing import age_map, draw_pictures, read_rates
+        from cns_drake.pictures import draw_aged_city
+        from cns_drake.scenarios import age_city
+        from worlds.ageing import read_rates
         from worlds.maps import recordable_map
 
     with errors_at_option("--output", "output"):
-        aged = age_map(
+        aged = age_city(
             recordable_map(maps[0]),
             wanted,
             seed,
             read_rates(rates, rate),
             output,
-            finish=lambda draft, one: (
-                draw_pictures(draft, one) if pictures else None
-            ),
+            *([draw_aged_city] if pictures else []),
         )
     rows = [
         (f"stage {stage}", f"year {year}" if year else "today")

@@ -6,7 +6,7 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from cns_drake.scenarios import Scenario, digest_file
+from cns_drake.scenarios import Scenario, age_city, digest_file
 from cns_drake.studies.maps.map_step import MakeMap, make_maps
 from cns_drake.studies.maps.redrawing import RedrawCity, redrawn_city
 from evaluation.base import (
@@ -21,7 +21,6 @@ from evaluation.study import Experiment, MadeMap
 from worlds.ageing import (
     DEFAULT_RATES,
     LAST_YEAR,
-    age_map,
     check_rates,
     read_rates,
 )
@@ -50,13 +49,13 @@ class AgeCity(MakeMap):
     rates: tuple[tuple[str, float], ...]
 
     def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
-        age_map(
+        age_city(
             self.source,
             self.years,
             self.seed,
             dict(self.rates),
             self.folder,
-            finish=lambda draft, _: finish(draft),
+            finish=lambda draft, *_: finish(draft),
         )
 
     def sources(self) -> dict[str, object]:

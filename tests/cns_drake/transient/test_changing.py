@@ -14,16 +14,17 @@ import pytest
 import shapely
 
 from cns_drake.scenarios import TransientConfig
-from cns_drake.scene import load_world
+from cns_drake.scene import geometry_by_structure, load_world
 from cns_drake.sensors import make_beam_pattern
 from cns_drake.simulation import scan_world
-from cns_drake.transient import change_world, geometry_by_structure
+from cns_drake.transient import change_world
+from worlds.shapes import Way
 
 # The drive leads through cars and roads, below z = 2.2 m or so.
 _CORNERS = [
     X_WT @ [x, y, 0] for x, y in ((-90, -3), (90, -3), (90, 2), (-90, 2))
 ]
-DRIVE = shapely.LineString([(X_WT @ [x, -1, 0])[:2] for x in (-60, 60)])
+DRIVE = Way([(X_WT @ [x, -1, 0])[:2] for x in (-60, 60)])
 LANES = shapely.Polygon([(x, y) for x, y, _ in _CORNERS])
 
 

@@ -4,8 +4,8 @@ from helpers.transient_town import DRIVE, X_WT
 import numpy as np
 import pytest
 
-from cns_drake.transient import GroundSurface
 from worlds.shapes import (
+    GroundSurface,
     turned_up,
     unit_normals,
 )
@@ -14,7 +14,7 @@ from worlds.shapes import (
 def test_kerbs_and_heights_of_a_plane_road(changed):
     """The oracle is where the road lies: between y = -3 and 3 of the town."""
     _, before = changed()
-    ground = GroundSurface(before, DRIVE.buffer(50))
+    ground = GroundSurface(before, DRIVE.area(50))
     assert ground.carriageway.area == pytest.approx(6 * 200, rel=0.01)
     kerbs = list(ground.kerbs(1.0))
     assert len(kerbs) == 1  # Once round.

@@ -17,13 +17,10 @@ from helpers.transient_town import (
 )
 import numpy as np
 import pytest
-import shapely
 
-from cns_drake.transient import triangle_corners
-from worlds.city import lowered
-from worlds.shapes import part_mesh
+from worlds.shapes import Way, lowered, part_mesh
 
-DRIVE = shapely.LineString([(X_WT @ [x, -1, 0])[:2] for x in (-60, 60)])
+DRIVE = Way([(X_WT @ [x, -1, 0])[:2] for x in (-60, 60)])
 # The parapet of a new roof, and the highest equipment on it [m].
 PARAPET = 0.9
 EQUIPMENT = 4.0
@@ -42,7 +39,7 @@ def height(thing):
 
 def wall_area(thing):
     """Area of all upright triangles of a structure [m^2]."""
-    corners = np.concatenate([triangle_corners(one) for one in thing.parts])
+    corners = np.concatenate([one.triangle_corners for one in thing.parts])
     a, b, c = np.moveaxis(corners, 1, 0)
     spans = np.cross(b - a, c - a)
     upright = np.abs(spans[:, 2]) < 1e-6 * np.linalg.norm(spans, axis=1)

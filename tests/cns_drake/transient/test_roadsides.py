@@ -17,6 +17,8 @@ import numpy as np
 import pytest
 import shapely
 
+from worlds.shapes import Way
+
 
 def kind_of(name):
     """The row of a thing, of names such as roadsides_+3_-2_hedge."""
@@ -114,7 +116,7 @@ def test_two_drives_along_a_road_have_the_same_things(sdf, changed):
         assert np.allclose(thing.p_WPs, mine[name].p_WPs, atol=1e-9)
     for name in mine.keys() - theirs.keys():
         # Stretches end 30 m from a drive, and things up to 14 m behind them.
-        assert mine[name].footprint.distance(elsewhere) > 30.0 - 14.0
+        assert elsewhere.distance(mine[name].footprint) > 30.0 - 14.0
 
 
 def test_other_switches_change_what_stands_there(changed):
@@ -154,7 +156,7 @@ def test_nothing_stands_on_the_carriageway_beyond_a_strip(tmp_path):
         {"north": "road", "south": "road", "lawn": "terrain"},
         (0.0,) * 6,
     )
-    line = shapely.LineString([(-60, -4.5), (60, -4.5)])
+    line = Way([(-60, -4.5), (60, -4.5)])
     fresh = new_things(
         change_maker(folder, line, shapely.Polygon()), roadsides=1.0
     )

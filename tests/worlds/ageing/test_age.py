@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.scenarios import load_scenario
-from cns_drake.scene import load_world
-from cns_drake.transient import geometry_by_structure
+from cns_drake.scenarios import age_city, load_scenario
+from cns_drake.scene import geometry_by_structure, load_world
 from evaluation.base import InputError
-from worlds.ageing import DEFAULT_RATES, age_map
+from worlds.ageing import DEFAULT_RATES
 from worlds.maps import MapFolder
 
 # A lot happens, so that a few years show all kinds of events.
@@ -22,7 +21,7 @@ _BUSY = {**dict.fromkeys(DEFAULT_RATES, 0.1), "built": 0.3, "moved": 2.0}
 @pytest.fixture(scope="module")
 def long(town):
     output = town.parent / "long"
-    age_map(town, [3, 8], 5, _BUSY, output)
+    age_city(town, [3, 8], 5, _BUSY, output)
     return output
 
 
@@ -34,7 +33,7 @@ def _rows(folder, name="history.csv"):
 @pytest.mark.slow
 def test_histories_are_nested_and_repeatable(town, long):
     short = town.parent / "short"
-    age_map(town, [3], 5, _BUSY, short)
+    age_city(town, [3], 5, _BUSY, short)
     name = "stage_02.sdf"
     assert (short / name).read_bytes() == (long / name).read_bytes()
     few, many = _rows(short), _rows(long)
@@ -53,7 +52,7 @@ def test_histories_are_nested_and_repeatable(town, long):
 @pytest.mark.night
 def test_another_seed_is_another_history(town, long):
     other = town.parent / "other"
-    age_map(town, [3], 6, _BUSY, other)
+    age_city(town, [3], 6, _BUSY, other)
     assert _rows(other) != [r for r in _rows(long) if int(r["year"]) <= 3]
 
 
@@ -128,10 +127,7 @@ def test_nothing_stands_in_another_or_on_a_street(long):
     assert new
     walls = [t for t in things.values() if t.semantic_class == "building"]
     corners = np.concatenate(
-        [
-            part.p_WPs[part.geometry.surface.triangles]
-            for part in things["carriageway"].parts
-        ]
+        [part.triangle_corners for part in things["carriageway"].parts]
     )
     roads = shapely.union_all(shapely.polygons(corners[..., :2]))
     for one in new:
@@ -159,7 +155,7 @@ def test_replacements_are_of_another_kind(long):
 @pytest.mark.slow
 def test_faulty_maps(town, tmp_path):
     def age(source, years=(1,), seed=1, output=None):
-        age_map(source, years, seed, _BUSY, output or tmp_path / "new")
+        age_city(source, years, seed, _BUSY, output or tmp_path / "new")
 
     with pytest.raises(InputError, match="no sequence_NN"):
         age(tmp_path)
@@ -255,7 +251,7 @@ def test_a_map_of_others_writes_nothing_outside(town, tmp_path, uri):
     )
     stage.write_text(text)
     with pytest.raises(InputError, match=r"stage_02\.sdf: uri: '.* is no file"):
-        age_map(folder, [1], 1, _BUSY, output)
+        age_city(folder, [1], 1, _BUSY, output)
     assert mine.read_text() == "mine"
     assert [path.name for path in output.parent.iterdir()] == ["evil.obj"]
 
@@ -273,7 +269,7 @@ def test_waypoints_of_any_names_are_kept_apart(town, tmp_path):
             f'map: .\nstage: "{number}"\nwaypoints: ../{number}/{way.name}\n'
             "speeds: {cruise: 5.0}\n"
         )
-    age_map(folder, [1], 1, _BUSY, tmp_path / "old")
+    age_city(folder, [1], 1, _BUSY, tmp_path / "old")
     assert len(_rows(tmp_path / "old", "structures.csv")) > 9
     for number, x in (("01", "40"), ("02", "60")):
         scenario = load_scenario(tmp_path / "old" / f"sequence_{number}.yaml")
@@ -307,7 +303,7 @@ def test_values_of_structures_that_cannot_be(town, tmp_path, column, value):
     with pytest.raises(
         InputError, match=rf"structures\.csv: line 5: {column}: '{value[:40]}'"
     ):
-        age_map(folder, [1], 1, _BUSY, tmp_path / "old")
+        age_city(folder, [1], 1, _BUSY, tmp_path / "old")
 
 
 def test_tables_of_structures_that_are_none(town, tmp_path):
@@ -316,11 +312,11 @@ def test_tables_of_structures_that_are_none(town, tmp_path):
     whole = table.read_text()
     table.write_bytes(whole.encode() + b"\xe9")
     with pytest.raises(InputError, match="not UTF-8"):
-        age_map(folder, [1], 1, _BUSY, tmp_path / "old")
+        age_city(folder, [1], 1, _BUSY, tmp_path / "old")
     table.unlink()
     os.mkfifo(table)
     with pytest.raises(InputError, match="not a regular file"):
-        age_map(folder, [1], 1, _BUSY, tmp_path / "old")
+        age_city(folder, [1], 1, _BUSY, tmp_path / "old")
 
 
 def test_visuals_of_further_models_are_refused(town, tmp_path):
@@ -337,7 +333,7 @@ def test_visuals_of_further_models_are_refused(town, tmp_path):
     assert text.count("</model>") == 1
     stage.write_text(text.replace("</model>", hut))
     with pytest.raises(InputError, match=r"stage_02\.sdf: not one model"):
-        age_map(folder, [1], 1, _BUSY, tmp_path / "old")
+        age_city(folder, [1], 1, _BUSY, tmp_path / "old")
 
 
 @pytest.mark.parametrize(
@@ -345,4 +341,4 @@ def test_visuals_of_further_models_are_refused(town, tmp_path):
 )
 def test_faulty_years(town, tmp_path, years):
     with pytest.raises(InputError, match="--years"):
-        age_map(town, years, 1, _BUSY, tmp_path / "old")
+        age_city(town, years, 1, _BUSY, tmp_path / "old")

@@ -16,12 +16,8 @@ import shapely
 from shapely.affinity import scale
 from shapely.geometry import MultiPoint, Polygon, box
 
-from worlds.city import (
-    ARCHETYPES,
-    Site,
-    sample,
-)
-from worlds.shapes import MeshShape
+from worlds.city import ARCHETYPES, sample
+from worlds.shapes import MeshShape, Site
 
 # How far walls reach into the ground [m].
 FOUNDATION_M = 0.5

@@ -27,8 +27,7 @@ import pytest
 import yaml
 
 from worlds.city import load_stages
-from worlds.maps import STRUCTURES_NAME
-from worlds.shapes import CLASS_IDS
+from worlds.shapes import CLASS_IDS, STRUCTURES_NAME
 
 pytestmark = pytest.mark.slow
 

@@ -10,15 +10,12 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from worlds.city import (
-    ARCHETYPES,
-    building_site,
-    lowered,
-    top_of,
-)
+from worlds.city import ARCHETYPES, building_site
 from worlds.shapes import (
     Structure,
+    lowered,
     part_mesh,
+    top_of,
 )
 
 # Height of the walls that the edge of the roof covers [m].

@@ -2,14 +2,11 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from worlds.city import (
-    ARCHETYPES,
-    OBJECTS,
-    sample,
-)
+from worlds.city import ARCHETYPES, sample
 from worlds.shapes import (
     CLASS_IDS,
     MATERIALS,
+    OBJECTS,
     USUAL_MATERIALS,
     Finish,
     Model,

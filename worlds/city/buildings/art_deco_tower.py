@@ -11,11 +11,11 @@ from worlds.city.facades import (
     bays,
     canopies,
     foot_band,
-    outlines,
     solids,
     tiers,
     top_band,
 )
+from worlds.shapes import outlines
 
 # Where each tier above the base starts, as shares of the tower's height.
 _TIER_STARTS = ((0.5,), (0.3, 0.62))

@@ -16,14 +16,14 @@ from worlds.city.facades import (
     around,
     balconies,
     bays,
-    equip_roof,
     foot_band,
-    outlines,
     tiers,
 )
 from worlds.shapes import (
     Mesh,
+    equip_roof,
     merge_meshes,
+    outlines,
 )
 
 # Room for balconies in front, and for canopies [m].

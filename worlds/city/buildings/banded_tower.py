@@ -13,13 +13,12 @@ from worlds.city.facades import (
     bays,
     canopies,
     facade_mesh,
-    outlines,
     piers,
     solids,
     tiers,
     top_band,
 )
-from worlds.shapes import MeshShape, merge_meshes
+from worlds.shapes import MeshShape, merge_meshes, outlines
 
 # Free strip between the widest storeys and the edge of the site [m].
 _MARGIN_M = 0.8

@@ -12,13 +12,13 @@ from worlds.city.facades import (
     boards,
     foot_band,
     free_stretches,
-    outlines,
     solids,
     wing_roofs,
 )
 from worlds.city.facades.reliefs import Patch
 from worlds.shapes import (
     Mesh,
+    outlines,
 )
 
 # Free strip around the walls, for eaves [m].

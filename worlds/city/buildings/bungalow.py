@@ -12,13 +12,12 @@ from worlds.city.facades import (
     Openings,
     Roof,
     Wing,
-    add_chimney,
     around,
-    outlines,
     porches,
     solids,
     wing_openings,
 )
+from worlds.shapes import add_chimney, outlines
 
 # Width of the free strip around the walls, for wide eaves [m].
 _MARGIN_M = 0.75

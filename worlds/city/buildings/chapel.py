@@ -14,13 +14,13 @@ from worlds.city.facades import (
     bays,
     foot_band,
     free_stretches,
-    outlines,
     solids,
     top_band,
     wing_roofs,
 )
 from worlds.shapes import (
     Mesh,
+    outlines,
 )
 
 # Free strip around the walls, for eaves and buttresses [m].

@@ -14,17 +14,18 @@ from worlds.city.facades import (
     balconies,
     bays,
     canopies,
-    equip_roof,
     foot_band,
-    outlines,
     piers,
     solids,
     tiers,
     top_band,
 )
-from worlds.city.facades.site import FRONT_LEFT, FRONT_RIGHT
 from worlds.shapes import (
+    FRONT_LEFT,
+    FRONT_RIGHT,
     Mesh,
+    equip_roof,
+    outlines,
 )
 
 _ROOF_ITEMS = ("stair_house", "skylight", "vents", "ac_unit")

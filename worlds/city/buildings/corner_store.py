@@ -11,15 +11,16 @@ from worlds.city.facades import (
     around,
     bays,
     canopies,
-    equip_roof,
     foot_band,
-    outlines,
     tiers,
     top_band,
 )
-from worlds.city.facades.site import FRONT_LEFT, FRONT_RIGHT
 from worlds.shapes import (
+    FRONT_LEFT,
+    FRONT_RIGHT,
     Mesh,
+    equip_roof,
+    outlines,
 )
 
 # Greatest number of windows along the front and one side together.

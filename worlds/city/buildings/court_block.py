@@ -12,12 +12,11 @@ from worlds.city.facades import (
     around,
     bays,
     foot_band,
-    outlines,
     solids,
     tiers,
     top_band,
 )
-from worlds.shapes import Mesh, MeshShape, merge_meshes
+from worlds.shapes import Mesh, MeshShape, merge_meshes, outlines
 
 # Least width of a site for a U around the court; others have an L [m].
 _U_WIDTH_M = 30.0

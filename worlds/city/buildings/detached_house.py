@@ -20,12 +20,10 @@ from worlds.city.facades import (
     Roof,
     WallFrame,
     Wing,
-    add_chimney,
     around,
     balconies,
     bay_windows,
     bays,
-    outlines,
     porches,
     solids,
     wing_openings,
@@ -33,7 +31,9 @@ from worlds.city.facades import (
 )
 from worlds.shapes import (
     Mesh,
+    add_chimney,
     merge_meshes,
+    outlines,
 )
 
 # Greatest depth of the main wing [m].

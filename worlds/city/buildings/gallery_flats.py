@@ -14,7 +14,6 @@ from worlds.city.facades import (
     balconies,
     bays,
     foot_band,
-    outlines,
     solids,
     tiers,
     top_band,
@@ -22,6 +21,7 @@ from worlds.city.facades import (
 from worlds.shapes import (
     Mesh,
     merge_meshes,
+    outlines,
 )
 
 # Greatest number of flats beside one another.

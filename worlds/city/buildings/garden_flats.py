@@ -13,7 +13,6 @@ from worlds.city.facades import (
     Roof,
     WallFrame,
     Wing,
-    add_chimney,
     around,
     balconies,
     bays,
@@ -22,7 +21,7 @@ from worlds.city.facades import (
     wing_openings,
     wing_roofs,
 )
-from worlds.shapes import Mesh, MeshShape, merge_meshes
+from worlds.shapes import Mesh, MeshShape, add_chimney, merge_meshes
 
 # Free strip around the walls, for eaves [m].
 _MARGIN_M = 0.5

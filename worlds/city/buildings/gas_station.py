@@ -8,15 +8,15 @@ from worlds.city.facades import (
     Wing,
     around,
     bays,
-    equip_roof,
     foot_band,
-    outlines,
     roofs,
     solids,
 )
 from worlds.shapes import (
     Mesh,
+    equip_roof,
     merge_meshes,
+    outlines,
 )
 
 # Depth of the windows behind the wall [m].

@@ -11,12 +11,12 @@ from worlds.city.facades import (
     WallFrame,
     bays,
     canopies,
-    outlines,
     piers,
     solids,
     tiers,
     top_band,
 )
+from worlds.shapes import outlines
 
 # Equipment on the roof.
 _ROOF_ITEMS = ("lift_house", "mast", *2 * ("cooling_tower",), "air_handler")

@@ -9,12 +9,11 @@ from worlds.city.facades import (
     WallFrame,
     bays,
     canopies,
-    equip_roof,
     foot_band,
-    outlines,
     solids,
     tiers,
 )
+from worlds.shapes import equip_roof, outlines
 
 # Strip between the walls and the edge of the site [m].
 _STRIP_M = 0.3

@@ -11,12 +11,11 @@ from worlds.city.facades import (
     balconies,
     bays,
     foot_band,
-    outlines,
     solids,
     tiers,
     top_band,
 )
-from worlds.shapes import Finish, Mesh
+from worlds.shapes import Finish, Mesh, outlines
 
 # Depth of the forecourt [m].
 _FORECOURT_M = 7.0

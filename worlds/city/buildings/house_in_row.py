@@ -5,7 +5,6 @@ import math
 
 from worlds.city.buildings.house_heights import ROOF_M
 from worlds.city.facades import (
-    Assembly,
     Band,
     Building,
     Openings,
@@ -13,19 +12,20 @@ from worlds.city.facades import (
     Roof,
     WallFrame,
     Wing,
-    add_chimney,
     around,
     bay_windows,
     boards,
     foot_band,
-    outlines,
     porches,
     roofs,
     wing_openings,
     wing_roofs,
 )
 from worlds.shapes import (
+    Assembly,
     Mesh,
+    add_chimney,
+    outlines,
 )
 
 # Party walls rise this far above a roof whose ridge follows the street [m].

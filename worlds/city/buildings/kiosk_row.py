@@ -13,10 +13,10 @@ from worlds.city.facades import (
     boards,
     canopies,
     foot_band,
-    outlines,
     roofs,
     solids,
 )
+from worlds.shapes import outlines
 
 # Height of a stall's counter [m].
 _COUNTER_M = 1.05

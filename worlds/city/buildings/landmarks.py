@@ -26,9 +26,8 @@ import numpy as np
 from pydantic import BaseModel
 
 from evaluation.base import parse_yaml
-from worlds.city.dice import Rgb
 from worlds.city.facades.building import Building
-from worlds.shapes import Finish, Mesh, MeshShape, read_mesh, triple
+from worlds.shapes import Finish, Mesh, MeshShape, Rgb, read_mesh, triple
 
 _MODELS = Path(__file__).parent / "landmark_models"
 _Triple = tuple[float, float, float]

@@ -9,12 +9,11 @@ from worlds.city.facades import (
     WallFrame,
     bays,
     canopies,
-    equip_roof,
     foot_band,
-    outlines,
     tiers,
     top_band,
 )
+from worlds.shapes import equip_roof, outlines
 
 # Greatest number of windows around the whole office.
 _MOST_BAYS = 42

@@ -15,13 +15,13 @@ from worlds.city.facades import (
     facade_mesh,
     foot_band,
     glass_mesh,
-    outlines,
     porches,
     roofs,
     solids,
 )
 from worlds.shapes import (
     Mesh,
+    outlines,
 )
 
 # Distance between the tables of a shelter [m].

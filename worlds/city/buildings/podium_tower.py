@@ -13,7 +13,6 @@ from worlds.city.facades import (
     bays,
     canopies,
     foot_band,
-    outlines,
     solids,
     tiers,
 )
@@ -21,6 +20,7 @@ from worlds.shapes import (
     Finish,
     Mesh,
     merge_meshes,
+    outlines,
 )
 
 _ROOF_ITEMS = (

@@ -12,12 +12,12 @@ from worlds.city.facades import (
     around,
     bays,
     foot_band,
-    outlines,
     roofs,
     solids,
     tiers,
     top_band,
 )
+from worlds.shapes import outlines
 
 # Free strip beside and behind the walls, for eaves [m].
 _MARGIN_M = 0.6

@@ -22,12 +22,12 @@ from worlds.city.facades import (
     Openings,
     Roof,
     Wing,
-    add_chimney,
     around,
     bay_windows,
     porches,
     wing_openings,
 )
+from worlds.shapes import add_chimney
 
 # Greatest depth of the houses [m].
 _MOST_DEPTH_M = 10.0

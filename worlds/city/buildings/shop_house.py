@@ -13,9 +13,9 @@ from worlds.city.facades import (
     Wing,
     bay_windows,
     bays,
-    equip_roof,
     wing_openings,
 )
+from worlds.shapes import equip_roof
 
 _ROOFS = ("flat", "gable", "gambrel")
 # A narrow house can also have a roof with a gable to the street.

@@ -9,10 +9,10 @@ from worlds.city.facades import (
     Wing,
     around,
     bays,
-    equip_roof,
     foot_band,
     wing_openings,
 )
+from worlds.shapes import equip_roof
 
 # Kept free in front for canopies [m].
 _FRONT_M = 0.4

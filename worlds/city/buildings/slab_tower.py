@@ -12,11 +12,11 @@ from worlds.city.facades import (
     around,
     bays,
     foot_band,
-    outlines,
     solids,
     tiers,
     top_band,
 )
+from worlds.shapes import outlines
 
 # Height of the walls above the topmost storey [m].
 _PARAPET_M = 1.2

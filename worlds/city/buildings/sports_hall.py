@@ -10,13 +10,12 @@ from worlds.city.facades import (
     Wing,
     around,
     bays,
-    equip_roof,
     foot_band,
     free_stretches,
-    outlines,
     roofs,
     solids,
 )
+from worlds.shapes import equip_roof, outlines
 
 # Depth of the windows behind the wall [m].
 _RECESS_M = 0.2

@@ -13,10 +13,10 @@ from worlds.city.facades import (
     Wing,
     around,
     bays,
-    equip_roof,
     foot_band,
     piers,
 )
+from worlds.shapes import equip_roof
 
 # Depth of the windows behind the wall [m].
 _RECESS_M = 0.25

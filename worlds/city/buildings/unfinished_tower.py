@@ -13,10 +13,9 @@ from worlds.city.facades import (
     facade_mesh,
     foot_band,
     glass_mesh,
-    outlines,
     solids,
 )
-from worlds.shapes import Finish, Mesh, merge_meshes
+from worlds.shapes import Finish, Mesh, merge_meshes, outlines
 
 # Finish of scaffolds and props.
 _STEEL = Finish((0.52, 0.53, 0.55))

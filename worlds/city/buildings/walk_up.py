@@ -11,17 +11,14 @@ from worlds.city.facades import (
     Layout,
     Relief,
     WallFrame,
-    add_chimney,
     around,
     bays,
-    equip_roof,
-    outlines,
     porches,
     roofs,
     tiers,
     top_band,
 )
-from worlds.shapes import Mesh
+from worlds.shapes import Mesh, add_chimney, equip_roof, outlines
 
 # Room in front of the walls for steps [m].
 _FRONT_M = 1.5

@@ -10,7 +10,6 @@ from worlds.city.facades import (
     around,
     bays,
     foot_band,
-    outlines,
     piers,
     porches,
     solids,
@@ -20,6 +19,7 @@ from worlds.city.facades.walls import Facade, facade_mesh, glass_mesh
 from worlds.shapes import (
     Mesh,
     merge_meshes,
+    outlines,
 )
 
 # Greatest number of bays of the front and one side together.

@@ -1,6 +1,5 @@
 """Parts of facades: walls, windows, doors, balconies and roofs."""
 
-from worlds.city.facades.assembly import Assembly as Assembly
 from worlds.city.facades.balconies import add_railing as add_railing
 from worlds.city.facades.building import Building as Building
 from worlds.city.facades.reliefs import Band as Band
@@ -8,9 +7,6 @@ from worlds.city.facades.reliefs import Patch as Patch
 from worlds.city.facades.reliefs import Relief as Relief
 from worlds.city.facades.reliefs import foot_band as foot_band
 from worlds.city.facades.reliefs import top_band as top_band
-from worlds.city.facades.roof_equipment import add_chimney as add_chimney
-from worlds.city.facades.roof_equipment import equip_roof as equip_roof
-from worlds.city.facades.site import Site as Site
 from worlds.city.facades.solids import around as around
 from worlds.city.facades.wall_frames import WallFrame as WallFrame
 from worlds.city.facades.walls import Facade as Facade

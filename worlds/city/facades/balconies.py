@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from worlds.city.facades.assembly import Assembly
 from worlds.city.facades.wall_frames import WallFrame
 from worlds.shapes import (
+    Assembly,
     Finish,
     Mesh,
 )

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from worlds.city.facades import bays, outlines, solids
-from worlds.city.facades.assembly import Assembly
+from worlds.city.facades import bays, solids
 from worlds.city.facades.reliefs import Band, Relief
 from worlds.city.facades.wall_frames import WallFrame
 from worlds.city.facades.walls import Facade, facade_mesh, glass_mesh
+from worlds.shapes import Assembly, outlines
 
 # Depth of the windows in bay windows [m].
 _RECESS = 0.1

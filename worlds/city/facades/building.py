@@ -8,9 +8,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, BeforeValidator
 
-from worlds.city.facades.assembly import Assembly
-from worlds.city.facades.site import Site
-from worlds.shapes import Finish
+from worlds.shapes import Assembly, Finish, Site
 
 GivenFinish = Annotated[Finish, BeforeValidator(Finish.given)]
 

@@ -5,11 +5,12 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import ArrayLike
 
-from worlds.city.facades import bays, outlines, solids
+from worlds.city.facades import bays, solids
 from worlds.city.facades.wall_frames import WallFrame
 from worlds.shapes import (
     Mesh,
     merge_meshes,
+    outlines,
 )
 
 # Width of a pilaster [m].

@@ -3,9 +3,9 @@
 import numpy as np
 
 from worlds.city.facades import roofs, solids
-from worlds.city.facades.assembly import Assembly
 from worlds.city.facades.wall_frames import WallFrame
 from worlds.shapes import (
+    Assembly,
     Mesh,
     merge_meshes,
 )

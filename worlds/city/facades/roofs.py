@@ -12,11 +12,12 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from worlds.city.facades import bays, outlines, solids
+from worlds.city.facades import bays, solids
 from worlds.city.facades.reliefs import Patch
 from worlds.shapes import (
     Mesh,
     merge_meshes,
+    outlines,
 )
 
 Line = Sequence[tuple[float, float]]

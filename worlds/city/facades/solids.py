@@ -9,12 +9,12 @@ import itertools
 import numpy as np
 from numpy.typing import ArrayLike
 
-from worlds.city.facades import outlines
 from worlds.shapes import (
     Mesh,
     box_mesh,
     cut_ears,
     merge_meshes,
+    outlines,
 )
 
 # Least and greatest coordinate along an axis [m].

@@ -8,15 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from worlds.city.facades import bays, outlines, piers, solids
-from worlds.city.facades.assembly import Assembly
+from worlds.city.facades import bays, piers, solids
 from worlds.city.facades.bays import Bay
 from worlds.city.facades.reliefs import Band
-from worlds.city.facades.roof_equipment import equip_roof
 from worlds.city.facades.walls import Facade, facade_mesh, glass_mesh
 from worlds.shapes import (
+    Assembly,
     Mesh,
+    equip_roof,
     merge_meshes,
+    outlines,
 )
 
 # A pane reaches this far into the reveals in front of it, so that no ray passes
@@ -284,7 +285,7 @@ def add_crown(
         part: name of the building's part that gets these walls and the roof.
         thickness: thickness of the parapet [m].
         items: names of the equipment on the roof, the most important first (see
-            `worlds.city.facades.roof_equipment.equip_roof`).
+            `worlds.shapes.equip_roof`).
     """
     roof = round(facade.height - parapet, 3)
     mesh = merge_meshes(

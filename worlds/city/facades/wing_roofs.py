@@ -8,11 +8,11 @@ import math
 import numpy as np
 
 from worlds.city.facades import bays, roofs, solids
-from worlds.city.facades.assembly import Assembly
 from worlds.city.facades.reliefs import Patch
 from worlds.city.facades.wall_frames import WallFrame
 from worlds.city.facades.wings import SEAT, Wing
 from worlds.shapes import (
+    Assembly,
     Mesh,
 )
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from worlds.city.facades import bays, solids
-from worlds.city.facades.assembly import Assembly
 from worlds.city.facades.reliefs import Arch, Band, Patch, Relief
 from worlds.city.facades.walls import Facade, facade_mesh, glass_mesh
 from worlds.city.facades.wing_roofs import Attic, add_roof
 from worlds.city.facades.wings import Wing, free_stretches
+from worlds.shapes import Assembly
 
 
 class Openings:

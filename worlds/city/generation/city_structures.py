@@ -26,7 +26,6 @@ from worlds.city.placement import sidewalks
 from worlds.city.placement.building_rows import place_buildings
 from worlds.city.placement.draft import Draft
 from worlds.city.placement.junctions import furnish_junctions
-from worlds.city.placement.objects import OBJECTS
 from worlds.city.placement.open_ground import furnish_district
 from worlds.city.placement.parking import park_along_streets
 from worlds.maps import MapFolder
@@ -39,6 +38,7 @@ from worlds.roads import (
     load_road_network,
 )
 from worlds.shapes import (
+    OBJECTS,
     Structure,
     UpperSides,
     ground_triangles,

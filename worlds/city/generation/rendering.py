@@ -11,14 +11,10 @@ from evaluation.base import MAX_INSTANCE, InputError, csv_text, doing
 from worlds.city.generation.city_structures import City
 from worlds.city.growth.stage_structures import GrowingCity
 from worlds.city.stages import Stages, load_stages
-from worlds.maps import (
-    MESH_FOLDER,
-    STAGES_NAME,
-    STRUCTURES_NAME,
-    stage_name,
-)
+from worlds.maps import MESH_FOLDER, STAGES_NAME, stage_name
 from worlds.shapes import (
     CLASS_RGB,
+    STRUCTURES_NAME,
     BoxShape,
     Mesh,
     MeshShape,

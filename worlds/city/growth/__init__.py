@@ -1,1 +1,1 @@
-"""Earlier stages: lower buildings, sites, and lots with another use."""
+"""Earlier stages: building sites, and lots with another use."""

@@ -17,16 +17,17 @@ from shapely.geometry.base import BaseGeometry
 
 from evaluation.base import parse_yaml
 from worlds.city.buildings import ARCHETYPES, sample
-from worlds.city.growth.lowering import lowered
-from worlds.city.placement.objects import OBJECTS, pick_key
-from worlds.city.plants import younger_plant
 from worlds.city.stages import LotUse, Stages
 from worlds.shapes import (
+    OBJECTS,
     Model,
     Occupancy,
     Part,
     Structure,
     largest_rectangle,
+    lowered,
+    pick_key,
+    younger_plant,
 )
 
 # Distance of objects from the edges of the lot, where the neighbours stand [m].

@@ -11,11 +11,10 @@ from shapely.geometry.base import BaseGeometry
 from evaluation.base import InputError, value_errors
 from worlds.city.buildings import ARCHETYPES, sample
 from worlds.city.city_plan import BuildingPlan, RowPlan
-from worlds.city.facades.site import Site
 from worlds.city.ground.districts import District
 from worlds.city.placement.draft import Draft
 from worlds.city.placement.frontage import Lot, lines_along, lot_at
-from worlds.shapes import Structure, placed
+from worlds.shapes import Site, Structure, placed
 
 # Neighbours closer than this get blank walls on the sides that face each other.
 # It leaves room for the eaves and balconies of both [m].

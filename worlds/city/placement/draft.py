@@ -13,10 +13,10 @@ from shapely.ops import unary_union
 
 from worlds.city.city_plan import CityPlan
 from worlds.city.ground.elevation import Ground, LevelGround
-from worlds.city.placement.objects import OBJECTS
-from worlds.city.plants import SPECIES
 from worlds.roads import Areas
 from worlds.shapes import (
+    OBJECTS,
+    SPECIES,
     MeshShape,
     Model,
     Occupancy,
@@ -215,7 +215,7 @@ def name_stem(object_kind: str) -> str:
     """Returns the everyday word for an object, with which its name begins.
 
     For example, the word for `lime_tree` is `tree`. `object_kind` is a key of
-    `worlds.city.placement.objects.OBJECTS`.
+    `worlds.shapes.OBJECTS`.
     """
     if object_kind in SPECIES:
         return "tree"

@@ -14,8 +14,8 @@ from worlds.city.city_plan import LinePlan, ObjectPlan, ScatterPlan
 from worlds.city.ground.districts import District
 from worlds.city.placement.draft import Draft
 from worlds.city.placement.frontage import station_at
-from worlds.city.placement.objects import OBJECTS, pick_key
 from worlds.city.placement.parking import park_in_bays
+from worlds.shapes import OBJECTS, pick_key
 
 # Least distance between two objects [m].
 _CLEARANCE = 0.15

@@ -9,8 +9,8 @@ import shapely
 
 from worlds.city.city_plan import ParkingPlan
 from worlds.city.placement.draft import Draft
-from worlds.city.placement.objects import OBJECTS, pick_key
 from worlds.roads import RoadNetwork
+from worlds.shapes import OBJECTS, pick_key
 
 # Length of a parking bay along the street, least and greatest [m].
 _BAY_LENGTH = (5.6, 7.0)

@@ -13,7 +13,7 @@ from worlds.city.city_plan import StreetPlan
 from worlds.city.ground.districts import District
 from worlds.city.placement.draft import Draft
 from worlds.city.placement.frontage import Station, lines_along, station_at
-from worlds.city.placement.objects import OBJECTS, pick_key
+from worlds.shapes import OBJECTS, pick_key
 
 # Distance from the kerb to an object's nearest point [m].
 _FROM_KERB_OF = {"lamp": 0.45, "tree": 0.9, "furniture": 0.6}

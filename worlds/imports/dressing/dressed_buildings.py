@@ -16,12 +16,6 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from worlds.city import (
-    Assembly,
-    Site,
-    add_chimney,
-    equip_roof,
-)
 from worlds.imports.dressing import facade_pieces
 from worlds.imports.dressing.facade_plan import (
     FacadePlan,
@@ -43,10 +37,14 @@ from worlds.imports.named_randomness import random_generator
 from worlds.imports.streets import Street
 from worlds.shapes import (
     GRID,
+    Assembly,
     Finish,
     MeshShape,
     Model,
+    Site,
     UpperSides,
+    add_chimney,
+    equip_roof,
     long_normals,
     looks_up,
     turned_up,

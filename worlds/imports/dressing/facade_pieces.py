@@ -14,7 +14,6 @@ import shapely
 from shapely.geometry import box
 
 from worlds.city import (
-    Assembly,
     AwningShape,
     Relief,
     balcony,
@@ -42,6 +41,7 @@ from worlds.imports.faces import parts_of
 from worlds.imports.imported_objects import to_mesh
 from worlds.shapes import (
     GRID,
+    Assembly,
     Mesh,
     triangulate,
 )

@@ -11,10 +11,7 @@ from shapely.geometry import LineString, MultiLineString, MultiPoint, Point
 from shapely.geometry.base import BaseGeometry
 
 from evaluation.base import parse_yaml
-from worlds.city import (
-    pick_key,
-    station_at,
-)
+from worlds.city import station_at
 from worlds.imports.dressing.guessed_streets import HALF_STREET
 from worlds.imports.dressing.street_room import (
     PlacedObjects,
@@ -27,7 +24,7 @@ from worlds.imports.ground import Ground
 from worlds.imports.imported_objects import ImportedObject
 from worlds.imports.named_randomness import random_generator
 from worlds.imports.streets import Street
-from worlds.shapes import Structure
+from worlds.shapes import Structure, pick_key
 
 # Distance between random lamps, and from them to those of the file [m].
 _LAMP_EVERY = 27.0

@@ -10,16 +10,14 @@ from shapely.geometry import LineString, MultiLineString, Point
 from shapely.geometry.base import BaseGeometry
 
 from evaluation.base import revolved
-from worlds.city import (
-    OBJECTS,
-    PARKED_CARS,
-    name_stem,
-)
+from worlds.city import name_stem
 from worlds.imports.drives.steerable_drives import WaypointRoute
 from worlds.imports.faces import joined_triangles
 from worlds.imports.ground import Ground
 from worlds.imports.imported_objects import ImportedObject
 from worlds.shapes import (
+    OBJECTS,
+    PARKED_CARS,
     CylinderShape,
     Mesh,
     MeshShape,
@@ -179,7 +177,7 @@ class StreetRoom:
         Args:
             name: name of the new structure.
             kind: kind of object, a key of
-                `worlds.city.placement.objects.OBJECTS`.
+                `worlds.shapes.OBJECTS`.
             xy: position of the object's centre in W [m].
             yaw: heading of the object in W [rad].
             rng: random generator for the object's variant and colours.

@@ -9,9 +9,9 @@ from matplotlib.colors import to_rgb
 import numpy as np
 
 from evaluation.base import parse_yaml
-from worlds.city import Dice
 from worlds.imports.openstreetmap.tags import count
 from worlds.shapes import (
+    Dice,
     Finish,
     triple,
 )

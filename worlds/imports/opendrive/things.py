@@ -13,11 +13,7 @@ from shapely.geometry import LineString, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from evaluation.base import Element, step_lengths
-from worlds.city import (
-    OBJECTS,
-    name_stem,
-    tree,
-)
+from worlds.city import name_stem
 from worlds.imports.faces import repaired
 from worlds.imports.faults import ImportFaults
 from worlds.imports.imported_objects import make_object
@@ -26,8 +22,10 @@ from worlds.imports.opendrive.road_model import ImportedRoad, Thing
 from worlds.imports.solids import extruded
 from worlds.shapes import (
     GRID,
+    OBJECTS,
     Structure,
     placed,
+    tree,
 )
 
 # Greatest number of repetitions of an object.

@@ -20,7 +20,6 @@ from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from evaluation.base import InputError
-from worlds.city import tree
 from worlds.imports import faces
 from worlds.imports.colours import WHITE_PAINT
 from worlds.imports.faults import ImportFaults
@@ -81,7 +80,7 @@ from worlds.imports.part_tables import PartTable
 from worlds.imports.solids import extruded
 from worlds.imports.streets import Street
 from worlds.maps import LocalMetres
-from worlds.shapes import Structure
+from worlds.shapes import Structure, tree
 
 _PARTS = PartTable(Path(__file__).with_name("parts.yaml"))
 # Greatest height of a barrier [m].
@@ -447,7 +446,7 @@ def _trees(
 def _object_kind(tags: Tags) -> str | None:
     """Returns the kind of small object that a node's tags describe.
 
-    The kind is a key of `worlds.city.placement.objects.OBJECTS`, or None for
+    The kind is a key of `worlds.shapes.OBJECTS`, or None for
     a node without such an object.
     """
     kinds: list[str] = [

@@ -5,6 +5,7 @@ import pytest
 from scipy.stats import poisson
 import shapely
 
+from cns_drake.scene import geometry_by_structure, load_world
 from worlds.ageing import DEFAULT_RATES
 from worlds.ageing.aged_map import AgeingCity
 from worlds.ageing.old_world import OldWorld
@@ -13,7 +14,9 @@ from worlds.maps import MapFolder
 
 @pytest.fixture(scope="module")
 def world(town):
-    return OldWorld(MapFolder(town))
+    return OldWorld(
+        MapFolder(town), lambda stage: geometry_by_structure(load_world(stage))
+    )
 
 
 @pytest.mark.slow

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from shapely.geometry import Polygon
 
-from worlds.city.facades import outlines, solids
+from worlds.city.facades import solids
 from worlds.city.facades.reliefs import Arch, Patch
 from worlds.city.facades.walls import Facade, facade_mesh, glass_mesh
+from worlds.shapes import outlines
 from worlds.shapes.mesh import merge_meshes
 
 # A rectangle turned by 30 degrees and moved off the origin.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from shapely.geometry import Polygon
 
-from worlds.city.facades import outlines
+from worlds.shapes import outlines
 
 # Numbers of the front corners of a rectangular site.
 FRONT_LEFT = 0

@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from worlds.city import (
-    OBJECTS,
-    younger_plant,
-)
-from worlds.shapes import part_mesh
+from worlds.shapes import OBJECTS, part_mesh, younger_plant
 
 
 @pytest.mark.parametrize("species", ["palm", "spruce", "hedge", "plane_tree"])

@@ -7,16 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from evaluation.base import parse_yaml
-from worlds.city.dice import Dice, Rgb
-from worlds.shapes import (
-    ROOT_DEPTH,
-    Builder,
-    MeshShape,
-    Model,
-    Part,
-    assemble,
-    block,
-)
+from worlds.shapes.dice import Dice, Rgb
+from worlds.shapes.models import MeshShape, Model, Part
+from worlds.shapes.object_models import ROOT_DEPTH, Builder, assemble, block
 
 # Greatest number of panels in one mesh; there are meshes of 1, 2, 4 and 8.
 _MOST_PANELS = 8

@@ -6,18 +6,17 @@ import math
 
 import numpy as np
 
-from worlds.city.dice import Dice
-from worlds.city.furniture.object_data import CHOICES, COLOURS
-from worlds.shapes import (
+from worlds.shapes.dice import Dice
+from worlds.shapes.models import Model, Part
+from worlds.shapes.object_models import (
     Builder,
-    Model,
-    Part,
     assemble,
     bar,
     block,
     in_a_row,
     mesh_part,
 )
+from worlds.shapes.objects.object_data import CHOICES, COLOURS
 
 # Length of a section of a crane's mast or jib [m].
 _SECTION_M = 4

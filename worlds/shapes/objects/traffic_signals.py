@@ -5,18 +5,17 @@ Traffic that drives towards -y has the mast on its right.
 
 import numpy as np
 
-from worlds.city.dice import Dice
-from worlds.city.furniture.object_data import COLOURS
-from worlds.shapes import (
+from worlds.shapes.dice import Dice
+from worlds.shapes.models import Model, Part
+from worlds.shapes.object_models import (
     Builder,
-    Model,
-    Part,
     assemble,
     bar,
     block,
     mesh_part,
     post,
 )
+from worlds.shapes.objects.object_data import COLOURS
 
 # Height of the mast that carries an arm [m].
 _MAST_M = 6.3

@@ -1,4 +1,6 @@
-"""The ground of a loaded world: carriageways, heights and kerbs."""
+"""The ground of a world: carriageways, heights and kerbs."""
+
+from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -6,22 +8,18 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from cns_drake.transient.structure_geometry import (
-    PartGeometry,
-    StructureGeometry,
-    triangle_corners,
-)
-from worlds.shapes import (
-    GROUND_CLASSES,
-    UpperSides,
+from worlds.shapes.polygons import Area, polygons_of
+from worlds.shapes.semantics import GROUND_CLASSES
+from worlds.shapes.structure_geometry import PartGeometry, StructureGeometry
+from worlds.shapes.triangles import (
     from_above,
-    polygons_of,
+    quartered,
     turned_up,
     unit_normals,
 )
+from worlds.shapes.upper_sides import UpperSides
 
 # Steeper surfaces are not ground: least z of the unit normal.
 _LEAST_UP = 0.3
@@ -51,7 +49,9 @@ class GroundSurface:
     """
 
     def __init__(
-        self, structures: Mapping[str, StructureGeometry], near: BaseGeometry
+        self,
+        structures: Mapping[str, StructureGeometry],
+        near: Area,
     ):
         """Collects the ground in an area.
 
@@ -72,15 +72,32 @@ class GroundSurface:
 
     def _near_triangles(self, part: PartGeometry) -> np.ndarray:
         """Returns the corners (M, 3, 3) of triangles that are not steep [m]."""
-        corners = turned_up(triangle_corners(part))
+        corners = turned_up(part.triangle_corners)
         middles = corners[:, :, :2].mean(axis=1)
         return corners[
             (unit_normals(corners)[:, 2] > _LEAST_UP)
             & shapely.contains_xy(self.near, middles)
         ]
 
+    @classmethod
+    def around(
+        cls,
+        structures: Mapping[str, StructureGeometry],
+        places: np.ndarray,
+        distance: float,
+    ) -> GroundSurface:
+        """Returns the ground in and around the bounding box of places (N, 2).
+
+        Args:
+            structures: name -> geometry, for all structures of the world.
+            places: the places in W [m].
+            distance: distance up to which the ground is known around them [m].
+        """
+        box = shapely.box(*places.min(axis=0), *places.max(axis=0))
+        return cls(structures, box.buffer(distance))
+
     @cached_property
-    def carriageway(self) -> BaseGeometry:
+    def carriageway(self) -> Area:
         """The area of class `road`, seen from above [m]."""
         joined = shapely.unary_union(from_above(self._roads), grid_size=0.001)
         return joined.buffer(_SEAM).buffer(-_SEAM)
@@ -113,7 +130,7 @@ class GroundSurface:
         """
         return self._sides[of_road].levels(xy)
 
-    def lowest(self, area: BaseGeometry, default: float) -> float:
+    def lowest(self, area: Area, default: float) -> float:
         """Returns the least height of the ground at the corners of an area [m].
 
         The result is `default` if there is no ground at any corner.
@@ -132,6 +149,48 @@ class GroundSurface:
         """
         z = self.heights(np.array([old, new]))
         return float(z[1] - z[0]) if np.isfinite(z).all() else 0.0
+
+    def is_below_road(self, part: PartGeometry) -> bool:
+        """Returns whether a piece of ground continues below a carriageway."""
+        corners = turned_up(part.triangle_corners)
+        corners = corners[unit_normals(corners)[:, 2] > 0.0]
+        inner = self.carriageway.buffer(-0.5)
+        if inner.is_empty or len(corners) == 0:
+            return False
+        shapely.prepare(inner)
+        return bool(shapely.intersects(from_above(corners), inner).any())
+
+    def triangles_beside_road(
+        self, corners: np.ndarray, fine: float
+    ) -> np.ndarray:
+        """Returns the parts of triangles beside the carriageway.
+
+        Triangles that its edge crosses are divided; they become part of the
+        result if their middle is beside the carriageway.
+
+        Args:
+            corners: (M, 3, 3) corners of triangles in W [m].
+            fine: longest side of triangles that are divided no further [m].
+        """
+        corners = corners[shapely.intersects(from_above(corners), self.near)]
+        road = self.carriageway
+        shapely.prepare(road)
+        done = [np.zeros((0, 3, 3))]
+        while len(corners):
+            areas = from_above(corners)
+            meets = shapely.intersects(areas, road)
+            done.append(corners[~meets])
+            corners = corners[meets]
+            corners = corners[~shapely.covers(road, areas[meets])]
+            sides = np.linalg.norm(
+                corners - np.roll(corners, -1, axis=1), axis=2
+            ).max(axis=1)
+            is_fine = sides <= fine
+            last = corners[is_fine]
+            middles = last[:, :, :2].mean(axis=1)
+            done.append(last[~shapely.contains_xy(road, middles)])
+            corners = quartered(corners[~is_fine])
+        return np.concatenate(done)
 
     def kerbs(self, spacing: float) -> Iterator[Kerb]:
         """Yields the edges of the carriageway within the area `near`.

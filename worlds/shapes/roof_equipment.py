@@ -6,8 +6,8 @@ import math
 import numpy as np
 from shapely.geometry import Point, Polygon
 
-from worlds.city.facades.assembly import Assembly
-from worlds.shapes import Finish
+from worlds.shapes.assembly import Assembly
+from worlds.shapes.models import Finish
 
 # Random places at which a piece is tried before it is left out.
 _PLACE_TRIES = 30

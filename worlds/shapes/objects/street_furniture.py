@@ -4,14 +4,10 @@ import math
 
 import numpy as np
 
-from worlds.city.dice import Dice, Rgb
-from worlds.city.furniture.object_data import CHOICES, COLOURS
-from worlds.shapes import (
+from worlds.shapes.dice import Dice, Rgb
+from worlds.shapes.models import MeshShape, Model, Part, SphereShape
+from worlds.shapes.object_models import (
     Builder,
-    MeshShape,
-    Model,
-    Part,
-    SphereShape,
     assemble,
     block,
     in_a_row,
@@ -19,6 +15,7 @@ from worlds.shapes import (
     pillar,
     post,
 )
+from worlds.shapes.objects.object_data import CHOICES, COLOURS
 
 _PLAIN: Rgb = (1.0, 1.0, 1.0)
 

@@ -4,18 +4,16 @@ import math
 
 import numpy as np
 
-from worlds.city.dice import Dice
-from worlds.city.furniture.object_data import CHOICES, COLOURS
-from worlds.shapes import (
+from worlds.shapes.dice import Dice
+from worlds.shapes.models import CylinderShape, Model, Part
+from worlds.shapes.object_models import (
     Builder,
-    CylinderShape,
-    Model,
-    Part,
     assemble,
     block,
     mesh_part,
     post,
 )
+from worlds.shapes.objects.object_data import CHOICES, COLOURS
 
 # Radius of a round sign [m].
 _ROUND_RADIUS_M = 0.32

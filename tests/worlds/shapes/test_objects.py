@@ -5,13 +5,11 @@ import numpy as np
 import pytest
 from shapely.geometry import MultiPoint
 
-from worlds.city import (
-    OBJECTS,
-    SPECIES,
-)
 from worlds.shapes import (
     CLASS_IDS,
     OBJECT_MESHES,
+    OBJECTS,
+    SPECIES,
     Mesh,
     MeshShape,
     part_mesh,

@@ -3,8 +3,8 @@ from helpers.mesh_checks import rotation_matrix
 import numpy as np
 import pytest
 
-from worlds.city import OBJECTS
 from worlds.shapes import (
+    OBJECTS,
     assemble,
     bar,
     block,

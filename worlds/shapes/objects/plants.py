@@ -7,17 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from worlds.shapes import (
+from worlds.shapes.models import (
     BoxShape,
-    Builder,
     MeshShape,
     Model,
     Part,
-    assemble,
-    object_mesh,
     part_mesh,
     triple,
 )
+from worlds.shapes.object_models import Builder, assemble, object_mesh
 
 # Tall trees are also wider, but less than in proportion: the width grows with
 # this power of the height.

@@ -5,9 +5,10 @@ import math
 
 import numpy as np
 
-from worlds.city.dice import Dice, Rgb
-from worlds.city.furniture.object_data import CHOICES, COLOURS
-from worlds.shapes import Builder, Model, assemble, mesh_part
+from worlds.shapes.dice import Dice, Rgb
+from worlds.shapes.models import Model
+from worlds.shapes.object_models import Builder, assemble, mesh_part
+from worlds.shapes.objects.object_data import CHOICES, COLOURS
 
 # There are four meshes of shrubs.
 _LETTERS = "abcd"

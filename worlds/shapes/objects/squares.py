@@ -4,17 +4,17 @@ import math
 
 import numpy as np
 
-from worlds.city.dice import Dice
-from worlds.city.furniture.object_data import CHOICES, COLOURS
-from worlds.shapes import (
+from worlds.shapes.dice import Dice
+from worlds.shapes.models import Model
+from worlds.shapes.object_models import (
     Builder,
-    Model,
     assemble,
     block,
     in_a_row,
     mesh_part,
     post,
 )
+from worlds.shapes.objects.object_data import CHOICES, COLOURS
 
 
 def statue(rng: np.random.Generator) -> Model:

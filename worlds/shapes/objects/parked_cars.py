@@ -8,14 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from worlds.shapes import (
-    Builder,
-    MeshShape,
-    Model,
-    Part,
-    assemble,
-    triple,
-)
+from worlds.shapes.models import MeshShape, Model, Part, triple
+from worlds.shapes.object_models import Builder, assemble
 
 # Paint colours, roughly in the shares seen on the road.
 PAINTS = (

@@ -8,8 +8,9 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from evaluation.base import parse_yaml
-from worlds.city.dice import Dice, Rgb
-from worlds.shapes import Builder, Model, assemble, mesh_part
+from worlds.shapes.dice import Dice, Rgb
+from worlds.shapes.models import Model
+from worlds.shapes.object_models import Builder, assemble, mesh_part
 
 
 class _OneMesh(BaseModel, frozen=True, extra="forbid"):

@@ -5,17 +5,17 @@ import math
 
 import numpy as np
 
-from worlds.city.dice import Dice
-from worlds.city.furniture.object_data import COLOURS
-from worlds.shapes import (
+from worlds.shapes.dice import Dice
+from worlds.shapes.models import Model
+from worlds.shapes.object_models import (
     Builder,
-    Model,
     assemble,
     bar,
     block,
     mesh_part,
     post,
 )
+from worlds.shapes.objects.object_data import COLOURS
 
 # Distance of the ends of straight arms from the mast [m].
 _ARM_M = 1.9

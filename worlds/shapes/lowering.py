@@ -13,19 +13,13 @@ from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from worlds.city.facades import Assembly, Site, equip_roof
-from worlds.shapes import (
-    Finish,
-    Mesh,
-    MeshShape,
-    Model,
-    Part,
-    part_mesh,
-    polygons_of,
-    snap,
-    surface_mesh,
-    wall_mesh,
-)
+from worlds.shapes.assembly import Assembly
+from worlds.shapes.mesh import Mesh
+from worlds.shapes.models import Finish, MeshShape, Model, Part, part_mesh
+from worlds.shapes.polygon_meshes import surface_mesh, wall_mesh
+from worlds.shapes.polygons import polygons_of, snap
+from worlds.shapes.roof_equipment import equip_roof
+from worlds.shapes.site import Site
 
 # Walls and the glass behind them count as one if they are this close [m].
 _REVEAL = 0.7

@@ -6,9 +6,11 @@ from matplotlib.figure import Figure
 import matplotlib.image
 import numpy as np
 
-from cns_drake.pictures import StageScene, View
+from cns_drake.motion import Trajectory
+from cns_drake.pictures.camera_views import View
+from cns_drake.pictures.stage_scene import StageScene
 from evaluation.base import doing, figure_style, save_figure
-from worlds.ageing.aged_map import AgedMap
+from worlds.ageing import AgedMap
 from worlds.maps import stage_name
 
 PICTURES = "pictures"
@@ -27,23 +29,29 @@ _SPACING = 25.0
 _SEEN = 60.0
 
 
-def street_views(aged: AgedMap) -> dict[str, View]:
+def street_views(
+    changed: np.ndarray, trajectory: Trajectory
+) -> dict[str, View]:
     """Returns camera views that show many changed buildings.
 
-    The cameras stand apart from each other on the path of the map's last drive,
-    and look in the direction of travel.
+    The cameras stand apart from each other on the path of a drive, and look in
+    the direction of travel.
+
+    Args:
+        changed: (N, 3) places of changed buildings in W [m].
+        trajectory: the drive.
 
     Returns:
         Name -> view. The names are `street_1`, `street_2` and so on, in the
         order in which the drive passes the cameras.
     """
-    way = aged.trajectory
-    times = np.linspace(0.0, way.duration, int(way.length / _SPACING) + 2)[:-1]
-    R_WBs, p_WBs = way.poses(times)
+    number = int(trajectory.length / _SPACING) + 2
+    times = np.linspace(0.0, trajectory.duration, number)[:-1]
+    R_WBs, p_WBs = trajectory.poses(times)
     ahead = np.array(R_WBs)[:, :, 0]
     seen = []
     for p, d in zip(p_WBs, ahead, strict=True):
-        to = aged.changed - p
+        to = changed - p
         far = np.linalg.norm(to[:, :2], axis=1)
         is_seen = (far < _SEEN) & (to @ d > 0.5 * far)
         seen.append(int(is_seen.sum()))
@@ -64,9 +72,9 @@ def street_views(aged: AgedMap) -> dict[str, View]:
     return views
 
 
-def air_view(aged: AgedMap) -> View:
-    """Returns a view from the air of the area around the map's last drive."""
-    _, p = aged.trajectory.poses(np.linspace(0.0, aged.trajectory.duration, 99))
+def air_view(trajectory: Trajectory) -> View:
+    """Returns a view from the air of the area around a drive."""
+    _, p = trajectory.poses(np.linspace(0.0, trajectory.duration, 99))
     x, y, z = (p.min(axis=0) + p.max(axis=0)) / 2
     half = float(np.ptp(p, axis=0)[:2].max()) / 2
     up = (x - 0.9 * half, y - 1.1 * half, z + 1.2 * half)
@@ -74,7 +82,7 @@ def air_view(aged: AgedMap) -> View:
 
 
 @figure_style()
-def draw_pictures(folder: Path, aged: AgedMap) -> None:
+def draw_aged_city(folder: Path, aged: AgedMap, trajectory: Trajectory) -> None:
     """Writes a picture of each view in each year, and a picture of all views.
 
     The files are `pictures/year_<year>_<view>.jpg` and `pictures/film.jpg` in
@@ -82,9 +90,11 @@ def draw_pictures(folder: Path, aged: AgedMap) -> None:
 
     Args:
         folder: folder of the map.
-        aged: stages and last drive of the map.
+        aged: stages of the map.
+        trajectory: drive from which the streets are seen.
     """
-    views = {"air": air_view(aged), **street_views(aged)}
+    streets = street_views(aged.changed, trajectory)
+    views = {"air": air_view(trajectory), **streets}
     years = sorted(aged.years, key=lambda stage: aged.years[stage])
     (folder / PICTURES).mkdir()
     figure = Figure(

@@ -9,18 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from shapely.geometry.base import BaseGeometry
 
-from worlds.city.dice import Dice
-from worlds.city.facades.site import Site
-from worlds.shapes import (
-    Finish,
-    Mesh,
-    MeshShape,
-    Model,
-    Part,
-    Shape,
-    merge_meshes,
-    object_mesh,
-)
+from worlds.shapes.dice import Dice
+from worlds.shapes.mesh import Mesh, merge_meshes
+from worlds.shapes.models import Finish, MeshShape, Model, Part, Shape
+from worlds.shapes.object_models import object_mesh
+from worlds.shapes.site import Site
 
 _GLASS = Finish((0.20, 0.26, 0.31), "glass")
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from worlds.city import Dice
+from worlds.shapes import Dice
 
 
 def test_numbers_lie_in_their_ranges_and_keep_their_digits():

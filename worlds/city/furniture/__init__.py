@@ -1,1 +1,0 @@
-"""Objects on streets, squares and building sites, except plants."""

@@ -1,0 +1,1 @@
+"""Objects on streets, squares and building sites: a family, a file each."""
