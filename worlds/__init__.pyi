@@ -1,4 +1,3 @@
-from .ageing import age_map as age_map
 from .city import generate_city as generate_city
 from .imports import ImportOptions as ImportOptions
 from .imports import import_city as import_city

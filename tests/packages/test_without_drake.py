@@ -37,7 +37,7 @@ ABSENT = {
         "shapely",
         "worlds",
     ),
-    "worlds": ("cns_drake", "embreex", "open3d", "pydrake"),
+    "worlds": ("cns_drake", "open3d", "pydrake"),
 }
 
 
