@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 import shlex
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -19,15 +19,9 @@ from evaluation.base import (
     terminal,
     whole_number,
 )
-from worlds.imports import (
-    REPORT_NAME,
-    DriveOn,
-    ImportOptions,
-    ImportReport,
-    Undated,
-    map_sources,
-)
-from worlds.maps import MapFolder
+
+if TYPE_CHECKING:
+    from worlds.imports import ImportOptions, ImportReport
 
 GROUP = "Make cities"
 
@@ -40,14 +34,14 @@ def import_(
     output: Annotated[Path, typer.Option()],
     years: Annotated[list[int] | None, typer.Option(metavar="YEAR ...")] = None,
     year_attribute: Annotated[str | None, typer.Option(metavar="NAME")] = None,
-    undated: Undated = "first",
+    undated: Literal["first", "last", "never"] = "first",
     lod: float | None = None,
     seed: Annotated[int, typer.Option(min=0)] = 0,
     along: Annotated[Path | None, typer.Option(metavar="WAYPOINTS")] = None,
     within: Annotated[
         float | None, typer.Option(min=1.0, metavar="METRES")
     ] = None,
-    drive_on: DriveOn | None = None,
+    drive_on: Literal["right", "left"] | None = None,
     grow: Annotated[
         float | None, typer.Option(min=0.01, max=0.9, metavar="PART")
     ] = None,
@@ -60,7 +54,8 @@ def import_(
     drives along the map's streets.
 
     Args:
-        source: File of the city: FORMATS.
+        source: File of the city: CityJSON (.json, .jsonl), OpenDRIVE (.xodr),
+            OpenStreetMap (.osm, .pbf).
         output: Folder of the map to write; its name becomes the map's name.
         years: Years for which to make stages. The stage of a year contains the
             buildings that were built in that year or earlier.
@@ -105,6 +100,14 @@ def import_(
         raise InputError(
             "--grow: not with --plain, which adds nothing at random"
         )
+    with ended_by_interrupts("cns-drake"):
+        from cns_drake.scenarios import write_table
+        from worlds.imports import (
+            ImportOptions,
+            import_city,
+            with_usual_growth,
+        )
+
     options = ImportOptions(
         stages,
         year_attribute,
@@ -117,10 +120,6 @@ def import_(
         grow,
         dressed=not plain,
     )
-    with ended_by_interrupts("cns-drake"):
-        from cns_drake.scenarios import write_table
-        from worlds.imports import import_city, with_usual_growth
-
     options = with_usual_growth(path, options)
     with errors_at_option("--output", "output"):
         report = import_city(
@@ -143,15 +142,6 @@ def import_(
     terminal.show(
         values, _report_rows(report, output, options.years), json=json
     )
-
-
-# The help lists the formats.
-import_.__doc__ = (import_.__doc__ or "").replace(
-    "FORMATS",
-    ", ".join(
-        f"{one.title} ({', '.join(one.suffixes)})" for one in map_sources()
-    ),
-)
 
 
 def _shortcomings(
@@ -182,6 +172,9 @@ def _report_rows(
     report: ImportReport, output: Path, years: tuple[int, ...]
 ) -> Iterator[tuple[str, str]]:
     """Yields lines with the most important numbers, and the next command."""
+    from worlds.imports import REPORT_NAME
+    from worlds.maps import MapFolder
+
     kinds = sorted(report.kinds.items(), key=lambda item: -item[1])
     parts = [f"{number} {kind}" for kind, number in kinds]
     yield "structures", _shortened(parts)

@@ -10,6 +10,7 @@ import cns_drake
 from cns_drake import command_line as cli
 from evaluation import command_line as evaluation_cli
 from evaluation.lidar_sheets import LIDAR_PRESETS
+from worlds.imports import map_sources
 
 PROGRAMS = {
     "cns-drake": typer.main.get_command(cli.app),
@@ -120,3 +121,11 @@ def test_completion(program, begun, completed, capsys, monkeypatch):
     monkeypatch.setenv("COMP_WORDS", words)
     monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
     assert run(capsys, program).split() == completed
+
+
+def test_the_formats_of_cities_are_listed():
+    source = find("cns-drake", "import").params[0]
+    formats = [
+        f"{one.title} ({', '.join(one.suffixes)})" for one in map_sources()
+    ]
+    assert source.help == f"File of the city: {', '.join(formats)}."
