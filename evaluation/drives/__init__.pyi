@@ -4,13 +4,10 @@ from .data_set_check import data_set_checks as data_set_checks
 from .deskewing import deskew as deskew
 from .deskewing import deskewed_notes as deskewed_notes
 from .deskewing import deskewed_scan as deskewed_scan
-from .drive import IMU_DTYPE as IMU_DTYPE
 from .drive import POSES_FRAME as POSES_FRAME
 from .drive import Drive as Drive
 from .drive import ImuSamples as ImuSamples
-from .drive import as_given as as_given
 from .drive import index_instances as index_instances
-from .drive import poses_frame as poses_frame
 from .drive_scenario import SCENARIO as SCENARIO
 from .drive_scenario import driven_way as driven_way
 from .drive_scenario import read_scenario as read_scenario
@@ -67,6 +64,5 @@ from .sources import DriveSource as DriveSource
 from .sources import JoinedSource as JoinedSource
 from .sources import Placement as Placement
 from .sources import RecordingSource as RecordingSource
-from .stamped_poses import StampedPoses as StampedPoses
 from .trajectories import read_poses as read_poses
 from .utm_poses import ORIGIN as ORIGIN
