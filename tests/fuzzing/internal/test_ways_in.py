@@ -357,8 +357,8 @@ def read_tables(folder):
 
 TABLES = ("evaluation.base.read_rows", "evaluation.base.read_records",
           "evaluation.base.parse_rows", "evaluation.recognition.read_overlaps",
-          "cns_drake.scene.load_structure_table",
-          "cns_drake.scene.read_materials")  # fmt: skip
+          "worlds.shapes.load_structure_table",
+          "worlds.shapes.read_materials")  # fmt: skip
 
 
 @way("csv: columns", "x.csv", *TABLES, use=read_tables)
@@ -897,8 +897,8 @@ def _(folder):
 
 
 @way(
-    "a mesh of a city", "m.obj", "worlds.city.read_mesh",
-    use=at_door("worlds.city", "read_mesh", "m.obj"),
+    "a mesh of a city", "m.obj", "worlds.shapes.read_mesh",
+    use=at_door("worlds.shapes", "read_mesh", "m.obj"),
 )  # fmt: skip
 def _(folder):
     (folder / "m.obj").write_text("v 1 2 3\n" * 100_000)
@@ -1233,6 +1233,7 @@ def _(folder):
 
 # --- The tests
 
+HOUSES = ("cns_drake", "evaluation", "worlds")
 # Public names that look like readers, and read no file of a user by themselves.
 NO_FILES = {
     "evaluation.base.decode_text": "bytes that are in memory",
@@ -1280,7 +1281,7 @@ OPENERS = {
     "yaml.compose": ("worlds.city.generation.generate",),
     "json.load": (),
     "zstandard.decompress": ("evaluation.drives.mcap_file",),
-    "zstandard.ZstdDecompressor": ("evaluation.base.jobs.parts",),
+    "zstandard.ZstdDecompressor": ("evaluation.study.parts",),
     "lz4.frame.decompress": (),
     "lz4.frame.LZ4FrameDecompressor": ("evaluation.drives.mcap_file",),
     # What another process of this program has sent.
@@ -1303,7 +1304,7 @@ def offered_readers():
     from worlds.imports import map_sources
 
     found = set()
-    for package in ("cns_drake", "evaluation", "worlds"):
+    for package in HOUSES:
         for door in sorted((ROOT / package).glob("*/__init__.pyi")):
             home = f"{package}.{door.parent.name}"
             names = filter(_READER.match, listed(home))
@@ -1334,9 +1335,7 @@ def test_archives_are_opened_in_one_place():
     found = {}
     ends = {name.rpartition(".")[2] for name in OPENERS}
     for path in sorted(
-        path
-        for house in ("cns_drake", "evaluation", "worlds")
-        for path in (ROOT / house).rglob("*.py")
+        path for house in HOUSES for path in (ROOT / house).rglob("*.py")
     ):
         module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
