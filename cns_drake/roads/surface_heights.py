@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from cns_drake.base import cos, sin
 from cns_drake.roads.network import RoadNetwork
 
 # Returns the heights (N,) of sidewalks above the road at places (N, 2) [m].
@@ -61,9 +62,7 @@ class RoadSurface:
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
         _, index = self._tree.query(xy)
         x, y, _, heading = self._places[index].T
-        ahead = (xy[:, 0] - x) * np.cos(heading) + (xy[:, 1] - y) * np.sin(
-            heading
-        )
+        ahead = (xy[:, 0] - x) * cos(heading) + (xy[:, 1] - y) * sin(heading)
         # On the inside of a bend, the tangent would lead beyond the
         # neighbouring place.
         ahead = np.clip(ahead, -_SPACING, _SPACING)

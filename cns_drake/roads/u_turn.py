@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base import cos, sin
+from cns_drake.base import cos, dot, sin
 from cns_drake.roads.car_outline import swept_area
 from cns_drake.roads.centreline import Centreline, sample_stations
 
@@ -127,7 +127,7 @@ def find_u_turn(
             return UTurn(begin, points)
         middle = _loop_centre(np.array([x, y]), heading, width)
         left = np.array([-math.sin(heading), math.cos(heading)])
-        sideways = (shapely.get_coordinates(swept) - middle) @ left
+        sideways = dot(shapely.get_coordinates(swept) - middle, left)
         needed = min(needed, 2 * np.abs(sideways).max())
         place = Point(middle)
         if area.covers(place):

@@ -31,7 +31,7 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-from cns_drake.base import InputError
+from cns_drake.base import InputError, cos, sin
 from cns_drake.scene import surfaces
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.mesh_files import MeshFiles, mesh_shape_key
@@ -433,8 +433,8 @@ def _cone(shape: shapes.MeshcatCone) -> TriangleSurface:
     angle = 2.0 * np.pi * np.arange(_CONE_SIDES) / _CONE_SIDES
     corners = np.zeros((2 + _CONE_SIDES, 3))
     corners[1:, 2] = shape.height()
-    corners[2:, 0] = shape.a() * np.cos(angle)
-    corners[2:, 1] = shape.b() * np.sin(angle)
+    corners[2:, 0] = shape.a() * cos(angle)
+    corners[2:, 1] = shape.b() * sin(angle)
     first = 2 + np.arange(_CONE_SIDES)
     second = np.roll(first, -1)
     point, middle = np.zeros_like(first), np.ones_like(first)

@@ -11,6 +11,7 @@ import itertools
 
 import numpy as np
 
+from cns_drake.base import dot
 from cns_drake.city.facades import bays, outlines, roofs
 from cns_drake.city.facades.wall_frames import WallFrame
 
@@ -189,7 +190,7 @@ def free_stretches(
     for other in hiding:
         for corner in other.outline:
             along = wall.point(0.0, 0.0), wall.point(1.0, 0.0)
-            x = float((corner - along[0]) @ (along[1] - along[0]))
+            x = float(dot(corner - along[0], along[1] - along[0]))
             if 0.0 < x < wall.length:
                 cuts.add(x)
     free: list[tuple[float, float]] = []

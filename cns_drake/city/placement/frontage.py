@@ -10,7 +10,7 @@ from shapely.geometry import LineString, Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import linemerge
 
-from cns_drake.base import wrapped
+from cns_drake.base import arctan2, dot, wrapped
 from cns_drake.city.geometry.polygons import placed
 
 # A vertex at which a line turns by more than this is a corner [rad].
@@ -142,7 +142,7 @@ def lot_at(
         np.array(line.interpolate(start + width * u).coords[0]) - a
         for u in _CHORD_SHARES
     ]
-    step_back = max(0.0, *(float(p @ away) for p in between))
+    step_back = max(0.0, *(float(dot(p, away)) for p in between))
     centre = (a + b) / 2 + away * (depth / 2 + step_back)
     return Lot(float(centre[0]), float(centre[1]), yaw, chord, depth)
 
@@ -163,7 +163,7 @@ def _split_at_corners(line: LineString) -> list[LineString]:
     """Returns the pieces of a line between its corners, in order."""
     coordinates = np.array(line.coords)[:, :2]
     edges = np.diff(coordinates, axis=0)
-    heading = np.arctan2(edges[:, 1], edges[:, 0])
+    heading = arctan2(edges[:, 1], edges[:, 0])
     turns = wrapped(np.diff(heading))
     corners = np.flatnonzero(np.abs(turns) > _CORNER) + 1
     closed = bool(np.allclose(coordinates[0], coordinates[-1]))

@@ -16,6 +16,7 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base import dot
 from cns_drake.city import (
     GRID,
     Assembly,
@@ -293,7 +294,7 @@ def _dress_building(
     for plan in plans:
         # The name must not depend on the map's origin.
         panel = plan.panel
-        heading = np.degrees(np.arctan2(panel.along[1], panel.along[0]))
+        heading = math.degrees(math.atan2(panel.along[1], panel.along[0]))
         wall = f"wall {panel.length:.1f} {heading:.0f}"
         rng = random_generator(seed, wall, imported.draw_name)
         counts += facade_pieces.add_facade(out, plan, rng)
@@ -378,8 +379,8 @@ class _DriveViews:
         near = self._tree.query_ball_point(middle, most + panel.length / 2.0)
         index = np.array(near, dtype=int)
         from_start = self._xy[index] - panel.origin[:2]
-        out = from_start @ panel.outward
-        x = from_start @ panel.along
+        out = dot(from_start, panel.outward)
+        x = dot(from_start, panel.along)
         aside = np.maximum(np.maximum(-x, x - panel.length), 0.0)
         distance = np.hypot(out, aside)
         usable = np.flatnonzero((out > 0.0) & (distance <= most))
@@ -644,7 +645,7 @@ def _add_chimneys(out: Assembly, roof: np.ndarray) -> None:
     ridge = corners[corners[:, 2] > corners[:, 2].max() - _RIDGE_TOLERANCE]
     start = ridge[np.lexsort([ridge[:, 1], ridge[:, 0]])[0]]
     end = ridge[np.linalg.norm(ridge - start, axis=1).argmax()]
-    length = float(np.linalg.norm(end - start))
+    length = float(np.linalg.norm(end - start, axis=0))
     yaw = math.atan2(end[1] - start[1], end[0] - start[0])
     sides = UpperSides(roof)
     count = 1 + int(length > _SHORT_RIDGE)

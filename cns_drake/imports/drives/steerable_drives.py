@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import BSpline
 from shapely.geometry import LineString
 
-from cns_drake.base import InputError, distances_along, length_of
+from cns_drake.base import InputError, distances_along, length_of, power
 from cns_drake.imports.drives.free_space import FreeSpace
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.roads import POINT_SPACING, TIGHTEST_RADIUS, make_waypoint_path
@@ -129,7 +130,7 @@ def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     count = int((last - first) * POINT_SPACING / _CHECK_SPACING) + 1
     u = np.linspace(first, last, count)
     (x1, y1), (x2, y2) = spline(u, 1).T, spline(u, 2).T
-    curvature = np.abs(x1 * y2 - y1 * x2) / np.hypot(x1, y1) ** 3
+    curvature = np.abs(x1 * y2 - y1 * x2) / power(np.hypot(x1, y1), 3)
     return spline(u), 1.0 / np.maximum(curvature, _STRAIGHTEST)
 
 
@@ -154,10 +155,7 @@ def simplified_drive(
     for window, tolerance in product(_MEAN_WINDOWS, tolerances):
         if len(xy) < _LEAST_WINDOWS * window:
             break
-        kernel = np.ones(window) / window
-        smooth = np.column_stack(
-            [np.convolve(column, kernel, mode="valid") for column in xy.T]
-        )
+        smooth = sliding_window_view(xy, window, axis=0).mean(axis=-1)
         line = LineString(smooth).simplify(tolerance)
         drive = steerable_drive(
             _dense_waypoints(np.array(line.coords)), space.obstacle
@@ -171,7 +169,7 @@ def _dense_waypoints(corners: np.ndarray) -> np.ndarray:
     """Returns waypoints (N, 2) at corners and between corners far apart [m]."""
     points = [corners[:1]]
     for a, b in pairwise(corners):
-        length = float(np.linalg.norm(b - a))
+        length = length_of(np.array([a, b]))
         number = int((length - _WAYPOINT_SPACING) // _WAYPOINT_SPACING)
         if number > 0:
             # Waypoints keep away from the corners, whose arcs need room.

@@ -56,10 +56,10 @@ def _growth(lengths: np.ndarray, ends: np.ndarray) -> np.ndarray:
         (k for k in range(fold) if scores[k] > max(scores) - _EQUAL),
         key=lambda k: math.cos(turns[k] - _ASIDE),
     )
-    x, y = _turned(views[best], -_ASIDE).T
-    x3, y3 = _turned(views[best], -1.5 * _ASIDE).T
+    along = _turned(views[best], -_ASIDE)[:, 0]
+    x, y = _turned(views[best], -1.5 * _ASIDE).T
     # The square is there for streets that enclose equal areas.
-    growth = x + 0.1 * (x3 * x3 - y3 * y3)
+    growth = along + 0.1 * (x * x - y * y)
     return np.asarray(0.5 + growth / 2.2)
 
 

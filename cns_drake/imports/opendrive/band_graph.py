@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+import math
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base import length_of, step_lengths, wrapped
+from cns_drake.base import dot, length_of, step_lengths, wrapped
 from cns_drake.imports.drives import search, steerable_drives, way_graph
 from cns_drake.imports.drives.steerable_drives import Obstacle, WaypointRoute
 from cns_drake.imports.opendrive.lanes import DRIVEN, LaneBand
@@ -149,14 +150,14 @@ def _usual_limit(bands: Iterable[LaneBand]) -> float:
         limits.append(np.where(limit > 0.0, limit, _DEFAULT_LIMIT))
         lengths.append(np.diff(band.s))
     limit, length = np.concatenate(limits), np.concatenate(lengths)
-    order = np.argsort(limit)
+    order = np.argsort(limit, kind="stable")
     reached = np.cumsum(length[order])
     return float(limit[order][np.searchsorted(reached, reached[-1] / 2.0)])
 
 
 def _heading(ends: np.ndarray) -> float:
     """Returns the heading from the first of two places (2, 3) to the second."""
-    return float(np.arctan2(ends[1, 1] - ends[0, 1], ends[1, 0] - ends[0, 0]))
+    return math.atan2(ends[1, 1] - ends[0, 1], ends[1, 0] - ends[0, 0])
 
 
 def _smoothed(points: np.ndarray, window: int) -> np.ndarray:
@@ -180,7 +181,7 @@ def _without_backward_points(line: np.ndarray) -> np.ndarray:
     for point in line[2:]:
         step, last = (point - kept[-1])[:2], (kept[-1] - kept[-2])[:2]
         size = float(np.hypot(*step))
-        ahead = step @ last > _BACKWARD_COSINE * size * np.hypot(*last)
+        ahead = dot(step, last) > _BACKWARD_COSINE * size * np.hypot(*last)
         if size > _LEAST_STEP and ahead:
             kept.append(point)
     return np.array(kept)

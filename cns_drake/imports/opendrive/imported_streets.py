@@ -3,13 +3,14 @@
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
+import math
 
 import numpy as np
 import shapely
 from shapely.geometry import LinearRing, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base import length_of, wrapped
+from cns_drake.base import arctan2, dot, length_of, wrapped
 from cns_drake.city import (
     TILE,
     Covering,
@@ -285,7 +286,7 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
     """
     steps = np.roll(xy, -1, axis=0) - xy
     lengths = np.hypot(*steps.T)
-    heading = np.arctan2(steps[:, 1], steps[:, 0])
+    heading = arctan2(steps[:, 1], steps[:, 0])
     turns = wrapped(heading - np.roll(heading, 1))
     is_step = (
         (lengths > _STEP[0])
@@ -298,8 +299,8 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
         # first.
         before = np.roll(xy[::-1], k + 1 - len(xy), axis=0)
         behind = np.roll(xy, -k - 1, axis=0)
-        ahead = np.array([np.cos(heading[k - 1]), np.sin(heading[k - 1])])
-        aside = float(lengths[k] * np.sin(turns[k]))
+        ahead = np.array([math.cos(heading[k - 1]), math.sin(heading[k - 1])])
+        aside = float(lengths[k]) * math.sin(turns[k])
         straight = before[: _num_straight_edges(before, -ahead) + 1]
         chain = _kerb_line(behind, ahead)
         reach = length_of(straight)
@@ -310,7 +311,10 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
             shapely.segmentize(shapely.linestrings(chain), _SPACING)
         )
         away = dense - xy[k]
-        along, left = away @ ahead, away @ [-ahead[1], ahead[0]]
+        along, left = (
+            dot(away, ahead),
+            dot(away, np.array([-ahead[1], ahead[0]])),
+        )
         reached = np.flatnonzero(
             (along > _SPACING) & (along < longest + _ROUNDING)
         )
@@ -328,7 +332,7 @@ def _num_straight_edges(xy: np.ndarray, ahead: np.ndarray) -> int:
     The edges lie between corners (N, 2), and `ahead` (2,) is the direction.
     """
     steps = np.diff(xy, axis=0)
-    goes_on = steps @ ahead > np.cos(_ASTRAY) * np.hypot(*steps.T)
+    goes_on = dot(steps, ahead) > math.cos(_ASTRAY) * np.hypot(*steps.T)
     return int(np.argmin(np.append(goes_on, False)))
 
 
@@ -345,7 +349,7 @@ def _kerb_line(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
     last = _num_straight_edges(xy, ahead)
     if 0 < last < len(xy) - 2 and _num_straight_edges(xy[last + 1 :], ahead):
         step = xy[last + 1] - xy[last]
-        goes_right = step @ [-ahead[1], ahead[0]] < 0.0
+        goes_right = ahead[0] * step[1] - ahead[1] * step[0] < 0.0
         if goes_right and np.hypot(*step) < _STEP[1]:
             last += 1
     return xy[: last + 1]

@@ -15,6 +15,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base import cos, dot, sin
 from cns_drake.city import DASH, DASH_GAP, GRID, Finish, Structure, triangulate
 from cns_drake.imports.colours import WHITE, Rgb
 from cns_drake.imports.faces import parts_of
@@ -135,7 +136,7 @@ def _at_quad_heights(flat: np.ndarray, quad: np.ndarray) -> np.ndarray:
     slope = np.linalg.lstsq(
         (quad - middle)[:, :2], quad[:, 2] - middle[2], rcond=None
     )[0]
-    z = middle[2] + (flat - middle[:2]) @ slope
+    z = middle[2] + dot(flat - middle[:2], slope)
     return np.concatenate([flat, z[..., None]], axis=2)
 
 
@@ -252,7 +253,7 @@ def _painted_quads(
         end: where the last mark ends [m].
         carriageway: area to which marks are limited; None for no limit.
     """
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    left = np.stack([-sin(heading), cos(heading)], axis=1)
     ends = [*(mark.start for mark in marks[1:]), end][: len(marks)]
     for mark, end_of_mark in zip(marks, ends, strict=True):
         lines = _lines(mark, float(np.sign(side)))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base import cos, sin
+from cns_drake.base import arcsin, arctan2, cos, sin
 from cns_drake.ray_casting import RayCastingScene, SceneHits, rotate
 from cns_drake.scene import PerceptionGeometry, StructureTable
 from cns_drake.sensors.lidar.beams import BeamPattern, Beams
@@ -80,7 +80,7 @@ class _UnitBeams:
         self.d_Sset = np.ascontiguousarray(d_Sset[self.beam])
         self.height = height[self.beam]
         self.orders = np.stack(
-            [np.arange(len(self.beam)), np.argsort(self.beam)]
+            [np.arange(len(self.beam)), np.argsort(self.beam, kind="stable")]
         )
         ends = np.flatnonzero(np.diff(self.height)) + 1
         ends = np.concatenate([[0], ends, [len(self.height)]])
@@ -128,13 +128,13 @@ def _make_unit_beams(
     offset = 0.0
     if sheet.head.tick_deg:
         tick = np.radians(sheet.head.tick_deg)
-        azimuth = np.arctan2(y, x)
+        azimuth = arctan2(y, x)
         to_tick = np.rint(azimuth / tick) * tick - azimuth
         draw = uniform(key, laser, len(_LaserErrors._fields))
         offset = ((draw - 0.5) * 2.0 * tick)[beams.ring]
     across = np.maximum(np.sqrt(x * x + y * y), 1e-9)
     lowest, heights, factors = np.transpose(sheet.head.blocks)
-    block = (np.degrees(np.arcsin(z))[:, None] < lowest[:-1]).sum(axis=1)
+    block = (np.degrees(arcsin(z))[:, None] < lowest[:-1]).sum(axis=1)
     flicker = errors.flicker
     return _UnitBeams(
         beams,
