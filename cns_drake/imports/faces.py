@@ -116,7 +116,7 @@ def _triangulate_along(
     corners of triangles lie in the face's plane. The other arguments are as for
     `face_triangles`.
     """
-    axis = int(np.abs(normal).argmax())
+    axis = int(np.abs(normal).round(9).argmax())
     axes = [(axis + 1) % 3, (axis + 2) % 3]
     if normal[axis] < 0.0:
         axes.reverse()

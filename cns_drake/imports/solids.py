@@ -203,7 +203,9 @@ def _mansard(
     if len(ring) != len(corners):
         return None
     # Each corner moves inwards, so that the nearest is its own.
-    first = np.linalg.norm(ring[:, :2] - corners[0, :2], axis=1).argmin()
+    first = (
+        np.linalg.norm(ring[:, :2] - corners[0, :2], axis=1).round(6).argmin()
+    )
     ring = np.roll(ring, -int(first), axis=0)
     following, next_ring = (
         np.roll(corners, -1, axis=0),
@@ -238,7 +240,7 @@ def _lower_side(
         # The outward normals are the sides, turned clockwise.
         outward = np.array([-math.sin(angle), math.cos(angle)])
         facing = dot(sides, outward) / lengths
-        return int(facing.argmax())
+        return int(facing.round(6).argmax())
     longest = int((lengths > lengths.max() - _SAME_LENGTH).argmax())
     return longest + 1 if is_across else longest
 

@@ -96,7 +96,9 @@ def lines_along(
         for piece in _split_at_corners(_street_on_right(line, streets))
         if piece.length > _LEAST_LINE
     ]
-    return sorted(pieces, key=lambda p: (*p.coords[0], p.length))
+    return sorted(
+        pieces, key=lambda p: np.round([*p.coords[0], p.length], 6).tolist()
+    )
 
 
 def station_at(line: LineString, s: float) -> Station:

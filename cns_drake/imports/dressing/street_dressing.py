@@ -212,7 +212,7 @@ def _fill_car_park(
         return
     sides = np.diff(box, axis=0)[:2]
     length, width = sorted(np.hypot(*sides.T).tolist(), reverse=True)
-    first = int(np.hypot(*sides[0]) < np.hypot(*sides[1]))
+    first = int(np.subtract(*np.hypot(*sides.T)) < -1e-6)
     along = sides[first] / length
     across = np.array([-along[1], along[0]])
     middle = box[:4].mean(axis=0)
@@ -393,7 +393,7 @@ def _beside_street(
     """
     point = Point(xy)
     distances = shapely.distance(courses, point)
-    nearest = int(np.argmin(distances))
+    nearest = int(np.argmin(np.round(distances, 6)))
     line = courses[nearest]
     half = streets[nearest].width / 2.0
     station = station_at(line, line.project(point))

@@ -90,7 +90,7 @@ def steerable_drive(
     except InputError:
         return xyz[len(xyz) // 2, :2]
     driven, radii = driven_path(points)
-    tightest = int(radii.argmin())
+    tightest = int(np.round(radii, 6).argmin())
     if radii[tightest] < margin * TIGHTEST_RADIUS:
         return driven[tightest]
     missing = None if room is None else room(driven)
@@ -106,7 +106,7 @@ def evenly_spaced(line: np.ndarray, spacing: float) -> np.ndarray:
     Ends of the line are kept.
     """
     along = distances_along(line)
-    count = max(1, round(along[-1] / spacing))
+    count = max(1, round(round(along[-1] / spacing, 6)))
     wanted = np.linspace(0.0, along[-1], count + 1)
     return np.column_stack([np.interp(wanted, along, x) for x in line.T])
 
@@ -170,7 +170,7 @@ def _dense_waypoints(corners: np.ndarray) -> np.ndarray:
     points = [corners[:1]]
     for a, b in pairwise(corners):
         length = length_of(np.array([a, b]))
-        number = int((length - _WAYPOINT_SPACING) // _WAYPOINT_SPACING)
+        number = int(round(length, 6) // _WAYPOINT_SPACING - 1)
         if number > 0:
             # Waypoints keep away from the corners, whose arcs need room.
             parts = np.linspace(0.0, 1.0, number + 2)[1:-1]

@@ -197,6 +197,7 @@ class StreetGraph(WayGraph):
     def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
         lines = [lane_path([self.lanes[k]]) for k in way]
         distances = [
-            np.linalg.norm(line[:, :2] - place, axis=1).min() for line in lines
+            np.linalg.norm(line[:, :2] - place, axis=1).min().round(6)
+            for line in lines
         ]
         return np.array([way[int(np.argmin(distances))]])

@@ -114,7 +114,7 @@ class BandGraph(way_graph.WayGraph):
 
     def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
         distances = [
-            float(np.hypot(*(self.lines[k][:, :2] - place).T).min())
+            float(np.hypot(*(self.lines[k][:, :2] - place).T).min().round(6))
             for k in way
         ]
         return np.array([way[int(np.argmin(distances))]])

@@ -322,7 +322,9 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
             continue
         # The taper touches the kerb at the place that is farthest to the right
         # in its view.
-        last = int(reached[np.argmin(left[reached] / along[reached])])
+        last = int(
+            reached[np.argmin(np.round(left[reached] / along[reached], 6))]
+        )
         yield np.concatenate([xy[k : k + 1], dense[: last + 1]])
 
 
