@@ -31,7 +31,12 @@ from cns_drake.ground_truth.exact_overlap import Sight, sights_of
 from cns_drake.ground_truth.labelled import LabelledDrive
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.simulation import SimulatedDrive
-from evaluation.base import num_cores, track
+from evaluation.base import (
+    cos,
+    num_cores,
+    sin,
+    track,
+)
 from evaluation.drives import sample_frames
 from evaluation.map_update import SIDES, Session
 
@@ -221,7 +226,7 @@ def _spiral() -> np.ndarray:
     z = 1.0 - number / _SPIRAL
     angle = np.pi * (1.0 + np.sqrt(5.0)) * number
     around = np.sqrt(1.0 - z * z)
-    return np.stack([around * np.cos(angle), around * np.sin(angle), z], axis=1)
+    return np.stack([around * cos(angle), around * sin(angle), z], axis=1)
 
 
 def _chunks(rows: np.ndarray) -> Iterator[np.ndarray]:

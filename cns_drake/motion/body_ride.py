@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -75,7 +76,7 @@ class BodyRide:
             q[:-1],
         ]
         powers = np.reshape(
-            [float(step) ** k for k in range(5, -1, -1)], (6, 1, 1)
+            [math.pow(step, k) for k in range(5, -1, -1)], (6, 1, 1)
         )
         spline = PPoly(np.array(coefficients) / powers, times)
         self._splines = [spline, spline.derivative(), spline.derivative(2)]

@@ -10,7 +10,7 @@ RoughnessClass = Literal["A", "B", "C", "D", "E"]
 # Class -> one-sided power spectral density of the heights along a line, at the
 # spatial frequency _N0 [m^3]. These are the geometric means of ISO 8608.
 ROUGHNESS: dict[str, float] = {
-    name: 16e-6 * 4.0**k for k, name in enumerate("ABCDE")
+    name: math.ldexp(16e-6, 2 * k) for k, name in enumerate("ABCDE")
 }
 _N0 = 0.1  # [cycles/m]
 
@@ -18,7 +18,7 @@ _N0 = 0.1  # [cycles/m]
 # of the class for wavelengths from 0.35 to 90 m. Longer waves, which are hills,
 # are no stronger than waves of 90 m. Shorter waves than 0.35 m are smoothed by
 # the tyre.
-_SPACINGS = 0.05 * 2.0 ** np.arange(10)
+_SPACINGS = np.ldexp(0.05, np.arange(10))
 # The finest layer also stands for all layers that would be finer: this is the
 # sum of the geometric series 1 + 1/4 + 1/16 + ...
 _FINEST_SHARE = 4.0 / 3.0

@@ -263,7 +263,7 @@ def _exponential(matrix: np.ndarray) -> np.ndarray:
     """
     _, exponent = math.frexp(np.abs(matrix).sum(axis=1).max())
     squarings = max(exponent + 1, 0)
-    part = matrix / 2.0**squarings
+    part = np.ldexp(matrix, -squarings)
     term = result = np.eye(len(matrix))
     # The norm of `part` is at most 1/2, so that the omitted terms are below
     # rounding.

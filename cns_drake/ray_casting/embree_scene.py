@@ -389,7 +389,7 @@ class NearShapes:
         """Takes the shapes of all groups."""
         still = shapes.select(shapes.rows == 0)
         begins = still.p_LGs[:, 0] - still.reaches
-        order = np.argsort(begins)
+        order = np.argsort(begins, kind="stable")
         self._still = still.select(order)
         self._begins = begins[order]
         # The greatest x of each ball and of all balls before it.

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -209,10 +210,10 @@ def circumscribe(
     `_BOUND_RATIOS[sides]` radii + `_BOUND_GAP`.
     """
     # The faces of an inscribed ball are nearest to its centre at the equator.
-    scale = _RATIO / np.cos(np.pi / sides) ** 2
+    scale = _RATIO / math.cos(np.pi / sides) ** 2
     if isinstance(surface, EllipsoidSurface):
-        wide = tuple(scale * a + _GAP for a in surface.semi_axes)
-        return tessellate(EllipsoidSurface(wide), sides)
+        a, b, c = (scale * axis + _GAP for axis in surface.semi_axes)
+        return tessellate(EllipsoidSurface((a, b, c)), sides)
     radius = scale * surface.radius + _GAP
     if isinstance(surface, CapsuleSurface):
         return tessellate(CapsuleSurface(radius, surface.length), sides)

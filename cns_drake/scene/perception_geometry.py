@@ -36,7 +36,11 @@ from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.mesh_files import MeshFiles, mesh_shape_key
 from cns_drake.scene.structure_names import part_name, structure_name
 from cns_drake.scene.surfaces import LARGEST_SIZE, Surface, TriangleSurface
-from evaluation.base import InputError
+from evaluation.base import (
+    InputError,
+    cos,
+    sin,
+)
 
 # The corners of a unit cube, and its faces, counter-clockwise from outside.
 _CUBE_CORNERS = np.array(
@@ -433,8 +437,8 @@ def _cone(shape: shapes.MeshcatCone) -> TriangleSurface:
     angle = 2.0 * np.pi * np.arange(_CONE_SIDES) / _CONE_SIDES
     corners = np.zeros((2 + _CONE_SIDES, 3))
     corners[1:, 2] = shape.height()
-    corners[2:, 0] = shape.a() * np.cos(angle)
-    corners[2:, 1] = shape.b() * np.sin(angle)
+    corners[2:, 0] = shape.a() * cos(angle)
+    corners[2:, 1] = shape.b() * sin(angle)
     first = 2 + np.arange(_CONE_SIDES)
     second = np.roll(first, -1)
     point, middle = np.zeros_like(first), np.ones_like(first)

@@ -6,7 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
-from evaluation.base import revolved
+from evaluation.base import (
+    cos,
+    revolved,
+    sin,
+)
 
 # Rays are cast in single precision, which cannot resolve a metre beyond this
 # [m].
@@ -138,7 +142,7 @@ def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
     if isinstance(surface, HalfSpaceSurface):
         return TriangleSurface(_PLANE_CORNERS, _PLANE_TRIANGLES)
     angle = np.linspace(0.0, np.pi / 2.0, sides // 2 + 1)
-    radius, z = np.sin(angle), np.cos(angle)
+    radius, z = sin(angle), cos(angle)
     z[-1] = 0.0
     if isinstance(surface, EllipsoidSurface):
         corners, triangles = revolved(radius, z, sides)

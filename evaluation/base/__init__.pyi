@@ -30,12 +30,15 @@ from .digests import file_digests as file_digests
 from .elementary import arcsin as arcsin
 from .elementary import arctan2 as arctan2
 from .elementary import cos as cos
+from .elementary import dot as dot
 from .elementary import exp as exp
+from .elementary import exp32 as exp32
 from .elementary import log as log
 from .elementary import power as power
 from .elementary import product as product
 from .elementary import rotated as rotated
 from .elementary import sin as sin
+from .elementary import sinc as sinc
 from .elementary import tan as tan
 from .errors import InputError as InputError
 from .errors import check_type as check_type

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from evaluation.base.elementary import cos, sin
+
 
 def revolved(
     radius: np.ndarray, z: np.ndarray, sides: int
@@ -24,7 +26,7 @@ def revolved(
     from scipy.spatial import ConvexHull
 
     angle = 2.0 * np.pi * np.arange(sides)[:, None] / sides
-    xyz = radius * np.cos(angle), radius * np.sin(angle), z
+    xyz = radius * cos(angle), radius * sin(angle), z
     upper = np.stack(np.broadcast_arrays(*xyz), axis=-1).reshape(-1, 3)
     vertices = np.unique(np.concatenate([upper, upper * (1, 1, -1)]), axis=0)
     hull = ConvexHull(vertices)

@@ -13,7 +13,10 @@ from typing import Literal
 import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
-from evaluation.base import NS_PER_S
+from evaluation.base import (
+    NS_PER_S,
+    arctan2,
+)
 
 LayoutName = Literal["cns", "ouster", "velodyne", "autoware"]
 _MM_PER_M = 1e3
@@ -104,8 +107,8 @@ def to_layout(
         "time_stamp": points["t"],
         "return_type": np.full(len(points), _SINGLE_STRONGEST),
         "channel": points["ring"],
-        "azimuth": np.arctan2(y, x) % (2.0 * np.pi),
-        "elevation": np.arctan2(z, np.hypot(x, y)),
+        "azimuth": arctan2(y, x) % (2.0 * np.pi),
+        "elevation": arctan2(z, np.hypot(x, y)),
         "distance": distance,
     }
     if layout == "autoware":

@@ -65,5 +65,6 @@ def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
         (K,) increasing frame numbers; the first is 0.
     """
     steps = travelled(positions) / max(spacing, _LEAST_SPACING)
-    passed = np.floor(steps).astype(np.int64)
+    # Where poses are a whole number of metres apart, no last bit decides.
+    passed = np.floor(steps.round(9)).astype(np.int64)
     return np.flatnonzero(np.diff(passed, prepend=-1) > 0)

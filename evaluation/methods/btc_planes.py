@@ -402,7 +402,7 @@ def hash_table_order(codes: np.ndarray) -> np.ndarray:
         first[buckets[::-1]] = np.arange(len(order))[::-1]
         # The newest bucket comes first, and in each bucket the newest element.
         ranks = first[buckets] * len(order) + np.arange(len(order))
-        order = order[np.argsort(ranks)[::-1]]
+        order = order[np.argsort(ranks, kind="stable")[::-1]]
         if len(order) == len(codes):
             break
     return order

@@ -231,7 +231,7 @@ def check_rerank(method: Method) -> None:
         return
     _, (described, *_), database = _described(method)
     scores = _scores(method, described, database, _NUM_PLACES)
-    best = np.argsort(-scores)[:number]
+    best = np.argsort(-scores, kind="stable")[:number]
     query, *_ = clouds = [read_only(cloud) for cloud in _clouds(method)]
     places = [clouds[place] for place in best]
     found = _call(method, "rerank", query, places, scores[best])

@@ -366,7 +366,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         # Rounding can put a value on the limit.
         row, column = np.minimum(cells, config.cells - 1).T
         cell = row * config.cells + column
-        order = np.argsort(cell)
+        order = np.argsort(cell, kind="stable")
         first = np.flatnonzero(np.diff(cell[order], prepend=-1))
         greatest = np.maximum.reduceat(features[order], first)
         image.reshape(-1, _NUM_FEATURES)[cell[order[first]]] = greatest

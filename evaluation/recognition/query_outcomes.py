@@ -218,10 +218,10 @@ class QueryOutcomes:
         """
         if not {"distance", "nearest"} <= self.columns.keys():
             return None
-        has_match = self.columns["nearest"] <= radius
+        has_match = self.columns["nearest"].round(9) <= radius
         if not has_match.any():
             return math.nan
-        is_right = self.columns["distance"] <= radius
+        is_right = self.columns["distance"].round(9) <= radius
         return replace(self, is_right=is_right, has_match=has_match).curve.auc
 
     def num_wrong_by(self, fault: str) -> int | None:

@@ -261,7 +261,7 @@ def _compare_batch(
     distances = _distances(database, query, rows)
     shown = None if overlaps is None else overlaps[rows.start : rows.stop]
     if protocol.overlap is None:
-        matches = (distances <= protocol.radius) & is_known
+        matches = (distances.round(9) <= protocol.radius) & is_known
     else:
         assert shown is not None
         matches = (shown >= protocol.overlap) & is_known
@@ -345,7 +345,9 @@ def matches_within_radius(
         protocol: protocol of the comparison.
         rows: numbers of R queries.
     """
-    is_near = _distances(database, query, rows) <= protocol.radius
+    distances = _distances(database, query, rows)
+    # No last bit decides at the radius.
+    is_near = distances.round(9) <= protocol.radius
     return is_near & _known_places(database, query, protocol, rows)
 
 

@@ -215,7 +215,7 @@ def _order_p_value(first: np.ndarray, second: np.ndarray) -> float:
         found = np.abs(_kendall_tau(first, second[orders]))
         return float(np.mean(found >= measured - _ROUNDING))
     rng = np.random.default_rng(number)
-    orders = np.argsort(rng.random((_ORDERS, number)), axis=1)
+    orders = np.argsort(rng.random((_ORDERS, number)), axis=1, kind="stable")
     found = np.abs(_kendall_tau(first, second[orders]))
     more = np.count_nonzero(found >= measured - _ROUNDING)
     return (1.0 + more) / (1.0 + _ORDERS)

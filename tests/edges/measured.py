@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 
+from helpers.processors import EMBREE, PROGRAM
 from mcap.reader import make_reader
 import numpy as np
 
@@ -56,7 +57,10 @@ def run(folder: Path, program: str, *words: object) -> str:
         RuntimeError: it fails, or code of the folder runs.
     """
     inputs.write_traps(folder)
-    text = _python(folder, _PROGRAMS[program], *words)
+    file = _PROGRAMS[program]
+    if program == "cns_drake" and EMBREE in os.environ:
+        file = PROGRAM
+    text = _python(folder, file, *words)
     if (folder / inputs.SPRUNG).exists():
         raise RuntimeError(f"{words}: code of the working folder runs")
     return text
@@ -160,8 +164,11 @@ def _topics(folder: Path) -> list[dict[str, object]]:
 
 
 @cache
-def _city_holder() -> tempfile.TemporaryDirectory:
-    """Returns the folder in which this process has built the small city."""
+def _city_holder(numpys: str | None) -> tempfile.TemporaryDirectory:
+    """Returns the folder in which this process has built the small city.
+
+    `numpys` are the instructions that NumPy may not use.
+    """
     holder = tempfile.TemporaryDirectory()
     inputs.write_city(Path(holder.name))
     run(Path(holder.name), "cns_drake", "city", "town")
@@ -169,7 +176,8 @@ def _city_holder() -> tempfile.TemporaryDirectory:
 
 
 def _small_city() -> Path:
-    return Path(_city_holder().name) / "town"
+    numpys = os.environ.get("NPY_DISABLE_CPU_FEATURES")
+    return Path(_city_holder(numpys).name) / "town"
 
 
 def city(folder: Path) -> dict[str, str]:

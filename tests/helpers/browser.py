@@ -65,7 +65,7 @@ def chromium(profile: Path, *options: str):
         os.close(ours_in)
         # It ends when its pipes are closed, or else it is killed.
         try:
-            process.wait(timeout=60)
+            process.wait(timeout=600)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()

@@ -71,14 +71,14 @@ def storey_on(
     if len(levels) == 0:
         return None
     sums = [areas[heights == level].sum() for level in levels]
-    z = float(levels[int(np.argmax(sums))])
+    z = float(levels[int(np.argmax(np.round(sums, 6)))])
     if max(sums) < 0.4 * plot.area.area:
         return None
     roof = shapely.union_all(from_above(flat[heights == z]), grid_size=0.01)
     pieces = polygons_of(roof.buffer(0.1).buffer(-1.3))
     if not pieces:
         return None
-    lot = largest_rectangle(max(pieces, key=lambda one: one.area))
+    lot = largest_rectangle(max(pieces, key=lambda one: round(one.area, 6)))
     x0, y0, x1, y1 = lot.bounds
     w, d = x1 - x0, y1 - y0
     if min(w, d) < 5.0:

@@ -505,7 +505,9 @@ def _building_site_on(
 ) -> list[Structure]:
     """Returns the structures of a building site: fences, machines and so on."""
     inner = plot.inside(plot.area.buffer(-0.4))
-    lot = largest_rectangle(max(polygons_of(inner), key=lambda one: one.area))
+    lot = largest_rectangle(
+        max(polygons_of(inner), key=lambda one: round(one.area, 6))
+    )
     x0, y0, x1, y1 = lot.bounds
     structures = []
     for k, (x, y, turn, length) in enumerate(

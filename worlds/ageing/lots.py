@@ -106,7 +106,7 @@ def _lots_of_buildings(
         pieces = [p for p in pieces if p.area > 0.3 * one.footprint.area]
         if not pieces:
             continue
-        area = max(pieces, key=lambda p: p.area).simplify(0.05)
+        area = max(pieces, key=lambda p: round(p.area, 6)).simplify(0.05)
         plot = Plot.facing(area, world.streets, one.bottom)
         z = _front_height(world, plot, one.bottom)
         yield AgeingLot(number, replace(plot, z=z), one.top - z, one.name)

@@ -14,6 +14,7 @@ from evaluation.base import (
     check_regular,
     is_there,
     poses,
+    product,
     read_elements,
     read_records,
     read_rows,
@@ -146,7 +147,7 @@ class OldWorld:
         geometry = self.geometry[name]
         materials = geometry.entry.materials
         for one in geometry.parts:
-            X_SG = X_SW @ one.X_WG
+            X_SG = product(X_SW, one.X_WG)
             shape = one.shape
             if shape is None:
                 raise InputError(

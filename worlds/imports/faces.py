@@ -9,7 +9,12 @@ from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 from shapely.validation import make_valid
 
-from worlds.imports.faults import ImportFaults
+from evaluation.base import (
+    dot,
+)
+from worlds.imports.faults import (
+    ImportFaults,
+)
 from worlds.shapes import (
     GRID,
     long_normals,
@@ -62,12 +67,12 @@ def face_triangles(
     has_holes = any(len(hole) >= 3 for hole in rings[1:])
     if len(outer) == 3 and not has_holes:
         return outer[None]
-    heights = (outer - outer[0]) @ normal
-    if np.ptp(heights) > 2.0 * _BENT * np.linalg.norm(normal):
+    heights = dot(outer - outer[0], normal)
+    if np.ptp(heights) > 2.0 * _BENT * np.linalg.norm(normal, axis=0):
         faults.add("face that is not plane, folded between its corners", name)
     if len(outer) == 4 and not has_holes:
         corners = outer[_CORNERS_OF_FOUR]
-        if (long_normals(corners) @ normal > 0.0).all():
+        if (dot(long_normals(corners), normal) > 0.0).all():
             return corners[[1, 3]]
     return _triangulate_along(normal, rings, name, faults)
 
@@ -80,12 +85,15 @@ def _normal_of_ring(ring: np.ndarray) -> np.ndarray:
     first, rest = ring[:1], ring[1:]
     fan = [np.repeat(first, len(rest) - 1, axis=0), rest[:-1], rest[1:]]
     # The vector is as long as twice the area.
-    normal = long_normals(np.stack(fan, axis=1)).sum(axis=0)
-    if 0.5 * np.linalg.norm(normal) >= LEAST_AREA:
-        return np.asarray(normal)
-    # The two halves of a ring that crosses itself may have the same area.
-    _, spread, axes = np.linalg.svd(ring - ring.mean(axis=0))
-    return axes[2] if spread[1] ** 2 >= LEAST_AREA else np.zeros(3)
+    normals = long_normals(np.stack(fan, axis=1))
+    normal = normals.sum(axis=0)
+    if 0.5 * np.linalg.norm(normal, axis=0) < LEAST_AREA:
+        # The two halves of a ring that crosses itself may have the same area.
+        areas = 0.5 * np.linalg.norm(normals, axis=1)
+        largest = int(np.round(areas / LEAST_AREA).argmax())
+        is_flat = areas[largest] < LEAST_AREA
+        return np.zeros(3) if is_flat else np.asarray(normals[largest])
+    return np.asarray(normal)
 
 
 def _without_repetitions(
@@ -116,7 +124,7 @@ def _triangulate_along(
     corners of triangles lie in the face's plane. The other arguments are as for
     `face_triangles`.
     """
-    axis = int(np.abs(normal).argmax())
+    axis = int(np.abs(normal).round(9).argmax())
     axes = [(axis + 1) % 3, (axis + 2) % 3]
     if normal[axis] < 0.0:
         axes.reverse()
@@ -151,7 +159,7 @@ def _triangulate_along(
             continue
         row[axes] = point
         row[axis] = origin[axis]
-        row[axis] -= normal @ (row - origin) / normal[axis]
+        row[axis] -= dot(normal, row - origin) / normal[axis]
     return lifted.reshape(-1, 3, 3)
 
 

@@ -6,13 +6,22 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import correlate1d
 import shapely
 from shapely.geometry import Point
 
-from worlds.imports.faces import joined_triangles
-from worlds.imports.imported_objects import ImportedObject
-from worlds.imports.surface_samples import surface_samples
+from evaluation.base import (
+    exp,
+)
+from worlds.imports.faces import (
+    joined_triangles,
+)
+from worlds.imports.imported_objects import (
+    ImportedObject,
+)
+from worlds.imports.surface_samples import (
+    surface_samples,
+)
 from worlds.shapes import (
     Mesh,
     MeshShape,
@@ -28,14 +37,17 @@ CELL = 4.0
 MARGIN = 40.0
 # Above this number of cells along a side, cells are larger.
 _MOST_CELLS = 500
-# Standard deviation of the filter that smooths a guessed ground [cells].
-_SMOOTHING_CELLS = 1.5
+# Weights of the Gaussian that smooths a guessed ground, with a standard
+# deviation of 1.5 cells, up to four times as far.
+_SMOOTHING = exp(-0.5 / 1.5**2 * np.arange(-6, 7) ** 2)
 # The mesh of the ground is this much lower than the ground itself, so that
 # pavements at the height of the ground can be seen [m].
 _MESH_DEPTH = 0.1
 # Beyond this distance from the convex hull of the feet, heights are not
 # interpolated between feet [m].
 _BESIDE_HULL = 1.0
+# Feet in a smaller hull are in a line [m^2].
+_LEAST_HULL = 1e-3
 # Every seventh corner of streets and other ground gives the height of the
 # guessed ground.
 _CORNER_STRIDE = 7
@@ -133,17 +145,19 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
     ys = np.arange(low[1], high[1] + cell, cell)
     x, y = np.meshgrid(xs, ys)
     z = np.full(x.shape, np.nan)
-    if len(feet) >= 4 and np.linalg.matrix_rank(feet[:, :2] - feet[0, :2]) == 2:
+    hull = hull_of(feet[:, :2])
+    if len(feet) >= 4 and hull.area > _LEAST_HULL:
         # SciPy takes long for places outside of the convex hull.
-        hull = hull_of(feet[:, :2]).buffer(_BESIDE_HULL)
-        near = shapely.contains_xy(hull, x, y)
+        near = shapely.contains_xy(hull.buffer(_BESIDE_HULL), x, y)
         z[near] = LinearNDInterpolator(feet[:, :2], feet[:, 2])(
             x[near], y[near]
         )
     outside = np.isnan(z)
     nearest = NearestNDInterpolator(feet[:, :2], feet[:, 2])
     z[outside] = nearest(x[outside], y[outside])
-    return Ground(xs, ys, gaussian_filter(z, _SMOOTHING_CELLS, mode="nearest"))
+    for axis in (0, 1):
+        z = correlate1d(z, _SMOOTHING / _SMOOTHING.sum(), axis, mode="nearest")
+    return Ground(xs, ys, z)
 
 
 def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:

@@ -13,7 +13,7 @@ from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 from threadpoolctl import threadpool_limits
 
-from evaluation.base import InputError, doing, draft_folder
+from evaluation.base import InputError, doing, dot, draft_folder
 from worlds.imports import map_files, overview
 from worlds.imports.dressing.dressed_city import dress_city
 from worlds.imports.drives.cell_graph import CellGraph
@@ -254,7 +254,7 @@ def _volumes(objects: Sequence[ImportedObject]) -> dict[str, float]:
             twice_area = np.cross(b - a, c - a)[:, 2]
             height = (a + b + c)[:, 2] / 3.0 - one.triangles[:, :, 2].min()
             volumes[_name_in_faults(one)] += (
-                abs(float(twice_area @ height)) / 2.0
+                abs(float(dot(twice_area, height))) / 2.0
             )
     return dict(volumes)
 

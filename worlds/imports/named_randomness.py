@@ -1,6 +1,7 @@
 """Random numbers that depend only on a seed, a purpose and a name."""
 
 import hashlib
+import math
 
 import numpy as np
 
@@ -13,7 +14,7 @@ def random_share(seed: int, purpose: str, name: str) -> float:
 
     `purpose` says what the number is used for, and `name` for which object.
     """
-    return _hashed_number(seed, purpose, name) / 2.0 ** (8 * _HASH_SIZE)
+    return math.ldexp(_hashed_number(seed, purpose, name), -8 * _HASH_SIZE)
 
 
 def random_generator(seed: int, purpose: str, name: str) -> np.random.Generator:

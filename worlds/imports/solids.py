@@ -1,14 +1,28 @@
 """Solids on footprints, with the roof shapes that OpenStreetMap describes."""
 
 import itertools
+import math
 
 import numpy as np
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
-from worlds.imports.faces import LEAST_AREA, flat_surface, level_rings
-from worlds.imports.faults import ImportFaults
-from worlds.shapes import long_normals
+from evaluation.base import (
+    cos,
+    dot,
+    sin,
+)
+from worlds.imports.faces import (
+    LEAST_AREA,
+    flat_surface,
+    level_rings,
+)
+from worlds.imports.faults import (
+    ImportFaults,
+)
+from worlds.shapes import (
+    long_normals,
+)
 
 # The ends of a hipped roof's ridge are inset by at most this share of its
 # length.
@@ -20,7 +34,7 @@ _SHORTEST_RIDGE = 1e-6
 _ARC = np.linspace(0.0, 0.5 * np.pi, 7)
 _PROFILES: dict[str, list[tuple[float, float]]] = {
     "pyramidal": [(1.0, 0.0), (0.0, 1.0)],
-    "dome": [*zip(np.cos(_ARC).tolist(), np.sin(_ARC).tolist(), strict=True)],
+    "dome": [*zip(cos(_ARC).tolist(), sin(_ARC).tolist(), strict=True)],
     "onion": [
         (1.0, 0.0),
         (0.96, 0.2),
@@ -146,8 +160,8 @@ def _slopes_and_gables(
     start, end = (a + d) / 2.0, (b + c) / 2.0
     start[2] = end[2] = high
     if roof == "hipped":
-        across = float(np.linalg.norm(d - a))
-        along = max(float(np.linalg.norm(end - start)), _SHORTEST_RIDGE)
+        across = float(np.linalg.norm(d - a, axis=0))
+        along = max(float(np.linalg.norm(end - start, axis=0)), _SHORTEST_RIDGE)
         # Slopes on all sides have the same pitch, if the ridge is long enough.
         share = min(_MOST_INSET_SHARE, 0.5 * across / along)
         inset = (end - start) * share
@@ -201,7 +215,9 @@ def _mansard(
     if len(ring) != len(corners):
         return None
     # Each corner moves inwards, so that the nearest is its own.
-    first = np.linalg.norm(ring[:, :2] - corners[0, :2], axis=1).argmin()
+    first = (
+        np.linalg.norm(ring[:, :2] - corners[0, :2], axis=1).round(6).argmin()
+    )
     ring = np.roll(ring, -int(first), axis=0)
     following, next_ring = (
         np.roll(corners, -1, axis=0),
@@ -232,10 +248,11 @@ def _lower_side(
     sides = np.roll(corners, -1, axis=0)[:, :2] - corners[:, :2]
     lengths = np.linalg.norm(sides, axis=1)
     if facing_deg is not None:
-        angle = np.radians(facing_deg)
+        angle = math.radians(facing_deg)
         # The outward normals are the sides, turned clockwise.
-        facing = (sides @ [-np.sin(angle), np.cos(angle)]) / lengths
-        return int(facing.argmax())
+        outward = np.array([-math.sin(angle), math.cos(angle)])
+        facing = dot(sides, outward) / lengths
+        return int(facing.round(6).argmax())
     longest = int((lengths > lengths.max() - _SAME_LENGTH).argmax())
     return longest + 1 if is_across else longest
 
@@ -246,11 +263,11 @@ def _skillion(
     """Returns a roof that rises from the first side, and its gables."""
     side = corners[1] - corners[0]
     inwards = np.array([-side[1], side[0]])
-    away = (corners[:, :2] - corners[0, :2]) @ inwards
+    away = dot(corners[:, :2] - corners[0, :2], inwards)
     low, high = away.min(), away.max()
 
     def raised(points: np.ndarray) -> np.ndarray:
-        share = (points[..., :2] - corners[0, :2]) @ inwards
+        share = dot(points[..., :2] - corners[0, :2], inwards)
         found = points.copy()
         found[..., 2] += roof_height * (share - low) / (high - low)
         return found

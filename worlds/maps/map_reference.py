@@ -34,7 +34,7 @@ class LocalMetres:
         e2 = _FLATTENING * (2.0 - _FLATTENING)
         s = math.sin(math.radians(latitude))
         w2 = 1.0 - e2 * s * s
-        north = _SEMI_MAJOR * (1.0 - e2) / w2**1.5
+        north = _SEMI_MAJOR * (1.0 - e2) / math.pow(w2, 1.5)
         east = _SEMI_MAJOR / math.sqrt(w2) * math.cos(math.radians(latitude))
         self._origin = np.array([longitude, latitude])
         self._metres = np.radians(1.0) * np.array([east, north])

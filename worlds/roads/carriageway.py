@@ -126,7 +126,9 @@ def junction_area(
     )
     pieces = getattr(area, "geoms", [area])
     centre = Point(junction.position)
-    return _simplified(min(pieces, key=lambda piece: piece.distance(centre)))
+    return _simplified(
+        min(pieces, key=lambda piece: round(piece.distance(centre), 6))
+    )
 
 
 def _extended_roads(

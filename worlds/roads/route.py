@@ -435,7 +435,10 @@ def draw_route(
         driven += network.roads[lane.road].length
         choices = successors[lane]
         weights = np.array(
-            [_WEIGHT_OF_NEW ** -visits[after.road] for _, after in choices]
+            [
+                math.pow(_WEIGHT_OF_NEW, -visits[after.road])
+                for _, after in choices
+            ]
         )
         chosen = int(rng.choice(len(choices), p=weights / weights.sum()))
         exit_lane, after = choices[chosen]

@@ -7,7 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from worlds.roads.network import RoadNetwork
+from evaluation.base import (
+    cos,
+    sin,
+)
+from worlds.roads.network import (
+    RoadNetwork,
+)
 
 # Returns the heights (N,) of sidewalks above the road at places (N, 2) [m].
 KerbMap = Callable[[np.ndarray], np.ndarray]
@@ -61,9 +67,7 @@ class RoadSurface:
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
         _, index = self._tree.query(xy)
         x, y, _, heading = self._places[index].T
-        ahead = (xy[:, 0] - x) * np.cos(heading) + (xy[:, 1] - y) * np.sin(
-            heading
-        )
+        ahead = (xy[:, 0] - x) * cos(heading) + (xy[:, 1] - y) * sin(heading)
         # On the inside of a bend, the tangent would lead beyond the
         # neighbouring place.
         ahead = np.clip(ahead, -_SPACING, _SPACING)

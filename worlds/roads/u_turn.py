@@ -10,9 +10,18 @@ import shapely
 from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
-from evaluation.base import cos, sin
-from worlds.roads.car_outline import swept_area
-from worlds.roads.centreline import Centreline, sample_stations
+from evaluation.base import (
+    cos,
+    dot,
+    sin,
+)
+from worlds.roads.car_outline import (
+    swept_area,
+)
+from worlds.roads.centreline import (
+    Centreline,
+    sample_stations,
+)
 
 # From the car in worlds/vehicle.sdf: its wheelbase [m].
 _WHEELBASE = 2.8
@@ -127,7 +136,7 @@ def find_u_turn(
             return UTurn(begin, points)
         middle = _loop_centre(np.array([x, y]), heading, width)
         left = np.array([-math.sin(heading), math.cos(heading)])
-        sideways = (shapely.get_coordinates(swept) - middle) @ left
+        sideways = dot(shapely.get_coordinates(swept) - middle, left)
         needed = min(needed, 2 * np.abs(sideways).max())
         place = Point(middle)
         if area.covers(place):

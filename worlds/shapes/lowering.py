@@ -186,7 +186,9 @@ def enclosed(edges: np.ndarray) -> MultiPolygon:
     plan: BaseGeometry = MultiPolygon()
     # Sorted from the outside inwards: courtyards lie inside their buildings.
     rings = [(Polygon(one.exterior), one) for one in polygons_of(walls)]
-    for outer, ring in sorted(rings, key=lambda r: r[0].area, reverse=True):
+    for outer, ring in sorted(
+        rings, key=lambda r: round(r[0].area, 6), reverse=True
+    ):
         mine = edges[shapely.intersects(lines, ring)]
         a, b = (mine - mine.mean(axis=(0, 1))).transpose(1, 0, 2)
         # The outer edges of a building run counter-clockwise, and the edges
@@ -241,7 +243,7 @@ def _wall_finish(placed: Sequence[tuple[Part, Mesh]]) -> Finish:
     """Returns the finish of the building's largest part that is not glass."""
 
     def extent(one: tuple[Part, Mesh]) -> float:
-        return float(np.prod(np.ptp(one[1].vertices, axis=0)))
+        return round(float(np.prod(np.ptp(one[1].vertices, axis=0))), 6)
 
     walls = [one for one in placed if one[0].material != "glass"]
     largest, _ = max(walls, key=extent)

@@ -5,14 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache, cached_property
 import itertools
+import math
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from evaluation.base import rotated
+
 # Coordinates are stored in whole millimetres. This is far below LiDAR
 # precision, and makes the files small and the same on every machine.
-_DECIMALS = 3
+_MM = 1000
 
 
 @dataclass(frozen=True)
@@ -71,9 +74,11 @@ class Mesh:
         `yaw` is the angle of the rotation [rad], and `translation` (3,) the
         shift [m].
         """
-        c, s = np.cos(yaw), np.sin(yaw)
+        c, s = math.cos(yaw), math.sin(yaw)
         R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return self.with_vertices(self.vertices @ R.T + np.asarray(translation))
+        return self.with_vertices(
+            rotated(R, self.vertices) + np.asarray(translation)
+        )
 
     def inside_out(self) -> Mesh:
         """Returns the mesh with its faces reversed: inside and outside swap."""
@@ -85,7 +90,7 @@ class Mesh:
         Vertices that coincide after rounding are merged, and faces that
         collapse are dropped. The same mesh always gives the same text.
         """
-        thousandths = np.rint(self.vertices * 10**_DECIMALS).astype(np.int64)
+        thousandths = np.rint(self.vertices * _MM).astype(np.int64)
         unique, inverse = np.unique(thousandths, axis=0, return_inverse=True)
         corners = inverse.reshape(-1)[self._corners] + 1
         is_new = corners != np.roll(corners, 1, axis=1)
@@ -94,7 +99,7 @@ class Mesh:
         # 15 digits are exact here, and leave out zeros at the end.
         vertices = "v %.15g %.15g %.15g\n" * len(unique)
         faces = ["", "", "", "f %d %d %d\n", "f %d %d %d %d\n"]
-        return vertices % tuple((unique / 10**_DECIMALS).ravel().tolist()) + (
+        return vertices % tuple((unique / _MM).ravel().tolist()) + (
             "".join(faces[k] for k in number) % tuple(corners[is_new].tolist())
         )
 

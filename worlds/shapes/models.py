@@ -10,8 +10,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from worlds.shapes.materials import MATERIALS
-from worlds.shapes.mesh import Mesh, box_mesh
+from evaluation.base import (
+    cos,
+    rotated,
+    sin,
+)
+from worlds.shapes.materials import (
+    MATERIALS,
+)
+from worlds.shapes.mesh import (
+    Mesh,
+    box_mesh,
+)
 
 # Number of sides of the prisms that stand for round shapes.
 _ROUND_SIDES = 12
@@ -162,7 +172,7 @@ def part_mesh(part: Part, meshes: Mapping[str, Mesh]) -> Mesh:
         mesh = _round_mesh(shape.radius, shape.length)
     else:
         mesh = _round_mesh(shape.radius, 2 * shape.radius)
-    vertices = mesh.vertices * scale @ rotation(part.rpy).T + part.xyz
+    vertices = rotated(rotation(part.rpy), mesh.vertices * scale) + part.xyz
     return mesh.with_vertices(vertices)
 
 
@@ -171,7 +181,7 @@ def rotation(rpy: tuple[float, float, float]) -> np.ndarray:
 
     `rpy` contains roll, pitch and yaw [rad].
     """
-    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(a), np.sin(a)) for a in rpy)
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in rpy)
     return np.array(
         [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
@@ -233,8 +243,8 @@ def _quaternion(R: np.ndarray) -> tuple[float, float, float, float]:
 def _round_mesh(radius: float, length: float) -> Mesh:
     """Returns the sides of a prism that just contains an upright cylinder."""
     angle = 2 * np.pi * np.arange(_ROUND_SIDES) / _ROUND_SIDES
-    ring = radius / np.cos(np.pi / _ROUND_SIDES)
-    x, y = ring * np.cos(angle), ring * np.sin(angle)
+    ring = radius / math.cos(np.pi / _ROUND_SIDES)
+    x, y = ring * cos(angle), ring * sin(angle)
     low = np.column_stack([x, y, np.full(_ROUND_SIDES, -length / 2)])
     n = _ROUND_SIDES
     sides = [(k, (k + 1) % n, n + (k + 1) % n, n + k) for k in range(n)]

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import inspect
+import math
 from pathlib import Path
 from typing import Any
 
@@ -102,9 +103,9 @@ def bar(
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     along = end - start
-    length = float(np.linalg.norm(along))
-    pitch = float(np.arccos(np.clip(along[2] / length, -1, 1)))
-    yaw = float(np.arctan2(along[1], along[0]))
+    length = float(np.linalg.norm(along, axis=0))
+    pitch = math.acos(np.clip(along[2] / length, -1, 1))
+    yaw = math.atan2(along[1], along[0])
     return Part(
         name,
         CylinderShape(radius, length),

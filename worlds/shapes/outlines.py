@@ -9,6 +9,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from evaluation.base import cos, dot, sin
+
 # x and y [m].
 Point = tuple[float, float]
 # Corners, each an array of x and y [m].
@@ -38,7 +40,7 @@ def regular_polygon(
     """
     angles = phase + np.arange(count) * 2 * math.pi / count
     return np.asarray(center) + radius * np.column_stack(
-        [np.cos(angles), np.sin(angles)]
+        [cos(angles), sin(angles)]
     )
 
 
@@ -110,7 +112,7 @@ def rounded(
     ) -> Corners:
         radius = corners[k]
         cross = into[0] * out[1] - into[1] * out[0]
-        turn = math.atan2(cross, float(into @ out))
+        turn = math.atan2(cross, float(dot(into, out)))
         center = (
             p
             - into * radius * math.tan(turn / 2)
@@ -204,7 +206,7 @@ def stadium(
     radius, middle = (y1 - y0) / 2, (y0 + y1) / 2
     count = max(2, math.ceil(math.pi * radius / step))
     angles = np.linspace(-math.pi / 2, math.pi / 2, count + 1)
-    arc = radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    arc = radius * np.column_stack([cos(angles), sin(angles)])
     right = np.array([x1 - radius, middle]) + arc
     left = np.array([x0 + radius, middle]) - arc
     # The arc on the left ends where the front begins.
@@ -280,6 +282,6 @@ def edges_on(
             start = outline[edge]
             along = outline[(edge + 1) % len(outline)] - start
             normal = np.array([-along[1], along[0]]) / np.hypot(*along)
-            if max(abs(normal @ (a - start)), abs(normal @ (b - start))) < 0.01:
+            if np.abs(dot(np.array([a, b]) - start, normal)).max() < 0.01:
                 found.add(k)
     return frozenset(found)

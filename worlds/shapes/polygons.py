@@ -55,7 +55,9 @@ def polygons_of(geometry: BaseGeometry) -> list[Polygon]:
         for part in shapely.get_parts(geometry)
         if isinstance(part, Polygon) and part.area > _SLIVER
     ]
-    return sorted(parts, key=lambda part: (part.bounds, part.area))
+    return sorted(
+        parts, key=lambda part: np.round([*part.bounds, part.area], 6).tolist()
+    )
 
 
 def tiles(geometry: BaseGeometry, size: float) -> Iterator[MultiPolygon]:

@@ -38,7 +38,7 @@ def largest_rectangle(footprint: BaseGeometry) -> Polygon:
         x, y = footprint.representative_point().coords[0]
         half = _HALF_SMALLEST
         return box(x - half, y - half, x + half, y + half)
-    return max(inside, key=lambda one: one.area)
+    return max(inside, key=lambda one: round(one.area, 6))
 
 
 def _evenly_chosen(values: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
+from evaluation.base import rotated
 from worlds.shapes.materials import USUAL_MATERIALS
 from worlds.shapes.models import Model, part_mesh, rotation, triple
 from worlds.shapes.polygons import placed
@@ -103,7 +104,7 @@ class Structure:
         the structure stays where it is.
         """
         p_WW = np.subtract(xyz, self.xyz)
-        p_SS = rotation((0.0, 0.0, -self.yaw)) @ p_WW
+        p_SS = rotated(rotation((0.0, 0.0, -self.yaw)), p_WW)
         parts = tuple(
             replace(part, xyz=triple(np.subtract(part.xyz, p_SS).round(4)))
             for part in self.model.parts
@@ -122,7 +123,8 @@ class Structure:
         meshes = [part_mesh(part, model.meshes) for part in model.parts]
         p_SPs = np.concatenate([mesh.vertices for mesh in meshes])
         is_low = p_SPs[:, 2] < p_SPs[:, 2].min() + _FEET
-        return p_SPs[is_low] @ rotation((0.0, 0.0, self.yaw)).T + self.xyz
+        R_WS = rotation((0.0, 0.0, self.yaw))
+        return rotated(R_WS, p_SPs[is_low]) + self.xyz
 
     def p_WP(
         self, p_SP: tuple[float, float, float]

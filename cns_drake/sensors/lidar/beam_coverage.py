@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from evaluation.base import arcsin, arctan2
+
 # Width of a cell in elevation and in azimuth [deg].
 _CELL_DEG = 0.25
 # Number of cells in elevation.
@@ -57,8 +59,8 @@ class BeamCoverage:
 def _cell_indices(d_Sset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns row and column of the cells of unit directions (N, 3)."""
     x, y, z = d_Sset.T
-    elevation_deg = np.degrees(np.arcsin(np.clip(z, -1.0, 1.0))) + 90.0
-    azimuth_deg = np.degrees(np.arctan2(y, x)) + 180.0
+    elevation_deg = np.degrees(arcsin(np.clip(z, -1.0, 1.0))) + 90.0
+    azimuth_deg = np.degrees(arctan2(y, x)) + 180.0
     # The direction straight up is rounded to the upper limit.
     rows = np.minimum((elevation_deg / _CELL_DEG).astype(np.int64), _ROWS - 1)
     return rows, (azimuth_deg / _CELL_DEG).astype(np.int64) % _COLUMNS

@@ -9,6 +9,8 @@ import math
 
 import numpy as np
 
+from evaluation.base import arcsin, arctan2
+
 # Height of the elevation bands in which beams of irregular patterns are cast.
 _BAND_RAD = 0.03
 # Greatest value of the field `ring` of a point.
@@ -88,8 +90,8 @@ def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
         t_ns: (N,) firing times since the start of the revolution [ns], not
             decreasing.
     """
-    elevation = np.arcsin(np.clip(d_Sset[:, 2], -1.0, 1.0))
-    azimuth = np.arctan2(d_Sset[:, 1], d_Sset[:, 0])
+    elevation = arcsin(np.clip(d_Sset[:, 2], -1.0, 1.0))
+    azimuth = arctan2(d_Sset[:, 1], d_Sset[:, 0])
     bands = np.floor(elevation / _BAND_RAD)
     column_t_ns, column = np.unique(t_ns, return_inverse=True)
     return Beams(
@@ -225,8 +227,8 @@ def _limited_beams(
 ) -> Beams:
     """Returns the beams within limits; equal arguments share one result."""
     x, y, z = beams.d_Sset.T
-    azimuth = np.rad2deg(np.arctan2(y, x))
-    elevation = np.rad2deg(np.arcsin(np.clip(z, -1.0, 1.0)))
+    azimuth = np.rad2deg(arctan2(y, x))
+    elevation = np.rad2deg(arcsin(np.clip(z, -1.0, 1.0)))
     # Beams on a limit are inside, with either rounding.
     low, high = azimuths_deg[0] - 1e-9, azimuths_deg[1] + 1e-9
     if low <= high:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.sensors.noise_draws import check_seed, noise_generator
+from evaluation.base import exp32
 
 # Intensity falls with distance as in CARLA's ray-cast LiDAR with its default
 # atmosphere: exp(-a d), a = 0.004 / m (docs/ref_sensors of CARLA).
@@ -147,7 +148,7 @@ class MeasurementModel:
         distance = measured
         if ranges is not true_ranges:
             distance = true_ranges.take(beams)
-        intensity = np.exp(-_ATTENUATION_PER_M * distance)
+        intensity = exp32(-_ATTENUATION_PER_M * distance)
         if self.dropout > 0.0 or self.faint_dropout > 0.0:
             draw = self._make_generator(_DROPOUT, frame).random(num_beams)[
                 beams

@@ -11,7 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cns_drake.sensors.lidar.beams import BeamPattern, Beams, make_beams
-from evaluation.base import cos, sin
+from evaluation.base import (
+    cos,
+    sin,
+    sinc,
+)
 
 
 @dataclass(frozen=True)
@@ -392,20 +396,21 @@ class RosettePattern(_TimedPattern):
     def directions(self, times: np.ndarray) -> np.ndarray:
         first, second = (2.0 * np.pi * hz * times for hz in _PRISMS_HZ)
         bend = np.deg2rad(self.fov_deg) / 4.0
-        left = bend * (np.cos(first) + np.cos(second))
-        up = bend * (np.sin(first) + np.sin(second))
+        left = bend * (cos(first) + cos(second))
+        up = bend * (sin(first) + sin(second))
         angle = np.hypot(left, up)
-        x = np.cos(angle)
-        # sin(angle) / angle, which numpy has with pi in it.
-        y, z = left * np.sinc(angle / np.pi), up * np.sinc(angle / np.pi)
+        x = cos(angle)
+        # sin(angle) / angle.
+        share = sinc(angle / np.pi)
+        y, z = left * share, up * share
         top = self.height_deg / 2.0 if self.num_lines > 1 else 0.0
         lines = np.deg2rad(np.linspace(top, -top, self.num_lines))
-        cos, sin = np.cos(lines), np.sin(lines)
+        c, s = cos(lines), sin(lines)
         return np.stack(
             [
-                x[:, None] * cos - z[:, None] * sin,
+                x[:, None] * c - z[:, None] * s,
                 np.broadcast_to(y[:, None], (len(times), self.num_lines)),
-                x[:, None] * sin + z[:, None] * cos,
+                x[:, None] * s + z[:, None] * c,
             ],
             axis=-1,
         )
@@ -454,9 +459,9 @@ class NoddingPattern(_TimedPattern):
         elevation = high - band * (lines + 1.0 - height[:, None])
         return np.stack(
             [
-                np.cos(elevation) * np.cos(azimuth),
-                np.cos(elevation) * np.sin(azimuth),
-                np.sin(elevation),
+                cos(elevation) * cos(azimuth),
+                cos(elevation) * sin(azimuth),
+                sin(elevation),
             ],
             axis=-1,
         )

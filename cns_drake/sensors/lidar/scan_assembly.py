@@ -83,7 +83,7 @@ class Revolution:
             p_Sset.astype(np.float32),
             beams.ring,
             beams.t_ns,
-            np.argsort(beams.packet_order),
+            np.argsort(beams.packet_order, kind="stable"),
         )
 
 

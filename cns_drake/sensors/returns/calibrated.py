@@ -24,7 +24,12 @@ from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
 from cns_drake.sensors.returns.surface_texture import with_texture
 from cns_drake.sensors.returns.tables import join
 from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
-from evaluation.base import cos, sin
+from evaluation.base import (
+    arcsin,
+    arctan2,
+    cos,
+    sin,
+)
 from evaluation.lidar_sheets import ReturnsSheet, find_sheet
 from worlds.shapes import StructureTable
 
@@ -81,7 +86,7 @@ class _UnitBeams:
         self.d_Sset = np.ascontiguousarray(d_Sset[self.beam])
         self.height = height[self.beam]
         self.orders = np.stack(
-            [np.arange(len(self.beam)), np.argsort(self.beam)]
+            [np.arange(len(self.beam)), np.argsort(self.beam, kind="stable")]
         )
         ends = np.flatnonzero(np.diff(self.height)) + 1
         ends = np.concatenate([[0], ends, [len(self.height)]])
@@ -129,13 +134,13 @@ def _make_unit_beams(
     offset = 0.0
     if sheet.head.tick_deg:
         tick = np.radians(sheet.head.tick_deg)
-        azimuth = np.arctan2(y, x)
+        azimuth = arctan2(y, x)
         to_tick = np.rint(azimuth / tick) * tick - azimuth
         draw = uniform(key, laser, len(_LaserErrors._fields))
         offset = ((draw - 0.5) * 2.0 * tick)[beams.ring]
     across = np.maximum(np.sqrt(x * x + y * y), 1e-9)
     lowest, heights, factors = np.transpose(sheet.head.blocks)
-    block = (np.degrees(np.arcsin(z))[:, None] < lowest[:-1]).sum(axis=1)
+    block = (np.degrees(arcsin(z))[:, None] < lowest[:-1]).sum(axis=1)
     flicker = errors.flicker
     return _UnitBeams(
         beams,

@@ -113,12 +113,12 @@ class Weather:
         """
         kinds = []
         if self.rain > 0.0:
-            slope = 4.1 * self.rain**-0.21
+            slope = 4.1 * math.pow(self.rain, -0.21)
             fresnel = ((_WATER_INDEX - 1.0) / (_WATER_INDEX + 1.0)) ** 2
             kinds.append((8000.0 * exp(-slope * diameters_mm), fresnel))
         if self.snowfall > 0.0:
-            slope = 2.29 * self.snowfall**-0.45
-            number = 2500.0 * self.snowfall**-0.94
+            slope = 2.29 * math.pow(self.snowfall, -0.45)
+            number = 2500.0 * math.pow(self.snowfall, -0.94)
             kinds.append(
                 (number * exp(-slope * diameters_mm), _FLAKE_REFLECTIVITY)
             )
@@ -230,7 +230,7 @@ def _weighted_quantiles(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     result = np.zeros((len(values), len(_QUANTILES)))
     for row, (value, weight) in enumerate(zip(values, weights, strict=True)):
         if weight.sum() > 0.0:
-            order = np.argsort(value)
+            order = np.argsort(value, kind="stable")
             share = np.cumsum(weight[order])
             place = np.searchsorted(share, _QUANTILES * share[-1])
             result[row] = value[order][place]

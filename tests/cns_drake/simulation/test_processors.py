@@ -4,12 +4,12 @@ import os
 import subprocess
 import sys
 
+from helpers.processors import PROGRAM, processors
 from helpers.recorded_traffic import write_rounds
 from helpers.small_city import ROADS
 from helpers.small_map import write_small_map
 from helpers.tiny_drive import tiny_scenario, write_scenario
 from mcap.reader import make_reader
-import numpy as np
 import pytest
 
 from cns_drake.simulation import simulate
@@ -59,32 +59,15 @@ def messages(folder):
 
 # Numba keeps code for each kind of processor apart, and compiles all anew.
 ANY = {"NUMBA_CPU_NAME": "generic"}
-# The program, with the oldest instructions in Embree.
-PROGRAM = """
-from cns_drake.__main__ import main
-from cns_drake.ray_casting import embree
-embree.ALONE += b",isa=sse2"
-main()
-"""
 
 
 @pytest.mark.parametrize("loops", [{}, ANY])
 def test_messages_are_those_of_another_processor(scenario, tmp_path, loops):
     file = write_scenario(scenario, tmp_path)
-    extensions = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
-    environment = os.environ | {
-        # NumPy has nothing but what every processor has.
-        "NPY_DISABLE_CPU_FEATURES": " ".join(extensions),
-        # The oldest kind of processor that has matrix products of its own.
-        "OPENBLAS_CORETYPE": "Prescott",
-        # The C library does not fuse products and sums.
-        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA,-AVX2",
-        **loops,
-    }
-    command = [sys.executable, "-c", PROGRAM, "simulate", str(file)]
+    command = [sys.executable, PROGRAM, "simulate", str(file)]
     subprocess.run(
         [*command, "--output", str(tmp_path / "other")],
-        env=environment,
+        env=os.environ | processors()["oldest"] | loops,
         check=True,
         capture_output=True,
     )

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 
+from helpers.processors import processors
 import numpy as np
 import pytest
 
@@ -84,17 +85,9 @@ def digest(arrays):
     "loops", [{}, pytest.param(ANY, marks=pytest.mark.night)]
 )
 def test_answers_are_those_of_another_processor(loops):
-    extensions = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
-    environment = os.environ | {
-        # NumPy has nothing but what every processor has.
-        "NPY_DISABLE_CPU_FEATURES": " ".join(extensions),
-        # The oldest kind of processor that has matrix products of its own.
-        "OPENBLAS_CORETYPE": "Prescott",
-        **loops,
-    }
     other = subprocess.run(
         [sys.executable, __file__],
-        env=environment,
+        env=os.environ | processors()["oldest"] | loops,
         check=True,
         capture_output=True,
         text=True,

@@ -67,7 +67,7 @@ def test_an_interrupted_import_leaves_nothing(tmp_path, line):
     process = start(tmp_path / "city.osm", tmp_path / "town")
     await_word(process, line)
     os.killpg(process.pid, signal.SIGINT)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=600)
     assert process.returncode == 130
     assert errors.endswith("cns-drake: interrupted\n")
     assert [path.name for path in Path(tmp_path).iterdir()] == ["city.osm"]
@@ -89,7 +89,7 @@ def test_an_import_after_a_killed_one_succeeds(tmp_path, line):
     process = start(tmp_path / "city.osm", output)
     await_word(process, line)
     process.kill()
-    process.communicate(timeout=60)
+    process.communicate(timeout=600)
     assert process.returncode == -signal.SIGKILL
     left = {path.name for path in tmp_path.iterdir()}
     assert left <= {"city.osm", "town.part", "town.part.lock"}

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from evaluation.base import cos, sin
 from worlds.city.facades import (
     Band,
     Building,
@@ -296,8 +297,8 @@ def _dome(building: CornerBuilding, plan: np.ndarray, z0: float) -> list[Mesh]:
     # The dome ends below the tip, where the lantern or the spire begins.
     share = 0.85 if building.dome == "dome" else 0.6
     angles = np.linspace(0.0, 0.4 * np.pi, 5)
-    radii = radius * np.cos(angles)
-    heights = drum_top + share * (top - drum_top) * np.sin(angles)
+    radii = radius * cos(angles)
+    heights = drum_top + share * (top - drum_top) * sin(angles)
     profile = list(zip(radii, heights, strict=True))
     pieces = [drum, solids.revolved(profile, _DOME_SIDES, center=center)]
     spire_foot = heights[-1]

@@ -26,7 +26,9 @@ def storeys_for(
     wanted = ridge_rise(span, pitch_deg)
     room = height - ROOF_M - floor - 0.15
     counts = [n for n in (1, 2, 3, 4) if room - n * STOREY_M > 0.1 * span]
-    return min(counts or [1], key=lambda n: abs(room - n * STOREY_M - wanted))
+    return min(
+        counts or [1], key=lambda n: round(abs(room - n * STOREY_M - wanted), 6)
+    )
 
 
 def wall_top_for(

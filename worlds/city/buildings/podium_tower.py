@@ -277,7 +277,9 @@ def _add_garden(building: PodiumTower, tower: np.ndarray, z: float) -> None:
         (x0, y0, x1, near),
         (x0, far, x1, y1),
     )
-    x0, y0, x1, y1 = max(strips, key=lambda s: min(s[2] - s[0], s[3] - s[1]))
+    x0, y0, x1, y1 = max(
+        strips, key=lambda s: round(min(s[2] - s[0], s[3] - s[1]), 6)
+    )
     x0, x1 = x0 + _GARDEN_EDGE_M, x1 - _GARDEN_EDGE_M
     y0, y1 = y0 + _GARDEN_EDGE_M, y1 - _GARDEN_EDGE_M
     if min(x1 - x0, y1 - y0) < _LEAST_GARDEN_M:

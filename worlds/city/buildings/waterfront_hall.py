@@ -1,6 +1,7 @@
 """The waterfront hall: a long shed with a loading dock."""
 
 import itertools
+import math
 
 import numpy as np
 
@@ -274,5 +275,5 @@ def _span_line(
     if roof == "gable":
         return [(front, 0.0), (middle, ridge), (back, 0.0)]
     angles = np.linspace(np.pi, 0.0, _BARREL_CHORDS + 1)[1:-1]
-    arc = [(middle + half * np.cos(t), ridge * np.sin(t)) for t in angles]
+    arc = [(middle + half * math.cos(t), ridge * math.sin(t)) for t in angles]
     return [(front, 0.0), *arc, (back, 0.0)]

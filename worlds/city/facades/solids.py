@@ -9,6 +9,9 @@ import itertools
 import numpy as np
 from numpy.typing import ArrayLike
 
+from evaluation.base import (
+    rotated,
+)
 from worlds.shapes import (
     Mesh,
     box_mesh,
@@ -302,14 +305,14 @@ def beam(start: ArrayLike, end: ArrayLike, width: float) -> Mesh:
         width: side of the square [m].
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
-    length = float(np.linalg.norm(end - start))
+    length = float(np.linalg.norm(end - start, axis=0))
     along = (end - start) / length
     side = np.cross(along, (0.0, 0.0, 1.0))
-    side /= np.linalg.norm(side)
+    side /= np.linalg.norm(side, axis=0)
     up = np.cross(side, along)
     unit = box_mesh((length, width, width))
     R = np.column_stack([along, -side, up])
-    return Mesh(unit.vertices @ R.T + (start + end) / 2, unit.faces)
+    return Mesh(rotated(R, unit.vertices) + (start + end) / 2, unit.faces)
 
 
 def foundation(points: ArrayLike) -> Mesh:

@@ -15,7 +15,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from worlds.city.facades.reliefs import Arch, Band, Relief, lifted
+from evaluation.base import (
+    dot,
+)
+from worlds.city.facades.reliefs import (
+    Arch,
+    Band,
+    Relief,
+    lifted,
+)
 from worlds.shapes import (
     Mesh,
 )
@@ -513,5 +521,5 @@ def _corner_shift(
     distance (other - depth cos t) / sin t from the corner, measured along the
     first wall. For equal depths, this distance is depth tan(t / 2).
     """
-    cosine, sine = float(a @ b), float(a[0] * b[1] - a[1] * b[0])
+    cosine, sine = float(dot(a, b)), float(a[0] * b[1] - a[1] * b[0])
     return 0.0 if abs(sine) < 1e-6 else (other - depth * cosine) / sine

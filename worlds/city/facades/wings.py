@@ -11,9 +11,16 @@ import itertools
 
 import numpy as np
 
+from evaluation.base import (
+    dot,
+)
 from worlds.city.facades import bays, roofs
-from worlds.city.facades.wall_frames import WallFrame
-from worlds.shapes import outlines
+from worlds.city.facades.wall_frames import (
+    WallFrame,
+)
+from worlds.shapes import (
+    outlines,
+)
 
 # Overlap of a roof's underside with the top of the walls [m].
 SEAT = 0.02
@@ -190,7 +197,7 @@ def free_stretches(
     for other in hiding:
         for corner in other.outline:
             along = wall.point(0.0, 0.0), wall.point(1.0, 0.0)
-            x = float((corner - along[0]) @ (along[1] - along[0]))
+            x = float(dot(corner - along[0], along[1] - along[0]))
             if 0.0 < x < wall.length:
                 cuts.add(x)
     free: list[tuple[float, float]] = []

@@ -9,6 +9,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
+from evaluation.base import sin
 from worlds.city.ground.coverings import Covering, water
 from worlds.city.ground.districts import District
 from worlds.city.ground.elevation import Ground
@@ -108,7 +109,7 @@ def _make_swell(
         u = np.clip(distance / plan.relief_margin, 0.0, 1.0)
         rise = u * u * (3 - 2 * u)
         phase = np.outer(x, waves[:, 0]) + np.outer(y, waves[:, 1])
-        wave = np.sin(phase + waves[:, 2]).mean(axis=1)
+        wave = sin(phase + waves[:, 2]).mean(axis=1)
         # The relief is nowhere below the level ground, so that it has no
         # hollows where water would collect.
         return plan.relief * rise * (0.65 + 0.35 * wave)

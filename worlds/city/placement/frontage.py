@@ -10,7 +10,11 @@ from shapely.geometry import LineString, Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import linemerge
 
-from evaluation.base import wrapped
+from evaluation.base import (
+    arctan2,
+    dot,
+    wrapped,
+)
 from worlds.shapes import (
     placed,
 )
@@ -98,7 +102,9 @@ def lines_along(
         for piece in _split_at_corners(_street_on_right(line, streets))
         if piece.length > _LEAST_LINE
     ]
-    return sorted(pieces, key=lambda p: (*p.coords[0], p.length))
+    return sorted(
+        pieces, key=lambda p: np.round([*p.coords[0], p.length], 6).tolist()
+    )
 
 
 def station_at(line: LineString, s: float) -> Station:
@@ -144,7 +150,7 @@ def lot_at(
         np.array(line.interpolate(start + width * u).coords[0]) - a
         for u in _CHORD_SHARES
     ]
-    step_back = max(0.0, *(float(p @ away) for p in between))
+    step_back = max(0.0, *(float(dot(p, away)) for p in between))
     centre = (a + b) / 2 + away * (depth / 2 + step_back)
     return Lot(float(centre[0]), float(centre[1]), yaw, chord, depth)
 
@@ -165,7 +171,7 @@ def _split_at_corners(line: LineString) -> list[LineString]:
     """Returns the pieces of a line between its corners, in order."""
     coordinates = np.array(line.coords)[:, :2]
     edges = np.diff(coordinates, axis=0)
-    heading = np.arctan2(edges[:, 1], edges[:, 0])
+    heading = arctan2(edges[:, 1], edges[:, 0])
     turns = wrapped(np.diff(heading))
     corners = np.flatnonzero(np.abs(turns) > _CORNER) + 1
     closed = bool(np.allclose(coordinates[0], coordinates[-1]))

@@ -75,7 +75,7 @@ def _middle_line(median: Polygon) -> LineString:
     corners = shapely.get_coordinates(median.minimum_rotated_rectangle)[:4]
     sides = np.roll(corners, -1, axis=0) - corners
     lengths = np.hypot(*sides.T)
-    short = int(np.argmin(lengths[:2]))
+    short = int(np.argmin(np.round(lengths[:2], 6)))
     a = (corners[short] + corners[short + 1]) / 2
     b = (corners[(short + 2) % 4] + corners[(short + 3) % 4]) / 2
     inset = lengths.min() / np.hypot(*(b - a))
@@ -95,7 +95,7 @@ def _furnish_sidewalk(
     while s < line.length - _END:
         at = station_at(line, s)
         here = shapely.Point(at.x, at.y)
-        district = min(districts, key=lambda d: d.area.distance(here))
+        district = min(districts, key=lambda d: round(d.area.distance(here), 6))
         street = district.plan.street or draft.plan.street
         step, object_kind = _draw_next(street, task, rng)
         if object_kind is not None and not keep_off.intersects(here):

@@ -18,8 +18,11 @@ import numpy as np
 from evaluation.base import (
     InputError,
     check_regular,
+    dot,
     errors_at,
     parse_json,
+    product,
+    rotated,
     user_errors,
 )
 from worlds.imports.cityjson.city_file import (
@@ -271,7 +274,7 @@ class _GeometrySource(NamedTuple):
         X = np.array(instance["transformationMatrix"], dtype=np.float64)
         X = X.reshape(4, 4)
         with np.errstate(over="ignore", invalid="ignore"):
-            placed = self.templates.points @ X[:3, :3].T + X[:3, 3]
+            placed = rotated(X[:3, :3], self.templates.points) + X[:3, 3]
         is_affine = (X[3] == [0.0, 0.0, 0.0, 1.0]).all()
         if reference < 0 or not is_affine:
             raise ValueError
@@ -544,9 +547,9 @@ def _exchange_axes(city: CityFile) -> None:
     """Exchanges the first two coordinates of the system and of all faces."""
     defined = city.system
     city.system = defined.exchanged()
-    turn = city.system.matrix @ np.linalg.inv(defined.matrix)
+    turn = product(city.system.matrix, np.linalg.inv(defined.matrix))
     for face in city.faces():
-        face[:] = [ring @ turn.T for ring in face]
+        face[:] = [rotated(turn, ring) for ring in face]
     order = [axis.partition(" ")[0] for axis in defined.axes[:2]]
     city.faults.add(
         f"reference system with {order[0]} first, but coordinates with"
@@ -604,7 +607,7 @@ def _look_outwards(city: CityFile) -> Iterator[bool]:
                     # Normal of the ring, as long as twice its area.
                     normal = np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)
                     if geometry.is_solid:
-                        size += float(p[0] @ normal)
+                        size += float(dot(p[0], normal))
                     else:
                         size += signs.get(kind, 0.0) * float(normal[2])
             if abs(size) > _LEAST_JUDGED:

@@ -8,7 +8,10 @@ import numpy as np
 import pyproj
 from pyproj.exceptions import CRSError, ProjError
 
-from evaluation.base import InputError
+from evaluation.base import (
+    InputError,
+    rotated,
+)
 
 # Direction of an axis -> its row among east, north and up, and its sign.
 _ROWS = {
@@ -60,7 +63,7 @@ class ReferenceSystem:
         """Converts coordinates (N, 3) to metres east, north and up."""
         if self.is_plain:
             return points
-        return points @ self.matrix.T
+        return rotated(self.matrix, points)
 
     def exchanged(self) -> ReferenceSystem:
         """Returns the reference system with its first two axes exchanged.

@@ -16,6 +16,7 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
+from evaluation.base import dot
 from worlds.imports.dressing import facade_pieces
 from worlds.imports.dressing.facade_plan import (
     FacadePlan,
@@ -291,10 +292,11 @@ def _dress_building(
     out.add_to("roof", to_mesh(building.roof))
     counts: Counter[str] = Counter()
     for plan in plans:
-        # The name must not depend on the map's origin.
-        panel = plan.panel
-        heading = np.degrees(np.arctan2(panel.along[1], panel.along[0]))
-        wall = f"wall {panel.length:.1f} {heading:.0f}"
+        # The name must not depend on the map's origin, nor on a last bit: no
+        # heading is -0 or -180.
+        x, y = plan.panel.along.round(9) + 0.0
+        heading = round(math.degrees(math.atan2(y, x)), 6)
+        wall = f"wall {round(plan.panel.length, 6):.1f} {heading:.0f}"
         rng = random_generator(seed, wall, imported.draw_name)
         counts += facade_pieces.add_facade(out, plan, rng)
     has_own_roof = imported.lod >= _LOD_WITH_ROOF or not len(building.roof)
@@ -378,12 +380,12 @@ class _DriveViews:
         near = self._tree.query_ball_point(middle, most + panel.length / 2.0)
         index = np.array(near, dtype=int)
         from_start = self._xy[index] - panel.origin[:2]
-        out = from_start @ panel.outward
-        x = from_start @ panel.along
+        out = dot(from_start, panel.outward)
+        x = dot(from_start, panel.along)
         aside = np.maximum(np.maximum(-x, x - panel.length), 0.0)
         distance = np.hypot(out, aside)
         usable = np.flatnonzero((out > 0.0) & (distance <= most))
-        usable = usable[np.argsort(distance[usable], kind="stable")]
+        usable = usable[np.argsort(distance[usable].round(6), kind="stable")]
         step = max(1, (len(usable) - _NEAREST) // _OTHERS)
         usable = np.append(usable[:_NEAREST], usable[_NEAREST::step])
         return index[usable], distance[usable]
@@ -492,7 +494,9 @@ def _with_fronts(
     plans_of: dict[int, list[FacadePlan]] = {}
     for building, walls in walls_of.items():
         on_street = [wall for wall in walls if plans[wall].on_street]
-        front = min(on_street, key=lambda k: (to_way[k], k), default=None)
+        front = min(
+            on_street, key=lambda k: (to_way[k].round(6), k), default=None
+        )
         plans_of[building] = []
         for wall in walls:
             plan = plans[wall]
@@ -516,7 +520,7 @@ def _visible_panels(
     panels = find_panels(walls, views.are_near)
     panels = [panel for panel in panels if panel.is_plane]
     distances = views.distances(panels)
-    order = np.argsort(distances, kind="stable")
+    order = np.argsort(distances.round(6), kind="stable")
     order = order[distances[order] <= _WALLS_WITHIN]
     costs = [
         _TRIANGLES_OF_WALL
@@ -634,7 +638,7 @@ def _without_holes(area: Polygon) -> Polygon:
             for part in shapely.get_parts(area.intersection(half))
             if isinstance(part, Polygon)
         ]
-        area = max(halves, key=lambda part: part.area)
+        area = max(halves, key=lambda part: round(part.area, 6))
     return area
 
 
@@ -642,9 +646,9 @@ def _add_chimneys(out: Assembly, roof: np.ndarray) -> None:
     """Adds one or two chimneys at random places on the ridge of a roof."""
     corners = roof.reshape(-1, 3)
     ridge = corners[corners[:, 2] > corners[:, 2].max() - _RIDGE_TOLERANCE]
-    start = ridge[np.lexsort([ridge[:, 1], ridge[:, 0]])[0]]
-    end = ridge[np.linalg.norm(ridge - start, axis=1).argmax()]
-    length = float(np.linalg.norm(end - start))
+    start = ridge[np.lexsort(ridge[:, 1::-1].round(6).T)[0]]
+    end = ridge[np.linalg.norm(ridge - start, axis=1).round(6).argmax()]
+    length = float(np.linalg.norm(end - start, axis=0))
     yaw = math.atan2(end[1] - start[1], end[0] - start[0])
     sides = UpperSides(roof)
     count = 1 + int(length > _SHORT_RIDGE)

@@ -248,7 +248,7 @@ def with_doors(plan: FacadePlan, paving: UpperSides) -> FacadePlan:
     number = max(1, round(plan.panel.length / _DOOR_EVERY))
     wanted = (np.arange(number) + 0.5) * plan.panel.length / number
     middles = np.array([(o.x0 + o.x1) / 2 for o in street])
-    nearest = np.abs(middles - wanted[:, None]).argmin(axis=1)
+    nearest = np.abs(middles - wanted[:, None]).round(6).argmin(axis=1)
     doors = {street[k] for k in nearest.tolist()}
     openings = []
     for o in plan.openings:

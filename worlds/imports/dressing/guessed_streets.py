@@ -7,6 +7,7 @@ import shapely
 from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 
+from evaluation.base import dot
 from worlds.imports.dressing.paving import (
     area_outside,
     near_drives,
@@ -130,7 +131,7 @@ def _draped(
         normal = np.cross(b - a, c - a)
         for part in parts_of(piece):
             flat = flat_surface(part, 0.0, "street", ImportFaults())
-            aside = (flat - a)[..., :2] @ normal[:2]
+            aside = dot((flat - a)[..., :2], normal[:2])
             flat[..., 2] = a[2] - aside / normal[2] + above
             draped.append(flat)
     return np.concatenate(draped)

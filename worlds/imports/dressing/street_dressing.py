@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+import math
 from pathlib import Path
 from typing import NamedTuple
 
@@ -212,7 +213,7 @@ def _fill_car_park(
         return
     sides = np.diff(box, axis=0)[:2]
     length, width = sorted(np.hypot(*sides.T).tolist(), reverse=True)
-    first = int(np.hypot(*sides[0]) < np.hypot(*sides[1]))
+    first = int(np.subtract(*np.hypot(*sides.T)) < -1e-6)
     along = sides[first] / length
     across = np.array([-along[1], along[0]])
     middle = box[:4].mean(axis=0)
@@ -223,7 +224,7 @@ def _fill_car_park(
         offsets = [width / 2.0 - _BAY_LENGTH / 2.0 - _BAYS_FROM_EDGE]
     if width > 2.0 * _BAY_LENGTH + _AISLE_WIDTH:
         offsets.append(-offsets[0])
-    heading = float(np.arctan2(along[1], along[0]))
+    heading = math.atan2(along[1], along[0])
     heading += 0.0 if is_row else np.pi / 2.0
     area = shapely.union_all(shapely.polygons(car_park.triangles[:, :, :2]))
     name = car_park.structure.name
@@ -393,7 +394,7 @@ def _beside_street(
     """
     point = Point(xy)
     distances = shapely.distance(courses, point)
-    nearest = int(np.argmin(distances))
+    nearest = int(np.argmin(np.round(distances, 6)))
     line = courses[nearest]
     half = streets[nearest].width / 2.0
     station = station_at(line, line.project(point))
@@ -402,12 +403,12 @@ def _beside_street(
     distance = float(np.hypot(*offset))
     if distance < _IN_THE_MIDDLE:
         # On the right of the street, where signs stand.
-        offset = np.array([np.sin(station.yaw), -np.cos(station.yaw)])
+        offset = np.array([math.sin(station.yaw), -math.cos(station.yaw)])
         distance = 1.0
     outwards = offset / distance
     if distances[nearest] < half + _FROM_EDGE:
         xy = middle + outwards * (half + _FROM_EDGE)
-    return xy, float(np.arctan2(-outwards[1], -outwards[0]))
+    return xy, math.atan2(-outwards[1], -outwards[0])
 
 
 def _place_along(
@@ -422,6 +423,6 @@ def _place_along(
         offset: distance from the line [m].
     """
     at = station_at(line, s)
-    x = at.x + side * offset * float(np.sin(at.yaw))
-    y = at.y - side * offset * float(np.cos(at.yaw))
+    x = at.x + side * offset * math.sin(at.yaw)
+    y = at.y - side * offset * math.cos(at.yaw)
     return (x, y), at.yaw

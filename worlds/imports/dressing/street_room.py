@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+import math
 
 import numpy as np
 import shapely
@@ -293,6 +294,6 @@ def _revolved(radius: list[float], z: list[float], sides: int) -> Mesh:
     `z` is as for `revolved`, and `radius` contains the radii of the circles.
     """
     step = 2.0 * np.pi / sides
-    wide = np.sqrt(step / np.sin(step)) * np.array(radius)
+    wide = np.sqrt(step / math.sin(step)) * np.array(radius)
     vertices, triangles = revolved(wide, np.array(z), sides)
     return Mesh(vertices, tuple(map(tuple, triangles.tolist())))

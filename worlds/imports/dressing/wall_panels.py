@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import itertools
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,8 +13,15 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from worlds.city import WallFrame
-from worlds.imports.faces import joined_triangles
+from evaluation.base import (
+    dot,
+)
+from worlds.city import (
+    WallFrame,
+)
+from worlds.imports.faces import (
+    joined_triangles,
+)
 from worlds.shapes import (
     long_normals,
     unit_normals,
@@ -23,10 +31,10 @@ from worlds.shapes import (
 _UPRIGHT = 0.02
 # Triangles of one wall have unit normals whose dot product is at least this (1
 # deg).
-_SAME_PLANE = float(np.cos(np.radians(1.0)))
+_SAME_PLANE = math.cos(math.radians(1.0))
 # A wall that bends is divided where normals differ by more than this (0.02
 # deg).
-_STRAIGHT = float(np.cos(np.radians(0.02)))
+_STRAIGHT = math.cos(math.radians(0.02))
 # Millimetres in a metre: corners that are equal in whole millimetres are one.
 _MM = 1000.0
 # A wall is a rectangle if at most this much of the rectangle's area is missing
@@ -161,7 +169,7 @@ def _plane_pieces(
     `facets` (M,) are the numbers of the plane facets to which triangles belong.
     The other arguments are as in `_make_panel`.
     """
-    x = (triangles[..., :2] - wall.origin[:2]).mean(axis=1) @ wall.along
+    x = dot((triangles[..., :2] - wall.origin[:2]).mean(axis=1), wall.along)
     starts = [x[facets == number].min() for number in range(facets.max() + 1)]
 
     def piece_of(members: Sequence[int]) -> Panel:
@@ -230,10 +238,10 @@ def _make_panel(
     outward = normals.sum(axis=0)[:2]
     outward /= np.hypot(*outward)
     along = np.array([-outward[1], outward[0]])
-    x = (corners[:, :2] - corners[0, :2]) @ along
+    x = dot(corners[:, :2] - corners[0, :2], along)
     start = corners[0, :2] + x.min() * along
     # The plane is in the middle, since triangles may not be quite plane.
-    aside = (corners[:, :2] - start) @ outward
+    aside = dot(corners[:, :2] - start, outward)
     start = start + outward * float(aside.mean())
     origin = np.array([*start, corners[:, 2].min()])
     length, height = float(np.ptp(x)), float(np.ptp(corners[:, 2]))

@@ -82,10 +82,10 @@ def _long_ways(graph: WayGraph) -> list[list[int]]:
         return []
     links = graph.links()
     _, part = connected_components(links, directed=False)
-    largest = np.bincount(part[pieces], graph.lengths[pieces]).argmax()
+    size = np.bincount(part[pieces], graph.lengths[pieces])[part[pieces]]
     number = int(np.clip(_MOST_REACHED // len(pieces), 1, _MOST_STARTS))
     starts = [
-        int((part[pieces] == largest).argmax()),
+        int((size == size.max()).argmax()),
         *range(0, len(pieces), -(-len(pieces) // number))[1:],
     ]
     into = links.T.tocsr()
@@ -110,8 +110,9 @@ def _longest_way_from(
     cost, before = dijkstra(links, indices=start, return_predecessors=True)
     cost = np.where(np.isfinite(cost), cost + graph.lengths / 2.0, -1.0)
     most = min(_MOST_ENDS, len(cost))
-    ends = np.argpartition(-cost, most - 1)[:most]
-    for end in ends[np.argsort(-cost[ends], kind="stable")].tolist():
+    # Of equal costs, the first piece: `argpartition` takes any of them.
+    ends = np.flatnonzero(cost >= np.partition(cost, -most)[-most])
+    for end in ends[np.argsort(-cost[ends], kind="stable")][:most].tolist():
         if cost[end] < 0.0:
             break
         way = [end]

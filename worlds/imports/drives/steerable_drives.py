@@ -5,13 +5,27 @@ from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import BSpline
 from shapely.geometry import LineString
 
-from evaluation.base import InputError, distances_along, length_of
-from worlds.imports.drives.free_space import FreeSpace
-from worlds.imports.faults import ImportFaults
-from worlds.roads import POINT_SPACING, TIGHTEST_RADIUS, make_waypoint_path
+from evaluation.base import (
+    InputError,
+    distances_along,
+    length_of,
+    power,
+)
+from worlds.imports.drives.free_space import (
+    FreeSpace,
+)
+from worlds.imports.faults import (
+    ImportFaults,
+)
+from worlds.roads import (
+    POINT_SPACING,
+    TIGHTEST_RADIUS,
+    make_waypoint_path,
+)
 
 # Paths of vehicles are quintic splines (`cns_drake.motion`). The points of a
 # path are their control points.
@@ -89,7 +103,7 @@ def steerable_drive(
     except InputError:
         return xyz[len(xyz) // 2, :2]
     driven, radii = driven_path(points)
-    tightest = int(radii.argmin())
+    tightest = int(np.round(radii, 6).argmin())
     if radii[tightest] < margin * TIGHTEST_RADIUS:
         return driven[tightest]
     missing = None if room is None else room(driven)
@@ -105,7 +119,7 @@ def evenly_spaced(line: np.ndarray, spacing: float) -> np.ndarray:
     Ends of the line are kept.
     """
     along = distances_along(line)
-    count = max(1, round(along[-1] / spacing))
+    count = max(1, round(round(along[-1] / spacing, 6)))
     wanted = np.linspace(0.0, along[-1], count + 1)
     return np.column_stack([np.interp(wanted, along, x) for x in line.T])
 
@@ -129,7 +143,7 @@ def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     count = int((last - first) * POINT_SPACING / _CHECK_SPACING) + 1
     u = np.linspace(first, last, count)
     (x1, y1), (x2, y2) = spline(u, 1).T, spline(u, 2).T
-    curvature = np.abs(x1 * y2 - y1 * x2) / np.hypot(x1, y1) ** 3
+    curvature = np.abs(x1 * y2 - y1 * x2) / power(np.hypot(x1, y1), 3)
     return spline(u), 1.0 / np.maximum(curvature, _STRAIGHTEST)
 
 
@@ -154,10 +168,7 @@ def simplified_drive(
     for window, tolerance in product(_MEAN_WINDOWS, tolerances):
         if len(xy) < _LEAST_WINDOWS * window:
             break
-        kernel = np.ones(window) / window
-        smooth = np.column_stack(
-            [np.convolve(column, kernel, mode="valid") for column in xy.T]
-        )
+        smooth = sliding_window_view(xy, window, axis=0).mean(axis=-1)
         line = LineString(smooth).simplify(tolerance)
         drive = steerable_drive(
             _dense_waypoints(np.array(line.coords)), space.obstacle
@@ -171,8 +182,8 @@ def _dense_waypoints(corners: np.ndarray) -> np.ndarray:
     """Returns waypoints (N, 2) at corners and between corners far apart [m]."""
     points = [corners[:1]]
     for a, b in pairwise(corners):
-        length = float(np.linalg.norm(b - a))
-        number = int((length - _WAYPOINT_SPACING) // _WAYPOINT_SPACING)
+        length = length_of(np.array([a, b]))
+        number = int(round(length, 6) // _WAYPOINT_SPACING - 1)
         if number > 0:
             # Waypoints keep away from the corners, whose arcs need room.
             parts = np.linspace(0.0, 1.0, number + 2)[1:-1]

@@ -4,11 +4,12 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+import math
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from evaluation.base import length_of, step_lengths
+from evaluation.base import arctan2, dot, length_of, step_lengths
 from worlds.imports.drives.free_space import FreeSpace
 from worlds.imports.drives.search import LONGEST
 from worlds.imports.drives.steerable_drives import (
@@ -113,8 +114,8 @@ def _leads_on(lane: StreetLane, after: StreetLane) -> bool:
         return False
     a, b = lane.line[-1] - lane.line[-2], after.line[1] - after.line[0]
     cross = a[0] * b[1] - a[1] * b[0]
-    dot = a @ b
-    return bool(abs(np.degrees(np.arctan2(cross, dot))) <= _SHARPEST_TURN_DEG)
+    turn = math.atan2(cross, float(dot(a, b)))
+    return abs(math.degrees(turn)) <= _SHARPEST_TURN_DEG
 
 
 def lane_path(lanes: Sequence[StreetLane]) -> np.ndarray:
@@ -177,11 +178,10 @@ class StreetGraph(WayGraph):
         # Where a line turns back, its direction may be (0, 0).
         lengths = np.linalg.norm(along, axis=1)
         along /= np.maximum(lengths, _LEAST_LENGTH)[:, None]
-        heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
+        heading = np.unwrap(arctan2(along[:, 1], along[:, 0]))
         bends = np.abs(np.gradient(heading)) > np.radians(_SHARP_DEG_PER_M)
         reach = int(_TURN_REACH / _LANE_SPACING)
-        around = np.ones(2 * reach + 1)
-        near_turn = np.convolve(bends, around, mode="same") > 0
+        near_turn = maximum_filter1d(bends, 2 * reach + 1, mode="constant")
         right = np.column_stack([along[:, 1], -along[:, 0]])
         to_kept_side = right * self._side
         drive: WaypointRoute | Obstacle = middle[len(middle) // 2]
@@ -197,6 +197,7 @@ class StreetGraph(WayGraph):
     def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
         lines = [lane_path([self.lanes[k]]) for k in way]
         distances = [
-            np.linalg.norm(line[:, :2] - place, axis=1).min() for line in lines
+            np.linalg.norm(line[:, :2] - place, axis=1).min().round(6)
+            for line in lines
         ]
         return np.array([way[int(np.argmin(distances))]])

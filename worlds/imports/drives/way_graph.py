@@ -2,17 +2,36 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+import math
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from worlds.imports.drives.steerable_drives import Obstacle, WaypointRoute
+from evaluation.base import (
+    arctan2,
+    cos,
+    sin,
+)
+from worlds.imports.drives.steerable_drives import (
+    Obstacle,
+    WaypointRoute,
+)
 
 # Greatest share by which lengths are made unequal.
 _UNEQUAL = 0.04
 # A turn from the directions of a grid to one that none of its streets has, and
 # that is not in the middle between two [rad].
 _ASIDE = 0.4
+# Numbers of directions that streets may prefer: those of a grid, of a honeycomb
+# or triangles, of rings.
+_FOLDS = range(4, 65, 2)
+# A network prefers directions if this share of its length remains in their mean
+# [-]. Coordinates in centimetres leave less where it has none.
+_PREFERRED = 1e-3
+# Scores of views that differ by less than this share are equal.
+_EQUAL = 1e-6
+# Lengths are whole numbers of this step [m]: sums are exact, in any order.
+_STEP = 2.0**-20
 
 
 def _growth(lengths: np.ndarray, ends: np.ndarray) -> np.ndarray:
@@ -27,22 +46,65 @@ def _growth(lengths: np.ndarray, ends: np.ndarray) -> np.ndarray:
         lengths: (N,) lengths of pieces [m].
         ends: (N, 2, 2) where each piece begins, and ends [m].
     """
-    begins, ends = np.moveaxis(ends[:, :, 0] + 1j * ends[:, :, 1], 1, 0)
+    begins, ends = np.moveaxis(ends, 1, 0)
     steps = ends - begins
+    weights = lengths / lengths.sum()
     # Another place for each direction of a street.
     places = begins + steps / 3.0
-    places -= np.average(begins + steps / 2.0, weights=lengths)
-    # The same for a street, its opposite direction, and its cross streets.
-    grid = np.sum(np.abs(steps) * np.exp(4j * np.angle(steps)))
-    places *= np.exp(-0.25j * np.angle(grid)) / max(np.abs(places).max(), 1.0)
-    aside = np.exp(-1j * _ASIDE)
-    view = max(
-        (places * 1j**quarters for quarters in range(4)),
-        key=lambda z: float((lengths @ (z**2 + z**3) * aside).real),
+    places -= (weights[:, None] * (begins + steps / 2.0)).sum(axis=0)
+    places /= max(np.sqrt((places**2).sum(axis=1).max()), 1.0)
+    fold, turn = _grid(steps)
+    turns = turn + 2.0 * np.pi / fold * np.arange(fold)
+    views = [_turned(places, -angle) for angle in turns.tolist()]
+    scores = [_score(weights, view, fold) for view in views]
+    # Of directions in which the network looks the same, the one that is the
+    # nearest to a fixed direction.
+    best = max(
+        (k for k in range(fold) if scores[k] > max(scores) - _EQUAL),
+        key=lambda k: math.cos(turns[k] - _ASIDE),
     )
+    along = _turned(views[best], -_ASIDE)[:, 0]
+    x, y = _turned(views[best], -1.5 * _ASIDE).T
     # The square is there for streets that enclose equal areas.
-    growth = (view * aside + 0.1 * view**2 * aside**3).real
+    growth = along + 0.1 * (x * x - y * y)
     return np.asarray(0.5 + growth / 2.2)
+
+
+def _grid(steps: np.ndarray) -> tuple[int, float]:
+    """Returns how many directions steps (N, 2) prefer, and one of them [rad].
+
+    The same for a street, its opposite direction, and its cross streets.
+    """
+    heading = arctan2(steps[:, 1], steps[:, 0])
+    sizes = np.sqrt((steps**2).sum(axis=1))
+    for fold in _FOLDS:
+        x = float((sizes * cos(fold * heading)).sum())
+        y = float((sizes * sin(fold * heading)).sum())
+        if math.hypot(x, y) > _PREFERRED * sizes.sum():
+            return fold, math.atan2(y, x) / fold
+    return _FOLDS[0], 0.0
+
+
+def _turned(xy: np.ndarray, angle: float) -> np.ndarray:
+    """Returns places (N, 2), turned by an angle [rad] about the origin."""
+    c, s = math.cos(angle), math.sin(angle)
+    x, y = xy.T
+    return np.column_stack([c * x - s * y, s * x + c * y])
+
+
+def _score(weights: np.ndarray, view: np.ndarray, fold: int) -> float:
+    """Returns a number for places (N, 2) that differs if they are turned.
+
+    It is the mean of z^2 + z^3 + ... + z^fold in complex numbers, seen from
+    aside. If it is the same in two of `fold` directions, the places are.
+    """
+    x, y = px, py = view.T
+    along = across = 0.0
+    for _ in range(2, fold + 1):
+        px, py = px * x - py * y, px * y + py * x
+        along += float((weights * px).sum())
+        across += float((weights * py).sum())
+    return along * math.cos(_ASIDE) + across * math.sin(_ASIDE)
 
 
 class WayGraph(ABC):
@@ -54,7 +116,7 @@ class WayGraph(ABC):
 
     A grid of streets has many ways of one length, between which the last bit of
     coordinates would decide. Where the ends of pieces are known, lengths are
-    therefore made unequal.
+    therefore made unequal, and whole numbers of micrometres.
 
     Attributes:
         lengths: (N,) lengths of the pieces [m], longer by up to 4 %.
@@ -81,7 +143,8 @@ class WayGraph(ABC):
         if ends is not None and len(ends):
             growth = _growth(lengths, ends)
             lengths = lengths * (1.0 + _UNEQUAL * growth)
-            self.order = np.argsort(growth)
+            lengths = np.rint(lengths / _STEP) * _STEP
+            self.order = np.argsort(np.round(growth, 9), kind="stable")
         self.lengths = lengths
         if costs is None:
             costs = (lengths[before] + lengths[after]) / 2.0

@@ -2,14 +2,30 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+import math
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from evaluation.base import length_of, step_lengths, wrapped
-from worlds.imports.drives import search, steerable_drives, way_graph
-from worlds.imports.drives.steerable_drives import Obstacle, WaypointRoute
-from worlds.imports.opendrive.lanes import DRIVEN, LaneBand
+from evaluation.base import (
+    dot,
+    length_of,
+    step_lengths,
+    wrapped,
+)
+from worlds.imports.drives import (
+    search,
+    steerable_drives,
+    way_graph,
+)
+from worlds.imports.drives.steerable_drives import (
+    Obstacle,
+    WaypointRoute,
+)
+from worlds.imports.opendrive.lanes import (
+    DRIVEN,
+    LaneBand,
+)
 
 # A lane follows another one if its start is within this distance of the other's
 # end [m].
@@ -113,7 +129,7 @@ class BandGraph(way_graph.WayGraph):
 
     def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
         distances = [
-            float(np.hypot(*(self.lines[k][:, :2] - place).T).min())
+            float(np.hypot(*(self.lines[k][:, :2] - place).T).min().round(6))
             for k in way
         ]
         return np.array([way[int(np.argmin(distances))]])
@@ -149,14 +165,14 @@ def _usual_limit(bands: Iterable[LaneBand]) -> float:
         limits.append(np.where(limit > 0.0, limit, _DEFAULT_LIMIT))
         lengths.append(np.diff(band.s))
     limit, length = np.concatenate(limits), np.concatenate(lengths)
-    order = np.argsort(limit)
+    order = np.argsort(limit, kind="stable")
     reached = np.cumsum(length[order])
     return float(limit[order][np.searchsorted(reached, reached[-1] / 2.0)])
 
 
 def _heading(ends: np.ndarray) -> float:
     """Returns the heading from the first of two places (2, 3) to the second."""
-    return float(np.arctan2(ends[1, 1] - ends[0, 1], ends[1, 0] - ends[0, 0]))
+    return math.atan2(ends[1, 1] - ends[0, 1], ends[1, 0] - ends[0, 0])
 
 
 def _smoothed(points: np.ndarray, window: int) -> np.ndarray:
@@ -180,7 +196,7 @@ def _without_backward_points(line: np.ndarray) -> np.ndarray:
     for point in line[2:]:
         step, last = (point - kept[-1])[:2], (kept[-1] - kept[-2])[:2]
         size = float(np.hypot(*step))
-        ahead = step @ last > _BACKWARD_COSINE * size * np.hypot(*last)
+        ahead = dot(step, last) > _BACKWARD_COSINE * size * np.hypot(*last)
         if size > _LEAST_STEP and ahead:
             kept.append(point)
     return np.array(kept)

@@ -10,6 +10,8 @@ import math
 
 import numpy as np
 
+from evaluation.base import arctan2, cos, dot, sin, sinc
+
 # Nodes of the Gauss-Legendre rule; it is exact on a panel to 1e-14 m.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 # Greatest change of a spiral's heading on a panel [rad].
@@ -37,7 +39,7 @@ def _integral(
 ) -> np.ndarray:
     """Returns the integrals (N,) of a rate from `begin` over `size` (N,)."""
     nodes = begin[:, None] + size[:, None] * (_NODES + 1.0) / 2.0
-    return size / 2.0 * (rate(nodes) @ _WEIGHTS)
+    return size / 2.0 * dot(rate(nodes), _WEIGHTS)
 
 
 @dataclass(frozen=True)
@@ -53,9 +55,9 @@ class Arc:
         """Returns u, v [m] and heading [rad], (N, 3), as `Shape` says."""
         half = self.curvature * ds / 2.0
         # The chord, which for a line points straight ahead.
-        chord = ds * np.sinc(half / np.pi)
+        chord = ds * sinc(half / np.pi)
         return np.stack(
-            [chord * np.cos(half), chord * np.sin(half), 2.0 * half], axis=1
+            [chord * cos(half), chord * sin(half), 2.0 * half], axis=1
         )
 
     @property
@@ -96,8 +98,8 @@ class Spiral:
 
     def _steps(self, begin: np.ndarray, length: np.ndarray) -> np.ndarray:
         """Returns displacements (N, 2) from `begin` over lengths (N,) [m]."""
-        u = _integral(lambda s: np.cos(self._heading(s)), begin, length)
-        v = _integral(lambda s: np.sin(self._heading(s)), begin, length)
+        u = _integral(lambda s: cos(self._heading(s)), begin, length)
+        v = _integral(lambda s: sin(self._heading(s)), begin, length)
         return np.stack([u, v], axis=1)
 
 
@@ -145,7 +147,7 @@ class Cubic:
         return np.stack([self._u(p), self._v(p), self._heading(p)], axis=1)
 
     def _heading(self, p: np.ndarray) -> np.ndarray:
-        return np.arctan2(self._dv(p), self._du(p))
+        return arctan2(self._dv(p), self._du(p))
 
     def _speed(self, p: np.ndarray) -> np.ndarray:
         return np.hypot(self._du(p), self._dv(p))

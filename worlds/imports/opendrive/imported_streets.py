@@ -3,13 +3,14 @@
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
+import math
 
 import numpy as np
 import shapely
 from shapely.geometry import LinearRing, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from evaluation.base import length_of, wrapped
+from evaluation.base import arctan2, dot, length_of, wrapped
 from worlds.city import (
     TILE,
     Covering,
@@ -287,7 +288,7 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
     """
     steps = np.roll(xy, -1, axis=0) - xy
     lengths = np.hypot(*steps.T)
-    heading = np.arctan2(steps[:, 1], steps[:, 0])
+    heading = arctan2(steps[:, 1], steps[:, 0])
     turns = wrapped(heading - np.roll(heading, 1))
     is_step = (
         (lengths > _STEP[0])
@@ -300,8 +301,8 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
         # first.
         before = np.roll(xy[::-1], k + 1 - len(xy), axis=0)
         behind = np.roll(xy, -k - 1, axis=0)
-        ahead = np.array([np.cos(heading[k - 1]), np.sin(heading[k - 1])])
-        aside = float(lengths[k] * np.sin(turns[k]))
+        ahead = np.array([math.cos(heading[k - 1]), math.sin(heading[k - 1])])
+        aside = float(lengths[k]) * math.sin(turns[k])
         straight = before[: _num_straight_edges(before, -ahead) + 1]
         chain = _kerb_line(behind, ahead)
         reach = length_of(straight)
@@ -312,7 +313,10 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
             shapely.segmentize(shapely.linestrings(chain), _SPACING)
         )
         away = dense - xy[k]
-        along, left = away @ ahead, away @ [-ahead[1], ahead[0]]
+        along, left = (
+            dot(away, ahead),
+            dot(away, np.array([-ahead[1], ahead[0]])),
+        )
         reached = np.flatnonzero(
             (along > _SPACING) & (along < longest + _ROUNDING)
         )
@@ -320,7 +324,9 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
             continue
         # The taper touches the kerb at the place that is farthest to the right
         # in its view.
-        last = int(reached[np.argmin(left[reached] / along[reached])])
+        last = int(
+            reached[np.argmin(np.round(left[reached] / along[reached], 6))]
+        )
         yield np.concatenate([xy[k : k + 1], dense[: last + 1]])
 
 
@@ -330,7 +336,7 @@ def _num_straight_edges(xy: np.ndarray, ahead: np.ndarray) -> int:
     The edges lie between corners (N, 2), and `ahead` (2,) is the direction.
     """
     steps = np.diff(xy, axis=0)
-    goes_on = steps @ ahead > np.cos(_ASTRAY) * np.hypot(*steps.T)
+    goes_on = dot(steps, ahead) > math.cos(_ASTRAY) * np.hypot(*steps.T)
     return int(np.argmin(np.append(goes_on, False)))
 
 
@@ -347,7 +353,7 @@ def _kerb_line(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
     last = _num_straight_edges(xy, ahead)
     if 0 < last < len(xy) - 2 and _num_straight_edges(xy[last + 1 :], ahead):
         step = xy[last + 1] - xy[last]
-        goes_right = step @ [-ahead[1], ahead[0]] < 0.0
+        goes_right = ahead[0] * step[1] - ahead[1] * step[0] < 0.0
         if goes_right and np.hypot(*step) < _STEP[1]:
             last += 1
     return xy[: last + 1]

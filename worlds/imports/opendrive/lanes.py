@@ -14,7 +14,7 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from evaluation.base import parse_yaml
+from evaluation.base import cos, parse_yaml, sin
 from worlds.imports.opendrive.road_model import (
     Cubics,
     ImportedRoad,
@@ -205,9 +205,9 @@ def _across(
     heading: np.ndarray, roll: np.ndarray, width: np.ndarray
 ) -> np.ndarray:
     """Returns vectors (N, 3) to the left across a road, with lengths (N,)."""
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-    flat = left * (width * np.cos(roll))[:, None]
-    return np.column_stack([flat, width * np.sin(roll)])
+    left = np.stack([-sin(heading), cos(heading)], axis=1)
+    flat = left * (width * cos(roll))[:, None]
+    return np.column_stack([flat, width * sin(roll)])
 
 
 def _edge_heights(lane: Lane, s: np.ndarray, inside: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from evaluation.base import cos, sin, tan
 from worlds.imports.opendrive.lanes import (
     LEAST_WIDTH,
     SAG,
@@ -45,11 +46,11 @@ class RoadHeights:
         places = np.concatenate(rows)
         self._p = places[:, :3]
         heading, roll, grade = places[:, 3:].T
-        across = np.tan(roll)
+        across = tan(roll)
         self._slope = np.stack(
             [
-                grade * np.cos(heading) - across * np.sin(heading),
-                grade * np.sin(heading) + across * np.cos(heading),
+                grade * cos(heading) - across * sin(heading),
+                grade * sin(heading) + across * cos(heading),
             ],
             axis=1,
         )

@@ -15,15 +15,32 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from evaluation.base import (
+    cos,
+    dot,
+    sin,
+)
 from worlds.city import (
     DASH,
     DASH_GAP,
 )
-from worlds.imports.colours import WHITE, Rgb
-from worlds.imports.faces import parts_of
-from worlds.imports.imported_objects import make_object
-from worlds.imports.opendrive.lanes import LaneBand
-from worlds.imports.opendrive.road_model import MarkLine, RoadMark
+from worlds.imports.colours import (
+    WHITE,
+    Rgb,
+)
+from worlds.imports.faces import (
+    parts_of,
+)
+from worlds.imports.imported_objects import (
+    make_object,
+)
+from worlds.imports.opendrive.lanes import (
+    LaneBand,
+)
+from worlds.imports.opendrive.road_model import (
+    MarkLine,
+    RoadMark,
+)
 from worlds.shapes import (
     GRID,
     Finish,
@@ -144,7 +161,7 @@ def _at_quad_heights(flat: np.ndarray, quad: np.ndarray) -> np.ndarray:
     slope = np.linalg.lstsq(
         (quad - middle)[:, :2], quad[:, 2] - middle[2], rcond=None
     )[0]
-    z = middle[2] + (flat - middle[:2]) @ slope
+    z = middle[2] + dot(flat - middle[:2], slope)
     return np.concatenate([flat, z[..., None]], axis=2)
 
 
@@ -261,7 +278,7 @@ def _painted_quads(
         end: where the last mark ends [m].
         carriageway: area to which marks are limited; None for no limit.
     """
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    left = np.stack([-sin(heading), cos(heading)], axis=1)
     ends = [*(mark.start for mark in marks[1:]), end][: len(marks)]
     for mark, end_of_mark in zip(marks, ends, strict=True):
         lines = _lines(mark, float(np.sign(side)))

@@ -10,7 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from worlds.imports.opendrive.curves import Shape
+from evaluation.base import (
+    cos,
+    power,
+    sin,
+)
+from worlds.imports.opendrive.curves import (
+    Shape,
+)
 
 
 @dataclass(frozen=True)
@@ -96,8 +103,8 @@ class Cubics:
         """
         pieces = self._pieces_at(s, inside)
         value = np.zeros(len(s))
-        for power in range(4):
-            value += pieces.coefficients[:, power] * pieces.ds**power
+        for degree in range(4):
+            value += pieces.coefficients[:, degree] * power(pieces.ds, degree)
         return np.where(pieces.is_there, value, 0.0)
 
     def slopes(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
@@ -108,9 +115,9 @@ class Cubics:
         """
         pieces = self._pieces_at(s, inside)
         value = np.zeros(len(s))
-        for power in range(1, 4):
-            factor = power * pieces.coefficients[:, power]
-            value += factor * pieces.ds ** (power - 1)
+        for degree in range(1, 4):
+            factor = degree * pieces.coefficients[:, degree]
+            value += factor * power(pieces.ds, degree - 1)
         return np.where(pieces.is_there, value, 0.0)
 
     def _pieces_at(self, s: np.ndarray, inside: np.ndarray) -> _CubicPieces:
@@ -348,12 +355,12 @@ class ImportedRoad:
             t: (N,) distances to the left of the reference line [m].
         """
         x, y, z, heading, roll = self.reference(s, inside).T
-        across = t * np.cos(roll)
+        across = t * cos(roll)
         return np.stack(
             [
-                x - across * np.sin(heading),
-                y + across * np.cos(heading),
-                z + t * np.sin(roll),
+                x - across * sin(heading),
+                y + across * cos(heading),
+                z + t * sin(roll),
             ],
             axis=1,
         )

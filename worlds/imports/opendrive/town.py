@@ -517,7 +517,7 @@ def _park_cars(
         backwards = (band.lane.number > 0) != band.road.keeps_left
         while place < along[-1] - _BAY_LENGTHS[0] / 2.0:
             x, y = (np.interp(place, along, band.middle[:, k]) for k in (0, 1))
-            nearest = int(np.abs(along - place).argmin())
+            nearest = int(np.abs(along - place).round(6).argmin())
             yaw = float(band.heading[nearest]) + (np.pi if backwards else 0.0)
             taken = rng.uniform() < _TAKEN_SHARE
             if taken:

@@ -39,8 +39,8 @@ def shrub(rng: np.random.Generator, *, height: float | None = None) -> Model:
     drawn = dice.uniform(0.8, 1.6)
     height = drawn if height is None else height
     mesh = f"shrub_{dice.pick(_LETTERS)}"
-    wide = height**_WIDTH_POWER * dice.uniform(0.85, 1.2)
-    deep = height**_WIDTH_POWER * dice.uniform(0.85, 1.2)
+    wide = math.pow(height, _WIDTH_POWER) * dice.uniform(0.85, 1.2)
+    deep = math.pow(height, _WIDTH_POWER) * dice.uniform(0.85, 1.2)
     scale = (round(wide, 3), round(deep, 3), round(height, 3))
     rgb = _leaves(dice)
     yaw = dice.uniform(-math.pi, math.pi, digits=3)

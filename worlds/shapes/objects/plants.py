@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import partial
+import math
 import string
 from typing import Any
 
@@ -90,7 +91,7 @@ def tree(
         variant = drawn_variant
     names = wood, crown = mesh_names(species, variant)
     up = height / max(object_mesh(n).vertices[:, 2].max() for n in names)
-    across = up**_WIDTH_POWER * stretch
+    across = math.pow(up, _WIDTH_POWER) * stretch
     scale = triple(round(float(s), 3) for s in (*across, up))
     rgb = np.clip(kind.leaf_rgb * tint, 0, 1)
     rpy = (0.0, 0.0, round(yaw, 3))
