@@ -22,7 +22,6 @@ from .lidar.beam_coverage import BeamCoverage as BeamCoverage
 from .lidar.beams import HIGHEST_RATE as HIGHEST_RATE
 from .lidar.beams import BeamPattern as BeamPattern
 from .lidar.lidar import Lidar as Lidar
-from .lidar.lidar import LidarOptions as LidarOptions
 from .lidar.measurement import Echoes as Echoes
 from .lidar.measurement import MeasurementModel as MeasurementModel
 from .lidar.patterns import DirectionPattern as DirectionPattern

@@ -22,31 +22,34 @@ import numpy as np
 from pydantic import ValidationError
 from pydrake.common.schema import Transform
 from pydrake.common.value import AbstractValue, Value
+from pydrake.common.yaml import yaml_dump_typed
 from pydrake.geometry import GeometryId, Role, SceneGraph
 from pydrake.lcm import DrakeLcm, DrakeLcmInterface
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import GetScopedFrameByName
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
-from pydrake.perception import PointCloudToLcm
+from pydrake.perception import PointCloud, PointCloudToLcm
 from pydrake.systems import framework
 from pydrake.systems import lcm as drake_lcm
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
-from pydrake.systems.primitives import ZeroOrderHold
 
 from cns_drake.base import Section, describe_validation_error, one_line
 from cns_drake.scene import find_bus
 from cns_drake.sensors import odometry
 from cns_drake.sensors.imu.config import ImuDescription, ImuSection
 from cns_drake.sensors.imu.imu import Imu, add_imu
-from cns_drake.sensors.lidar.lidar import Lidar, period_of_rate
+from cns_drake.sensors.lidar.beams import period_of_rate
+from cns_drake.sensors.lidar.lidar import Lidar, sample_times
 from cns_drake.sensors.lidar_adding import add_lidar
 from cns_drake.sensors.lidar_config import (
     LidarDescription,
     LidarSection,
     make_lidar_model,
 )
+from cns_drake.sensors.noise_draws import check_seed
+from cns_drake.sensors.sheet_patterns import revolution_at_rate
 from cns_drake.sensors.system_names import check_unused_names
 from cns_drake.units import DEFAULT_PRESET, LONGEST_PERIOD
 
@@ -138,9 +141,11 @@ def _of_type(value: Any, hint: Any, name: str) -> Any:
     return value
 
 
-@dataclass
+@dataclass(eq=False)
 class PublishedSensor:
     """The place of a sensor and of its messages, of whatever kind it is.
+
+    Two configs of a kind are equal if their fields are.
 
     Attributes:
         name: name of the system, and part of the channel's name.
@@ -153,9 +158,36 @@ class PublishedSensor:
     X_PB: Transform = field(default_factory=Transform)
     lcm_bus: str = "default"
 
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        # Drake's Transform has no equality.
+        return yaml_dump_typed(self) == yaml_dump_typed(other)
+
+    __hash__ = None  # type: ignore[assignment]  # As any dataclass that changes.
+
+    def ValidateOrThrow(self) -> None:
+        """Checks all that can be checked without a Diagram, as Drake's configs.
+
+        Raises:
+            InputError: a file that the config names cannot be used.
+            ValueError: a field is out of range; the message names it.
+        """
+        with _errors_of(self):
+            if not self.name:
+                raise ValueError("name: it is empty")
+            if not np.isfinite(
+                self.X_PB.GetDeterministicValue().GetAsMatrix34()
+            ).all():
+                raise ValueError("X_PB: not finite")
+            self._validate()
+
+    def _validate(self) -> None:
+        """Checks the fields that only this kind of sensor has."""
+
 
 @_names_of_fields_in_errors
-@dataclass
+@dataclass(eq=False)
 class LidarConfig(LidarDescription, PublishedSensor):
     """The configuration of a LiDAR, for YAML and `ApplyLidarConfig`.
 
@@ -164,18 +196,18 @@ class LidarConfig(LidarDescription, PublishedSensor):
     rounded by default. A relative path `unit` starts at the working directory.
 
     Attributes:
-        rate: scans (revolutions) per second, from 0.25 to 1000. With a rate,
-            the LiDAR is discrete: it computes a scan once per period and holds
-            it. By default, the LiDAR is continuous, and publishes at the rate
-            of the data sheet.
+        rate: scans per second, from 0.25 to 1000. With a rate, the LiDAR is
+            discrete: it computes a scan once per period and holds it. By
+            default, the LiDAR is continuous, and publishes at the rate of the
+            data sheet. A revolution takes as long as the data sheet states, or
+            1 / `rate` if that is shorter.
         causal: whether a scan covers the revolution that ends at its time, so
             that a controller can use it at once.
-        capture_offset: time of the first published scan [s]; the other scans
-            follow, one per revolution. With different offsets, several LiDARs
-            can take turns.
-        output_delay: time from a scan's capture to its publication [s], less
-            than a revolution. The message keeps the time of the capture. The
-            ports of the `Lidar` are not delayed.
+        capture_offset: time of a discrete LiDAR's first periodic scan [s].
+            With different offsets, several LiDARs can take turns.
+        output_delay: time from a discrete LiDAR's scan to its appearance on the
+            ports and its publication [s], less than 1 / `rate`. The message
+            has the time of the scan.
         seed: seed of the noise.
         role: role of the geometry that the LiDAR sees: `perception`,
             `illustration` or `proximity`.
@@ -205,9 +237,29 @@ class LidarConfig(LidarDescription, PublishedSensor):
     unseen: list[str] | None = None
     num_threads: int = 1
 
+    def _validate(self) -> None:
+        self._section()
+        sample_times(self.rate, self.capture_offset, self.output_delay)
+        if self.rate is not None:
+            period_of_rate(self.rate, LONGEST_PERIOD)
+        if self.role not in _ROLES:
+            raise ValueError(
+                f"role: {self.role!r} is not one of {', '.join(_ROLES)}"
+            )
+        check_seed(self.seed)
+        if self.num_threads < 1:
+            raise ValueError(f"num_threads: {self.num_threads} is less than 1")
+
+    def _section(self) -> LidarSection:
+        """Returns the section of a scenario with the same fields."""
+        given = _given(self, LidarSection)
+        if self.unit is not None and self.preset == DEFAULT_PRESET:
+            given["preset"] = None  # Nobody has given it.
+        return _checked(given, LidarSection)
+
 
 @_names_of_fields_in_errors
-@dataclass
+@dataclass(eq=False)
 class ImuConfig(ImuDescription, PublishedSensor):
     """The configuration of an IMU, for YAML and `ApplyImuConfig`.
 
@@ -229,9 +281,32 @@ class ImuConfig(ImuDescription, PublishedSensor):
     name: str = "imu"
     seed: int = 0
 
+    def _validate(self) -> None:
+        check_seed(self.seed)
+        if not self.sample_rate() > 0.0 or math.isinf(self.sample_rate()):
+            raise ValueError(
+                f"rate: {self.rate!r} is not a positive number of samples a "
+                "second"
+            )
+
+    def _section(self) -> ImuSection:
+        """Returns the section of a scenario with the same fields."""
+        return _checked(_given(self, ImuSection), ImuSection)
+
+    def sample_rate(self) -> float:
+        """Returns the number of samples per second.
+
+        Raises:
+            InputError: Kalibr's file cannot be used.
+            ValueError: a field is out of range.
+        """
+        if self.rate is not None:
+            return self.rate
+        return self._section().sample_rate(_RATE)
+
 
 @_names_of_fields_in_errors
-@dataclass
+@dataclass(eq=False)
 class OdometryConfig(PublishedSensor):
     """The configuration of exact odometry, for YAML and `ApplyOdometryConfig`.
 
@@ -250,6 +325,13 @@ class OdometryConfig(PublishedSensor):
     name: str = "odometry"
     rate: int | None = None
 
+    def _validate(self) -> None:
+        period_of_rate(self.message_rate())
+
+    def message_rate(self) -> int:
+        """Returns the number of messages per second."""
+        return _RATE if self.rate is None else self.rate
+
 
 Config: TypeAlias = LidarConfig | ImuConfig | OdometryConfig
 
@@ -263,11 +345,11 @@ _CHANNELS = {
 # An interface on which messages are published.
 _Interface: TypeAlias = DrakeLcmInterface | LcmInterfaceSystem
 # Endings of the names of the systems that publish a sensor's messages.
-_PARTS = ("to_lcm", "publisher", "delay")
+_PARTS = ("to_lcm", "publisher")
 
 
 @contextmanager
-def _errors_of(config: Config) -> Iterator[None]:
+def _errors_of(config: PublishedSensor) -> Iterator[None]:
     """Names a configured sensor in the errors of its values."""
     try:
         yield
@@ -315,7 +397,6 @@ def _publish_measurements(
     *,
     period: float,
     offset: float = 0.0,
-    delay: float = 0.0,
 ) -> None:
     """Adds systems that convert measurements to LCM messages and publish them.
 
@@ -328,39 +409,60 @@ def _publish_measurements(
         lcm: what `_find_interface` returned.
         ports: output ports of the sensor.
         to_lcm: system that converts the ports' values to a message: a
-            `PointCloudToLcm` or a `_SignalToLcm`.
+            `_ScanToLcm` or a `_SignalToLcm`.
         period: time between two messages [s].
-        offset: time of the first conversion [s].
-        delay: time from a conversion to the publication [s].
+        offset: time of the first message [s].
     """
     if lcm is None:
         lcm = builder.AddSystem(LcmInterfaceSystem(lcm=DrakeLcm()))
     if lcm.get_lcm_url() == LcmBuses.kLcmUrlMemqNull:
         return
-    is_cloud = isinstance(to_lcm, PointCloudToLcm)
+    is_cloud = isinstance(to_lcm, _ScanToLcm)
     publisher = drake_lcm.LcmPublisherSystem.Make(
         f"DRAKE_{_CHANNELS[type(config)]}_{config.name}",
         lcmt_point_cloud if is_cloud else lcmt_drake_signal,
         lcm,
         publish_period=period,
-        publish_offset=offset + delay,
+        publish_offset=offset,
         use_cpp_serializer=is_cloud,
     )
-    converter_name, publisher_name, delay_name = (
-        f"{config.name}_{part}" for part in _PARTS
-    )
-    builder.AddNamedSystem(converter_name, to_lcm)
+    for part, system in zip(_PARTS, (to_lcm, publisher), strict=True):
+        builder.AddNamedSystem(f"{config.name}_{part}", system)
     for index, port in enumerate(ports):
         builder.Connect(port, to_lcm.get_input_port(index))
-    builder.AddNamedSystem(publisher_name, publisher)
-    message = to_lcm.get_output_port()
-    if delay:
-        hold = builder.AddNamedSystem(
-            delay_name, ZeroOrderHold(period, message.Allocate(), offset)
+    builder.Connect(to_lcm.get_output_port(), publisher.get_input_port())
+
+
+class _ScanToLcm(framework.LeafSystem):
+    """Converts a scan to an `lcmt_point_cloud`, as Drake's `PointCloudToLcm`.
+
+    The message has the time of the scan, which can be earlier than that of the
+    Context.
+    """
+
+    def __init__(self) -> None:
+        """Declares the ports."""
+        super().__init__()
+        self._convert = PointCloudToLcm("world")
+        self._cloud = self.DeclareAbstractInputPort(
+            "point_cloud_W", Value(PointCloud(0))
         )
-        builder.Connect(message, hold.get_input_port())
-        message = hold.get_output_port()
-    builder.Connect(message, publisher.get_input_port())
+        self._time = self.DeclareVectorInputPort("scan_time", 1)
+        self.DeclareAbstractOutputPort(
+            "lcmt_point_cloud",
+            self._convert.get_output_port().Allocate,
+            self._calc_message,
+        )
+
+    def _calc_message(self, context: Context, output: AbstractValue) -> None:
+        own = self._convert.CreateDefaultContext()
+        (time,) = np.nan_to_num(self._time.Eval(context))
+        # Drake cuts off what is below a microsecond.
+        own.SetTime((round(time * 1e6) + 0.5) / 1e6)
+        self._convert.get_input_port().FixValue(
+            own, self._cloud.EvalAbstract(context)
+        )
+        output.SetFrom(self._convert.get_output_port().EvalAbstract(own))
 
 
 class _SignalToLcm(framework.LeafSystem):
@@ -445,17 +547,9 @@ def ApplyLidarConfig(
 
         ApplyLidarConfig(LidarConfig(name="roof", rate=10), builder)
     """
-    section = _checked_section(config, LidarSection)
-    with _errors_of(config):
-        period = section.sheet.period
-        if config.rate is not None:
-            period = period_of_rate(config.rate, LONGEST_PERIOD)
-        _check_time(config.capture_offset, math.inf, "capture_offset")
-        _check_time(config.output_delay, period, "output_delay")
-        if config.role not in _ROLES:
-            raise ValueError(
-                f"role: {config.role!r} is not one of {', '.join(_ROLES)}"
-            )
+    config.ValidateOrThrow()
+    section = config._section()
+    period = revolution_at_rate(section.sheet, config.rate, section.columns)
     interface = _find_interface(config, builder, lcm_buses, lcm)
     scene_graph = scene_graph or builder.GetSubsystemByName("scene_graph")
     plant = plant or builder.GetSubsystemByName("plant")
@@ -471,21 +565,21 @@ def ApplyLidarConfig(
             motion_distortion=section.motion_distortion,
             causal=config.causal,
             rate=config.rate,
-            # Without a rate, it concerns the messages only.
-            capture_offset=config.capture_offset if config.rate else 0.0,
+            capture_offset=config.capture_offset,
+            output_delay=config.output_delay,
             role=_ROLES[config.role],
             unseen=_unseen(config, plant, scene_graph),
             num_threads=config.num_threads,
         )
+    messages = (period, 0.0) if lidar.samples is None else lidar.samples.outputs
     _publish_measurements(
         config,
         builder,
         interface,
-        [lidar.GetOutputPort("point_cloud_W")],
-        PointCloudToLcm("world"),
-        period=period,
-        offset=config.capture_offset,
-        delay=config.output_delay,
+        [lidar.point_cloud_W_output_port(), lidar.scan_time_output_port()],
+        _ScanToLcm(),
+        period=messages[0],
+        offset=messages[1],
     )
     return lidar
 
@@ -519,10 +613,8 @@ def ApplyImuConfig(
 
         ApplyImuConfig(ImuConfig(rate=200), builder)
     """
-    section = _checked_section(config, ImuSection)
-    rate = config.rate
-    if rate is None:
-        rate = section.sample_rate(_RATE)
+    config.ValidateOrThrow()
+    section, rate = config._section(), config.sample_rate()
     interface = _find_interface(config, builder, lcm_buses, lcm)
     with _errors_of(config):
         imu = add_imu(
@@ -576,10 +668,9 @@ def ApplyOdometryConfig(
 
         ApplyOdometryConfig(OdometryConfig(rate=100), builder)
     """
+    config.ValidateOrThrow()
     interface = _find_interface(config, builder, lcm_buses, lcm)
     with _errors_of(config):
-        rate = _RATE if config.rate is None else config.rate
-        period = period_of_rate(rate)
         frame, X_PB = _carrier_frame(config, builder, plant)
         sensor = odometry.add_odometry(
             builder, frame, X_PB=X_PB, name=config.name
@@ -593,30 +684,32 @@ def ApplyOdometryConfig(
         interface,
         ports,
         _SignalToLcm(ports, axes, _odometry_numbers),
-        period=period,
+        period=1.0 / config.message_rate(),
     )
     return sensor
 
 
-def _checked_section(config: Config, kind: type[Section]) -> Any:
-    """Returns the section of a scenario with the fields of a config.
+def _given(config: PublishedSensor, kind: type[Section]) -> dict[str, Any]:
+    """Returns the values of a config for the fields of a scenario's section."""
+    names = kind.model_fields.keys() - _LEFT_OUT
+    return {name: getattr(config, name) for name in names}
+
+
+_Section = TypeVar("_Section", bound=Section)
+
+
+def _checked(given: dict[str, Any], kind: type[_Section]) -> _Section:
+    """Returns the section of a scenario with some values.
 
     Raises:
         ValueError: a field is out of range.
     """
-    source = _caller(config)
-    given = {
-        name: getattr(config, name)
-        for name in kind.model_fields
-        if name not in _LEFT_OUT
-    }
-    if given.get("unit") is not None and given["preset"] == DEFAULT_PRESET:
-        given["preset"] = None  # Nobody has given it.
     try:
         return kind.model_validate(given)
     except ValidationError as error:
-        text = describe_validation_error(source, error, kind)
-        raise ValueError(text) from None
+        # The text begins with the source, which the caller names.
+        text = describe_validation_error("", error, kind)
+        raise ValueError(text.removeprefix(": ")) from None
 
 
 def _unseen(
@@ -650,21 +743,6 @@ def _unseen(
     return unseen
 
 
-def _check_time(time: float, end: float, name: str) -> None:
-    """Checks the offset or the delay of scans, as Drake does for cameras.
-
-    Args:
-        time: the offset or delay [s].
-        end: what it must be below [s].
-        name: the field, with which an error message begins.
-
-    Raises:
-        ValueError: the time is out of range.
-    """
-    if not 0.0 <= time < end:
-        raise ValueError(f"{name}: {time:g} is not from 0 to below {end:g} s")
-
-
 def _carrier_frame(
     config: Config, builder: DiagramBuilder, plant: MultibodyPlant | None
 ) -> tuple[Frame, RigidTransform]:
@@ -676,7 +754,7 @@ def _carrier_frame(
     return frame, config.X_PB.GetDeterministicValue()
 
 
-def _caller(config: Config) -> str:
+def _caller(config: PublishedSensor) -> str:
     """Returns the text with which errors of a configured sensor begin."""
     return f"{type(config).__name__} {config.name}"
 

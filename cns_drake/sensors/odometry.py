@@ -145,15 +145,14 @@ def add_odometry(
     Raises:
         RuntimeError: the plant is not finalized.
         TypeError: an argument is of another type.
-        ValueError: the pose is not finite, or the name is taken, reserved or
-            cannot be a part of a ROS 2 topic.
+        ValueError: the pose is not finite, or the name is taken or empty.
 
     Example:
         from cns_drake import add_odometry
 
         odometry = add_odometry(builder, body)
     """
-    check_new_sensor(builder, name, own="odometry")
+    check_new_sensor(builder, name)
     carrier, X_CB = body_and_pose(body, X_PB or RigidTransform())
     is_body = X_PB is None and not isinstance(body, Frame)
     names = ("body_poses", "body_spatial_velocities")

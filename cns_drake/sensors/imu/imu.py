@@ -18,7 +18,6 @@ from pydrake.systems.framework import (
 from pydrake.systems.sensors import Accelerometer, Gyroscope
 
 from cns_drake.base import check_type, is_real
-from cns_drake.drives import IMU_FRAME
 from cns_drake.sensors import carriers, system_names
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
 from cns_drake.sensors.imu.sampling import MEASUREMENTS, last_sample
@@ -143,8 +142,7 @@ def add_imu(
         RuntimeError: the plant is not finalized.
         TypeError: an argument is of another type.
         ValueError: there is noise without a rate, the rate is not positive, the
-            pose is not finite, or the name is taken, reserved or cannot be a
-            part of a ROS 2 topic.
+            pose is not finite, or the name is taken or empty.
 
     Example:
         from cns_drake import add_imu
@@ -162,7 +160,7 @@ def add_imu(
     if noise is not None and noise.sensor_name == ImuNoise.sensor_name:
         noise = replace(noise, sensor_name=name)
     parts = system_names.IMU_PARTS
-    system_names.check_new_sensor(builder, name, own=IMU_FRAME, parts=parts)
+    system_names.check_new_sensor(builder, name, parts)
     systems = [f"{name}_{part}" for part in parts]
     body, X_BI = carriers.body_and_pose(body, X_PB)
     poses, velocities, accelerations = carriers.find_motion(
