@@ -1,5 +1,6 @@
 """Angles in the plane, and units of time."""
 
+import math
 from typing import TypeVar
 
 import numpy as np
@@ -11,3 +12,8 @@ Angle = TypeVar("Angle", float, np.ndarray)
 def wrapped(angle: Angle) -> Angle:
     """Wraps an angle, or every angle of an array, to [-pi, pi) [rad]."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+def nearest_ns(time: float) -> int:
+    """Returns a time [s] as the nearest whole number of nanoseconds."""
+    return math.floor(time * NS_PER_S + 0.5)

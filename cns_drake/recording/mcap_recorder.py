@@ -26,6 +26,7 @@ from pydrake.systems.sensors import (
     ImageRgba8U,
 )
 
+from cns_drake.base import nearest_ns
 from cns_drake.drives import (
     BASE_FRAME,
     IMU_FRAME,
@@ -45,7 +46,11 @@ from cns_drake.recording.recorded_topics import (
     TF_TOPIC,
 )
 from cns_drake.recording.rosbag2_metadata import Topic
-from cns_drake.recording.schedule import Schedule, make_schedule
+from cns_drake.recording.schedule import (
+    ScanEvents,
+    Schedule,
+    make_schedule,
+)
 from cns_drake.scene import optional_value
 
 _IMAGES = {"color": ImageRgba8U, "depth": ImageDepth32F, "label": ImageLabel16I}
@@ -185,6 +190,7 @@ class McapRecorder(LeafSystem):
         - objects (if it is declared)
         - <lidar>_scan (one for each LiDAR)
         - <lidar>_pose (for each LiDAR that is not fixed on B)
+        - <lidar>_time (for each discrete LiDAR)
         - <camera>_color (one for each camera)
         - <camera>_depth
         - <camera>_label
@@ -203,6 +209,7 @@ class McapRecorder(LeafSystem):
     - `objects`: abstract, `RecordedObjects`.
     - `<lidar>_scan`: abstract, structured array of points expressed in S.
     - `<lidar>_pose`: abstract, X_WS.
+    - `<lidar>_time`: time of the scan, vector of size 1 [s].
     - `<camera>_color`, `_depth`, `_label`: images as Drake's RgbdSensor gives
       them; `<camera>_pose`: abstract, the pose of that sensor.
 
@@ -215,9 +222,14 @@ class McapRecorder(LeafSystem):
     event. A simulation that starts before time zero causes a warning. A forced
     publish writes nothing.
 
-    Connect the inputs directly to continuous outputs. A publish event sees the
-    state before any update at the same time. With a zero-order hold between
-    output and input, every message would therefore be one period old.
+    A discrete LiDAR has events of its own. One writes the odometry at the time
+    of a scan, so that it has the state that the scan has seen; a message that
+    is due with the same stamp is left out. Another writes the scan that is on
+    the port, with its own time and pose, at most once.
+
+    Connect all other inputs directly to continuous outputs. A publish event
+    sees the state before any update at the same time. With a zero-order hold
+    between output and input, every message would therefore be one period old.
 
     Example:
         from cns_drake import McapRecorder
@@ -236,6 +248,7 @@ class McapRecorder(LeafSystem):
         cameras: Mapping[str, RecordedCamera] | None = None,
         period: float | None = None,
         schedule: Schedule | None = None,
+        discrete: Mapping[str, ScanEvents] | None = None,
         further: Mapping[str, RecordedSensor] | None = None,
         layouts: Mapping[str, str] | None = None,
         num_rings: Mapping[str, int] | None = None,
@@ -258,6 +271,8 @@ class McapRecorder(LeafSystem):
                 `period` or `schedule`.
             schedule: times of the messages, with a stream for each topic, if
                 topics have rates of their own.
+            discrete: name of a discrete LiDAR -> its events. The schedule does
+                not have its topic.
             further: name -> further sensor.
             layouts: LiDAR name -> name of the layout of its recorded points; by
                 default `cns`.
@@ -279,6 +294,7 @@ class McapRecorder(LeafSystem):
         """
         super().__init__()
         cameras, further, layouts = cameras or {}, further or {}, layouts or {}
+        discrete = discrete or {}
         _check_frames(X_BSs, cameras, further)
         if (period is None) == (schedule is None):
             raise ValueError("a recorder needs either a period or a schedule")
@@ -301,6 +317,8 @@ class McapRecorder(LeafSystem):
         ] = []
         # The tick of the last event; None before the first event.
         self._last_tick: int | None = None
+        # Topic -> number of its messages, and the stamp of the last one [ns].
+        self._written: dict[str, tuple[int, int]] = {}
 
         # The following lines determine the order of the ports.
         self._odometry = self._declare_port("odometry", object())
@@ -314,11 +332,12 @@ class McapRecorder(LeafSystem):
                 num_rings=(num_rings or {}).get(name),
                 is_calibrated=name in calibrated,
             )
-            self._add_scan_port(name, convert)
+            self._add_scan_port(name, convert, discrete.get(name))
         for name, X_BS in X_BSs.items():
             if X_BS is None:
                 port = self._declare_pose_port(name)
-                self._poses[name] = port, RigidTransform()
+                if name not in discrete:
+                    self._poses[name] = port, RigidTransform()
         for name, camera in cameras.items():
             self._add_camera_ports(name, camera)
         for name, sensor in further.items():
@@ -403,7 +422,10 @@ class McapRecorder(LeafSystem):
         self._add_port("objects", recorded_topics.OBJECTS_TOPIC, make)
 
     def _add_scan_port(
-        self, name: str, convert: Callable[[np.ndarray], np.ndarray]
+        self,
+        name: str,
+        convert: Callable[[np.ndarray], np.ndarray],
+        events: ScanEvents | None,
     ) -> None:
         topic = recorded_topics.points_topic(name)
 
@@ -415,7 +437,47 @@ class McapRecorder(LeafSystem):
                 made[recorded_topics.labels_topic(name)] = labels
             return made
 
-        self._add_port(f"{name}_scan", topic, make)
+        if events is None:
+            self._add_port(f"{name}_scan", topic, make)
+        else:
+            self._add_discrete_port(name, make, events)
+
+    def _add_discrete_port(
+        self,
+        name: str,
+        make: Callable[[np.ndarray, int], dict[Topic, Any]],
+        events: ScanEvents,
+    ) -> None:
+        """Declares the ports and the events of a discrete LiDAR.
+
+        Args:
+            name: name of the LiDAR.
+            make: function that returns topic -> message, given a scan and its
+                stamp [ns].
+            events: the events.
+        """
+        scan = self._declare_port(f"{name}_scan", object())
+        time = self.DeclareVectorInputPort(f"{name}_time", 1)
+
+        def write_motion(context: Context) -> EventStatus:
+            stamp_ns = self._start_ns + nearest_ns(context.get_time())
+            self._write_fixed_poses(stamp_ns)
+            self._write_new(self._motion_messages(context, stamp_ns), stamp_ns)
+            return EventStatus.Succeeded()
+
+        def write_scan(context: Context) -> EventStatus:
+            if not np.isfinite(time.Eval(context)[0]):
+                return EventStatus.DidNothing()
+            stamp_ns = self._start_ns + nearest_ns(time.Eval(context)[0])
+            made = make(scan.Eval(context), stamp_ns)
+            if self._write_new(made, stamp_ns) and name not in self._X_BCs:
+                X_WS = self.GetInputPort(f"{name}_pose").Eval(context)
+                tf = messages.make_tf(MAP_FRAME, {name: X_WS}, stamp_ns)
+                self._write_message(TF_TOPIC, tf, stamp_ns)
+            return EventStatus.Succeeded()
+
+        self.DeclarePeriodicPublishEvent(*events.captures, write_motion)
+        self.DeclarePeriodicPublishEvent(*events.outputs, write_scan)
 
     def _add_sensor_port(self, name: str, sensor: RecordedSensor) -> None:
         self._add_port(
@@ -453,6 +515,8 @@ class McapRecorder(LeafSystem):
         waits = {IMU_TOPIC.name} if self._imu_samples is not None else set()
         steps = self._schedule.steps
         step = math.gcd(*(steps[name] for name in steps if name not in waits))
+        if not step:
+            return  # Discrete LiDARs alone.
         self.DeclarePeriodicPublishEvent(
             period_sec=float(self._schedule.exact_period * step),
             offset_sec=0.0,
@@ -472,9 +536,7 @@ class McapRecorder(LeafSystem):
         tick = round(context.get_time() / self._schedule.period)
         stamp_ns = self._start_ns + self._schedule.time_ns(tick)
         due = set(self._schedule.due(tick))
-        if self._X_BCs and self._last_tick is None:
-            tf = messages.make_tf(BASE_FRAME, self._X_BCs, stamp_ns)
-            self._write_message(TF_STATIC_TOPIC, tf, stamp_ns, 0)
+        self._write_fixed_poses(stamp_ns)
         outgoing: dict[Topic, Any] = {}
         if TF_TOPIC.name in due or ODOMETRY_TOPIC.name in due:
             outgoing |= self._motion_messages(context, stamp_ns)
@@ -486,11 +548,16 @@ class McapRecorder(LeafSystem):
         for topic, make in self._streams:
             if topic.name in due:
                 outgoing |= make(context, stamp_ns)
-        for topic, message in outgoing.items():
-            if topic.name in due:
-                number = tick // self._schedule.steps[topic.name]
-                self._write_message(topic, message, stamp_ns, number)
+        self._write_new(
+            {t: made for t, made in outgoing.items() if t.name in due}, stamp_ns
+        )
         return EventStatus.Succeeded()
+
+    def _write_fixed_poses(self, stamp_ns: int) -> None:
+        """Writes the poses of fixed sensors before all other messages."""
+        if self._X_BCs and not self._written:
+            tf = messages.make_tf(BASE_FRAME, self._X_BCs, stamp_ns)
+            self._write_message(TF_STATIC_TOPIC, tf, stamp_ns)
 
     def _motion_messages(
         self, context: Context, stamp_ns: int
@@ -560,15 +627,30 @@ class McapRecorder(LeafSystem):
             if number * step == tick:
                 made[IMU_TOPIC] = message
             else:
-                self._write_message(IMU_TOPIC, message, stamp_ns, number)
+                self._write_message(IMU_TOPIC, message, stamp_ns)
         return made
 
-    def _write_message(
-        self, topic: Topic, message: Any, stamp_ns: int, sequence: int
-    ) -> None:
+    def _write_new(self, made: Mapping[Topic, Any], stamp_ns: int) -> bool:
+        """Writes messages, unless their topics have one with this stamp.
+
+        Returns:
+            Whether a message was written.
+        """
+        new = [
+            topic
+            for topic in made
+            if self._written.get(topic.name, (0, -1))[1] != stamp_ns
+        ]
+        for topic in new:
+            self._write_message(topic, made[topic], stamp_ns)
+        return bool(new)
+
+    def _write_message(self, topic: Topic, message: Any, stamp_ns: int) -> None:
         if not isinstance(message, bytes):
             message = serialize(message)
-        self._bag.write(topic.name, stamp_ns, message, sequence)
+        number, _ = self._written.get(topic.name, (0, -1))
+        self._bag.write(topic.name, stamp_ns, message, number)
+        self._written[topic.name] = number + 1, stamp_ns
 
 
 def _check_frames(

@@ -176,9 +176,8 @@ class PublishedSensor:
         with _errors_of(self):
             if not self.name:
                 raise ValueError("name: it is empty")
-            if not np.isfinite(
-                self.X_PB.GetDeterministicValue().GetAsMatrix34()
-            ).all():
+            X_PB = self.X_PB.GetDeterministicValue()
+            if not np.isfinite(X_PB.GetAsMatrix34()).all():
                 raise ValueError("X_PB: not finite")
             self._validate()
 
@@ -239,9 +238,9 @@ class LidarConfig(LidarDescription, PublishedSensor):
 
     def _validate(self) -> None:
         self._section()
-        sample_times(self.rate, self.capture_offset, self.output_delay)
         if self.rate is not None:
             period_of_rate(self.rate, LONGEST_PERIOD)
+        sample_times(self.rate, self.capture_offset, self.output_delay)
         if self.role not in _ROLES:
             raise ValueError(
                 f"role: {self.role!r} is not one of {', '.join(_ROLES)}"

@@ -24,7 +24,14 @@ from pydrake.systems.framework import (
     ValueProducer,
 )
 
-from cns_drake.base import check_type, is_real, product, rotated
+from cns_drake.base import (
+    NS_PER_S,
+    check_type,
+    is_real,
+    nearest_ns,
+    product,
+    rotated,
+)
 from cns_drake.ray_casting import (
     EVERYWHERE,
     NOTHING_KNOWN,
@@ -130,7 +137,7 @@ class SampleTimes(NamedTuple):
     delay: float
 
     @property
-    def scans(self) -> tuple[float, float]:
+    def captures(self) -> tuple[float, float]:
         """Period and offset [s] of events at which the poses are a scan's."""
         early = 1.0 - _READERS_EARLY
         return self.period * early, self.offset * early
@@ -650,7 +657,7 @@ class Lidar(LeafSystem):
         """Takes a scan, and shows it unless there is a delay."""
         assert self.samples is not None
         taken = _Capture(
-            math.floor(context.get_time() * 1e9 + 0.5),
+            nearest_ns(context.get_time()),
             self._points.Eval(context),
             self._measured.Eval(context),
             _eval_seen(self._seen_in_reach, context).instance,
@@ -754,7 +761,7 @@ class Lidar(LeafSystem):
     def _calc_measured(self, context: Context, output: AbstractValue) -> None:
         time = context.get_time()
         if self.samples is not None:
-            time = round(time, 9)  # The nominal time.
+            time = nearest_ns(time) / NS_PER_S
         # Not `round`: of two scans a period apart, it gives half numbers one.
         revolution = math.floor(time / self.pattern.period + 0.5)
         draw = 0.0
@@ -848,7 +855,9 @@ class Lidar(LeafSystem):
         if held is None:
             output[0] = context.get_time()
         else:
-            output[0] = np.nan if held.time_ns is None else held.time_ns / 1e9
+            output[0] = (
+                np.nan if held.time_ns is None else held.time_ns / NS_PER_S
+            )
 
     def _set_cloud(
         self,
