@@ -26,7 +26,6 @@ from .rosbag2_metadata import Topic as Topic
 from .rosbag2_metadata import to_yaml as to_yaml
 from .schedule import FRAME_PERIOD as FRAME_PERIOD
 from .schedule import START_NS as START_NS
-from .schedule import ScanEvents as ScanEvents
 from .schedule import Schedule as Schedule
 from .schedule import frame_stamp_ns as frame_stamp_ns
 from .schedule import frames_within as frames_within

@@ -26,7 +26,7 @@ from pydrake.systems.sensors import (
     ImageRgba8U,
 )
 
-from cns_drake.base import nearest_ns
+from cns_drake.base import nearest_ns, shortly_before
 from cns_drake.drives import (
     BASE_FRAME,
     IMU_FRAME,
@@ -46,11 +46,7 @@ from cns_drake.recording.recorded_topics import (
     TF_TOPIC,
 )
 from cns_drake.recording.rosbag2_metadata import Topic
-from cns_drake.recording.schedule import (
-    ScanEvents,
-    Schedule,
-    make_schedule,
-)
+from cns_drake.recording.schedule import Schedule, make_schedule
 from cns_drake.scene import optional_value
 
 _IMAGES = {"color": ImageRgba8U, "depth": ImageDepth32F, "label": ImageLabel16I}
@@ -248,7 +244,7 @@ class McapRecorder(LeafSystem):
         cameras: Mapping[str, RecordedCamera] | None = None,
         period: float | None = None,
         schedule: Schedule | None = None,
-        discrete: Mapping[str, ScanEvents] | None = None,
+        discrete: Mapping[str, tuple[float, float, float]] | None = None,
         further: Mapping[str, RecordedSensor] | None = None,
         layouts: Mapping[str, str] | None = None,
         num_rings: Mapping[str, int] | None = None,
@@ -257,6 +253,7 @@ class McapRecorder(LeafSystem):
         with_imu_samples: bool = False,
         with_objects: bool = False,
         start_ns: int = 0,
+        has_steps: bool = False,
     ):
         """Declares the ports and the schedule.
 
@@ -271,8 +268,9 @@ class McapRecorder(LeafSystem):
                 `period` or `schedule`.
             schedule: times of the messages, with a stream for each topic, if
                 topics have rates of their own.
-            discrete: name of a discrete LiDAR -> its events. The schedule does
-                not have its topic.
+            discrete: name of a discrete LiDAR -> period and offset of its
+                scans, and their delay [s]. The schedule does not have its
+                topic.
             further: name -> further sensor.
             layouts: LiDAR name -> name of the layout of its recorded points; by
                 default `cns`.
@@ -286,6 +284,9 @@ class McapRecorder(LeafSystem):
             with_imu_samples: whether there is a port `imu_samples`.
             with_objects: whether there is a port `objects`.
             start_ns: the stamp of time zero [ns].
+            has_steps: whether the Diagram can have a plant with a step. The
+                events then come shortly before their times, see
+                `cns_drake.base.shortly_before`.
 
         Raises:
             ValueError: period and schedule are both given, or neither is; or
@@ -303,6 +304,8 @@ class McapRecorder(LeafSystem):
             topics = _recorded_topics(X_BSs, cameras, further, layouts)
             schedule = make_schedule({topic.name: period for topic in topics})
         self._schedule = schedule
+        self._has_steps = has_steps
+        self._is_discrete = bool(discrete)
         self._bag = bag
         self._start_ns = start_ns
         self._X_BI = None if X_BI is None else RigidTransform(X_BI)
@@ -317,7 +320,7 @@ class McapRecorder(LeafSystem):
         ] = []
         # The tick of the last event; None before the first event.
         self._last_tick: int | None = None
-        # Topic -> number of its messages, and the stamp of the last one [ns].
+        # Topic -> sequence number and stamp [ns] of its last message.
         self._written: dict[str, tuple[int, int]] = {}
 
         # The following lines determine the order of the ports.
@@ -342,7 +345,7 @@ class McapRecorder(LeafSystem):
             self._add_camera_ports(name, camera)
         for name, sensor in further.items():
             self._add_sensor_port(name, sensor)
-        self.DeclareInitializationPublishEvent(publish=_warn_of_early_start)
+        self.DeclareInitializationPublishEvent(publish=self._start)
         self._declare_events()
 
     def _declare_port(self, name: str, example: object) -> InputPort:
@@ -425,7 +428,7 @@ class McapRecorder(LeafSystem):
         self,
         name: str,
         convert: Callable[[np.ndarray], np.ndarray],
-        events: ScanEvents | None,
+        samples: tuple[float, float, float] | None,
     ) -> None:
         topic = recorded_topics.points_topic(name)
 
@@ -437,16 +440,18 @@ class McapRecorder(LeafSystem):
                 made[recorded_topics.labels_topic(name)] = labels
             return made
 
-        if events is None:
+        if samples is None:
             self._add_port(f"{name}_scan", topic, make)
         else:
-            self._add_discrete_port(name, make, events)
+            self._add_discrete_port(name, make, *samples)
 
     def _add_discrete_port(
         self,
         name: str,
         make: Callable[[np.ndarray, int], dict[Topic, Any]],
-        events: ScanEvents,
+        period: float,
+        offset: float,
+        delay: float,
     ) -> None:
         """Declares the ports and the events of a discrete LiDAR.
 
@@ -454,10 +459,12 @@ class McapRecorder(LeafSystem):
             name: name of the LiDAR.
             make: function that returns topic -> message, given a scan and its
                 stamp [ns].
-            events: the events.
+            period: time between two scans [s].
+            offset: time of the first periodic scan [s].
+            delay: time from a scan to its appearance on the port [s].
         """
         scan = self._declare_port(f"{name}_scan", object())
-        time = self.DeclareVectorInputPort(f"{name}_time", 1)
+        scan_time = self.DeclareVectorInputPort(f"{name}_time", 1)
 
         def write_motion(context: Context) -> EventStatus:
             stamp_ns = self._start_ns + nearest_ns(context.get_time())
@@ -466,18 +473,27 @@ class McapRecorder(LeafSystem):
             return EventStatus.Succeeded()
 
         def write_scan(context: Context) -> EventStatus:
-            if not np.isfinite(time.Eval(context)[0]):
+            if not np.isfinite(scan_time.Eval(context)[0]):
                 return EventStatus.DidNothing()
-            stamp_ns = self._start_ns + nearest_ns(time.Eval(context)[0])
+            stamp_ns = self._start_ns + nearest_ns(scan_time.Eval(context)[0])
+            if not self._is_new(recorded_topics.points_topic(name), stamp_ns):
+                return EventStatus.DidNothing()
             made = make(scan.Eval(context), stamp_ns)
-            if self._write_new(made, stamp_ns) and name not in self._X_BCs:
+            if name not in self._X_BCs:
                 X_WS = self.GetInputPort(f"{name}_pose").Eval(context)
                 tf = messages.make_tf(MAP_FRAME, {name: X_WS}, stamp_ns)
-                self._write_message(TF_TOPIC, tf, stamp_ns)
+                made = {TF_TOPIC: tf, **made}
+            for topic, message in made.items():
+                self._write_message(topic, message, stamp_ns)
             return EventStatus.Succeeded()
 
-        self.DeclarePeriodicPublishEvent(*events.captures, write_motion)
-        self.DeclarePeriodicPublishEvent(*events.outputs, write_scan)
+        for time, publish in (
+            (offset, write_motion),
+            (offset + delay, write_scan),
+        ):
+            self.DeclarePeriodicPublishEvent(
+                shortly_before(period), shortly_before(time), publish
+            )
 
     def _add_sensor_port(self, name: str, sensor: RecordedSensor) -> None:
         self._add_port(
@@ -517,8 +533,9 @@ class McapRecorder(LeafSystem):
         step = math.gcd(*(steps[name] for name in steps if name not in waits))
         if not step:
             return  # Discrete LiDARs alone.
+        period = float(self._schedule.exact_period * step)
         self.DeclarePeriodicPublishEvent(
-            period_sec=float(self._schedule.exact_period * step),
+            period_sec=shortly_before(period) if self._has_steps else period,
             offset_sec=0.0,
             publish=self._write_due_messages,
         )
@@ -530,6 +547,22 @@ class McapRecorder(LeafSystem):
                 offset_sec=end * self._schedule.period,
                 publish=self._write_due_messages,
             )
+
+    def _start(self, context: Context) -> EventStatus:
+        """Warns of an early start; writes what the first event was due for."""
+        time, period = context.get_time(), self._schedule.period
+        if time < 0.0:
+            warnings.warn(
+                f"the simulation starts at {time:g} s: nothing is recorded "
+                "before time zero",
+                stacklevel=2,
+            )
+        # The event of this time would have come shortly before it.
+        if self._has_steps and period and time > 0.0:
+            tick = round(time / period)
+            if abs(time - tick * period) < 1e-9:
+                self._write_due_messages(context)
+        return EventStatus.Succeeded()
 
     def _write_due_messages(self, context: Context) -> EventStatus:
         # The event's time differs from a tick's only by rounding.
@@ -549,7 +582,9 @@ class McapRecorder(LeafSystem):
             if topic.name in due:
                 outgoing |= make(context, stamp_ns)
         self._write_new(
-            {t: made for t, made in outgoing.items() if t.name in due}, stamp_ns
+            {t: made for t, made in outgoing.items() if t.name in due},
+            stamp_ns,
+            tick,
         )
         return EventStatus.Succeeded()
 
@@ -627,30 +662,41 @@ class McapRecorder(LeafSystem):
             if number * step == tick:
                 made[IMU_TOPIC] = message
             else:
-                self._write_message(IMU_TOPIC, message, stamp_ns)
+                self._write_message(IMU_TOPIC, message, stamp_ns, number)
         return made
 
-    def _write_new(self, made: Mapping[Topic, Any], stamp_ns: int) -> bool:
-        """Writes messages, unless their topics have one with this stamp.
+    def _write_new(
+        self,
+        made: Mapping[Topic, Any],
+        stamp_ns: int,
+        tick: int | None = None,
+    ) -> None:
+        """Writes messages, unless their topics have one with this stamp."""
+        for topic, message in made.items():
+            if self._is_new(topic, stamp_ns):
+                number = None
+                if tick is not None and not self._is_discrete:
+                    number = tick // self._schedule.steps[topic.name]
+                self._write_message(topic, message, stamp_ns, number)
 
-        Returns:
-            Whether a message was written.
-        """
-        new = [
-            topic
-            for topic in made
-            if self._written.get(topic.name, (0, -1))[1] != stamp_ns
-        ]
-        for topic in new:
-            self._write_message(topic, made[topic], stamp_ns)
-        return bool(new)
+    def _is_new(self, topic: Topic, stamp_ns: int) -> bool:
+        """Returns whether the last message of a topic has another stamp."""
+        return self._written.get(topic.name, (0, -1))[1] != stamp_ns
 
-    def _write_message(self, topic: Topic, message: Any, stamp_ns: int) -> None:
+    def _write_message(
+        self,
+        topic: Topic,
+        message: Any,
+        stamp_ns: int,
+        sequence: int | None = None,
+    ) -> None:
+        """Writes a message; by default, it has the next sequence number."""
         if not isinstance(message, bytes):
             message = serialize(message)
-        number, _ = self._written.get(topic.name, (0, -1))
-        self._bag.write(topic.name, stamp_ns, message, number)
-        self._written[topic.name] = number + 1, stamp_ns
+        if sequence is None:
+            sequence = self._written.get(topic.name, (-1, -1))[0] + 1
+        self._bag.write(topic.name, stamp_ns, message, sequence)
+        self._written[topic.name] = sequence, stamp_ns
 
 
 def _check_frames(
@@ -715,14 +761,3 @@ def _fixed_poses(
     return {
         name: RigidTransform(X) for name, X in X_BCs.items() if X is not None
     }
-
-
-def _warn_of_early_start(context: Context) -> EventStatus:
-    time = context.get_time()
-    if time < 0.0:
-        warnings.warn(
-            f"the simulation starts at {time:g} s: nothing is recorded before "
-            "time zero",
-            stacklevel=2,
-        )
-    return EventStatus.Succeeded()

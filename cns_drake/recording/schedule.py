@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 import math
-from typing import NamedTuple
 
 from cns_drake.base import NS_PER_S
 
@@ -34,18 +33,6 @@ def frames_within(duration: float, period: float = FRAME_PERIOD) -> int:
     The first frame is at the start of the drive.
     """
     return math.floor(duration / period) + 1
-
-
-class ScanEvents(NamedTuple):
-    """Period and offset [s] of the events at which a discrete LiDAR is read.
-
-    Attributes:
-        captures: the odometry is that of a scan.
-        outputs: a scan is on the LiDAR's ports.
-    """
-
-    captures: tuple[float, float]
-    outputs: tuple[float, float]
 
 
 @dataclass(frozen=True)

@@ -570,15 +570,17 @@ def ApplyLidarConfig(
             unseen=_unseen(config, plant, scene_graph),
             num_threads=config.num_threads,
         )
-    messages = (period, 0.0) if lidar.samples is None else lidar.samples.outputs
+    offset = 0.0
+    if lidar.samples is not None:
+        period, offset = lidar.samples.output_events()
     _publish_measurements(
         config,
         builder,
         interface,
         [lidar.point_cloud_W_output_port(), lidar.scan_time_output_port()],
         _ScanToLcm(),
-        period=messages[0],
-        offset=messages[1],
+        period=period,
+        offset=offset,
     )
     return lidar
 

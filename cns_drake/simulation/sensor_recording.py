@@ -20,7 +20,6 @@ from cns_drake.recording import (
     BagWriter,
     McapRecorder,
     RecordedCamera,
-    ScanEvents,
     Schedule,
     Topic,
     camera_topic,
@@ -119,11 +118,7 @@ def add_mcap_recorder(
     check_type("rates", rates, Mapping, NoneType)
     periods = _message_periods(period, rates or {}, lidars, cameras, imu)
     discrete = {
-        lidar.get_name(): ScanEvents(
-            lidar.samples.captures, lidar.samples.outputs
-        )
-        for lidar in lidars
-        if lidar.samples is not None
+        lidar.get_name(): lidar.samples for lidar in lidars if lidar.samples
     }
     X_BSs = {
         lidar.get_name(): _pose_at_odometry(lidar, odometry) for lidar in lidars
@@ -166,6 +161,7 @@ def add_mcap_recorder(
             discrete=discrete,
             imu_variances=variances,
             start_ns=start_ns,
+            has_steps=True,
         ),
     )
     connect_by_name(

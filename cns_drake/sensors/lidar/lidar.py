@@ -31,6 +31,7 @@ from cns_drake.base import (
     nearest_ns,
     product,
     rotated,
+    shortly_before,
 )
 from cns_drake.ray_casting import (
     EVERYWHERE,
@@ -65,16 +66,6 @@ _WITHOUT_GREY = Fields(BaseField.kXYZs)
 _WITH_GREY = Fields(BaseField.kXYZs | BaseField.kRGBs)
 # A pose in the port `sweep`: three rows of four numbers.
 _POSE_SIZE = 12
-
-
-# By this part of their time, the events of a discrete LiDAR come early. Drake
-# runs publish events before the updates of the same time, and a time that is
-# computed as offset + k * period before or after one that is computed with
-# another period. A few roundings earlier, a scan is there for whatever reads
-# it at its nominal time, and sees the state that a plant has at that time.
-_EARLY = 2.0**-47
-# Those who read a scan as soon as it is there come after it, but early, too.
-_READERS_EARLY = 2.0**-48
 
 
 class _Capture(NamedTuple):
@@ -136,17 +127,12 @@ class SampleTimes(NamedTuple):
     offset: float
     delay: float
 
-    @property
-    def captures(self) -> tuple[float, float]:
-        """Period and offset [s] of events at which the poses are a scan's."""
-        early = 1.0 - _READERS_EARLY
-        return self.period * early, self.offset * early
-
-    @property
-    def outputs(self) -> tuple[float, float]:
-        """Period and offset [s] of events at which the ports show a scan."""
-        early = 1.0 - _READERS_EARLY
-        return self.period * early, (self.offset + self.delay) * early
+    def output_events(self) -> tuple[float, float]:
+        """Returns period and offset [s] of events that read each new scan."""
+        return (
+            shortly_before(self.period),
+            shortly_before(self.offset + self.delay),
+        )
 
 
 def sample_times(
@@ -396,11 +382,11 @@ class Lidar(LeafSystem):
         events = [(offset, self._take)]
         if delay:
             events.append((offset + delay, self._show))
-        early = 1.0 - _EARLY
+        # Before the events of those who read the scan, such as a recorder.
         for time, update in events:
             self.DeclarePeriodicUnrestrictedUpdateEvent(
-                period_sec=period * early,
-                offset_sec=time * early,
+                period_sec=shortly_before(period, 2),
+                offset_sec=shortly_before(time, 2),
                 update=update,
             )
         self.DeclareInitializationUnrestrictedUpdateEvent(self._initialize)
