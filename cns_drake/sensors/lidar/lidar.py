@@ -572,7 +572,7 @@ class Lidar(LeafSystem):
             instances, shapes = seen.instance, seen.built
         else:
             instances = held.instance
-            shapes = held.measured.geometries if held.measured else []
+            shapes = held.measured.geometries if held.measured else ()
         found: dict[int, tuple[GeometryId, ...]] = {}
         for instance, shape in zip(instances.tolist(), shapes, strict=True):
             found[instance] = (*found.get(instance, ()), shape.geometry_id)
