@@ -26,6 +26,11 @@ def shortly_before(time: float, times: int = 1) -> float:
     return time * (1.0 - times * 2.0**-48)
 
 
-def nearest_ns(time: float) -> int:
-    """Returns a time [s] as the nearest whole number of nanoseconds."""
-    return math.floor(time * NS_PER_S + 0.5)
+def nearest_ns(time: float, times: int = 0) -> int:
+    """Returns a time [s] as the nearest whole number of nanoseconds.
+
+    Args:
+        time: the time, or that of an event `shortly_before` it.
+        times: the number that was given to `shortly_before`; 0 for the time.
+    """
+    return math.floor(time / (1.0 - times * 2.0**-48) * NS_PER_S + 0.5)

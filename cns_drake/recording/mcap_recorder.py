@@ -467,7 +467,7 @@ class McapRecorder(LeafSystem):
         scan_time = self.DeclareVectorInputPort(f"{name}_time", 1)
 
         def write_motion(context: Context) -> EventStatus:
-            stamp_ns = self._start_ns + nearest_ns(context.get_time())
+            stamp_ns = self._start_ns + nearest_ns(context.get_time(), 1)
             self._write_fixed_poses(stamp_ns)
             self._write_new(self._motion_messages(context, stamp_ns), stamp_ns)
             return EventStatus.Succeeded()

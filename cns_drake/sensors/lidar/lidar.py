@@ -639,11 +639,11 @@ class Lidar(LeafSystem):
             context,
         )
 
-    def _take(self, context: Context, state: State) -> None:
-        """Takes a scan, and shows it unless there is a delay."""
+    def _take(self, context: Context, state: State, times: int = 2) -> None:
+        """Takes a scan `times` before, and shows it unless there is a delay."""
         assert self.samples is not None
         taken = _Capture(
-            nearest_ns(context.get_time()),
+            nearest_ns(context.get_time(), times),
             self._points.Eval(context),
             self._measured.Eval(context),
             _eval_seen(self._seen_in_reach, context).instance,
@@ -665,7 +665,7 @@ class Lidar(LeafSystem):
         if self.samples.delay:
             self._hold(state, _Held())
         else:
-            self._take(context, state)
+            self._take(context, state, times=0)
 
     def _hold(self, state: State, held: _Held) -> None:
         state.get_mutable_abstract_state(self._state).set_value(held)
