@@ -314,6 +314,9 @@ class McapRecorder(LeafSystem):
         # Frame C that moves in the map -> the port with the pose of a frame P,
         # and the pose X_PC. Several frames may share a port.
         self._poses: dict[str, tuple[InputPort, RigidTransform]] = {}
+        # Discrete LiDAR that moves in the map -> the port with the pose of its
+        # scan, which is written with the stamp of the scan alone.
+        self._held_poses: dict[str, InputPort] = {}
         # A topic, and a function that makes all messages that are due with it.
         self._streams: list[
             tuple[Topic, Callable[[Context, int], dict[Topic, Any]]]
@@ -339,7 +342,9 @@ class McapRecorder(LeafSystem):
         for name, X_BS in X_BSs.items():
             if X_BS is None:
                 port = self._declare_pose_port(name)
-                if name not in discrete:
+                if name in discrete:
+                    self._held_poses[name] = port
+                else:
                     self._poses[name] = port, RigidTransform()
         for name, camera in cameras.items():
             self._add_camera_ports(name, camera)
@@ -478,12 +483,7 @@ class McapRecorder(LeafSystem):
             stamp_ns = self._start_ns + nearest_ns(scan_time.Eval(context)[0])
             if not self._is_new(recorded_topics.points_topic(name), stamp_ns):
                 return EventStatus.DidNothing()
-            made = make(scan.Eval(context), stamp_ns)
-            if name not in self._X_BCs:
-                X_WS = self.GetInputPort(f"{name}_pose").Eval(context)
-                tf = messages.make_tf(MAP_FRAME, {name: X_WS}, stamp_ns)
-                made = {TF_TOPIC: tf, **made}
-            for topic, message in made.items():
+            for topic, message in make(scan.Eval(context), stamp_ns).items():
                 self._write_message(topic, message, stamp_ns)
             return EventStatus.Succeeded()
 
@@ -609,6 +609,13 @@ class McapRecorder(LeafSystem):
             X_WP = optional_value(port, context)
             if X_WP is not None:
                 X_WCs[name] = X_WP @ X_PC
+        for name, port in self._held_poses.items():
+            (time,) = self.GetInputPort(f"{name}_time").Eval(context)
+            if (
+                self._start_ns + nearest_ns(np.nan_to_num(time, nan=-1.0))
+                == stamp_ns
+            ):
+                X_WCs[name] = port.Eval(context)
         if X_WCs:
             tf = messages.make_tf(MAP_FRAME, X_WCs, stamp_ns)
             return {TF_TOPIC: tf, **made}

@@ -96,8 +96,9 @@ def add_mcap_recorder(
         ValueError: `rates` names an unknown sensor, neither a period nor a
             LiDAR is given, `period` or `start_ns` is out of range, a LiDAR is
             causal (its scan covers the revolution before its time stamp), a
-            LiDAR with a rate is to be recorded at another rate, or names of
-            sensors are not unique or cannot be parts of ROS 2 topics.
+            LiDAR with a rate is to be recorded at another rate, or has a delay
+            and is not on the body of the odometry, or names of sensors are not
+            unique or cannot be parts of ROS 2 topics.
 
     Example:
         from cns_drake import add_mcap_recorder
@@ -123,6 +124,13 @@ def add_mcap_recorder(
     X_BSs = {
         lidar.get_name(): _pose_at_odometry(lidar, odometry) for lidar in lidars
     }
+    for key, samples in discrete.items():
+        if X_BSs[key] is None and samples.delay:
+            # Its pose comes after later poses, on a topic in order of time.
+            raise ValueError(
+                f"lidars: '{key}' has an output_delay; its pose is recorded "
+                "only with the odometry of its body"
+            )
     recorded = {
         key: _recorded_camera(camera) for key, camera in cameras.items()
     }

@@ -2,6 +2,7 @@
 
 import itertools
 
+from helpers.bag_recordings import messages_by_topic
 import numpy as np
 from pydrake.geometry import Box
 from pydrake.math import RigidTransform
@@ -29,7 +30,17 @@ AHEAD = make_flash_pattern(
 )
 
 
-def record(folder, time_step, seconds, *, imu_rate=200, rates=None, **options):
+def record(
+    folder,
+    time_step,
+    seconds,
+    *,
+    imu_rate=200,
+    rates=None,
+    others=(),
+    with_odometry=True,
+    **options,
+):
     """Records a cart that drives towards a wall at a constant speed."""
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step)
@@ -49,14 +60,13 @@ def record(folder, time_step, seconds, *, imu_rate=200, rates=None, **options):
         )
     )
     plant.Finalize()
-    lidar = add_lidar(
-        builder, scene_graph, cart, RigidTransform(), AHEAD, **options
-    )
+    place = scene_graph, cart, RigidTransform(), AHEAD
+    lidars = [add_lidar(builder, *place, **one) for one in (options, *others)]
     bag = add_mcap_recorder(
         builder,
         folder,
-        lidars=[lidar],
-        odometry=add_odometry(builder, cart),
+        lidars=lidars,
+        odometry=add_odometry(builder, cart) if with_odometry else None,
         imu=add_imu(builder, cart, RigidTransform(), rate=imu_rate),
         rates=rates,
     )
@@ -65,7 +75,7 @@ def record(folder, time_step, seconds, *, imu_rate=200, rates=None, **options):
     joint.set_translation_rate(own, SPEED)
     with bag:
         simulator.AdvanceTo(seconds)
-    return McapDrive(folder)
+    return McapDrive(folder) if with_odometry else None
 
 
 def check(drive, rate, offset, seconds, delay=0.0, *, time_step):
@@ -142,3 +152,42 @@ def test_a_delay_and_odometry_at_a_rate_of_its_own(
         rates={"odometry": odometry_rate},
     )
     check(drive, 10, 0.07, 4.0, delay, time_step=0.005)
+
+
+@pytest.mark.parametrize("time_step", [0.0, 0.01])
+def test_poses_of_lidars_without_odometry(tmp_path, time_step):
+    """Of the rates, some times are equal, and no power of two apart."""
+    record(
+        tmp_path / "drive",
+        time_step,
+        3.0,
+        rate=10,
+        others=[{"name": "slow", "rate": 10 / 3}, {"name": "free"}],
+        with_odometry=False,
+    )
+    found = messages_by_topic(tmp_path / "drive")
+    poses = {"lidar": {}, "slow": {}, "free": {}}
+    for time_ns, message in found["/tf"]:
+        for edge in message.transforms:
+            x = edge.transform.translation.x
+            poses[edge.child_frame_id][time_ns] = x
+            at = time_ns / 1e9
+            if time_step:
+                at = np.ceil(at / time_step - 1e-6) * time_step
+            assert x == pytest.approx(SPEED * at, abs=1e-9)
+    for name, count in (("lidar", 31), ("slow", 11), ("free", 31)):
+        stamps = [stamp_ns for stamp_ns, _ in found[f"/{name}/points"]]
+        assert len(stamps) == count
+        assert poses[name].keys() >= set(stamps)
+
+
+def test_a_delayed_pose_needs_odometry(tmp_path):
+    with pytest.raises(ValueError, match=r"^lidars: 'lidar' has an output_del"):
+        record(
+            tmp_path / "drive",
+            0.01,
+            1.0,
+            rate=10,
+            output_delay=0.02,
+            with_odometry=False,
+        )
