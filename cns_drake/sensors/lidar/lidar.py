@@ -639,17 +639,10 @@ class Lidar(LeafSystem):
             context,
         )
 
-    def _take(self, context: Context, state: State, times: int = 2) -> None:
-        """Takes a scan `times` before, and shows it unless there is a delay."""
+    def _take(self, context: Context, state: State) -> None:
+        """Takes a scan, and shows it unless there is a delay."""
         assert self.samples is not None
-        taken = _Capture(
-            nearest_ns(context.get_time(), times),
-            self._points.Eval(context),
-            self._measured.Eval(context),
-            _eval_seen(self._seen_in_reach, context).instance,
-            self._calc_poses(context),
-            self._calc_pose(context),
-        )
+        taken = self._capture(context, 2)
         held = context.get_abstract_state(self._state).get_value()
         shown = held.shown if self.samples.delay else taken
         self._hold(state, _Held(taken, shown))
@@ -665,7 +658,19 @@ class Lidar(LeafSystem):
         if self.samples.delay:
             self._hold(state, _Held())
         else:
-            self._take(context, state, times=0)
+            taken = self._capture(context, 0)
+            self._hold(state, _Held(taken, taken))
+
+    def _capture(self, context: Context, times: int) -> _Capture:
+        """Returns the scan of an event that comes `times` before its time."""
+        return _Capture(
+            nearest_ns(context.get_time(), times),
+            self._points.Eval(context),
+            self._measured.Eval(context),
+            _eval_seen(self._seen_in_reach, context).instance,
+            self._calc_poses(context),
+            self._calc_pose(context),
+        )
 
     def _hold(self, state: State, held: _Held) -> None:
         state.get_mutable_abstract_state(self._state).set_value(held)
