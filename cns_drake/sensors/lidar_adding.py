@@ -279,8 +279,8 @@ def add_lidar_view(
         builder: builder of a diagram with the LiDAR.
         lidar: the LiDAR.
         meshcat: server that shows the points.
-        period: time between two shown scans [s]; by default the duration of a
-            revolution.
+        period: time between two shown scans [s]; by default that between two
+            scans of a discrete LiDAR, or the duration of a revolution.
         point_size: size of a point [m].
 
     Raises:
@@ -293,11 +293,11 @@ def add_lidar_view(
     """
     name = lidar.get_name()
     check_unused_names(builder, f"{name}_view")
+    if period is None:
+        period = (lidar.samples or lidar.pattern).period
     view = builder.AddNamedSystem(
         f"{name}_view",
-        geometry.MeshcatPointCloudVisualizer(
-            meshcat, name, lidar.pattern.period if period is None else period
-        ),
+        geometry.MeshcatPointCloudVisualizer(meshcat, name, period),
     )
     view.set_default_rgba(_VIEW_COLOR)
     view.set_point_size(point_size)

@@ -278,6 +278,18 @@ def test_drake_leaves_out_no_scan(casts):
     assert casts[0] == 11
 
 
+def test_times_are_exact_after_days():
+    site = Site(0.01)
+    simulator = site.simulator()
+    start = 1_000_000.0
+    simulator.get_mutable_context().SetTime(start)
+    simulator.Initialize()
+    for number in range(1, 20):
+        simulator.AdvanceTo(start + 0.1 * number + 0.05)
+        (time,) = site.eval(simulator.get_context(), "scan_time")
+        assert time == start + round(0.1 * number, 1)
+
+
 def test_a_scan_steers_without_an_algebraic_loop():
     """A LiDAR with a rate has no direct feedthrough, as RgbdSensorDiscrete."""
     site = Site(0.0)
