@@ -550,6 +550,8 @@ class McapRecorder(LeafSystem):
 
     def _start(self, context: Context) -> EventStatus:
         """Warns of an early start; writes what the first event was due for."""
+        # Of a simulation that begins again, the bag refuses what is there.
+        self._written = {t: (n, -1) for t, (n, _) in self._written.items()}
         time, period = context.get_time(), self._schedule.period
         if time < 0.0:
             warnings.warn(
