@@ -27,12 +27,11 @@ from cns_drake.sensors.published_sensor import (
     Interface,
     PublishedSensor,
     carrier_frame,
-    checked_section,
     errors_of,
     find_interface,
     names_of_fields_in_errors,
     publish_measurements,
-    section_fields,
+    section_of,
 )
 from cns_drake.sensors.sheet_patterns import revolution_at_rate
 from cns_drake.units import DEFAULT_PRESET, LONGEST_PERIOD
@@ -110,10 +109,10 @@ class LidarConfig(LidarDescription, PublishedSensor):
 
     def _section(self) -> LidarSection:
         """Returns the section of a scenario with the same fields."""
-        given = section_fields(self, LidarSection)
         if self.unit is not None and self.preset == DEFAULT_PRESET:
-            given["preset"] = None  # Nobody has given it.
-        return checked_section(given, LidarSection)
+            # Nobody has given the preset.
+            return section_of(self, LidarSection, preset=None)
+        return section_of(self, LidarSection)
 
 
 class _ScanToLcm(framework.LeafSystem):
@@ -210,9 +209,6 @@ def ApplyLidarConfig(
             unseen=_unseen(config, plant, scene_graph),
             num_threads=config.num_threads,
         )
-    offset = 0.0
-    if lidar.samples is not None:
-        period, offset = lidar.samples.output_events()
     publish_measurements(
         config,
         "POINT_CLOUD",
@@ -220,8 +216,8 @@ def ApplyLidarConfig(
         interface,
         [lidar.point_cloud_W_output_port(), lidar.scan_time_output_port()],
         _ScanToLcm(),
-        period=period,
-        offset=offset,
+        period=lidar.samples.period if lidar.samples else period,
+        offset=config.capture_offset + config.output_delay,
     )
     return lidar
 

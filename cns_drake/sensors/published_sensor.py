@@ -32,7 +32,11 @@ from pydrake.systems import lcm as drake_lcm
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
 
-from cns_drake.base import Section, describe_validation_error
+from cns_drake.base import (
+    Section,
+    describe_validation_error,
+    shortly_before,
+)
 from cns_drake.scene import find_bus
 from cns_drake.sensors.system_names import check_unused_names
 
@@ -163,6 +167,7 @@ class PublishedSensor:
         """Checks the fields that only this kind of sensor has."""
 
 
+_Section = TypeVar("_Section", bound=Section)
 # An interface on which messages are published.
 Interface: TypeAlias = DrakeLcmInterface | LcmInterfaceSystem
 # Endings of the names of the systems that publish a sensor's messages.
@@ -244,8 +249,9 @@ def publish_measurements(
         f"DRAKE_{kind}_{config.name}",
         lcmt_point_cloud if is_cloud else lcmt_drake_signal,
         lcm,
-        publish_period=period,
-        publish_offset=offset,
+        # With the state of a plant's step, and the scan, of this time.
+        publish_period=shortly_before(period),
+        publish_offset=shortly_before(offset),
         use_cpp_serializer=is_cloud,
     )
     for part, system in zip(_PARTS, (to_lcm, publisher), strict=True):
@@ -299,25 +305,18 @@ class SignalToLcm(framework.LeafSystem):
         output.set_value(message)
 
 
-def section_fields(
-    config: PublishedSensor, kind: type[Section]
-) -> dict[str, Any]:
-    """Returns the values of a config for the fields of a scenario's section."""
-    names = kind.model_fields.keys() - _LEFT_OUT
-    return {name: getattr(config, name) for name in names}
-
-
-_Section = TypeVar("_Section", bound=Section)
-
-
-def checked_section(given: dict[str, Any], kind: type[_Section]) -> _Section:
-    """Returns the section of a scenario with some values.
+def section_of(
+    config: PublishedSensor, kind: type[_Section], **changes: Any
+) -> _Section:
+    """Returns the section of a scenario with the fields of a config.
 
     Raises:
         ValueError: a field is out of range.
     """
+    names = kind.model_fields.keys() - _LEFT_OUT
+    given = {name: getattr(config, name) for name in names}
     try:
-        return kind.model_validate(given)
+        return kind.model_validate(given | changes)
     except ValidationError as error:
         # The text begins with the source, which the caller names.
         text = describe_validation_error("", error, kind)

@@ -31,12 +31,11 @@ from cns_drake.sensors.published_sensor import (
     PublishedSensor,
     SignalToLcm,
     carrier_frame,
-    checked_section,
     errors_of,
     find_interface,
     names_of_fields_in_errors,
     publish_measurements,
-    section_fields,
+    section_of,
 )
 
 
@@ -242,7 +241,7 @@ class ImuConfig(ImuDescription, PublishedSensor):
 
     def _section(self) -> ImuSection:
         """Returns the section of a scenario with the same fields."""
-        return checked_section(section_fields(self, ImuSection), ImuSection)
+        return section_of(self, ImuSection)
 
     def sample_rate(self) -> float:
         """Returns the number of samples per second.

@@ -127,13 +127,6 @@ class SampleTimes(NamedTuple):
     offset: float
     delay: float
 
-    def output_events(self) -> tuple[float, float]:
-        """Returns period and offset [s] of events that read each new scan."""
-        return (
-            shortly_before(self.period),
-            shortly_before(self.offset + self.delay),
-        )
-
 
 def sample_times(
     rate: float | None, capture_offset: float, output_delay: float
