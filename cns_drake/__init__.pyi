@@ -25,7 +25,6 @@ from .sensors import ImuConfig as ImuConfig
 from .sensors import ImuNoise as ImuNoise
 from .sensors import Lidar as Lidar
 from .sensors import LidarConfig as LidarConfig
-from .sensors import LidarOptions as LidarOptions
 from .sensors import MeasurementModel as MeasurementModel
 from .sensors import NoddingPattern as NoddingPattern
 from .sensors import Odometry as Odometry

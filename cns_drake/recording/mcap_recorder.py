@@ -38,6 +38,10 @@ from cns_drake.recording.recorded_topics import (
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
 from cns_drake.scene import optional_value
+from evaluation.base import (
+    nearest_ns,
+    shortly_before,
+)
 from evaluation.drives import (
     BASE_FRAME,
     IMU_FRAME,
@@ -185,6 +189,7 @@ class McapRecorder(LeafSystem):
         - objects (if it is declared)
         - <lidar>_scan (one for each LiDAR)
         - <lidar>_pose (for each LiDAR that is not fixed on B)
+        - <lidar>_time (for each discrete LiDAR)
         - <camera>_color (one for each camera)
         - <camera>_depth
         - <camera>_label
@@ -203,6 +208,7 @@ class McapRecorder(LeafSystem):
     - `objects`: abstract, `RecordedObjects`.
     - `<lidar>_scan`: abstract, structured array of points expressed in S.
     - `<lidar>_pose`: abstract, X_WS.
+    - `<lidar>_time`: time of the scan, vector of size 1 [s].
     - `<camera>_color`, `_depth`, `_label`: images as Drake's RgbdSensor gives
       them; `<camera>_pose`: abstract, the pose of that sensor.
 
@@ -215,9 +221,14 @@ class McapRecorder(LeafSystem):
     event. A simulation that starts before time zero causes a warning. A forced
     publish writes nothing.
 
-    Connect the inputs directly to continuous outputs. A publish event sees the
-    state before any update at the same time. With a zero-order hold between
-    output and input, every message would therefore be one period old.
+    A discrete LiDAR has events of its own. One writes the odometry at the time
+    of a scan, so that it has the state that the scan has seen; a message that
+    is due with the same stamp is left out. Another writes the scan that is on
+    the port, with its own time and pose, at most once.
+
+    Connect all other inputs directly to continuous outputs. A publish event
+    sees the state before any update at the same time. With a zero-order hold
+    between output and input, every message would therefore be one period old.
 
     Example:
         from cns_drake import McapRecorder
@@ -236,6 +247,7 @@ class McapRecorder(LeafSystem):
         cameras: Mapping[str, RecordedCamera] | None = None,
         period: float | None = None,
         schedule: Schedule | None = None,
+        discrete: Mapping[str, tuple[float, float, float]] | None = None,
         further: Mapping[str, RecordedSensor] | None = None,
         layouts: Mapping[str, str] | None = None,
         num_rings: Mapping[str, int] | None = None,
@@ -244,6 +256,7 @@ class McapRecorder(LeafSystem):
         with_imu_samples: bool = False,
         with_objects: bool = False,
         start_ns: int = 0,
+        has_steps: bool = False,
     ):
         """Declares the ports and the schedule.
 
@@ -258,6 +271,9 @@ class McapRecorder(LeafSystem):
                 `period` or `schedule`.
             schedule: times of the messages, with a stream for each topic, if
                 topics have rates of their own.
+            discrete: name of a discrete LiDAR -> period and offset of its
+                scans, and their delay [s]. The schedule does not have its
+                topic.
             further: name -> further sensor.
             layouts: LiDAR name -> name of the layout of its recorded points; by
                 default `cns`.
@@ -271,6 +287,9 @@ class McapRecorder(LeafSystem):
             with_imu_samples: whether there is a port `imu_samples`.
             with_objects: whether there is a port `objects`.
             start_ns: the stamp of time zero [ns].
+            has_steps: whether the Diagram can have a plant with a step. The
+                events then come shortly before their times, see
+                `evaluation.base.shortly_before`.
 
         Raises:
             ValueError: period and schedule are both given, or neither is; or
@@ -279,6 +298,7 @@ class McapRecorder(LeafSystem):
         """
         super().__init__()
         cameras, further, layouts = cameras or {}, further or {}, layouts or {}
+        discrete = discrete or {}
         _check_frames(X_BSs, cameras, further)
         if (period is None) == (schedule is None):
             raise ValueError("a recorder needs either a period or a schedule")
@@ -287,6 +307,8 @@ class McapRecorder(LeafSystem):
             topics = _recorded_topics(X_BSs, cameras, further, layouts)
             schedule = make_schedule({topic.name: period for topic in topics})
         self._schedule = schedule
+        self._has_steps = has_steps
+        self._is_discrete = bool(discrete)
         self._bag = bag
         self._start_ns = start_ns
         self._X_BI = None if X_BI is None else RigidTransform(X_BI)
@@ -295,12 +317,17 @@ class McapRecorder(LeafSystem):
         # Frame C that moves in the map -> the port with the pose of a frame P,
         # and the pose X_PC. Several frames may share a port.
         self._poses: dict[str, tuple[InputPort, RigidTransform]] = {}
+        # Discrete LiDAR that moves in the map -> the port with the pose of its
+        # scan, which is written with the stamp of the scan alone.
+        self._held_poses: dict[str, InputPort] = {}
         # A topic, and a function that makes all messages that are due with it.
         self._streams: list[
             tuple[Topic, Callable[[Context, int], dict[Topic, Any]]]
         ] = []
         # The tick of the last event; None before the first event.
         self._last_tick: int | None = None
+        # Topic -> sequence number and stamp [ns] of its last message.
+        self._written: dict[str, tuple[int, int]] = {}
 
         # The following lines determine the order of the ports.
         self._odometry = self._declare_port("odometry", object())
@@ -314,16 +341,19 @@ class McapRecorder(LeafSystem):
                 num_rings=(num_rings or {}).get(name),
                 is_calibrated=name in calibrated,
             )
-            self._add_scan_port(name, convert)
+            self._add_scan_port(name, convert, discrete.get(name))
         for name, X_BS in X_BSs.items():
             if X_BS is None:
                 port = self._declare_pose_port(name)
-                self._poses[name] = port, RigidTransform()
+                if name in discrete:
+                    self._held_poses[name] = port
+                else:
+                    self._poses[name] = port, RigidTransform()
         for name, camera in cameras.items():
             self._add_camera_ports(name, camera)
         for name, sensor in further.items():
             self._add_sensor_port(name, sensor)
-        self.DeclareInitializationPublishEvent(publish=_warn_of_early_start)
+        self.DeclareInitializationPublishEvent(publish=self._start)
         self._declare_events()
 
     def _declare_port(self, name: str, example: object) -> InputPort:
@@ -403,7 +433,10 @@ class McapRecorder(LeafSystem):
         self._add_port("objects", recorded_topics.OBJECTS_TOPIC, make)
 
     def _add_scan_port(
-        self, name: str, convert: Callable[[np.ndarray], np.ndarray]
+        self,
+        name: str,
+        convert: Callable[[np.ndarray], np.ndarray],
+        samples: tuple[float, float, float] | None,
     ) -> None:
         topic = recorded_topics.points_topic(name)
 
@@ -415,7 +448,55 @@ class McapRecorder(LeafSystem):
                 made[recorded_topics.labels_topic(name)] = labels
             return made
 
-        self._add_port(f"{name}_scan", topic, make)
+        if samples is None:
+            self._add_port(f"{name}_scan", topic, make)
+        else:
+            self._add_discrete_port(name, make, *samples)
+
+    def _add_discrete_port(
+        self,
+        name: str,
+        make: Callable[[np.ndarray, int], dict[Topic, Any]],
+        period: float,
+        offset: float,
+        delay: float,
+    ) -> None:
+        """Declares the ports and the events of a discrete LiDAR.
+
+        Args:
+            name: name of the LiDAR.
+            make: function that returns topic -> message, given a scan and its
+                stamp [ns].
+            period: time between two scans [s].
+            offset: time of the first periodic scan [s].
+            delay: time from a scan to its appearance on the port [s].
+        """
+        scan = self._declare_port(f"{name}_scan", object())
+        scan_time = self.DeclareVectorInputPort(f"{name}_time", 1)
+
+        def write_motion(context: Context) -> EventStatus:
+            stamp_ns = self._start_ns + nearest_ns(context.get_time(), 1)
+            self._write_fixed_poses(stamp_ns)
+            self._write_new(self._motion_messages(context, stamp_ns), stamp_ns)
+            return EventStatus.Succeeded()
+
+        def write_scan(context: Context) -> EventStatus:
+            if not np.isfinite(scan_time.Eval(context)[0]):
+                return EventStatus.DidNothing()
+            stamp_ns = self._start_ns + nearest_ns(scan_time.Eval(context)[0])
+            if not self._is_new(recorded_topics.points_topic(name), stamp_ns):
+                return EventStatus.DidNothing()
+            for topic, message in make(scan.Eval(context), stamp_ns).items():
+                self._write_message(topic, message, stamp_ns)
+            return EventStatus.Succeeded()
+
+        for time, publish in (
+            (offset, write_motion),
+            (offset + delay, write_scan),
+        ):
+            self.DeclarePeriodicPublishEvent(
+                shortly_before(period), shortly_before(time), publish
+            )
 
     def _add_sensor_port(self, name: str, sensor: RecordedSensor) -> None:
         self._add_port(
@@ -453,8 +534,11 @@ class McapRecorder(LeafSystem):
         waits = {IMU_TOPIC.name} if self._imu_samples is not None else set()
         steps = self._schedule.steps
         step = math.gcd(*(steps[name] for name in steps if name not in waits))
+        if not step:
+            return  # Discrete LiDARs alone.
+        period = float(self._schedule.exact_period * step)
         self.DeclarePeriodicPublishEvent(
-            period_sec=float(self._schedule.exact_period * step),
+            period_sec=shortly_before(period) if self._has_steps else period,
             offset_sec=0.0,
             publish=self._write_due_messages,
         )
@@ -467,14 +551,30 @@ class McapRecorder(LeafSystem):
                 publish=self._write_due_messages,
             )
 
+    def _start(self, context: Context) -> EventStatus:
+        """Warns of an early start; writes what the first event was due for."""
+        # Of a simulation that begins again, the bag refuses what is there.
+        self._written = {t: (n, -1) for t, (n, _) in self._written.items()}
+        time, period = context.get_time(), self._schedule.period
+        if time < 0.0:
+            warnings.warn(
+                f"the simulation starts at {time:g} s: nothing is recorded "
+                "before time zero",
+                stacklevel=2,
+            )
+        # The event of this time would have come shortly before it.
+        if self._has_steps and period and time > 0.0:
+            tick = round(time / period)
+            if abs(time - tick * period) < 1e-9:
+                self._write_due_messages(context)
+        return EventStatus.Succeeded()
+
     def _write_due_messages(self, context: Context) -> EventStatus:
         # The event's time differs from a tick's only by rounding.
         tick = round(context.get_time() / self._schedule.period)
         stamp_ns = self._start_ns + self._schedule.time_ns(tick)
         due = set(self._schedule.due(tick))
-        if self._X_BCs and self._last_tick is None:
-            tf = messages.make_tf(BASE_FRAME, self._X_BCs, stamp_ns)
-            self._write_message(TF_STATIC_TOPIC, tf, stamp_ns, 0)
+        self._write_fixed_poses(stamp_ns)
         outgoing: dict[Topic, Any] = {}
         if TF_TOPIC.name in due or ODOMETRY_TOPIC.name in due:
             outgoing |= self._motion_messages(context, stamp_ns)
@@ -486,11 +586,18 @@ class McapRecorder(LeafSystem):
         for topic, make in self._streams:
             if topic.name in due:
                 outgoing |= make(context, stamp_ns)
-        for topic, message in outgoing.items():
-            if topic.name in due:
-                number = tick // self._schedule.steps[topic.name]
-                self._write_message(topic, message, stamp_ns, number)
+        self._write_new(
+            {t: made for t, made in outgoing.items() if t.name in due},
+            stamp_ns,
+            tick,
+        )
         return EventStatus.Succeeded()
+
+    def _write_fixed_poses(self, stamp_ns: int) -> None:
+        """Writes the poses of fixed sensors before all other messages."""
+        if self._X_BCs and not self._written:
+            tf = messages.make_tf(BASE_FRAME, self._X_BCs, stamp_ns)
+            self._write_message(TF_STATIC_TOPIC, tf, stamp_ns)
 
     def _motion_messages(
         self, context: Context, stamp_ns: int
@@ -507,6 +614,13 @@ class McapRecorder(LeafSystem):
             X_WP = optional_value(port, context)
             if X_WP is not None:
                 X_WCs[name] = X_WP @ X_PC
+        for name, port in self._held_poses.items():
+            (time,) = self.GetInputPort(f"{name}_time").Eval(context)
+            if (
+                self._start_ns + nearest_ns(np.nan_to_num(time, nan=-1.0))
+                == stamp_ns
+            ):
+                X_WCs[name] = port.Eval(context)
         if X_WCs:
             tf = messages.make_tf(MAP_FRAME, X_WCs, stamp_ns)
             return {TF_TOPIC: tf, **made}
@@ -563,12 +677,38 @@ class McapRecorder(LeafSystem):
                 self._write_message(IMU_TOPIC, message, stamp_ns, number)
         return made
 
-    def _write_message(
-        self, topic: Topic, message: Any, stamp_ns: int, sequence: int
+    def _write_new(
+        self,
+        made: Mapping[Topic, Any],
+        stamp_ns: int,
+        tick: int | None = None,
     ) -> None:
+        """Writes messages, unless their topics have one with this stamp."""
+        for topic, message in made.items():
+            if self._is_new(topic, stamp_ns):
+                number = None
+                if tick is not None and not self._is_discrete:
+                    number = tick // self._schedule.steps[topic.name]
+                self._write_message(topic, message, stamp_ns, number)
+
+    def _is_new(self, topic: Topic, stamp_ns: int) -> bool:
+        """Returns whether the last message of a topic has another stamp."""
+        return self._written.get(topic.name, (0, -1))[1] != stamp_ns
+
+    def _write_message(
+        self,
+        topic: Topic,
+        message: Any,
+        stamp_ns: int,
+        sequence: int | None = None,
+    ) -> None:
+        """Writes a message; by default, it has the next sequence number."""
         if not isinstance(message, bytes):
             message = serialize(message)
+        if sequence is None:
+            sequence = self._written.get(topic.name, (-1, -1))[0] + 1
         self._bag.write(topic.name, stamp_ns, message, sequence)
+        self._written[topic.name] = sequence, stamp_ns
 
 
 def _check_frames(
@@ -633,14 +773,3 @@ def _fixed_poses(
     return {
         name: RigidTransform(X) for name, X in X_BCs.items() if X is not None
     }
-
-
-def _warn_of_early_start(context: Context) -> EventStatus:
-    time = context.get_time()
-    if time < 0.0:
-        warnings.warn(
-            f"the simulation starts at {time:g} s: nothing is recorded before "
-            "time zero",
-            stacklevel=2,
-        )
-    return EventStatus.Succeeded()

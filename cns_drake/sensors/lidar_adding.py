@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 import warnings
 
 import numpy as np
@@ -25,8 +26,9 @@ from cns_drake.sensors.carriers import (
     find_motion,
 )
 from cns_drake.sensors.lidar.beams import BeamPattern
-from cns_drake.sensors.lidar.lidar import Lidar, period_of_rate
+from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
+from cns_drake.sensors.lidar.seen_geometry import Place, Structures
 from cns_drake.sensors.system_names import check_new_sensor, check_unused_names
 from evaluation.base import check_type
 
@@ -51,13 +53,23 @@ def add_lidar(
     pattern: BeamPattern | str | Path,
     *,
     name: str = "lidar",
+    rate: float | None = None,
+    capture_offset: float = 0.0,
+    output_delay: float = 0.0,
+    causal: bool = False,
     motion_distortion: bool = False,
     motion: System | None = None,
+    moving_bodies: Mapping[FrameId, int] | None = None,
     range_noise: float = 0.0,
     dropout: float = 0.0,
     seed: int = 0,
+    measurement: MeasurementModel | None = None,
     returns: CalibratedReturns | str | None = "ideal",
-    **options: Any,
+    role: Role = Role.kPerception,
+    unseen: Collection[Place] | None = None,
+    structures: Structures | None = None,
+    anchored_frames: Collection[FrameId] | None = None,
+    num_threads: int = 1,
 ) -> Lidar:
     """Adds a LiDAR to a diagram and connects it to the SceneGraph.
 
@@ -74,17 +86,27 @@ def add_lidar(
         X_PB: pose of the sensor's body B in P, as in Drake's RgbdSensor. The
             frame S of the measurements coincides with B.
         pattern: beams of the LiDAR, the name of a preset, or the file of a data
-            sheet. With a name or file, the LiDAR makes `rate` revolutions per
-            second, by default as many as its data sheet states, and coordinates
-            are not rounded.
+            sheet. With a name or file, a revolution takes as long as the data
+            sheet states, or 1 / `rate` if that is shorter.
         name: name of the system, and of the LiDAR's frame and topics in a
             recording.
+        rate: scans per second of a discrete LiDAR, which takes a scan once per
+            period and holds it; by default the LiDAR is continuous.
+        capture_offset: time of a discrete LiDAR's first periodic scan [s].
+        output_delay: time from a scan of a discrete LiDAR to its appearance on
+            the ports [s], less than 1 / `rate`.
+        causal: whether a scan is the revolution that ends at the time of the
+            output; by default the revolution starts at that time.
         motion_distortion: whether the LiDAR and all other bodies of its plant
             keep moving during a revolution (see `Lidar`). Bodies of other
             plants and frames of other sources stay where they are at the time
             of the output.
         motion: source of the bodies' velocities for motion distortion; by
             default the plant.
+        moving_bodies: frame -> index of its body in the LiDAR's port
+            `body_spatial_velocities`, which you then connect yourself. With
+            `motion_distortion` alone, this function connects the port, for all
+            bodies of the plant.
         range_noise: standard deviation of the Gaussian errors of ranges [m]; 0
             for calibrated returns, which have range errors of their own.
         dropout: probability that a return is lost; 0 for calibrated returns.
@@ -93,16 +115,18 @@ def add_lidar(
             and differ after each `SetRandomContext` of the Diagram. A
             model of noise or returns with a `sensor_name` uses the
             `sensor_name` instead of the name.
+        measurement: model of noise, losses and rounding, instead of
+            `range_noise`, `dropout` and `seed`.
         returns: `ideal` (or None), `calibrated` by the data sheet of a preset,
             or a `CalibratedReturns`.
-        options: further fields of `LidarOptions`, such as `rate`, `role` and
-            `unseen`. A `measurement` takes the place of `range_noise`,
-            `dropout` and `seed`. By default, the LiDAR does not see its body
-            and all bodies that are welded to this body, except the world; and
-            `anchored_frames` are those of the plant's bodies that are welded to
-            the world. Give `moving_bodies` only if you connect the port
-            `body_spatial_velocities` yourself; with `motion_distortion`, this
-            function connects the port, for all bodies of the plant.
+        role: role of the geometry that the LiDAR sees.
+        unseen: bodies, frames and geometries that the LiDAR does not see; by
+            default its body and all bodies that are welded to it, except the
+            world. A FrameId stands only for its own geometry.
+        structures: table of labels and instance ids; see `GeometryView`.
+        anchored_frames: frames that never move; by default those of the plant's
+            bodies that are welded to the world.
+        num_threads: number of threads that share the rays.
 
     Returns:
         The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W`,
@@ -115,14 +139,14 @@ def add_lidar(
             in the diagram.
         TypeError: an argument is of the wrong type, or unknown.
         ValueError: there is no preset of that name, the name of the LiDAR is
-            taken, reserved or cannot be a part of a ROS 2 topic, the noise is
-            out of range or given twice, motion distortion needs a body,
-            calibrated returns need a preset or a data sheet, or an option is
-            out of range (see `LidarOptions`).
+            taken or empty, the noise is out of range or given twice, motion
+            distortion needs a body, calibrated returns need a preset or a data
+            sheet, or another argument is out of range.
         InputError: the file cannot be read, or is no data sheet.
 
     Warns:
-        UserWarning: the SceneGraph has no geometry that the LiDAR could see.
+        UserWarning: the SceneGraph has no geometry that the LiDAR could see, or
+            at this `rate` a revolution has fewer beams than in the data sheet.
 
     Example:
         from cns_drake import add_lidar
@@ -143,14 +167,12 @@ def add_lidar(
     unit = pattern if isinstance(pattern, str | Path) else None
     if unit is not None:
         # Imported here: patterns of the caller's own need no data sheets.
-        from cns_drake.sensors.sheet_patterns import make_beam_pattern
-        from evaluation.lidar_sheets import LONGEST_PERIOD
-
-        rate = options.get("rate")
-        pattern = make_beam_pattern(
-            unit,
-            None if rate is None else period_of_rate(rate, LONGEST_PERIOD),
+        from cns_drake.sensors.sheet_patterns import (
+            make_beam_pattern,
+            revolution_at_rate,
         )
+
+        pattern = make_beam_pattern(unit, revolution_at_rate(unit, rate))
     if not isinstance(pattern, BeamPattern):
         raise TypeError(
             f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "
@@ -161,22 +183,22 @@ def add_lidar(
         from cns_drake.sensors.sheet_patterns import aimed
 
         pattern = aimed(pattern, model.sheet)
-    measurement = options.get("measurement")
     check_type("measurement", measurement, MeasurementModel, NoneType)
     if model is not None:
         _check_no_noise(measurement, range_noise, dropout)
     else:
         measurement = _noise_model(measurement, range_noise, dropout, seed)
     velocities: list[OutputPort] = []
-    defaults: dict[str, Any] = {}
     if isinstance(body, RigidBody):
         plant = body.GetParentPlant()
         _check_registered(plant, scene_graph)
         frame_id = plant.GetBodyFrameIdOrThrow(body.index())
-        defaults["unseen"] = _welded_to(body)
-        defaults["anchored_frames"] = find_anchored_frames(plant)
+        if unseen is None:
+            unseen = _welded_to(body)
+        if anchored_frames is None:
+            anchored_frames = find_anchored_frames(plant)
         if motion_distortion:
-            options["moving_bodies"] = _body_frames(plant)
+            moving_bodies = _body_frames(plant)
             velocities = find_motion(builder, motion, body, _VELOCITIES)
     else:
         frame_id = body
@@ -185,9 +207,23 @@ def add_lidar(
                 "motion distortion needs a body of a plant, which has its "
                 "velocity; a frame of another source does not"
             )
-    given = {k: value for k, value in options.items() if value is not None}
-    given |= {"measurement": _with_name(measurement or IDEAL, name)}
-    lidar = Lidar(frame_id, X_PB, pattern, returns=model, **(defaults | given))
+    lidar = Lidar(
+        frame_id,
+        X_PB,
+        pattern,
+        measurement=_with_name(measurement or IDEAL, name),
+        returns=model,
+        causal=causal,
+        rate=rate,
+        capture_offset=capture_offset,
+        output_delay=output_delay,
+        moving_bodies=moving_bodies,
+        role=role,
+        unseen=unseen,
+        structures=structures,
+        anchored_frames=() if anchored_frames is None else anchored_frames,
+        num_threads=num_threads,
+    )
     # Adds a port to a SceneGraph, or fails.
     geometry_port(scene_graph, lidar.role)
     _warn_of_no_geometry(scene_graph, lidar.role)
@@ -243,8 +279,8 @@ def add_lidar_view(
         builder: builder of a diagram with the LiDAR.
         lidar: the LiDAR.
         meshcat: server that shows the points.
-        period: time between two shown scans [s]; by default the duration of a
-            revolution.
+        period: time between two shown scans [s]; by default that between two
+            scans of a discrete LiDAR, or the duration of a revolution.
         point_size: size of a point [m].
 
     Raises:
@@ -257,11 +293,11 @@ def add_lidar_view(
     """
     name = lidar.get_name()
     check_unused_names(builder, f"{name}_view")
+    if period is None:
+        period = (lidar.samples or lidar.pattern).period
     view = builder.AddNamedSystem(
         f"{name}_view",
-        geometry.MeshcatPointCloudVisualizer(
-            meshcat, name, lidar.pattern.period if period is None else period
-        ),
+        geometry.MeshcatPointCloudVisualizer(meshcat, name, period),
     )
     view.set_default_rgba(_VIEW_COLOR)
     view.set_point_size(point_size)

@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass, field
 
+import numpy as np
 from pydrake.common.value import AbstractValue, Value
+from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialVelocity
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame, RigidBody
 from pydrake.systems.framework import (
     Context,
@@ -12,8 +15,21 @@ from pydrake.systems.framework import (
     LeafSystem,
     System,
 )
+from pydrake.systems.lcm import LcmBuses
 
 from cns_drake.sensors.carriers import body_and_pose, find_motion
+from cns_drake.sensors.lidar.beams import period_of_rate
+from cns_drake.sensors.published_sensor import (
+    USUAL_RATE,
+    Interface,
+    PublishedSensor,
+    SignalToLcm,
+    carrier_frame,
+    errors_of,
+    find_interface,
+    names_of_fields_in_errors,
+    publish_measurements,
+)
 from cns_drake.sensors.system_names import check_new_sensor
 
 
@@ -145,15 +161,14 @@ def add_odometry(
     Raises:
         RuntimeError: the plant is not finalized.
         TypeError: an argument is of another type.
-        ValueError: the pose is not finite, or the name is taken, reserved or
-            cannot be a part of a ROS 2 topic.
+        ValueError: the pose is not finite, or the name is taken or empty.
 
     Example:
         from cns_drake import add_odometry
 
         odometry = add_odometry(builder, body)
     """
-    check_new_sensor(builder, name, own="odometry")
+    check_new_sensor(builder, name)
     carrier, X_CB = body_and_pose(body, X_PB or RigidTransform())
     is_body = X_PB is None and not isinstance(body, Frame)
     names = ("body_poses", "body_spatial_velocities")
@@ -164,3 +179,94 @@ def add_odometry(
     for port_name, port in zip(names, ports, strict=True):
         builder.Connect(port, sensor.GetInputPort(port_name))
     return sensor
+
+
+@names_of_fields_in_errors
+@dataclass(eq=False)
+class OdometryConfig(PublishedSensor):
+    """The configuration of exact odometry, for YAML and `ApplyOdometryConfig`.
+
+    The fields are those of all sensors (`name`, `X_PB` and `lcm_bus`), and the
+    following. B is the observed frame.
+
+    Attributes:
+        rate: messages per second; by default 20.
+
+    Example:
+        from cns_drake import OdometryConfig
+
+        config = OdometryConfig(name="odometry", rate=100)
+    """
+
+    name: str = "odometry"
+    rate: int | None = None
+
+    def _validate(self) -> None:
+        period_of_rate(self.message_rate())
+
+    def message_rate(self) -> int:
+        """Returns the number of messages per second."""
+        return USUAL_RATE if self.rate is None else self.rate
+
+
+def ApplyOdometryConfig(
+    config: OdometryConfig,
+    builder: DiagramBuilder,
+    plant: MultibodyPlant | None = None,
+    scene_graph: SceneGraph | None = None,
+    lcm_buses: LcmBuses | None = None,
+    lcm: Interface | None = None,
+) -> OdometrySensor:
+    """Adds exact odometry of a frame B to a diagram, published on LCM.
+
+    The messages are `lcmt_drake_signal` on the channel `DRAKE_ODOMETRY_<name>`:
+    the quaternion of R_WB (w first), p_WB [m], then angular and linear velocity
+    in the world, expressed in B [rad/s, m/s].
+
+    Args:
+        config: description of the odometry.
+        scene_graph: ignored, so that the function has the arguments of Drake's
+            `ApplyCameraConfig`.
+
+    The other arguments are those of `ApplyLidarConfig`.
+
+    Raises:
+        RuntimeError: there is no such plant, frame or bus, or the plant is not
+            finalized.
+
+    Example:
+        from cns_drake import ApplyOdometryConfig, OdometryConfig
+
+        ApplyOdometryConfig(OdometryConfig(rate=100), builder)
+    """
+    config.ValidateOrThrow()
+    interface = find_interface(config, builder, lcm_buses, lcm)
+    with errors_of(config):
+        frame, X_PB = carrier_frame(config, builder, plant)
+        sensor = add_odometry(builder, frame, X_PB=X_PB, name=config.name)
+    axes = ["qw", "qx", "qy", "qz", "x", "y", "z"]
+    axes += ["wx", "wy", "wz", "vx", "vy", "vz"]
+    ports = [sensor.GetOutputPort("odometry")]
+    publish_measurements(
+        config,
+        "ODOMETRY",
+        builder,
+        interface,
+        ports,
+        SignalToLcm(ports, axes, _odometry_numbers),
+        period=1.0 / config.message_rate(),
+    )
+    return sensor
+
+
+def _odometry_numbers(value: Odometry) -> np.ndarray:
+    """Returns the numbers (13,) of a message, see `ApplyOdometryConfig`."""
+    X_WB, V_WB_B = value.X_WB, value.V_WB_B
+    return np.hstack(
+        [
+            X_WB.rotation().ToQuaternion().wxyz(),
+            X_WB.translation(),
+            V_WB_B.rotational(),
+            V_WB_B.translational(),
+        ]
+    )

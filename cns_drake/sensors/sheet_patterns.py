@@ -6,10 +6,11 @@ from dataclasses import replace
 import math
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
+import warnings
 
 import numpy as np
 
-from cns_drake.sensors.lidar.beams import BeamPattern
+from cns_drake.sensors.lidar.beams import BeamPattern, period_of_rate
 from cns_drake.sensors.lidar.patterns import (
     NoddingPattern,
     RosettePattern,
@@ -108,6 +109,46 @@ def make_beam_pattern(
                 **common,
             )
     raise AssertionError(sheet)  # There is no other kind.
+
+
+def revolution_at_rate(
+    unit: str | Path | LidarSheet,
+    rate: float | None,
+    num_columns: int | None = None,
+) -> float:
+    """Returns the duration of a revolution of a LiDAR that takes scans [s].
+
+    It is the duration in the data sheet, or 1 / `rate` if that is shorter.
+
+    Args:
+        unit: as for `make_beam_pattern`.
+        rate: scans per second; None for the duration in the data sheet.
+        num_columns: as for `make_beam_pattern`.
+
+    Raises:
+        ValueError: see `make_beam_pattern`, or the rate is out of range.
+
+    Warns:
+        UserWarning: the revolution has fewer beams than in the data sheet.
+    """
+    sheet = find_sheet(unit)
+    if rate is None:
+        return sheet.period
+    period = period_of_rate(rate, LONGEST_PERIOD)
+    if period >= sheet.period:
+        return sheet.period
+    num_beams, usual = (
+        make_beam_pattern(sheet, one, num_columns=num_columns).num_beams
+        for one in (period, None)
+    )
+    if num_beams != usual:
+        warnings.warn(
+            f"rate: {rate:g} scans per second: a revolution takes {period:g} s "
+            f"and has {num_beams} beams, not {sheet.period:g} s and {usual} "
+            "beams as in the data sheet",
+            stacklevel=3,
+        )
+    return period
 
 
 def aimed(pattern: _Pattern, sheet: ReturnsSheet) -> _Pattern:

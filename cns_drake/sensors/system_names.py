@@ -4,32 +4,29 @@ from collections.abc import Collection
 
 from pydrake.systems.framework import DiagramBuilder
 
-from evaluation.drives import check_sensor_name
-
 # Endings of the names of an IMU's systems.
 IMU_PARTS = ("accelerometer", "gyroscope", "noise")
 
 
 def check_new_sensor(
-    builder: DiagramBuilder,
-    name: str,
-    own: str | None = None,
-    parts: Collection[str] = (),
+    builder: DiagramBuilder, name: str, parts: Collection[str] = ()
 ) -> None:
     """Checks the name of a sensor that is added to a diagram.
+
+    Only a recorder asks more of a name: it becomes a part of a ROS 2 topic.
 
     Args:
         builder: builder of the diagram.
         name: the name.
-        own: a reserved name that this kind of sensor can have.
         parts: endings of the names of the sensor's systems; an underscore
             stands between the sensor's name and the ending.
 
     Raises:
-        ValueError: the name cannot be a part of a ROS 2 topic, is reserved, or
-            another system or sensor of the diagram has it.
+        ValueError: the name is no text, is empty, or another system or sensor
+            of the diagram has it.
     """
-    check_sensor_name(name, own=own)
+    if not isinstance(name, str) or not name:
+        raise ValueError(f"name: {name!r} is not a text of at least one letter")
     # An IMU has the first part, but no system of the name itself.
     endings = dict.fromkeys((IMU_PARTS[0], *parts))
     check_unused_names(builder, name, *(f"{name}_{part}" for part in endings))

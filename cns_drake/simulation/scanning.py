@@ -100,7 +100,7 @@ def scan_world(
         world: the world.
         X_WS: pose of the LiDAR in the world.
         pattern: directions and ranges of the LiDAR's beams.
-        options: further fields of `LidarOptions`.
+        options: further arguments of `Lidar`.
 
     Returns:
         Structured array (N,) of `POINT_DTYPE`, in the LiDAR's frame S.

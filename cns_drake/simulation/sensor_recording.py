@@ -5,7 +5,6 @@ import numbers
 from pathlib import Path
 from types import NoneType
 
-import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.sensors import Gyroscope, RgbdSensor
@@ -64,10 +63,12 @@ def add_mcap_recorder(
     on the same body as the odometry are in `/tf_static`; the poses of all other
     sensors are in `/tf`.
 
-    A sensor with an entry in `rates` is recorded at this rate. An IMU that was
-    added with a rate is recorded at that rate. All other sensors are recorded
-    once per `period`. Without `period`, each LiDAR is recorded once per
-    revolution, and all other sensors once per revolution of the first LiDAR.
+    A LiDAR that was added with a rate is recorded as often as it takes scans,
+    together with the odometry of these times. A sensor with an entry in `rates`
+    is recorded at this rate. An IMU that was added with a rate is recorded at
+    that rate. All other sensors are recorded once per `period`. Without
+    `period`, each LiDAR is recorded once per revolution, and all other sensors
+    as often as the first LiDAR.
 
     Args:
         builder: builder of a diagram with the sensors.
@@ -94,9 +95,10 @@ def add_mcap_recorder(
         TypeError: an argument is of another type.
         ValueError: `rates` names an unknown sensor, neither a period nor a
             LiDAR is given, `period` or `start_ns` is out of range, a LiDAR is
-            causal (its scan covers the revolution before its time stamp), scans
-            or poses are recorded between the scans of a discrete LiDAR, or
-            names of sensors are not unique or cannot be parts of ROS 2 topics.
+            causal (its scan covers the revolution before its time stamp), a
+            LiDAR with a rate is to be recorded at another rate, or has a delay
+            and is not on the body of the odometry, or names of sensors are not
+            unique or cannot be parts of ROS 2 topics.
 
     Example:
         from cns_drake import add_mcap_recorder
@@ -116,10 +118,19 @@ def add_mcap_recorder(
     _check_sensors(builder, lidars, cameras, imu, odometry)
     check_type("rates", rates, Mapping, NoneType)
     periods = _message_periods(period, rates or {}, lidars, cameras, imu)
-    _check_captures(lidars, periods)
+    discrete = {
+        lidar.get_name(): lidar.samples for lidar in lidars if lidar.samples
+    }
     X_BSs = {
         lidar.get_name(): _pose_at_odometry(lidar, odometry) for lidar in lidars
     }
+    for key, samples in discrete.items():
+        if X_BSs[key] is None and samples.delay:
+            # Its pose comes after later poses, on a topic in order of time.
+            raise ValueError(
+                f"lidars: '{key}' has an output_delay; its pose is recorded "
+                "only with the odometry of its body"
+            )
     recorded = {
         key: _recorded_camera(camera) for key, camera in cameras.items()
     }
@@ -154,9 +165,11 @@ def add_mcap_recorder(
             X_BSs=X_BSs,
             X_BI=X_BI,
             cameras=recorded,
-            schedule=_make_schedule(periods, topics),
+            schedule=_make_schedule(periods, topics, discrete),
+            discrete=discrete,
             imu_variances=variances,
             start_ns=start_ns,
+            has_steps=True,
         ),
     )
     connect_by_name(
@@ -203,35 +216,6 @@ def _check_sensors(
     check_sensor_names((*(lidar.get_name() for lidar in lidars), *cameras))
 
 
-def _check_captures(
-    lidars: Iterable[Lidar], periods: Mapping[str, float]
-) -> None:
-    """Checks that discrete LiDARs are recorded only when they take scans.
-
-    Between two of its scans, a discrete LiDAR shows a former scan and pose.
-
-    Args:
-        lidars: the LiDARs.
-        periods: sensor name -> time between its messages [s].
-
-    Raises:
-        ValueError: a LiDAR takes its scans at other times.
-    """
-    for lidar in lidars:
-        if lidar.capture_period is None:
-            continue
-        messages = periods[lidar.get_name()], _moving_period(periods)
-        scans = np.array(messages) / lidar.capture_period
-        whole = np.maximum(np.rint(scans), 1.0)
-        if lidar.capture_offset or np.abs(scans - whole).max() > 1e-9:
-            raise ValueError(
-                f"lidars: '{lidar.get_name()}' takes "
-                f"{1.0 / lidar.capture_period:g} scans per second from "
-                f"{lidar.capture_offset:g} s on, and would be recorded at "
-                "other times; add it without rate"
-            )
-
-
 def _recorded_ports(
     lidars: Iterable[Lidar],
     cameras: Mapping[str, RgbdSensor],
@@ -243,6 +227,7 @@ def _recorded_ports(
     for lidar in lidars:
         ports[f"{lidar.get_name()}_scan"] = lidar.GetOutputPort("scan")
         ports[f"{lidar.get_name()}_pose"] = lidar.GetOutputPort("X_WS")
+        ports[f"{lidar.get_name()}_time"] = lidar.GetOutputPort("scan_time")
     for key, camera in cameras.items():
         ports[f"{key}_color"] = camera.color_image_output_port()
         ports[f"{key}_depth"] = camera.depth_image_32F_output_port()
@@ -279,7 +264,12 @@ def _message_periods(
     imu: Imu | None,
 ) -> dict[str, float]:
     """Returns sensor name -> time between its messages [s]."""
-    revolutions = {lidar.get_name(): lidar.pattern.period for lidar in lidars}
+    revolutions = {
+        lidar.get_name(): lidar.samples.period
+        if lidar.samples
+        else lidar.pattern.period
+        for lidar in lidars
+    }
     if period is None and not revolutions:
         raise ValueError("period: a recording without a LiDAR needs one")
     if period is not None and not (
@@ -293,6 +283,12 @@ def _message_periods(
     periods = dict.fromkeys((*revolutions, *cameras, "imu", "odometry"), usual)
     if period is None:
         periods |= revolutions
+    own = {
+        lidar.get_name(): lidar.samples.period
+        for lidar in lidars
+        if lidar.samples
+    }
+    periods |= own
     if imu is not None and imu.rate is not None:
         periods["imu"] = 1.0 / imu.rate
     for name, rate in rates.items():
@@ -304,6 +300,11 @@ def _message_periods(
             raise ValueError(
                 f"rates: {name}: {rate!r} is not a positive number of messages "
                 f"a second, at most {HIGHEST_RATE}"
+            )
+        if 1.0 / rate != own.get(name, 1.0 / rate):
+            raise ValueError(
+                f"rates: {name}: the LiDAR takes {1.0 / own[name]:g} scans per "
+                "second, and is recorded as often; leave it out"
             )
         periods[name] = 1.0 / rate
     return periods
@@ -318,9 +319,18 @@ def _moving_period(periods: Mapping[str, float]) -> float:
 
 
 def _make_schedule(
-    periods: Mapping[str, float], topics: Collection[Topic]
+    periods: Mapping[str, float],
+    topics: Collection[Topic],
+    discrete: Collection[str],
 ) -> Schedule:
-    """Returns the schedule of the topics of sensors with periods [s]."""
+    """Returns the schedule of the topics of sensors with periods [s].
+
+    Args:
+        periods: name of a sensor -> time between its messages [s].
+        topics: topics of the recording.
+        discrete: names of the discrete LiDARs, which have events of their own.
+    """
+    own = set(map(points_topic, discrete))
     sensor_of = {IMU_TOPIC: "imu", ODOMETRY_TOPIC: "odometry"}
     for name in periods:
         sensor_of[points_topic(name)] = name
@@ -334,7 +344,7 @@ def _make_schedule(
             if topic == TF_TOPIC
             else periods[sensor_of[topic]]
             for topic in topics
-            if not topic.latched
+            if not topic.latched and topic not in own
         }
     )
 

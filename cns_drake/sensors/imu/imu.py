@@ -1,12 +1,13 @@
 """An IMU: Drake's accelerometer and gyroscope, with optional errors."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
+import math
 from types import NoneType
 
 import numpy as np
+from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, RigidBody
 from pydrake.systems.framework import (
     Context,
@@ -15,13 +16,32 @@ from pydrake.systems.framework import (
     OutputPort,
     System,
 )
+from pydrake.systems.lcm import LcmBuses
 from pydrake.systems.sensors import Accelerometer, Gyroscope
 
 from cns_drake.sensors import carriers, system_names
+from cns_drake.sensors.imu.config import ImuDescription, ImuSection
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
 from cns_drake.sensors.imu.sampling import MEASUREMENTS, last_sample
-from evaluation.base import check_type, is_real
-from evaluation.drives import IMU_FRAME
+from cns_drake.sensors.noise_draws import (
+    check_seed,
+)
+from cns_drake.sensors.published_sensor import (
+    USUAL_RATE,
+    Interface,
+    PublishedSensor,
+    SignalToLcm,
+    carrier_frame,
+    errors_of,
+    find_interface,
+    names_of_fields_in_errors,
+    publish_measurements,
+    section_of,
+)
+from evaluation.base import (
+    check_type,
+    is_real,
+)
 
 
 class NoisyImu(LeafSystem):
@@ -143,8 +163,7 @@ def add_imu(
         RuntimeError: the plant is not finalized.
         TypeError: an argument is of another type.
         ValueError: there is noise without a rate, the rate is not positive, the
-            pose is not finite, or the name is taken, reserved or cannot be a
-            part of a ROS 2 topic.
+            pose is not finite, or the name is taken or empty.
 
     Example:
         from cns_drake import add_imu
@@ -162,7 +181,7 @@ def add_imu(
     if noise is not None and noise.sensor_name == ImuNoise.sensor_name:
         noise = replace(noise, sensor_name=name)
     parts = system_names.IMU_PARTS
-    system_names.check_new_sensor(builder, name, own=IMU_FRAME, parts=parts)
+    system_names.check_new_sensor(builder, name, parts)
     systems = [f"{name}_{part}" for part in parts]
     body, X_BI = carriers.body_and_pose(body, X_PB)
     poses, velocities, accelerations = carriers.find_motion(
@@ -192,3 +211,105 @@ def add_imu(
     for port_name, port in imu.ports().items():
         builder.Connect(port, noisy.GetInputPort(port_name))
     return replace(imu, noisy=noisy)
+
+
+@names_of_fields_in_errors
+@dataclass(eq=False)
+class ImuConfig(ImuDescription, PublishedSensor):
+    """The configuration of an IMU, for YAML and `ApplyImuConfig`.
+
+    The fields are those of an `ImuDescription`, of all sensors (`name`, `X_PB`
+    and `lcm_bus`), and the following.
+
+    Attributes:
+        rate: samples per second; any number is possible, as for `add_imu`. By
+            default the rate in the file `kalibr`, or 20 if no file states a
+            rate.
+        seed: seed of the errors.
+
+    Example:
+        from cns_drake import ImuConfig
+
+        config = ImuConfig(name="imu", rate=200)
+    """
+
+    name: str = "imu"
+    seed: int = 0
+
+    def _validate(self) -> None:
+        check_seed(self.seed)
+        if not self.sample_rate() > 0.0 or math.isinf(self.sample_rate()):
+            raise ValueError(
+                f"rate: {self.rate!r} is not a positive number of samples a "
+                "second"
+            )
+
+    def _section(self) -> ImuSection:
+        """Returns the section of a scenario with the same fields."""
+        return section_of(self, ImuSection)
+
+    def sample_rate(self) -> float:
+        """Returns the number of samples per second.
+
+        Raises:
+            InputError: Kalibr's file cannot be used.
+            ValueError: a field is out of range.
+        """
+        if self.rate is not None:
+            return self.rate
+        return self._section().sample_rate(USUAL_RATE)
+
+
+def ApplyImuConfig(
+    config: ImuConfig,
+    builder: DiagramBuilder,
+    plant: MultibodyPlant | None = None,
+    scene_graph: SceneGraph | None = None,
+    lcm_buses: LcmBuses | None = None,
+    lcm: Interface | None = None,
+) -> Imu:
+    """Adds an IMU to a diagram and publishes its samples on LCM.
+
+    The messages are `lcmt_drake_signal` on the channel `DRAKE_IMU_<name>`:
+    specific force [m/s^2] and angular velocity [rad/s], expressed in the IMU's
+    frame.
+
+    Args:
+        config: description of the IMU.
+        scene_graph: ignored, so that the function has the arguments of Drake's
+            `ApplyCameraConfig`.
+
+    The other arguments are those of `ApplyLidarConfig`.
+
+    Raises:
+        InputError: Kalibr's file cannot be used.
+
+    Example:
+        from cns_drake import ApplyImuConfig, ImuConfig
+
+        ApplyImuConfig(ImuConfig(rate=200), builder)
+    """
+    config.ValidateOrThrow()
+    section, rate = config._section(), config.sample_rate()
+    interface = find_interface(config, builder, lcm_buses, lcm)
+    with errors_of(config):
+        imu = add_imu(
+            builder,
+            *carrier_frame(config, builder, plant),
+            rate=rate,
+            noise=None if section.is_ideal else section.noise(config.seed),
+            name=config.name,
+        )
+    measured = imu.ports()
+    ports = list(measured.values())
+    axes = [f"{name}_{axis}" for name in measured for axis in "xyz"]
+    publish_measurements(
+        config,
+        "IMU",
+        builder,
+        interface,
+        ports,
+        SignalToLcm(ports, axes, lambda *values: np.hstack(values)),
+        period=1.0 / rate,
+    )
+    return imu

@@ -9,7 +9,11 @@ import math
 
 import numpy as np
 
-from evaluation.base import arcsin, arctan2
+from evaluation.base import (
+    arcsin,
+    arctan2,
+    is_real,
+)
 
 # Height of the elevation bands in which beams of irregular patterns are cast.
 _BAND_RAD = 0.03
@@ -247,3 +251,24 @@ def _limited_beams(
         beams.column_t_ns,
         place[order],
     )
+
+
+def period_of_rate(rate: float, longest: float = math.inf) -> float:
+    """Returns the time between two scans [s].
+
+    Args:
+        rate: scans per second.
+        longest: greatest time that is allowed [s].
+
+    Raises:
+        ValueError: the rate is not a positive number, or is out of range.
+    """
+    if not (
+        is_real(rate) and 0.0 < rate <= HIGHEST_RATE and rate * longest >= 1
+    ):
+        least = f"at least {1.0 / longest:g} and " if longest < math.inf else ""
+        raise ValueError(
+            f"rate: {rate!r} is not a positive number per second, {least}"
+            f"up to {HIGHEST_RATE}"
+        )
+    return 1.0 / rate

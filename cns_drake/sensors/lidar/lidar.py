@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from types import NoneType
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
-from pydrake.geometry import FrameId, GeometryId, QueryObject
+from pydrake.geometry import FrameId, GeometryId, QueryObject, Role
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.perception import BaseField, Fields, PointCloud
@@ -17,7 +17,6 @@ from pydrake.systems.framework import (
     BasicVector,
     CacheEntry,
     Context,
-    DependencyTicket,
     InputPort,
     LeafSystem,
     OutputPort,
@@ -34,7 +33,7 @@ from cns_drake.ray_casting import (
     RayCastingScene,
 )
 from cns_drake.scene import optional_value
-from cns_drake.sensors.lidar.beams import HIGHEST_RATE, BeamPattern
+from cns_drake.sensors.lidar.beams import BeamPattern, period_of_rate
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.ray_queries import (
     RayHits,
@@ -43,8 +42,21 @@ from cns_drake.sensors.lidar.ray_queries import (
 )
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE, set_points
 from cns_drake.sensors.lidar.scanner import MeasuredReturns, Scanner
-from cns_drake.sensors.lidar.seen_geometry import GeometryView, SeenGeometry
-from evaluation.base import check_type, is_real, product, rotated
+from cns_drake.sensors.lidar.seen_geometry import (
+    GeometryView,
+    Place,
+    SeenGeometry,
+    Structures,
+)
+from evaluation.base import (
+    NS_PER_S,
+    check_type,
+    is_real,
+    nearest_ns,
+    product,
+    rotated,
+    shortly_before,
+)
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.
@@ -57,11 +69,10 @@ _POSE_SIZE = 12
 
 
 class _Capture(NamedTuple):
-    """A scan that a discrete LiDAR has taken and holds.
+    """A scan that a discrete LiDAR has taken.
 
     Attributes:
-        number: number of the capture; see `_CaptureTimes`.
-        time: time of the capture [s].
+        time_ns: time of the capture [ns]; None if no scan has been taken.
         points: points of the scan.
         measured: returns, with the geometry that each comes from.
         instance: (num_geometries,) uint16 structure of each geometry.
@@ -69,150 +80,82 @@ class _Capture(NamedTuple):
         X_WS: pose of S.
     """
 
-    number: int
-    time: float
+    time_ns: int | None
     points: np.ndarray
-    measured: MeasuredReturns
+    measured: MeasuredReturns | None
     instance: np.ndarray
     poses: tuple[np.ndarray, np.ndarray]
     X_WS: RigidTransform
 
-    def __deepcopy__(self, memo: dict) -> _Capture:
+
+_NO_CAPTURE = _Capture(
+    None,
+    np.empty(0, POINT_DTYPE),
+    None,
+    np.empty(0, np.uint16),
+    (np.zeros((1, 3)), np.eye(3)[None]),
+    RigidTransform(),
+)
+
+
+class _Held(NamedTuple):
+    """The state of a discrete LiDAR.
+
+    Attributes:
+        taken: the last scan that was taken.
+        shown: the scan on the output ports: the same, after `output_delay`.
+    """
+
+    taken: _Capture = _NO_CAPTURE
+    shown: _Capture = _NO_CAPTURE
+
+    def __deepcopy__(self, memo: dict) -> _Held:
         # A Context is cloned together with this value, which never changes.
         return self
 
 
-class _CaptureTimes(NamedTuple):
-    """The times at which a discrete LiDAR takes scans: offset + k * period.
+class SampleTimes(NamedTuple):
+    """When a discrete LiDAR takes scans, and when its ports show them.
 
     Attributes:
-        period: time between two captures [s].
-        offset: time of capture 0 [s].
+        period: time between two scans [s].
+        offset: time of the first periodic scan [s].
+        delay: time from a scan to its appearance on the ports [s].
     """
 
     period: float
     offset: float
-
-    def time(self, number: int) -> float:
-        """Returns the time of a capture [s], rounded as Drake rounds it."""
-        return self.offset + number * self.period
-
-    def number(self, time: float) -> int:
-        """Returns the number of the last capture up to a time [s].
-
-        Before capture 0, it is -1.
-        """
-        number = math.floor((time - self.offset) / self.period)
-        # The division rounds.
-        if self.time(number + 1) <= time:
-            number += 1
-        elif self.time(number) > time:
-            number -= 1
-        return max(number, -1)
-
-    def is_capture(self, time: float) -> bool:
-        """Returns whether a scan is taken at a time [s]."""
-        number = self.number(time)
-        return number >= 0 and self.time(number) == time
+    delay: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class LidarOptions(GeometryView):
-    """What a LiDAR sees, how it measures, and when it takes scans.
-
-    The fields are keywords of `Lidar` and `add_lidar`, and those of a
-    `GeometryView`.
-
-    Attributes:
-        measurement: the model of noise, losses and rounding.
-        returns: the model of a real unit; None for ideal returns. With a model,
-            only the resolution is taken from `measurement`.
-        moving_bodies: frame -> index of its body in the port
-            `body_spatial_velocities`. The LiDAR has this port only if this
-            field is given.
-        causal: whether a scan is the revolution that ends at the time of the
-            output; by default the revolution starts at that time.
-        rate: scans per second of a discrete LiDAR, at most 1000 and at most one
-            scan per revolution, which computes a scan once per period and holds
-            it. By default the LiDAR is continuous: it has a scan for each time
-            at which its ports are evaluated.
-        capture_offset: time of a discrete LiDAR's first scan [s].
-
-    Raises:
-        TypeError: see `GeometryView`.
-        ValueError: the rate is not positive or too high, the offset is negative
-            or without a rate, or there is no thread.
-
-    Example:
-        from cns_drake import add_lidar
-
-        options = {"rate": 10, "causal": True}
-        add_lidar(builder, scene_graph, body, X_PB, "os1-64", **options)
-    """
-
-    measurement: MeasurementModel = IDEAL
-    returns: CalibratedReturns | None = None
-    moving_bodies: Mapping[FrameId, int] | None = None
-    causal: bool = False
-    rate: float | None = None
-    capture_offset: float = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_type("measurement", self.measurement, MeasurementModel)
-        check_type("causal", self.causal, bool)
-        if self.moving_bodies is not None:
-            check_type("moving_bodies", self.moving_bodies, Mapping)
-        offset = self.capture_offset
-        if not (is_real(offset) and offset >= 0.0):
-            raise ValueError(
-                f"capture_offset: {offset!r} is not a time from 0 on"
-            )
-        if self.rate is not None:
-            period_of_rate(self.rate)
-        elif offset:
-            raise ValueError("capture_offset: only a LiDAR with a rate has one")
-
-    def captures(self, revolution: float) -> _CaptureTimes | None:
-        """Returns when scans are taken; None for a continuous LiDAR.
-
-        Args:
-            revolution: duration of a revolution [s].
-
-        Raises:
-            ValueError: the next scan would be taken during a revolution.
-        """
-        if self.rate is None:
-            return None
-        period = period_of_rate(self.rate)
-        # A rate that was computed from the duration of a revolution is allowed.
-        if period < revolution * (1.0 - 1e-9):
-            raise ValueError(
-                f"rate: {self.rate:g} scans per second, but a revolution takes "
-                f"{revolution:g} s; give a pattern with a shorter period"
-            )
-        return _CaptureTimes(period, float(self.capture_offset))
-
-
-def period_of_rate(rate: float, longest: float = math.inf) -> float:
-    """Returns the time between two scans [s].
+def sample_times(
+    rate: float | None, capture_offset: float, output_delay: float
+) -> SampleTimes | None:
+    """Returns when a discrete LiDAR takes scans; None for a continuous one.
 
     Args:
-        rate: scans per second.
-        longest: greatest time that is allowed [s].
+        rate: scans per second; None for a continuous LiDAR.
+        capture_offset: time of the first periodic scan [s].
+        output_delay: time from a scan to its appearance on the ports [s].
 
     Raises:
-        ValueError: the rate is not a positive number, or is out of range.
+        ValueError: the rate is not positive or too high, the offset or delay
+            is out of range, or is given without a rate.
     """
-    if not (
-        is_real(rate) and 0.0 < rate <= HIGHEST_RATE and rate * longest >= 1
+    period = math.inf if rate is None else period_of_rate(rate)
+    for name, time, end in (
+        ("capture_offset", capture_offset, math.inf),
+        ("output_delay", output_delay, period),
     ):
-        least = f"at least {1.0 / longest:g} and " if longest < math.inf else ""
-        raise ValueError(
-            f"rate: {rate!r} is not a positive number per second, {least}"
-            f"up to {HIGHEST_RATE}"
-        )
-    return 1.0 / rate
+        if not (is_real(time) and 0.0 <= time < end):
+            raise ValueError(
+                f"{name}: {time!r} is not a time from 0 to below {end:g} s"
+            )
+        if rate is None and time:
+            raise ValueError(f"{name}: only a LiDAR with a rate has one")
+    if rate is None:
+        return None
+    return SampleTimes(period, float(capture_offset), float(output_delay))
 
 
 class Lidar(LeafSystem):
@@ -254,15 +197,16 @@ class Lidar(LeafSystem):
     cast from the pose of S at the time of the output (a deskewed scan), which
     follows from the pose of P in the SceneGraph.
 
-    A LiDAR with a `rate` is discrete. At time t, all output ports,
-    `EvalGeometryIds` and `EvalInstances` show the last capture up to t. At the
-    time of a capture itself, they show the new scan even before the update of
-    the state, so that a message that is published at this time has this scan.
-    If the state does not contain the last capture, because no Simulator was
-    there to take it, they show a scan at time t, as without a rate. A Simulator
-    also takes a scan when it is initialized between two captures or before the
-    first; the ports show it until the next capture. `CastRays` and `EvalScene`
-    always use the present geometry.
+    A LiDAR with a `rate` is discrete, like RgbdSensorDiscrete. A periodic event
+    takes a scan and holds it in the state of the Context. All output ports,
+    `EvalGeometryIds` and `EvalInstances` show what is held, and depend on
+    nothing else; before the first scan, they are empty, and `scan_time` is NaN.
+    A scan comes some roundings before its nominal time: an event at this time
+    that reads it, such as that of a publisher, finds it. Its `scan_time` is
+    the nominal time in whole nanoseconds. `Simulator.Initialize` takes a scan
+    at once. With an `output_delay`, a second event shows the scan later, and
+    `Simulator.Initialize` takes none. `CastRays` and `EvalScene` always use
+    the present geometry.
 
     If the port `sweep` is connected, the poses of P come from this port and not
     from the SceneGraph: one pose for each column, at the column's firing time,
@@ -311,6 +255,7 @@ class Lidar(LeafSystem):
         role: the role of the geometry that the LiDAR sees.
         causal: whether a scan is the revolution that ends at the time of the
             output.
+        samples: when a discrete LiDAR takes scans; None for a continuous one.
 
     Example:
         from cns_drake import Lidar, make_beam_pattern
@@ -323,7 +268,19 @@ class Lidar(LeafSystem):
         parent_frame_id: FrameId,
         X_PB: RigidTransform,
         pattern: BeamPattern,
-        **options: Any,
+        *,
+        measurement: MeasurementModel = IDEAL,
+        returns: CalibratedReturns | None = None,
+        causal: bool = False,
+        rate: float | None = None,
+        capture_offset: float = 0.0,
+        output_delay: float = 0.0,
+        moving_bodies: Mapping[FrameId, int] | None = None,
+        role: Role = Role.kPerception,
+        unseen: Collection[Place] | None = None,
+        structures: Structures | None = None,
+        anchored_frames: Collection[FrameId] = (),
+        num_threads: int = 1,
     ):
         """Constructs the LiDAR.
 
@@ -331,29 +288,62 @@ class Lidar(LeafSystem):
             parent_frame_id: the frame P that carries the sensor.
             X_PB: pose of the sensor's body B in P.
             pattern: the beams.
-            options: any fields of `LidarOptions`.
+            measurement: the model of noise, losses and rounding.
+            returns: the model of a real unit; None for ideal returns. With a
+                model, only the resolution is taken from `measurement`.
+            causal: whether a scan is the revolution that ends at the time of
+                the output; by default the revolution starts at that time.
+            rate: scans per second of a discrete LiDAR, at most 1000 and at most
+                one scan per revolution. By default the LiDAR is continuous: it
+                has a scan for each time at which its ports are evaluated.
+            capture_offset: time of a discrete LiDAR's first periodic scan [s].
+            output_delay: time from a scan of a discrete LiDAR to its appearance
+                on the ports [s], less than 1 / `rate`.
+            moving_bodies: frame -> index of its body in the port
+                `body_spatial_velocities`. The LiDAR has this port only if this
+                argument is given.
+            role: see `GeometryView`, as for the following arguments.
+            unseen: what is not seen.
+            structures: table of labels and instance ids.
+            anchored_frames: frames that never move.
+            num_threads: number of threads that share the rays.
 
         Raises:
-            TypeError: there is no such option, or its value is of another type.
+            TypeError: an argument is of another type.
             ValueError: limits or period of the pattern are impossible, the pose
-                is not finite, or an option is out of range.
+                is not finite, or an argument is out of range.
         """
         super().__init__()
-        given = LidarOptions(**options)
+        view = GeometryView(
+            role=role,
+            unseen=unseen,
+            structures=structures,
+            anchored_frames=anchored_frames,
+            num_threads=num_threads,
+        )
+        check_type("measurement", measurement, MeasurementModel)
+        check_type("causal", causal, bool)
+        check_type("moving_bodies", moving_bodies, Mapping, NoneType)
         pattern.check()
         if not np.isfinite(X_PB.GetAsMatrix34()).all():
             raise ValueError("X_PB: not finite")
         self.parent_frame_id = parent_frame_id
         self.X_PB = RigidTransform(X_PB)
         self.pattern = pattern
-        self.causal = given.causal
-        self.role = given.role
-        self._captures = given.captures(pattern.period)
-        self._scanner = Scanner(pattern, given.measurement, given.returns)
-        self._moving_bodies = dict(given.moving_bodies or {})
-        self._declare_inputs(has_velocities=given.moving_bodies is not None)
-        self._declare_captures()
-        self._declare_caches(given)
+        self.causal = causal
+        self.role = role
+        self.samples = sample_times(rate, capture_offset, output_delay)
+        # A rate that was computed from the duration of a revolution is allowed.
+        if self.samples and self.samples.period < pattern.period * (1 - 1e-9):
+            raise ValueError(
+                f"rate: {rate:g} scans per second, but a revolution takes "
+                f"{pattern.period:g} s; give a pattern with a shorter period"
+            )
+        self._scanner = Scanner(pattern, measurement, returns)
+        self._moving_bodies = dict(moving_bodies or {})
+        self._declare_inputs(has_velocities=moving_bodies is not None)
+        self._declare_samples()
+        self._declare_caches(view)
         self._declare_outputs()
 
     def _declare_inputs(self, *, has_velocities: bool) -> None:
@@ -376,24 +366,22 @@ class Lidar(LeafSystem):
                 AbstractValue.Make([SpatialVelocity()]),
             )
 
-    def _declare_captures(self) -> None:
+    def _declare_samples(self) -> None:
         """Declares the scan that a discrete LiDAR holds."""
-        self._held_inputs = set()
-        if self._captures is None:
+        if self.samples is None:
             return
-        self._held_state = self.DeclareAbstractState(
-            # Of any Python type; no scan is held at first.
-            Value[object](None)
-        )
-        self._held_inputs = {
-            self.time_ticket(),
-            self.abstract_state_ticket(self._held_state),
-        }
-        self.DeclarePeriodicUnrestrictedUpdateEvent(
-            period_sec=self._captures.period,
-            offset_sec=self._captures.offset,
-            update=self._capture,
-        )
+        self._state = self.DeclareAbstractState(Value[object](_Held()))
+        period, offset, delay = self.samples
+        events = [(offset, self._take)]
+        if delay:
+            events.append((offset + delay, self._show))
+        # Before the events of those who read the scan, such as a recorder.
+        for time, update in events:
+            self.DeclarePeriodicUnrestrictedUpdateEvent(
+                period_sec=shortly_before(period, 2),
+                offset_sec=shortly_before(time, 2),
+                update=update,
+            )
         self.DeclareInitializationUnrestrictedUpdateEvent(self._initialize)
 
     def _declare_caches(self, view: GeometryView) -> None:
@@ -452,7 +440,12 @@ class Lidar(LeafSystem):
 
     def _declare_outputs(self) -> None:
         """Declares the output ports, in the order of their indices."""
-        scan = {self._points.ticket()} | self._held_inputs
+        scan = {self._points.ticket()}
+        time = {self.time_ticket()}
+        poses, pose = self._poses_inputs, self._pose_inputs
+        if self.samples is not None:
+            scan = time = {self.abstract_state_ticket(self._state)}
+            poses = pose = scan
         self.DeclareAbstractOutputPort(
             "scan",
             alloc=lambda: Value(np.empty(0, POINT_DTYPE)),
@@ -466,93 +459,28 @@ class Lidar(LeafSystem):
             ("point_cloud_W", True, _WITH_GREY),
             ("positions_W", True, _WITHOUT_GREY),
         ):
-            self._declare_cloud(
+            self.DeclareAbstractOutputPort(
                 name,
-                in_world,
-                fields,
-                scan | (self._poses_inputs if in_world else set()),
+                alloc=lambda fields=fields: Value(PointCloud(0, fields)),
+                calc=lambda context, output, in_world=in_world: self._set_cloud(
+                    output.get_mutable_value(),
+                    self._eval_points(context),
+                    self._eval_poses(context) if in_world else None,
+                ),
+                prerequisites_of_calc=scan | (poses if in_world else set()),
             )
         self.DeclareAbstractOutputPort(
             "X_WS",
             alloc=lambda: Value(RigidTransform()),
             calc=self._calc_X_WS,
-            prerequisites_of_calc=self._pose_inputs | self._held_inputs,
+            prerequisites_of_calc=pose,
         )
         self.DeclareVectorOutputPort(
             "scan_time",
             1,
             self._calc_scan_time,
-            prerequisites_of_calc={self.time_ticket()} | self._held_inputs,
+            prerequisites_of_calc=time,
         )
-
-    def _declare_cloud(
-        self,
-        name: str,
-        in_world: bool,
-        fields: Fields,
-        prerequisites: set[DependencyTicket],
-    ) -> None:
-        """Declares an output port with the points of a scan as a cloud.
-
-        Args:
-            name: name of the port.
-            in_world: whether the cloud is expressed in the world.
-            fields: fields of the cloud.
-            prerequisites: what a scan and its poses depend on.
-        """
-
-        def allocate() -> AbstractValue:
-            return Value(PointCloud(0, fields))
-
-        def calc(context: Context, output: AbstractValue) -> None:
-            poses = self._eval_poses(context) if in_world else None
-            points = self._eval_points(context)
-            self._set_cloud(output.get_mutable_value(), points, poses)
-
-        if self._captures is not None:
-            calc_now, held = calc, self._declare_held_cloud(allocate, in_world)
-
-            def calc(context: Context, output: AbstractValue) -> None:
-                if self._held(context) is None:
-                    calc_now(context, output)
-                else:
-                    output.SetFrom(held.EvalAbstract(context))
-
-        self.DeclareAbstractOutputPort(
-            name,
-            alloc=allocate,
-            calc=calc,
-            prerequisites_of_calc=prerequisites,
-        )
-
-    def _declare_held_cloud(
-        self, allocate: Callable[[], AbstractValue], in_world: bool
-    ) -> CacheEntry:
-        """Declares the cloud of the scan that a discrete LiDAR holds."""
-
-        def calc(context: Context, output: AbstractValue) -> None:
-            capture = self._last_capture(context)
-            assert capture is not None  # The port looks first.
-            poses = capture.poses if in_world else None
-            self._set_cloud(output.get_mutable_value(), capture.points, poses)
-
-        return self.DeclareCacheEntry(
-            description="cloud of the scan that is held",
-            value_producer=ValueProducer(allocate=allocate, calc=calc),
-            prerequisites_of_calc={
-                self.abstract_state_ticket(self._held_state)
-            },
-        )
-
-    @property
-    def capture_period(self) -> float | None:
-        """The time between two scans of a discrete LiDAR [s], or else None."""
-        return None if self._captures is None else self._captures.period
-
-    @property
-    def capture_offset(self) -> float:
-        """The time of a discrete LiDAR's first scan [s]."""
-        return 0.0 if self._captures is None else self._captures.offset
 
     @property
     def is_random(self) -> bool:
@@ -610,10 +538,10 @@ class Lidar(LeafSystem):
             RuntimeError: the Context does not belong to this LiDAR.
         """
         self._check_context(context)
-        held = self._held(context)
-        measured = (
-            self._measured.Eval(context) if held is None else (held.measured)
-        )
+        held = self._shown(context)
+        measured = self._measured.Eval(context) if not held else held.measured
+        if measured is None:
+            return []
         return geometry_ids(measured.geometries, measured.geometry)
 
     def EvalInstances(
@@ -631,12 +559,13 @@ class Lidar(LeafSystem):
             print(plant.GetModelInstanceName(body.model_instance()))
         """
         self._check_context(context)
-        held = self._held(context)
+        held = self._shown(context)
         if held is None:
             seen = _eval_seen(self._seen_in_reach, context)
             instances, shapes = seen.instance, seen.built
         else:
-            instances, shapes = held.instance, held.measured.geometries
+            instances = held.instance
+            shapes = held.measured.geometries if held.measured else ()
         found: dict[int, tuple[GeometryId, ...]] = {}
         for instance, shape in zip(instances.tolist(), shapes, strict=True):
             found[instance] = (*found.get(instance, ()), shape.geometry_id)
@@ -703,59 +632,56 @@ class Lidar(LeafSystem):
             context,
         )
 
-    def _capture(self, context: Context, state: State) -> None:
-        """Takes a scan and holds it."""
-        assert self._captures is not None
-        self._hold(
-            state,
-            _Capture(
-                self._captures.number(context.get_time()),
-                context.get_time(),
-                self._points.Eval(context),
-                self._measured.Eval(context),
-                _eval_seen(self._seen_in_reach, context).instance,
-                self._calc_poses(context),
-                self._calc_pose(context),
-            ),
-        )
+    def _take(self, context: Context, state: State) -> None:
+        """Takes a scan, and shows it unless there is a delay."""
+        assert self.samples is not None
+        taken = self._capture(context, 2)
+        held = context.get_abstract_state(self._state).get_value()
+        shown = held.shown if self.samples.delay else taken
+        self._hold(state, _Held(taken, shown))
+
+    def _show(self, context: Context, state: State) -> None:
+        """Shows the last scan after its delay."""
+        taken = context.get_abstract_state(self._state).get_value().taken
+        self._hold(state, _Held(taken, taken))
 
     def _initialize(self, context: Context, state: State) -> None:
-        """Forgets the scan of an earlier simulation.
-
-        Between two captures, a scan is taken at once: until the next capture,
-        it would be computed for each time.
-        """
-        assert self._captures is not None
-        if self._captures.is_capture(context.get_time()):
-            self._hold(state, None)
+        """Forgets the scans of an earlier simulation, and takes the first."""
+        assert self.samples is not None
+        if self.samples.delay:
+            self._hold(state, _Held())
         else:
-            self._capture(context, state)
+            taken = self._capture(context, 0)
+            self._hold(state, _Held(taken, taken))
 
-    def _hold(self, state: State, capture: _Capture | None) -> None:
-        state.get_mutable_abstract_state(self._held_state).set_value(capture)
+    def _capture(self, context: Context, times: int) -> _Capture:
+        """Returns the scan of an event that comes `times` before its time."""
+        return _Capture(
+            nearest_ns(context.get_time(), times),
+            self._points.Eval(context),
+            self._measured.Eval(context),
+            _eval_seen(self._seen_in_reach, context).instance,
+            self._calc_poses(context),
+            self._calc_pose(context),
+        )
 
-    def _last_capture(self, context: Context) -> _Capture | None:
-        """Returns the scan that a discrete LiDAR took last, if any."""
-        return context.get_abstract_state(self._held_state).get_value()
+    def _hold(self, state: State, held: _Held) -> None:
+        state.get_mutable_abstract_state(self._state).set_value(held)
 
-    def _held(self, context: Context) -> _Capture | None:
-        """Returns what the outputs show; None if they are to be computed."""
-        if self._captures is None:
+    def _shown(self, context: Context) -> _Capture | None:
+        """Returns the scan that a discrete LiDAR shows; None if continuous."""
+        if self.samples is None:
             return None
-        capture = self._last_capture(context)
-        number = self._captures.number(context.get_time())
-        if capture is None or capture.number != number:
-            return None
-        return capture
+        return context.get_abstract_state(self._state).get_value().shown
 
     def _eval_points(self, context: Context) -> np.ndarray:
         """Returns the points of `scan`."""
-        held = self._held(context)
+        held = self._shown(context)
         return self._points.Eval(context) if held is None else held.points
 
     def _eval_poses(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
         """Returns the poses of S during the revolution of `scan`."""
-        held = self._held(context)
+        held = self._shown(context)
         return self._calc_poses(context) if held is None else held.poses
 
     def _update_seen(
@@ -817,8 +743,11 @@ class Lidar(LeafSystem):
         return {f: m for f, m in motions.items() if m.w.any() or m.v.any()}
 
     def _calc_measured(self, context: Context, output: AbstractValue) -> None:
+        time = context.get_time()
+        if self.samples is not None:
+            time = nearest_ns(time) / NS_PER_S
         # Not `round`: of two scans a period apart, it gives half numbers one.
-        revolution = math.floor(context.get_time() / self.pattern.period + 0.5)
+        revolution = math.floor(time / self.pattern.period + 0.5)
         draw = 0.0
         if self._noise_draw.HasValue(context):
             draw = self._noise_draw.Eval(context)[0]
@@ -900,14 +829,19 @@ class Lidar(LeafSystem):
         return np.array([p_WS]), np.array([R_WS])
 
     def _calc_X_WS(self, context: Context, output: AbstractValue) -> None:
-        held = self._held(context)
+        held = self._shown(context)
         output.set_value(
             self._calc_pose(context) if held is None else held.X_WS
         )
 
     def _calc_scan_time(self, context: Context, output: BasicVector) -> None:
-        held = self._held(context)
-        output[0] = context.get_time() if held is None else held.time
+        held = self._shown(context)
+        if held is None:
+            output[0] = context.get_time()
+        else:
+            output[0] = (
+                np.nan if held.time_ns is None else held.time_ns / NS_PER_S
+            )
 
     def _set_cloud(
         self,

@@ -8,7 +8,11 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import PrismaticJoint, SpatialInertia
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from pydrake.systems.framework import (
+    DiagramBuilder,
+    LeafSystem,
+    PortDataType,
+)
 import pytest
 
 from cns_drake import (
@@ -16,7 +20,6 @@ from cns_drake import (
     LidarConfig,
     add_lidar,
     add_mcap_recorder,
-    add_odometry,
     make_flash_pattern,
 )
 from cns_drake.ray_casting import RayCastingScene
@@ -36,7 +39,10 @@ class Reader(LeafSystem):
         super().__init__()
         self.seen = []
         for k, port in enumerate(ports):
-            self.DeclareAbstractInputPort(f"u{k}", port.Allocate())
+            if port.get_data_type() == PortDataType.kVectorValued:
+                self.DeclareVectorInputPort(f"u{k}", port.size())
+            else:
+                self.DeclareAbstractInputPort(f"u{k}", port.Allocate())
 
         def publish(context):
             values = [
@@ -200,15 +206,122 @@ def test_captures_are_the_scans_of_a_continuous_lidar(noise, offset):
     assert len({seen[8.0][time].tobytes() for time in kept}) == 8
 
 
-def test_without_a_simulator_there_is_a_scan_at_each_time():
+def is_empty(site, context):
+    own = site.lidar.GetMyContextFromRoot(context)
+    assert site.eval(context, "point_cloud_W").size() == 0
+    assert site.eval(context, "X_WS").IsExactlyIdentity()
+    assert site.lidar.EvalGeometryIds(own) == []
+    assert site.lidar.EvalInstances(own) == {}
+    return len(site.eval(context)) == 0 and np.isnan(
+        site.eval(context, "scan_time")
+    )
+
+
+def test_nothing_is_shown_before_the_first_scan(casts):
+    """As by RgbdSensorAsync: ports depend on the state alone."""
     site = Site()
-    context = site.builder.Build().CreateDefaultContext()
-    for time, x in ((0.0, 1.0), (0.03, 2.0), (0.1, 3.0), (0.0, 4.0)):
+    diagram = site.builder.Build()
+    context = diagram.CreateDefaultContext()
+    for time, x in ((0.0, 1.0), (0.03, 2.0)):
         context.SetTime(time)
         site.start(context, x)
-        assert distance(site.eval(context)) == pytest.approx(50.0 - x)
-        assert site.eval(context, "X_WS").translation()[0] == x
-        assert site.eval(context, "scan_time") == [time]
+        assert is_empty(site, context)
+    assert casts[0] == 0
+    diagram.ExecuteInitializationEvents(context)
+    assert distance(site.eval(context)) == pytest.approx(48.0)
+    assert site.eval(context, "scan_time") == [0.03]
+    for name in (*PORTS, "scan_time"):
+        port = site.lidar.GetOutputPort(name).get_index()
+        for k in range(site.lidar.num_input_ports()):
+            assert not site.lidar.HasDirectFeedthrough(k, port)
+
+
+@pytest.mark.parametrize("time_step", [0.0, 0.001, 0.004, 0.0625])
+def test_ports_show_a_scan_after_its_delay(time_step):
+    """At its time, an event that reads finds it."""
+    site = Site(
+        time_step,
+        ("scan", "scan_time"),
+        lambda scan, time: (distance(scan) if len(scan) else None, time[0]),
+        capture_offset=0.02,
+        output_delay=0.06,
+    )
+    site.simulator().AdvanceTo(1.1)
+    seen, late = dict(site.reader.seen), []
+    assert len({scan for scan, _ in seen.values()}) == 12
+    for now, (ahead, taken) in seen.items():
+        if abs(np.remainder(now + 0.02 + 0.05, 0.1) - 0.05) < 1e-12:
+            # The event of the output, or a step that ends at its time.
+            late.append(ahead is None or now - taken > 0.1)
+            continue
+        if now < 0.08:
+            assert ahead is None
+            assert np.isnan(taken)
+            continue
+        number = np.floor((now - 0.08) * 10.0 + 1e-9)
+        assert taken == pytest.approx(0.02 + 0.1 * number, abs=1e-12)
+        x = 50.0 - ahead
+        assert SPEED * taken - 1e-4 < x < SPEED * (taken + time_step) + 1e-4
+    # The new scan is there after the event alone; a step of the plant that
+    # ends at this time, if there is one, is after it.
+    assert late == [True, False][: 1 + (time_step in (0.001, 0.004))] * 11
+
+
+def test_drake_leaves_out_no_scan(casts):
+    """Of its own ZeroOrderHold, it leaves out the update at 0.33 s."""
+    site = Site(
+        0.001, ("scan_time",), lambda time: time[0], capture_offset=0.03
+    )
+    site.simulator().AdvanceTo(1.0)
+    found = sorted({time for _, time in site.reader.seen})
+    assert found == pytest.approx([0.0, *(0.03 + 0.1 * np.arange(10))])
+    assert casts[0] == 11
+
+
+def test_times_are_exact_after_days():
+    site = Site(0.01)
+    simulator = site.simulator()
+    start = 1_000_000.0
+    simulator.get_mutable_context().SetTime(start)
+    simulator.Initialize()
+    for number in range(1, 20):
+        simulator.AdvanceTo(start + 0.1 * number + 0.05)
+        (time,) = site.eval(simulator.get_context(), "scan_time")
+        assert time == start + round(0.1 * number, 1)
+
+
+def test_a_scan_steers_without_an_algebraic_loop():
+    """A LiDAR with a rate has no direct feedthrough, as RgbdSensorDiscrete."""
+    site = Site(0.0)
+    brake = site.builder.AddSystem(Brake(site))
+    site.builder.Connect(
+        site.lidar.scan_output_port(), brake.GetInputPort("scan")
+    )
+    site.builder.Connect(
+        brake.GetOutputPort("force"),
+        site.plant.get_applied_generalized_force_input_port(),
+    )
+    simulator = site.simulator()
+    simulator.AdvanceTo(3.0)
+    # -1 N on 1 kg from 0.6 s on, where the scan is the first within 48.9 m.
+    own = site.plant.GetMyContextFromRoot(simulator.get_context())
+    assert site.joint.get_translation_rate(own) == pytest.approx(-0.4)
+
+
+class Brake(LeafSystem):
+    """Pushes back with 1 N as soon as the wall is within 48.9 m."""
+
+    def __init__(self, site):
+        super().__init__()
+        scan = self.DeclareAbstractInputPort(
+            "scan", site.lidar.scan_output_port().Allocate()
+        )
+
+        def calc(context, output):
+            seen = scan.Eval(context)
+            output[0] = -1.0 if len(seen) and distance(seen) < 48.9 else 0.0
+
+        self.DeclareVectorOutputPort("force", 1, calc)
 
 
 def test_contexts_hold_scans_of_their_own(casts):
@@ -241,7 +354,7 @@ def test_contexts_hold_scans_of_their_own(casts):
         lambda one: diagram.SetRandomContext(one, RandomGenerator(3)),
     ):
         reset(clone)
-        assert distance(site.eval(clone)) == pytest.approx(50.0, abs=0.1)
+        assert is_empty(site, clone)
 
 
 def test_initializing_again_forgets_the_scan():
@@ -269,7 +382,8 @@ def test_advancing_in_pieces_changes_nothing(casts):
         for end in pieces:
             simulator.AdvanceTo(end)
         found.append(site.eval(simulator.get_context()).copy())
-        assert casts[0] == 11
+        # The scan of the start, and 11 periodic ones.
+        assert casts[0] == 12
     np.testing.assert_array_equal(*found)
 
 
@@ -307,6 +421,9 @@ def test_a_lidar_config_with_a_rate_is_discrete(casts):
         ({"rate": "fast"}, "rate: 'fast' is not a positive"),
         ({"rate": True}, "rate: True is not a positive"),
         ({"rate": 20}, "rate: 20 scans per second, but a revolution takes 0.1"),
+        ({"output_delay": 0.1}, "output_delay: 0.1 is not .* below 0.1 s"),
+        ({"output_delay": np.nan}, "output_delay: nan"),
+        ({"rate": None, "output_delay": 0.1}, "output_delay: only"),
         ({"capture_offset": -0.1}, "capture_offset: -0.1"),
         ({"capture_offset": np.inf}, "capture_offset: inf"),
         ({"rate": None, "capture_offset": 0.1}, "capture_offset: only"),
@@ -317,29 +434,28 @@ def test_rates_that_cannot_be(options, fault):
         Site(**options)
 
 
-def test_a_rate_sets_the_revolutions_of_a_preset():
-    site = Site(pattern="vlp-16", rate=5.0)
-    assert site.lidar.pattern.period == 0.2
+def test_a_rate_changes_the_beams_of_a_preset_with_a_word_alone():
+    usual = Site(pattern="mid-70", rate=None).lidar.pattern
+    assert usual.period == 0.1
+    for rate in (0.5, 3, 7.5, 10.0):
+        assert Site(pattern="mid-70", rate=rate).lidar.pattern == usual
+    with pytest.warns(UserWarning, match="has 2500 beams, not 0.1 s and 10000"):
+        site = Site(pattern="mid-70", rate=40)
+    assert site.lidar.pattern.period == 1.0 / 40
     with pytest.raises(ValueError, match=r"^rate: 0 is not a positive"):
         Site(pattern="vlp-16", rate=0)
 
 
-def test_a_recording_needs_the_pose_at_its_own_times(tmp_path):
+def test_a_recording_has_every_scan(tmp_path):
     site = Site()
-    odometry = add_odometry(site.builder, site.cart)
-    fault = r"^lidars: 'lidar' takes 10 scans .*; add it without rate"
-    for rates in ({"odometry": 100}, {"lidar": 20}):
-        with pytest.raises(ValueError, match=fault):
-            add_mcap_recorder(
-                site.builder,
-                tmp_path / "drive",
-                lidars=[site.lidar],
-                odometry=odometry,
-                rates=rates,
-            )
-    site = Site(capture_offset=0.02)
+    fault = "^rates: lidar: the LiDAR takes 10 scans per second, and is"
     with pytest.raises(ValueError, match=fault):
-        add_mcap_recorder(site.builder, tmp_path / "drive", lidars=[site.lidar])
+        add_mcap_recorder(
+            site.builder,
+            tmp_path / "drive",
+            lidars=[site.lidar],
+            rates={"lidar": 20},
+        )
 
 
 def test_a_recording_has_each_scan_at_its_time(tmp_path):

@@ -1,0 +1,341 @@
+"""Sensors configured in YAML, in the same way as Drake's cameras.
+
+Each kind of sensor has a config class that `pydrake.common.yaml` reads and
+writes, and a function beside it that adds the configured sensor to a diagram
+and publishes its measurements on LCM. The sections of scenarios define which
+values the fields can have.
+"""
+
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+import copy
+from dataclasses import dataclass, field
+import numbers
+import os
+import types
+import typing
+from typing import Any, TypeAlias, TypeVar
+
+from drake import lcmt_drake_signal, lcmt_point_cloud
+import numpy as np
+from pydantic import ValidationError
+from pydrake.common.schema import Transform
+from pydrake.common.value import AbstractValue, Value
+from pydrake.common.yaml import yaml_dump_typed
+from pydrake.lcm import DrakeLcm, DrakeLcmInterface
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import GetScopedFrameByName
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame
+from pydrake.systems import framework
+from pydrake.systems import lcm as drake_lcm
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
+from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
+
+from cns_drake.scene import find_bus
+from cns_drake.sensors.system_names import check_unused_names
+from evaluation.base import (
+    Section,
+    describe_validation_error,
+    shortly_before,
+)
+
+# Messages per second of an IMU or odometry that names no rate.
+USUAL_RATE = 20
+# Fields of a section that a config does not have, as `X_PB` replaces the mount
+# and only recordings have a layout, or that differ from the config's.
+_LEFT_OUT = ("xyz", "rpy_deg", "layout", "rate")
+_KINDS = {
+    bool: "true or false",
+    float: "a number",
+    int: "a whole number",
+    str: "a text",
+}
+_Struct = TypeVar("_Struct")
+
+
+def names_of_fields_in_errors(struct: type[_Struct]) -> type[_Struct]:
+    """Makes a dataclass refuse values of a wrong type by the field's name.
+
+    Drake's reader of YAML itself refuses `rate: fast` without the name of the
+    field. It accepts any scalar where the type of a field admits any; then the
+    dataclass refuses the value, also in Python.
+    """
+    fields: dict[str, Any] = struct.__dataclass_fields__  # type: ignore[attr-defined]  # A dataclass.
+    # Without the limits, which a section of a scenario checks.
+    types = typing.get_type_hints(struct)
+    hints = {name: types[name] for name in fields}
+    for name, hint in hints.items():
+        # A copy: base classes share the field.
+        fields[name] = copy.copy(fields[name])
+        fields[name].type = typing.Union[(hint, *_KINDS)]
+
+    def set_field(self: _Struct, name: str, value: Any) -> None:
+        if name in hints:
+            value = _of_type(value, hints[name], f"{struct.__name__}.{name}")
+        object.__setattr__(self, name, value)
+
+    struct.__setattr__ = set_field  # type: ignore[method-assign, assignment]  # Of this class.
+    return struct
+
+
+def _of_type(value: Any, hint: Any, name: str) -> Any:
+    """Returns a value as the type of a field; converts as Drake's reader does.
+
+    Raises:
+        ValueError: the value is of another type; the message begins with
+            `name`.
+    """
+    options = [hint]
+    if isinstance(hint, types.UnionType):
+        options = list(typing.get_args(hint))
+    if value is None and type(None) in options:
+        return None
+    kind = options[0]
+    fault = f"{name}: {value!r} is not {_KINDS.get(kind, 'a pose')}"
+    if typing.get_origin(kind) is list:
+        if isinstance(value, str) or not (
+            isinstance(value, Collection)
+            and all(isinstance(one, str) for one in value)
+        ):
+            raise ValueError(f"{name}: {value!r} is not a list of names")
+        return list(value)
+    if kind is bool:
+        if value in ("true", "false"):  # Quoted in YAML.
+            return value == "true"
+    elif kind is str and isinstance(value, os.PathLike):
+        return os.fspath(value)
+    elif kind in (int, float) and not isinstance(value, bool):
+        if isinstance(value, str):
+            try:
+                value = float(value)
+            except ValueError:
+                raise ValueError(fault) from None
+        if isinstance(value, numbers.Real) and (
+            kind is float or float(value).is_integer()
+        ):
+            return kind(value)
+        raise ValueError(fault)
+    if not isinstance(value, kind) or (
+        kind in (int, float) and isinstance(value, bool)
+    ):
+        raise ValueError(fault)
+    return value
+
+
+@dataclass(eq=False)
+class PublishedSensor:
+    """The place of a sensor and of its messages, of whatever kind it is.
+
+    Two configs of a kind are equal if their fields are.
+
+    Attributes:
+        name: name of the system, and part of the channel's name.
+        X_PB: pose of the sensor's body B in a frame P of the plant. The field
+            `base_frame` of this pose names P; by default P is the world frame.
+        lcm_bus: name of the bus on which the measurements are published.
+    """
+
+    name: str
+    X_PB: Transform = field(default_factory=Transform)
+    lcm_bus: str = "default"
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        # Drake's Transform has no equality.
+        return yaml_dump_typed(self) == yaml_dump_typed(other)
+
+    __hash__ = None  # type: ignore[assignment]  # As any dataclass that changes.
+
+    def ValidateOrThrow(self) -> None:
+        """Checks all that can be checked without a Diagram, as Drake's configs.
+
+        Raises:
+            InputError: a file that the config names cannot be used.
+            ValueError: a field is out of range; the message names it.
+        """
+        with errors_of(self):
+            if not self.name:
+                raise ValueError("name: it is empty")
+            X_PB = self.X_PB.GetDeterministicValue()
+            if not np.isfinite(X_PB.GetAsMatrix34()).all():
+                raise ValueError("X_PB: not finite")
+            self._validate()
+
+    def _validate(self) -> None:
+        """Checks the fields that only this kind of sensor has."""
+
+
+_Section = TypeVar("_Section", bound=Section)
+# An interface on which messages are published.
+Interface: TypeAlias = DrakeLcmInterface | LcmInterfaceSystem
+# Endings of the names of the systems that publish a sensor's messages.
+_PARTS = ("to_lcm", "publisher")
+
+
+@contextmanager
+def errors_of(config: PublishedSensor) -> Iterator[None]:
+    """Names a configured sensor in the errors of its values."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{_caller(config)}: {error}") from None
+
+
+def find_interface(
+    config: PublishedSensor,
+    builder: DiagramBuilder,
+    lcm_buses: LcmBuses | None,
+    lcm: Interface | None,
+) -> Interface | None:
+    """Returns the interface on which a configured sensor publishes.
+
+    Returns:
+        The interface; None for one to the default URL, which is still to be
+        added to the diagram.
+
+    Raises:
+        RuntimeError: there is no such bus.
+        ValueError: the diagram already has a system with the name of one that
+            publishes the sensor's messages.
+    """
+    name = config.name
+    check_unused_names(builder, *(f"{name}_{part}" for part in _PARTS))
+    if lcm is not None:
+        return lcm
+    if lcm_buses is not None:
+        return find_bus(builder, lcm_buses, _caller(config), config.lcm_bus)
+    if config.lcm_bus != "default":
+        raise RuntimeError(
+            f"{_caller(config)}: lcm_bus: there is no bus '{config.lcm_bus}' "
+            "without lcm_buses"
+        )
+    return None
+
+
+def publish_measurements(
+    config: PublishedSensor,
+    kind: str,
+    builder: DiagramBuilder,
+    lcm: Interface | None,
+    ports: list[OutputPort],
+    to_lcm: framework.System,
+    *,
+    period: float,
+    offset: float = 0.0,
+) -> None:
+    """Adds systems that convert measurements to LCM messages and publish them.
+
+    Nothing is added for the interface of a null bus, such as in `lcm_buses:
+    {default: null}`. Drake's cameras behave in the same way.
+
+    Args:
+        config: description of the sensor.
+        kind: kind of the sensor in the name of the channel.
+        builder: builder of a diagram with the sensor.
+        lcm: what `find_interface` returned.
+        ports: output ports of the sensor.
+        to_lcm: system that converts the ports' values to a message.
+        period: time between two messages [s].
+        offset: time of the first message [s].
+    """
+    if lcm is None:
+        lcm = builder.AddSystem(LcmInterfaceSystem(lcm=DrakeLcm()))
+    if lcm.get_lcm_url() == LcmBuses.kLcmUrlMemqNull:
+        return
+    is_cloud = not isinstance(to_lcm, SignalToLcm)
+    publisher = drake_lcm.LcmPublisherSystem.Make(
+        f"DRAKE_{kind}_{config.name}",
+        lcmt_point_cloud if is_cloud else lcmt_drake_signal,
+        lcm,
+        # With the state of a plant's step, and the scan, of this time.
+        publish_period=shortly_before(period),
+        publish_offset=shortly_before(offset),
+        use_cpp_serializer=is_cloud,
+    )
+    for part, system in zip(_PARTS, (to_lcm, publisher), strict=True):
+        builder.AddNamedSystem(f"{config.name}_{part}", system)
+    for index, port in enumerate(ports):
+        builder.Connect(port, to_lcm.get_input_port(index))
+    builder.Connect(to_lcm.get_output_port(), publisher.get_input_port())
+
+
+class SignalToLcm(framework.LeafSystem):
+    """Converts the values of ports to an `lcmt_drake_signal`."""
+
+    def __init__(
+        self,
+        ports: list[OutputPort],
+        names: list[str],
+        values: Callable[..., np.ndarray],
+    ):
+        """Declares an input for each port.
+
+        Args:
+            ports: the output ports whose values are converted.
+            names: name of each number in a message.
+            values: function that takes the values of the ports, and returns the
+                numbers of a message.
+        """
+        super().__init__()
+        self._names = names
+        self._values = values
+        for index, port in enumerate(ports):
+            if port.get_data_type() == framework.PortDataType.kVectorValued:
+                self.DeclareVectorInputPort(f"u{index}", port.size())
+            else:
+                self.DeclareAbstractInputPort(f"u{index}", port.Allocate())
+        self.DeclareAbstractOutputPort(
+            "lcmt_drake_signal",
+            lambda: Value(lcmt_drake_signal()),
+            self._calc_message,
+        )
+
+    def _calc_message(self, context: Context, output: AbstractValue) -> None:
+        inputs = [
+            self.get_input_port(index).Eval(context)
+            for index in range(self.num_input_ports())
+        ]
+        message = lcmt_drake_signal()
+        message.val = self._values(*inputs).tolist()
+        message.dim = len(message.val)
+        message.coord = self._names
+        message.timestamp = round(context.get_time() * 1e6)
+        output.set_value(message)
+
+
+def section_of(
+    config: PublishedSensor, kind: type[_Section], **changes: Any
+) -> _Section:
+    """Returns the section of a scenario with the fields of a config.
+
+    Raises:
+        ValueError: a field is out of range.
+    """
+    names = kind.model_fields.keys() - _LEFT_OUT
+    given = {name: getattr(config, name) for name in names}
+    try:
+        return kind.model_validate(given | changes)
+    except ValidationError as error:
+        # The text begins with the source, which the caller names.
+        text = describe_validation_error("", error, kind)
+        raise ValueError(text.removeprefix(": ")) from None
+
+
+def carrier_frame(
+    config: PublishedSensor,
+    builder: DiagramBuilder,
+    plant: MultibodyPlant | None,
+) -> tuple[Frame, RigidTransform]:
+    """Returns the frame P that carries a sensor, and the pose X_PB."""
+    plant = plant or builder.GetSubsystemByName("plant")
+    frame = plant.world_frame()
+    if config.X_PB.base_frame is not None:
+        frame = GetScopedFrameByName(plant, config.X_PB.base_frame)
+    return frame, config.X_PB.GetDeterministicValue()
+
+
+def _caller(config: PublishedSensor) -> str:
+    """Returns the text with which errors of a configured sensor begin."""
+    return f"{type(config).__name__} {config.name}"
