@@ -4,7 +4,9 @@ NumPy, OpenBLAS, the C library and Embree choose their instructions by the
 processor. What the program computes must not follow.
 """
 
+import os
 from pathlib import Path
+import sys
 
 import numpy as np
 
@@ -35,3 +37,9 @@ def processors():
             EMBREE: "sse4.2",
         },
     }
+
+
+def on_processor(name):
+    """Returns the environment of a test's own program on a processor."""
+    paths = {"PYTHONPATH": os.pathsep.join(sys.path)}
+    return os.environ | processors()[name] | paths

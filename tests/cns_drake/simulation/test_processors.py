@@ -1,10 +1,9 @@
 """Recordings have the same bytes on every processor."""
 
-import os
 import subprocess
 import sys
 
-from helpers.processors import PROGRAM, processors
+from helpers.processors import PROGRAM, on_processor
 from helpers.recorded_traffic import write_rounds
 from helpers.small_city import ROADS
 from helpers.small_map import write_small_map
@@ -67,7 +66,7 @@ def test_messages_are_those_of_another_processor(scenario, tmp_path, loops):
     command = [sys.executable, PROGRAM, "simulate", str(file)]
     subprocess.run(
         [*command, "--output", str(tmp_path / "other")],
-        env=os.environ | processors()["oldest"] | loops,
+        env=on_processor("oldest") | loops,
         check=True,
         capture_output=True,
     )

@@ -6,13 +6,12 @@ Where streets look the same from several sides, no last bit decides.
 from functools import cache
 import hashlib
 import json
-import os
 from pathlib import Path
 import subprocess
 import sys
 
 from helpers.internal.studies import leave_figures_unrendered
-from helpers.processors import processors
+from helpers.processors import on_processor, processors
 from helpers.small_cityjson import CityWriter
 from helpers.small_osm import OsmWriter
 import numpy as np
@@ -22,7 +21,6 @@ from worlds.imports import ImportOptions, import_city
 
 pytestmark = pytest.mark.slow
 
-PROCESSORS = processors()
 # Distance from place to place in a regular town [m].
 PITCH = 52.0
 
@@ -115,7 +113,10 @@ def towns(tmp_path_factory):
     ("number", "processor"),
     [
         (4, "oldest"),
-        *(pytest.param(48, one, marks=pytest.mark.night) for one in PROCESSORS),
+        *(
+            pytest.param(48, one, marks=pytest.mark.night)
+            for one in processors()
+        ),
     ],
 )
 def test_towns_are_those_of_another_processor(
@@ -123,9 +124,7 @@ def test_towns_are_those_of_another_processor(
 ):
     other = subprocess.run(
         [sys.executable, __file__, str(tmp_path), str(number)],
-        env=os.environ
-        | PROCESSORS[processor]
-        | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        env=on_processor(processor),
         stdout=subprocess.PIPE,
         text=True,
         check=True,
