@@ -125,6 +125,7 @@ def test_a_thousand_periods(tmp_path, time_step):
 
 
 @pytest.mark.night
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate", "imu_rate", "offset", "time_step"), CASES)
 def test_a_thousand_periods_of_each(
     tmp_path, rate, imu_rate, offset, time_step
