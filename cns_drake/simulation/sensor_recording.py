@@ -264,10 +264,13 @@ def _message_periods(
     imu: Imu | None,
 ) -> dict[str, float]:
     """Returns sensor name -> time between its messages [s]."""
-    revolutions = {
+    own = {
         lidar.get_name(): lidar.samples.period
+        for lidar in lidars
         if lidar.samples
-        else lidar.pattern.period
+    }
+    revolutions = {
+        lidar.get_name(): own.get(lidar.get_name(), lidar.pattern.period)
         for lidar in lidars
     }
     if period is None and not revolutions:
@@ -283,11 +286,6 @@ def _message_periods(
     periods = dict.fromkeys((*revolutions, *cameras, "imu", "odometry"), usual)
     if period is None:
         periods |= revolutions
-    own = {
-        lidar.get_name(): lidar.samples.period
-        for lidar in lidars
-        if lidar.samples
-    }
     periods |= own
     if imu is not None and imu.rate is not None:
         periods["imu"] = 1.0 / imu.rate

@@ -1,7 +1,5 @@
 """Scan, pose and stamp of a recorded discrete LiDAR belong together."""
 
-import itertools
-
 from helpers.bag_recordings import messages_by_topic
 import numpy as np
 from pydrake.geometry import Box
@@ -95,46 +93,20 @@ def check(drive, rate, offset, seconds, delay=0.0, *, time_step):
     np.testing.assert_allclose(ahead, WALL - x, rtol=0, atol=8e-6)
 
 
-CASES = list(
-    itertools.product(
-        (5, 10, 20), (100, 200, 400), (0.0, 0.03, 0.0125), (0.0, 0.001, 0.01)
-    )
-)
-
-
-@pytest.mark.sampled(9)
+@pytest.mark.sampled(5)
 @pytest.mark.slow
-@pytest.mark.parametrize(("rate", "imu_rate", "offset", "time_step"), CASES)
-def test_a_scan_agrees_with_pose_and_stamp(
-    tmp_path, rate, imu_rate, offset, time_step
-):
-    seconds = 40 / rate
-    options = {"rate": rate, "capture_offset": offset}
-    drive = record(
-        tmp_path / "drive", time_step, seconds, imu_rate=imu_rate, **options
-    )
-    check(drive, rate, offset, seconds, time_step=time_step)
-    assert len(drive.imu) == seconds * imu_rate + 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("time_step", [0.0, 0.003, 0.007, 0.01])
-def test_a_thousand_periods(tmp_path, time_step):
-    drive = record(tmp_path / "drive", time_step, 50.0, imu_rate=100, rate=20)
-    check(drive, 20, 0.0, 50.0, time_step=time_step)
-
-
-@pytest.mark.night
-@pytest.mark.parametrize(("rate", "imu_rate", "offset", "time_step"), CASES)
-def test_a_thousand_periods_of_each(
-    tmp_path, rate, imu_rate, offset, time_step
-):
+@pytest.mark.parametrize("rate", [5, 10, 20])
+@pytest.mark.parametrize("imu_rate", [100, 200, 400])
+@pytest.mark.parametrize("offset", [0.0, 0.03, 0.0125])
+@pytest.mark.parametrize("time_step", [0.0, 0.001, 0.003, 0.007, 0.01])
+def test_a_thousand_periods(tmp_path, rate, imu_rate, offset, time_step):
     seconds = 1000 / rate
     options = {"rate": rate, "capture_offset": offset}
     drive = record(
         tmp_path / "drive", time_step, seconds, imu_rate=imu_rate, **options
     )
     check(drive, rate, offset, seconds, time_step=time_step)
+    assert len(drive.imu) == seconds * imu_rate + 1
 
 
 @pytest.mark.parametrize("odometry_rate", [7, 100])
