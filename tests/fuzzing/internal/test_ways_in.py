@@ -1281,7 +1281,7 @@ OPENERS = {
     "yaml.compose": ("worlds.city.generation.generate",),
     "json.load": (),
     "zstandard.decompress": ("evaluation.drives.mcap_file",),
-    "zstandard.ZstdDecompressor": ("evaluation.study.parts",),
+    "zstandard.ZstdDecompressor": ("evaluation.base.jobs.parts",),
     "lz4.frame.decompress": (),
     "lz4.frame.LZ4FrameDecompressor": ("evaluation.drives.mcap_file",),
     # What another process of this program has sent.
