@@ -50,8 +50,6 @@ from .errors import no_such as no_such
 from .errors import one_line as one_line
 from .errors import validated as validated
 from .errors import value_errors as value_errors
-from .families import Family as Family
-from .families import import_modules as import_modules
 from .figures import GONE_RGB as GONE_RGB
 from .figures import NEW_RGB as NEW_RGB
 from .figures import UNSEEN_RGB as UNSEEN_RGB
@@ -102,6 +100,8 @@ from .number_format import other_separator as other_separator
 from .number_format import parse_rows as parse_rows
 from .number_format import to_number as to_number
 from .number_format import whole_number as whole_number
+from .plugins import Family as Family
+from .plugins import import_modules as import_modules
 from .points import FARTHEST_RETURN as FARTHEST_RETURN
 from .points import MAX_INSTANCE as MAX_INSTANCE
 from .points import OTHER_MOVING_ID as OTHER_MOVING_ID

@@ -21,7 +21,7 @@ from evaluation.base.errors import (
     one_line,
     shows_traceback,
 )
-from evaluation.base.families import import_modules, plugin_fault
+from evaluation.base.plugins import import_modules, plugin_fault
 from evaluation.base.process import collect_garbage_seldom
 from evaluation.base.progress import doing
 from evaluation.base.system_libraries import has_utf8, missing_library

@@ -22,7 +22,7 @@ from evaluation.base import (
     value_errors,
     xyz,
 )
-from evaluation.drives import mcap_messages, ros_types
+from evaluation.drives import mcap_messages, ros_messages
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.drive import (
     ODOMETRY_DTYPE,
@@ -100,7 +100,7 @@ _CLOUDS = _Stream(
     "point clouds",
     "LiDAR",
     _LIDAR_TOPIC,
-    ((ros_types.POINT_CLOUD, ros_types.LIVOX, ros_types.LIVOX_1),),
+    ((ros_messages.POINT_CLOUD, ros_messages.LIVOX, ros_messages.LIVOX_1),),
     "--lidar TOPIC",
     "/points",
 )
@@ -185,13 +185,13 @@ class McapDrive(Drive):
         labels = self._lidar_topic.removesuffix("points") + "labels"
         self._labels_topic = labels if labels in self._file.topics else None
         for topic, kind in (
-            (labels, ros_types.POINT_CLOUD),
-            (_IMU_TOPIC, ros_types.IMU),
-            (_TF_STATIC_TOPIC, ros_types.TF),
+            (labels, ros_messages.POINT_CLOUD),
+            (_IMU_TOPIC, ros_messages.IMU),
+            (_TF_STATIC_TOPIC, ros_messages.TF),
         ):
             if topic in self._file.topics:
                 self._topics.require(topic, kind)
-        self._has_tf = _TF_TOPIC in self._topics.find(ros_types.TF)
+        self._has_tf = _TF_TOPIC in self._topics.find(ros_messages.TF)
         self._images = _McapImages(self._topics)
 
     def __len__(self) -> int:
@@ -536,7 +536,7 @@ class McapDrive(Drive):
 
     @property
     def _is_livox(self) -> bool:
-        return self._topics.kind(self._lidar_topic) != ros_types.POINT_CLOUD
+        return self._topics.kind(self._lidar_topic) != ros_messages.POINT_CLOUD
 
 
 class _Topics:
@@ -693,9 +693,9 @@ class _Topics:
         kind = self._types[topic]
         places = self.file.locate(topic)
         with self.faults(topic):
-            if kind == ros_types.PATH:
+            if kind == ros_messages.PATH:
                 found = self._path(topic)
-            elif kind in (ros_types.ODOMETRY, ros_types.IMU):
+            elif kind in (ros_messages.ODOMETRY, ros_messages.IMU):
                 rows = MessageRows(kind, len(places))
                 for index, data in self.file.visit(places):
                     rows.add(index, data)
@@ -718,7 +718,7 @@ class _Topics:
         places = self.file.locate(topic)
 
         def rows(place: np.void) -> np.ndarray:
-            made = POSE_ROWS[ros_types.PATH](self.message(topic, place))
+            made = POSE_ROWS[ros_messages.PATH](self.message(topic, place))
             return np.array([*made], ODOMETRY_DTYPE)
 
         first, found = rows(places[0]), rows(places[-1])
@@ -806,7 +806,7 @@ class _McapImages:
 
     def __init__(self, topics: _Topics):
         self._topics = topics
-        found = topics.find(ros_types.COMPRESSED_IMAGE)
+        found = topics.find(ros_messages.COMPRESSED_IMAGE)
         cameras = [topic for topic in found if not topic.endswith(_DEPTH)]
         self._topic = cameras[0] if cameras else None
 

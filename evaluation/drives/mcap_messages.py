@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from evaluation.base import NS_PER_S, InputError, poses, value_errors
-from evaluation.drives import ros_types
+from evaluation.drives import ros_messages
 
 # A few compressed kilobytes can hold a million transforms or fields: greatest
 # length of a message of transforms [bytes], and number of fields of a cloud.
@@ -36,14 +36,14 @@ def decode(data: bytes | memoryview, message_type: str) -> Any:
             any plausible message of this type.
     """
     _check_uncompressed(data)
-    if message_type == ros_types.TF and len(data) > _LONGEST_TF:
+    if message_type == ros_messages.TF and len(data) > _LONGEST_TF:
         raise ValueError(
             f"a message of {len(data)} bytes, more than one of its type holds"
         )
-    if message_type == ros_types.POINT_CLOUD:
+    if message_type == ros_messages.POINT_CLOUD:
         read_cloud_header(data)
     try:
-        return ros_types.deserialize(data, message_type)
+        return ros_messages.deserialize(data, message_type)
     except Exception as error:
         # rosbags raises any error of its generated code.
         raise ValueError(

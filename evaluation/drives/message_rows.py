@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evaluation.base import NS_PER_S, poses
-from evaluation.drives import ros_types
+from evaluation.drives import ros_messages
 from evaluation.drives.drive import IMU_DTYPE, ODOMETRY_DTYPE
 from evaluation.drives.mcap_messages import decode, stamp_ns, xyz, xyzw
 
@@ -55,11 +55,11 @@ def pose_row(message: Any) -> tuple:
 # Type of messages with poses -> function that returns a message's rows, in the
 # order in which topics are chosen.
 POSE_ROWS: dict[str, Callable[[Any], list[tuple]]] = {
-    ros_types.ODOMETRY: lambda message: [odometry_row(message)],
-    ros_types.TRANSFORM: lambda message: [transform_row(message)],
-    ros_types.POSE_COVARIANCE: lambda message: [pose_row(message)],
-    ros_types.POSE: lambda message: [pose_row(message)],
-    ros_types.PATH: lambda message: list(map(pose_row, message.poses)),
+    ros_messages.ODOMETRY: lambda message: [odometry_row(message)],
+    ros_messages.TRANSFORM: lambda message: [transform_row(message)],
+    ros_messages.POSE_COVARIANCE: lambda message: [pose_row(message)],
+    ros_messages.POSE: lambda message: [pose_row(message)],
+    ros_messages.PATH: lambda message: list(map(pose_row, message.poses)),
 }
 
 
@@ -98,7 +98,7 @@ class _Kind(NamedTuple):
 
 
 _KINDS = {
-    ros_types.ODOMETRY: _Kind(
+    ros_messages.ODOMETRY: _Kind(
         odometry_row,
         vehicle_frames,
         ODOMETRY_DTYPE,
@@ -113,7 +113,7 @@ _KINDS = {
             ]
         ),
     ),
-    ros_types.IMU: _Kind(
+    ros_messages.IMU: _Kind(
         imu_row,
         lambda message: message.header.frame_id,
         IMU_DTYPE,

@@ -14,7 +14,7 @@ import numpy as np
 from rosbags.highlevel import AnyReader
 
 from evaluation.base import InputError, listed
-from evaluation.drives import ros_types
+from evaluation.drives import ros_messages
 from evaluation.drives.mcap_file import LOCATION
 
 # How to read a damaged bag of ROS 1, for error messages.
@@ -51,7 +51,7 @@ class RosbagFile:
         )
         with self._faults():
             self._reader = AnyReader(
-                paths, default_typestore=ros_types.known_types()
+                paths, default_typestore=ros_messages.known_types()
             )
             self._reader.open()
         self._connections: dict[str, list[Any]] = {}
@@ -126,7 +126,7 @@ class RosbagFile:
                         yield row_of[offset], memoryview(data)
                         continue
                     message = self._reader.deserialize(data, connection.msgtype)
-                    packed = ros_types.serialize(message)
+                    packed = ros_messages.serialize(message)
                     yield row_of[offset], memoryview(packed)
 
     def attachment(self, name: str) -> bytes | None:

@@ -36,9 +36,9 @@ from typing import Any
 
 from evaluation.base import errors, interrupts, system_libraries
 from evaluation.base.errors import InputError
-from evaluation.base.families import plugin_fault
 from evaluation.base.file_locks import exclusive, remove_lock
 from evaluation.base.jobs.step import Reporter, Step
+from evaluation.base.plugins import plugin_fault
 from evaluation.base.process import ONE_CORE, collect_garbage_seldom
 from evaluation.base.progress import heard_by
 from evaluation.base.working_folder import (

@@ -11,7 +11,7 @@ from cns_drake.recording.object_messages import (
     marked_detections,
 )
 from evaluation.drives import DETECTIONS_3D, SCENE_UPDATE
-from evaluation.drives.ros_types import deserialize
+from evaluation.drives.ros_messages import deserialize
 
 CLASSES = ("car", "person", "bicyclist")
 STAMP_NS = 1_700_000_012_345_678_901

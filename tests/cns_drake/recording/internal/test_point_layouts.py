@@ -9,7 +9,7 @@ from cns_drake.sensors import POINT_DTYPE
 from evaluation.drives import POINT_CLOUD, McapDrive, to_labels, to_layout
 from evaluation.drives.point_cloud2 import to_points, to_records
 from evaluation.drives.point_layouts import from_layout
-from evaluation.drives.ros_types import deserialize
+from evaluation.drives.ros_messages import deserialize
 
 # sensor_msgs/PointField: UINT8 2, UINT16 4, UINT32 6, FLOAT32 7.
 XYZ = [("x", 0, 7), ("y", 4, 7), ("z", 8, 7)]

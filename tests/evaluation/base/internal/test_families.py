@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from evaluation.base import Family, families, program
-from evaluation.base.families import plugin_fault
+from evaluation.base.plugins import plugin_fault
 
 
 @pytest.fixture

@@ -4,10 +4,10 @@ from helpers.drive_files import TYPES
 import numpy as np
 import pytest
 
-from evaluation.drives import ros_types
+from evaluation.drives import ros_messages
 from evaluation.drives.message_rows import MessageRows, imu_row, odometry_row
 
-ROWS = {ros_types.ODOMETRY: odometry_row, ros_types.IMU: imu_row}
+ROWS = {ros_messages.ODOMETRY: odometry_row, ros_messages.IMU: imu_row}
 
 
 def fill(kind, rng, texts):

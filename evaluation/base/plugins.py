@@ -1,4 +1,4 @@
-"""Families, a public noun: members by name, of this project and of plug-ins.
+"""Plug-ins and families, a public noun: members by name, ours and others.
 
 A plug-in is an installed package with an entry point of the group
 `cns_drake.plugins`, which names a module. The module registers members when it
