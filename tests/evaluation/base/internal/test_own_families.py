@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from evaluation.base import Family, families, program
+from evaluation.base import Family, plugins, program
 from evaluation.base.plugins import plugin_fault
 
 
@@ -13,7 +13,7 @@ from evaluation.base.plugins import plugin_fault
 def install(tmp_path, monkeypatch):
     """Installs packages with an entry point each, before plug-ins are read."""
     monkeypatch.syspath_prepend(tmp_path)
-    families._load_plugins.cache_clear()
+    plugins._load_plugins.cache_clear()
 
     def write(name, text, module=None):
         (tmp_path / f"{name}.py").write_text(text)
@@ -25,7 +25,7 @@ def install(tmp_path, monkeypatch):
         )
 
     yield write
-    families._load_plugins.cache_clear()
+    plugins._load_plugins.cache_clear()
 
 
 def test_members_come_in_order_and_once():
