@@ -5,6 +5,7 @@ from .deskewing import deskew as deskew
 from .deskewing import deskewed_notes as deskewed_notes
 from .deskewing import deskewed_scan as deskewed_scan
 from .drive import POSES_FRAME as POSES_FRAME
+from .drive import SHARED_FRAMES as SHARED_FRAMES
 from .drive import Drive as Drive
 from .drive import ImuSamples as ImuSamples
 from .drive import index_instances as index_instances

@@ -12,6 +12,7 @@ import numpy as np
 
 from evaluation.base import (
     FARTHEST_RETURN,
+    NS_PER_S,
     InputError,
     check_range,
     is_there,
@@ -19,6 +20,7 @@ from evaluation.base import (
     parse_json,
     poses,
     read_text,
+    read_yaml,
     value_errors,
     xyz,
 )
@@ -29,6 +31,7 @@ from evaluation.drives.drive import (
     Drive,
     as_given,
     index_instances,
+    is_shared,
     poses_frame,
 )
 from evaluation.drives.drive_scenario import SCENARIO, read_scenario
@@ -52,7 +55,7 @@ from evaluation.drives.point_cloud2 import (
     to_records,
 )
 from evaluation.drives.point_layouts import from_layout
-from evaluation.drives.rosbag_file import RosbagFile
+from evaluation.drives.rosbag_file import RosbagFile, check_finished
 from evaluation.drives.stamped_poses import PosedScans, StampedPoses
 from evaluation.drives.trajectories import read_trajectory
 
@@ -60,11 +63,13 @@ _IMU_TOPIC = "/imu/data"
 _TF_TOPIC = "/tf"
 _TF_STATIC_TOPIC = "/tf_static"
 _KALIBR = "imu.yaml"
-# By REP 105 of ROS, other frames, such as `odom`, may start anew in each drive.
-_SHARED_FRAME = "map"
 _METADATA = "metadata.yaml"
 # rosbag2 compresses each file or message if its metadata say so.
 _PACKED = r"^\s*compression_mode: *[\"']?(file|message)"
+# Files are not joined where the poses jump by more than this [m] ...
+_JUMP = 2.0
+# ... and this speed of a vehicle allow [m/s].
+_FASTEST = 50.0
 # A function that returns the poses of the LiDAR, given the scans' stamps [ns].
 _Poses = Callable[[np.ndarray], StampedPoses]
 # `image_transport` adds this to the names of topics of depth images.
@@ -100,7 +105,7 @@ _CLOUDS = _Stream(
     "point clouds",
     "LiDAR",
     _LIDAR_TOPIC,
-    ((ros_types.POINT_CLOUD, ros_types.LIVOX, ros_types.LIVOX_1),),
+    (ros_types.CLOUDS,),
     "--lidar TOPIC",
     "/points",
 )
@@ -144,8 +149,9 @@ class McapDrive(Drive):
     """
 
     placing = (
-        " (recordings share a world if their poses are in one frame; --odometry"
-        " TOPIC and --poses FILE choose others)"
+        " (bags share a world if their poses are in a frame map, utm, earth,"
+        " world or enu, or a scenario.yaml in the folder of each names one map;"
+        " --odometry TOPIC and --poses FILE choose other poses)"
     )
 
     def __init__(
@@ -257,11 +263,24 @@ class McapDrive(Drive):
     def world_frame(self) -> str:  # type: ignore[override]  # Read late.
         if self._pose_topic is None:
             return poses_frame(Path(str(self._posed_by.source)))
+        frame = self._pose_frame
+        return f"{frame}{self._path.resolve()}" if self.has_own_world else frame
+
+    @property
+    def has_own_world(self) -> bool:  # type: ignore[override]  # Read late.
+        return self._pose_topic is not None and not is_shared(
+            self._pose_frame, self.scenario
+        )
+
+    @property
+    def _pose_frame(self) -> str:
+        """Name of the frame of the poses of a topic, as recorded."""
+        assert self._pose_topic is not None
         return frame_name(self._topics.first(self._pose_topic).header.frame_id)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        notes = [*self._posed.notes, *self._mounted[1]]
+        notes = [*self._file.notes, *self._posed.notes, *self._mounted[1]]
         missing = self._posed.kept.stop - self._kept.stop
         if missing:
             notes.append(
@@ -274,12 +293,6 @@ class McapDrive(Drive):
                 f"{self._path}: {self._lidar_topic}: row_step is not width x"
                 " point_step; the points are read one after the other, which"
                 " the length of the data shows"
-            )
-        if self._pose_topic is not None and self.world_frame != _SHARED_FRAME:
-            notes.append(
-                f"{self._path}: {self._pose_topic}: all drives with poses in a"
-                f" frame {self.world_frame!r} count as drives in one world"
-                " (--align always aligns them nevertheless)"
             )
         return (*notes, *filter(None, [self.distortion_note]))
 
@@ -465,7 +478,31 @@ class McapDrive(Drive):
             rows["position"][kept], rows["quat_xyzw"][kept], str(self._path)
         )
         source = f"{self._path}: {self._pose_topic}"
+        self._check_joints(source, stamps_ns, X_WB[:, :3, 3])
         return StampedPoses(source, stamps_ns, X_WB, num_unknown)
+
+    def _check_joints(
+        self, source: str, stamps_ns: np.ndarray, p_WB: np.ndarray
+    ) -> None:
+        """Refuses files that are joined where the poses begin anew.
+
+        Args:
+            source: file and topic of the poses, for errors.
+            stamps_ns: (N,) stamps of the poses [ns].
+            p_WB: (N, 3) positions of the vehicle [m].
+        """
+        for joint_ns in self._file.joints_ns:
+            after = int(np.searchsorted(stamps_ns, joint_ns, side="right"))
+            if not 0 < after < len(stamps_ns):
+                continue
+            step_s = (stamps_ns[after] - stamps_ns[after - 1]) / NS_PER_S
+            jump = np.linalg.norm(p_WB[after] - p_WB[after - 1])
+            if jump > _JUMP + _FASTEST * step_s:
+                raise InputError(
+                    f"{source}: several recordings: the poses jump by"
+                    f" {jump:.1f} m where a file ends and the next begins; give"
+                    f" one of {' '.join(one.name for one in self._file.files)}"
+                )
 
     @property
     def X_BS(self) -> np.ndarray:
@@ -491,7 +528,7 @@ class McapDrive(Drive):
         """Whether points are in the frame of the poses, as of FAST-LIO's."""
         if self._pose_topic is None:
             return self._lidar_frame in _WORLD_FRAMES
-        return self._lidar_frame == self.world_frame
+        return self._lidar_frame == self._pose_frame
 
     @cached_property
     def _mounted(self) -> tuple[np.ndarray, list[str]]:
@@ -851,8 +888,15 @@ def _open_bag(path: Path) -> McapFile | RosbagFile:
         return McapFile(path)
     files = {ending: listed(path, f"*{ending}") for ending in _ENDINGS}
     mcap, sqlite, ros1 = (files[ending] for ending in _ENDINGS)
+    for file in listed(path, "*.bag.active"):
+        check_finished([file.with_suffix("")])
+    if sum(map(bool, files.values())) > 1:
+        names = " ".join(one.name for some in files.values() for one in some)
+        raise InputError(f"{path}: several recordings; give one of {names}")
     metadata = path / _METADATA
     told = read_text(metadata) if metadata.is_file() else ""
+    if told:
+        _check_listed(metadata, [*mcap, *sqlite])
     if len(mcap) == 1 and not re.search(_PACKED, told, re.I | re.M):
         return McapFile(mcap[0])
     if told:
@@ -866,6 +910,36 @@ def _open_bag(path: Path) -> McapFile | RosbagFile:
         f"{path}: {number} {ending} files instead of one, and no {_METADATA},"
         " which says that they are one bag"
     )
+
+
+def _check_listed(metadata: Path, files: Sequence[Path]) -> None:
+    """Refuses a bag of which rosbag2's list names fewer or more files.
+
+    Raises:
+        InputError: the list is no list, or other files are there.
+    """
+    content = read_yaml(metadata)
+    try:
+        told = content["rosbag2_bagfile_information"]["relative_file_paths"]
+        names = {Path(str(one)).name for one in told}
+    except (TypeError, KeyError):
+        return  # The reader says what is wrong.
+    packed = (".zstd", ".lz4")
+    there = {one.name for one in files} | {
+        one.name
+        for ending in packed
+        for one in listed(metadata.parent, f"*{ending}")
+    }
+    if len(names) == len(there):
+        return
+    for name in sorted(there - names):
+        raise InputError(
+            f"{metadata.parent / name}: not one of the files in"
+            f" {metadata.name} ({' '.join(sorted(names))}); `ros2 bag reindex`"
+            " lists all, or move it to a folder of its own"
+        )
+    missing = " ".join(sorted(names - there))
+    raise InputError(f"{metadata}: names files that are not there: {missing}")
 
 
 def _drive_name(path: Path) -> str:

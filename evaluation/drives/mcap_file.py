@@ -123,7 +123,11 @@ class McapFile:
 
     Attributes:
         path: path of the file.
+        notes, joints_ns: as of `RosbagFile`; there is one file.
     """
+
+    notes: tuple[str, ...] = ()
+    joints_ns: tuple[int, ...] = ()
 
     def __init__(self, path: Path):
         """Opens a file and reads its index.

@@ -7,18 +7,32 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 import contextlib
+import itertools
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rosbags.highlevel import AnyReader
 
-from evaluation.base import InputError, listed
+from evaluation.base import NS_PER_S, InputError, is_there, listed
 from evaluation.drives import ros_types
 from evaluation.drives.mcap_file import LOCATION
 
 # How to read a damaged bag of ROS 1, for error messages.
 _ADVICE = " (rosbag reindex FILE, of ROS 1, saves what is intact)"
+# A file of a recording begins this long after the end of the one before, at
+# most [ns].
+_NEXT_NS = 5 * NS_PER_S
+# What SQLite and the recorders leave beside a file that was not closed, by the
+# ending of its name. The package rosbags reads none of these.
+_UNFINISHED = {
+    "-wal": "messages of the bag are in this log only; on a copy of the folder,"
+    " `sqlite3 {file} 'PRAGMA wal_checkpoint(TRUNCATE)'` moves them",
+    "-journal": "the bag was not closed, and this log undoes a half-written"
+    " change; open a copy of the folder once with `sqlite3 {file} .tables`",
+    ".active": "the recording was not finished; `rosbag reindex` of a copy"
+    " without `.active` saves what is intact",
+}
 
 
 class RosbagFile:
@@ -32,6 +46,8 @@ class RosbagFile:
         path: the bag, for messages.
         files: its files.
         library: name of the program that wrote it, which is unknown.
+        joints_ns: log times at which a file of ROS 1 ends and the next begins
+            [ns].
     """
 
     library = ""
@@ -43,17 +59,20 @@ class RosbagFile:
             paths: the folder or file of rosbag2, or the files of ROS 1.
 
         Raises:
-            InputError: there is no readable bag.
+            InputError: there is no readable bag, its recorder left a file
+                behind that is not read, or the files are not one recording.
         """
         self.path = paths[0] if len(paths) == 1 else paths[0].parent
         self.files = (
             tuple(listed(self.path)) if self.path.is_dir() else tuple(paths)
         )
+        check_finished(self.files)
         with self._faults():
             self._reader = AnyReader(
                 paths, default_typestore=ros_types.known_types()
             )
             self._reader.open()
+        self.joints_ns = self._joints(paths)
         self._connections: dict[str, list[Any]] = {}
         for one in self._reader.connections:
             self._connections.setdefault(one.topic, []).append(one)
@@ -64,6 +83,55 @@ class RosbagFile:
         """Closes the bag, and removes what was uncompressed for it."""
         with contextlib.suppress(Exception):
             self._reader.close()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Notes on the files that were joined."""
+        names = [
+            one.name
+            for one in self.files
+            if {".bag", ".db3", ".mcap"} & set(one.suffixes)
+        ]
+        if len(names) < 2:
+            return ()
+        return (
+            f"{self.path}: {len(names)} files are read as one recording:"
+            f" {' '.join(names)}",
+        )
+
+    def _joints(self, paths: Sequence[Path]) -> list[int]:
+        """Returns where files of ROS 1 are joined; checks that they may be.
+
+        Raises:
+            InputError: a file does not continue the one before it.
+        """
+        readers: Any = sorted(
+            self._reader.readers, key=lambda one: one.start_time
+        )
+        for before, after in itertools.pairwise(readers):
+            gap_ns = after.start_time - before.end_time
+            first, second = (
+                {
+                    (one.topic, one.msgtype)
+                    for one in reader.connections
+                    if one.msgtype in ros_types.CLOUDS
+                }
+                for reader in (before, after)
+            )
+            why = ""
+            if gap_ns < -_NEXT_NS or after.end_time < before.end_time:
+                why = "are of the same time"
+            elif gap_ns > _NEXT_NS:
+                why = f"have {gap_ns / NS_PER_S:.0f} s between them"
+            elif first != second:
+                why = "have other topics of point clouds"
+            if why:
+                names = [Path(one.path).name for one in (before, after)]
+                raise InputError(
+                    f"{self.path}: several recordings: {' and '.join(names)}"
+                    f" {why}; give one of {' '.join(p.name for p in paths)}"
+                )
+        return [one.end_time for one in readers[:-1]]
 
     @property
     def topics(self) -> dict[str, list[str]]:
@@ -151,3 +219,16 @@ class RosbagFile:
                 f"{self.path}: the bag cannot be read"
                 f" ({type(error).__name__}: {error}){_ADVICE if is_1 else ''}"
             ) from error
+
+
+def check_finished(files: Sequence[Path]) -> None:
+    """Refuses a bag beside which its recorder left what is not read.
+
+    Raises:
+        InputError: there is such a file.
+    """
+    for file in files:
+        for ending, fault in _UNFINISHED.items():
+            left = file.with_name(file.name + ending)
+            if is_there(left) and left.stat().st_size:
+                raise InputError(f"{left}: {fault.format(file=file.name)}")

@@ -29,6 +29,7 @@ from evaluation.base import (
     completing,
     draft_folder,
     encode_pcd,
+    from_xyz,
     is_there,
     listed,
     poses,
@@ -373,6 +374,40 @@ def _g2o_poses(X: np.ndarray) -> Iterable[str]:
     quat_xyzw = Rotation.from_matrix(X[:, :3, :3]).as_quat(canonical=True)
     numbers = np.hstack([X[:, :3, 3], quat_xyzw]).tolist()
     return [" ".join(map(repr, row)) for row in numbers]
+
+
+class SessionDrive(Drive):
+    """The scans of a session as a drive, which can be aligned."""
+
+    def __init__(self, session: Session):
+        """Wraps a session.
+
+        Raises:
+            InputError: it has no scans.
+        """
+        if len(session.X_WS) == 0:
+            raise InputError(
+                f"{session.folder}: no scans and poses, by which maps are"
+                " aligned"
+            )
+        self.name = session.side
+        # Both maps of a folder are in one world, by the form of the folder.
+        self.world_frame = "map"
+        self._session = session
+
+    def __len__(self) -> int:
+        return len(self._session.X_WS)
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        return np.arange(len(self), dtype=np.int64)
+
+    @property
+    def X_WS(self) -> np.ndarray:
+        return self._session.X_WS
+
+    def scan(self, index: int) -> np.ndarray:
+        return from_xyz(self._session.scan(index))
 
 
 class SessionPair(NamedTuple):

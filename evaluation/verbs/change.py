@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from evaluation.alignment import When, open_in_one_world
+from evaluation.alignment import When, open_pair
 from evaluation.base import json_values, note
 from evaluation.change import (
     ChangeReport,
@@ -40,6 +40,7 @@ class Change(Measured):
             {
                 "source": self.report.source,
                 "target": self.report.target,
+                "world": self.world.to_json(),
                 "tcr_sym_registered": None,
                 "registration_yaw_deg": None,
                 **self.metrics,
@@ -67,8 +68,8 @@ def change_between(
         b: drive or map after the change.
         no_change: control: a third drive, on A's route in B's stage or on B's
             route in A's stage.
-        align: whether to align the drives: `auto` (if their world frames
-            differ), `always` or `never`.
+        align: whether to align the drives: `auto` (unless something says
+            that they share a world), `always` or `never`.
         lidar: name of the LiDAR, for recordings with several LiDARs; like the
             next three, one value for all drives, or a list with one for each.
         odometry: topic of the poses, for recordings with several.
@@ -89,10 +90,11 @@ def change_between(
     readings = Reading.each(
         len(given), lidar=lidar, odometry=odometry, poses=poses, columns=columns
     )
-    opened, alignments = open_in_one_world(given, readings, align, on_note)
+    opened = open_pair(given, readings, align, on_note)
+    alignments = opened.world.alignments
     maps = [
         map_source(one, reading.columns)
-        for one, reading in zip(opened, readings, strict=True)
+        for one, reading in zip(opened.drives, readings, strict=True)
     ]
     before, after, *controls = maps
     report = change_of_maps(before, after)
@@ -116,16 +118,24 @@ def change_between(
             on_note(f"{drive_map.name}: {ignored} {NOT_FINITE}")
     if report.note is not None:
         on_note(report.note)
+    world = opened.world
+    if report.note is not None:
+        world = replace(
+            world,
+            why=f"{world.why}; the poses decide a part of the change:"
+            f" {report.note}",
+        )
     names = before.name, after.name
     rows = []
     for stage, (found, newer) in compared.items():
         factors = {STAGE: stage} if controls else {}
         key = pair_key("tcr", _map_of(newer), names, "change", factors=factors)
-        rows += rows_of(numbers_of("change", found), key)
+        rows += rows_of(numbers_of("change", found), key, world)
     return Change(
         {one.metric: one for one in numbers_of("change", report)},
         Results.of(rows),
         QueryRows.of(()),
+        world,
         report,
     )
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from evaluation.alignment import When, open_in_one_world
+from evaluation.alignment import When, open_pair
 from evaluation.base import InputError, json_values, note
 from evaluation.drives import Drive, Reading
 from evaluation.localisation import (
@@ -70,6 +70,7 @@ class Localisation(Measured):
             "start": self.starts.radius,
             "start_turn_deg": self.starts.turn_deg,
             "seed": self.starts.seed,
+            "world": self.world.to_json(),
             **self.metrics,
             "seconds_mean": float(self.rows["seconds"].mean()),
         }
@@ -114,8 +115,8 @@ def localise(
         track: whether to track the whole drive.
         odometry_drift: drift of the odometry with which the drive is tracked,
             as a share of the distance; by default 0.01. Only with `track`.
-        align: whether to align the drives: `auto` (if their world frames
-            differ), `always` or `never`.
+        align: whether to align the drives: `auto` (unless something says
+            that they share a world), `always` or `never`.
         lidar: name of the LiDAR, for recordings with several LiDARs; like the
             next three, one value for all drives, or a list with one for each.
         odometry: topic of the poses, for recordings with several.
@@ -146,9 +147,8 @@ def localise(
     readings = Reading.each(
         2, lidar=lidar, odometry=odometry, poses=poses, columns=columns
     )
-    (source, asked), _ = open_in_one_world(
-        (place, query), readings, align, on_note
-    )
+    opened = open_pair((place, query), readings, align, on_note)
+    source, asked = opened.drives
     # A point cloud is a drive of one scan.
     if isinstance(asked, Drive):
         drive = asked
@@ -208,8 +208,9 @@ def localise(
     )
     return Localisation(
         {one.metric: one for one in numbers},
-        Results.of(rows_of(numbers, key)),
+        Results.of(rows_of(numbers, key, opened.world)),
         QueryRows.of([answers]),
+        opened.world,
         name,
         source.name,
         drive.name,

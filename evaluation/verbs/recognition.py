@@ -11,7 +11,7 @@ from typing import Any, get_args
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from evaluation.alignment import When, open_in_one_world
+from evaluation.alignment import When, open_pair
 from evaluation.base import (
     InputError,
     check_regular,
@@ -78,6 +78,7 @@ class Recognition(Measured):
                 "mode": self.mode,
                 "database": outcome.database,
                 "query": outcome.query,
+                "world": self.world.to_json(),
                 **metrics,
                 "intervals_95": {
                     name: one.to_json()
@@ -143,8 +144,8 @@ def recognise(
         sensor_height: height of the LiDAR above the ground for a named method
             [m].
         metrics: Python files that register metrics of your own.
-        align: whether to align the drives: `auto` (if their world frames
-            differ), `always` or `never`.
+        align: whether to align the drives: `auto` (unless something says
+            that they share a world), `always` or `never`.
         across_maps: whether the drives may be through maps of different names.
         lidar: name of the LiDAR, for recordings with several LiDARs; like the
             next three, one value for all drives, or a list with one for each.
@@ -188,10 +189,10 @@ def recognise(
     readings = Reading.each(
         2, lidar=lidar, odometry=odometry, poses=poses, columns=columns
     )
-    opened, _ = open_in_one_world(
+    opened = open_pair(
         (database, query), readings, align, on_note, across_maps=across_maps
     )
-    places, queries = drives = [_scans_of(one) for one in opened]
+    places, queries = drives = [_scans_of(one) for one in opened.drives]
     overlaps = _overlaps(places, queries, protocol, exact_overlaps)
     ((outcomes, _),) = measure_places(
         noting(on_note),
@@ -241,7 +242,7 @@ def recognise(
             row
             for task in key
             for one in outcomes
-            for row in rows_of(one.numbers(task), key[task])
+            for row in rows_of(one.numbers(task), key[task], opened.world)
         ),
         QueryRows.of(
             Answers(
@@ -252,6 +253,7 @@ def recognise(
             )
             for one in outcomes
         ),
+        opened.world,
         made,
         outcome,
         mode,

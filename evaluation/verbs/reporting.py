@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
+from evaluation.alignment import When
 from evaluation.base import Cluster, choose_cluster, note
 from evaluation.recognition import PROTOCOLS, RetrievalProtocol, choose_methods
 from evaluation.results import PrintStyle
@@ -20,6 +21,7 @@ def report(
     protocols: Mapping[str, RetrievalProtocol] | None = None,
     lidar: str | None = None,
     columns: int | None = None,
+    align: When = "auto",
     cluster: Cluster | None = None,
     with_costs: bool = True,
     printed: PrintStyle | None = None,
@@ -40,6 +42,8 @@ def report(
             `random-yaw`.
         lidar: name of the LiDAR, for recordings with several LiDARs.
         columns: number of columns of `.bin` files.
+        align: whether to align the recordings of a map: `auto` (if their worlds
+            differ), `always` or `never`.
         cluster: runs the jobs; by default a job for each core.
         with_costs: whether the page shows the times and memory of methods.
         printed: style of the charts for print.
@@ -72,4 +76,5 @@ def report(
         with_costs=with_costs,
         printed=printed,
         on_note=on_note,
+        align=align,
     )

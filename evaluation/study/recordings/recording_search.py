@@ -205,5 +205,5 @@ def _recording_info(
         scenario=scenario_digest(scenario),
         length=float(travelled(drive.X_WS[:, :3, 3])[-1]),
         num_scans=len(drive),
-        world_frame=drive.world_frame,
+        world=drive.world,
     )

@@ -138,7 +138,7 @@ BAGS = {
         [*clouds("/velodyne_points", "velodyne", "x y z intensity ring time"),
          *clouds("/kiss/local_map", "odom_lidar", in_world=True),
          *odometry("/kiss/odometry", "odom_lidar", "velodyne", X_BS)],
-        {}, {"lidar": "/velodyne_points"}, "'odom_lidar' count as drives",
+        {}, {"lidar": "/velodyne_points"}, "poses are interpolated",
     ),
     "robot_localization": (
         [*static(BASE), *clouds("/velodyne_points", "velodyne"),
