@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 import contextlib
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 import re
@@ -56,7 +57,11 @@ from evaluation.drives.point_cloud2 import (
 )
 from evaluation.drives.point_layouts import from_layout
 from evaluation.drives.rosbag_file import RosbagFile, check_finished
-from evaluation.drives.stamped_poses import PosedScans, StampedPoses
+from evaluation.drives.stamped_poses import (
+    LONGEST_GAP,
+    PosedScans,
+    StampedPoses,
+)
 from evaluation.drives.trajectories import read_trajectory
 
 _IMU_TOPIC = "/imu/data"
@@ -66,6 +71,7 @@ _KALIBR = "imu.yaml"
 _METADATA = "metadata.yaml"
 # rosbag2 compresses each file or message if its metadata say so.
 _PACKED = r"^\s*compression_mode: *[\"']?(file|message)"
+_GAP_ADVICE = " (--pose-gap SECONDS allows more)"
 # Files are not joined where the poses jump by more than this [m] ...
 _JUMP = 2.0
 # ... and this speed of a vehicle allow [m/s].
@@ -160,6 +166,7 @@ class McapDrive(Drive):
         lidar: str | None = None,
         odometry: str | None = None,
         poses: _Poses | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a recording.
 
@@ -171,6 +178,8 @@ class McapDrive(Drive):
             odometry: topic of the poses.
             poses: function that returns poses of the LiDAR, which are used
                 instead of those of a topic.
+            pose_gap: greatest time between two poses that are interpolated [s];
+                by default a second.
 
         Raises:
             InputError: if there is no complete recording at `path`, or no such
@@ -185,6 +194,7 @@ class McapDrive(Drive):
             self.name = str((self.scenario or {}).get("name", self.name))
         self._lidar_topic = self._topics.choose(_CLOUDS, lidar)
         self._given = poses
+        self._longest_gap = LONGEST_GAP if pose_gap is None else pose_gap
         self._pose_topic = None
         if poses is None:
             self._pose_topic = self._topics.choose(_POSES, odometry)
@@ -462,7 +472,11 @@ class McapDrive(Drive):
     def _posed_by(self) -> StampedPoses:
         """The poses of the vehicle, or those of the LiDAR from a file."""
         if self._given is not None:
-            return self._given(self._all_scans[0])
+            return replace(
+                self._given(self._all_scans[0]),
+                longest_gap=self._longest_gap,
+                advice=_GAP_ADVICE,
+            )
         return self._trajectory()
 
     def _trajectory(self, *later: np.ndarray) -> StampedPoses:
@@ -473,13 +487,20 @@ class McapDrive(Drive):
         known = np.isfinite(rows["position"]).all(axis=1) & (length > 0.0)
         num_unknown = len(rows) - int(known.sum())
         rows = rows[known] if known.any() else rows
-        stamps_ns, kept = np.unique(rows["stamp_ns"], return_index=True)
         X_WB = checked_poses(
-            rows["position"][kept], rows["quat_xyzw"][kept], str(self._path)
+            rows["position"], rows["quat_xyzw"], str(self._path)
         )
         source = f"{self._path}: {self._pose_topic}"
-        self._check_joints(source, stamps_ns, X_WB[:, :3, 3])
-        return StampedPoses(source, stamps_ns, X_WB, num_unknown)
+        found = StampedPoses.of(
+            source,
+            rows["stamp_ns"],
+            X_WB,
+            num_unknown=num_unknown,
+            longest_gap=self._longest_gap,
+            advice=_GAP_ADVICE,
+        )
+        self._check_joints(source, found.stamps_ns, found.X_WB[:, :3, 3])
+        return found
 
     def _check_joints(
         self, source: str, stamps_ns: np.ndarray, p_WB: np.ndarray
@@ -679,10 +700,10 @@ class _Topics:
             InputError: the topic has messages of other types.
         """
         found = self.file.topics[topic]
-        if found != [f"{message_type} in cdr"]:
+        if found != [message_type]:
             raise InputError(
                 f"{self.path}: {topic}: {' and '.join(found)} instead of"
-                f" {message_type} in cdr{_ros_1_advice(found)}"
+                f" {message_type}{_ros_1_advice(found)}"
             )
         self._types[topic] = message_type
 
@@ -694,7 +715,7 @@ class _Topics:
         found = [
             topic
             for topic, kinds in self.file.topics.items()
-            if kinds == [f"{message_type} in cdr"]
+            if kinds == [message_type]
         ]
         self._types |= dict.fromkeys(found, message_type)
         return found
@@ -744,7 +765,8 @@ class _Topics:
                     for row in POSE_ROWS[kind](mcap_messages.decode(data, kind))
                 ]
                 found = np.array(made, ODOMETRY_DTYPE)
-            check_agreement(found)
+            if kind == ros_types.IMU:
+                check_agreement(found)
         return found[np.argsort(found["stamp_ns"], kind="stable")]
 
     def _path(self, topic: str) -> np.ndarray:
@@ -973,10 +995,11 @@ def _open(
     lidar: str | None = None,
     odometry: str | None = None,
     poses: Path | None = None,
+    pose_gap: float | None = None,
 ) -> McapDrive:
     """Opens a bag; the arguments are those of `open_drive`."""
     given = None if poses is None else partial(read_trajectory, Path(poses))
-    return McapDrive(path, lidar, odometry, given)
+    return McapDrive(path, lidar, odometry, given, pose_gap)
 
 
 DATA_SET = DataSet(

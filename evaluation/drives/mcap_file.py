@@ -154,7 +154,9 @@ class McapFile:
 
     @property
     def topics(self) -> dict[str, list[str]]:
-        """Maps topics to sorted types of messages, as `<type> in <encoding>`.
+        """Maps topics to sorted types of messages.
+
+        A type of messages that are not in CDR is `<type> in <encoding>`.
 
         In an intact recording each topic has exactly one such entry. Channels
         without a message do not count: `ros2 bag record` writes them for all
@@ -289,7 +291,8 @@ class McapFile:
     def _kind(self, channel: Channel) -> str:
         schema = self._contents.schemas.get(channel.schema_id)
         name = "a message without a type" if schema is None else schema.name
-        return f"{name} in {channel.message_encoding}"
+        encoding = channel.message_encoding
+        return name if encoding == "cdr" else f"{name} in {encoding}"
 
     def _read_locations(self, topic: str) -> np.ndarray:
         numbers = [channel.id for channel in self._channels[topic]]

@@ -9,17 +9,27 @@ from collections.abc import Iterator, Sequence
 import contextlib
 import itertools
 from pathlib import Path
+import re
 from typing import Any
 
 import numpy as np
 from rosbags.highlevel import AnyReader
 
-from evaluation.base import NS_PER_S, InputError, is_there, listed
+from evaluation.base import (
+    NS_PER_S,
+    InputError,
+    check_regular,
+    is_there,
+    listed,
+)
 from evaluation.drives import ros_types
 from evaluation.drives.mcap_file import LOCATION
 
 # How to read a damaged bag of ROS 1, for error messages.
 _ADVICE = " (rosbag reindex FILE, of ROS 1, saves what is intact)"
+# How a bag of ROS 1 begins; its header has the place of the index.
+_MAGIC = b"#ROSBAG V2.0"
+_START_BYTES = 4200
 # A file of a recording begins this long after the end of the one before, at
 # most [ns].
 _NEXT_NS = 5 * NS_PER_S
@@ -119,7 +129,10 @@ class RosbagFile:
                 for reader in (before, after)
             )
             why = ""
-            if gap_ns < -_NEXT_NS or after.end_time < before.end_time:
+            shorter_ns = min(
+                one.end_time - one.start_time for one in (before, after)
+            )
+            if -gap_ns > min(NS_PER_S, shorter_ns // 2):
                 why = "are of the same time"
             elif gap_ns > _NEXT_NS:
                 why = f"have {gap_ns / NS_PER_S:.0f} s between them"
@@ -137,7 +150,7 @@ class RosbagFile:
     def topics(self) -> dict[str, list[str]]:
         """Maps topics with messages to types, as `McapFile.topics`."""
         return {
-            topic: sorted({f"{one.msgtype} in cdr" for one in connections})
+            topic: sorted({one.msgtype for one in connections})
             for topic, connections in self._connections.items()
             if any(one.msgcount for one in connections)
         }
@@ -214,11 +227,25 @@ class RosbagFile:
             raise
         except Exception as error:
             # rosbags, SQLite and the compression raise errors of any class.
-            is_1 = any(file.suffix == ".bag" for file in self.files)
             raise InputError(
                 f"{self.path}: the bag cannot be read"
-                f" ({type(error).__name__}: {error}){_ADVICE if is_1 else ''}"
+                f" ({type(error).__name__}: {error}){self._advice()}"
             ) from error
+
+    def _advice(self) -> str:
+        """Returns what helps against the error of a bag of ROS 1, if known."""
+        for file in self.files:
+            if file.suffix != ".bag" or not file.is_file():
+                continue
+            with open(file, "rb") as stream:
+                start = stream.read(_START_BYTES)
+            if not start.startswith(_MAGIC):
+                return f" ({file.name} does not begin as a bag of ROS 1)"
+            found = re.search(rb"index_pos=(.{8})", start, re.DOTALL)
+            place = int.from_bytes(found[1], "little") if found else 0
+            if not 0 < place < file.stat().st_size:
+                return _ADVICE
+        return ""
 
 
 def check_finished(files: Sequence[Path]) -> None:
@@ -228,6 +255,8 @@ def check_finished(files: Sequence[Path]) -> None:
         InputError: there is such a file.
     """
     for file in files:
+        if is_there(file):  # Of a recording that goes on, the file is not.
+            check_regular(file)
         for ending, fault in _UNFINISHED.items():
             left = file.with_name(file.name + ending)
             if is_there(left) and left.stat().st_size:

@@ -59,6 +59,7 @@ def change_between(
     odometry: str | Sequence[str] | None = None,
     poses: Path | Sequence[Path] | None = None,
     columns: int | Sequence[int] | None = None,
+    pose_gap: float | None = None,
     on_note: Callable[[str], None] = note,
 ) -> Change:
     """Measures how much changed between two drives, as `cns-eval tcr` does.
@@ -75,6 +76,8 @@ def change_between(
         odometry: topic of the poses, for recordings with several.
         poses: file with the poses of the LiDAR, see `open_drive`.
         columns: number of columns of `.bin` files.
+        pose_gap: greatest time between two poses of a bag that are interpolated
+            [s], see `open_drive`.
         on_note: is called with notes for the user.
 
     Raises:
@@ -88,7 +91,12 @@ def change_between(
     """
     given = [one for one in (a, b, no_change) if one is not None]
     readings = Reading.each(
-        len(given), lidar=lidar, odometry=odometry, poses=poses, columns=columns
+        len(given),
+        lidar=lidar,
+        odometry=odometry,
+        poses=poses,
+        columns=columns,
+        pose_gap=pose_gap,
     )
     opened = open_pair(given, readings, align, on_note)
     alignments = opened.world.alignments

@@ -96,6 +96,7 @@ def localise(
     odometry: str | Sequence[str] | None = None,
     poses: Path | Sequence[Path] | None = None,
     columns: int | Sequence[int] | None = None,
+    pose_gap: float | None = None,
     processes: int = 1,
     on_note: Callable[[str], None] = note,
 ) -> Localisation:
@@ -122,6 +123,8 @@ def localise(
         odometry: topic of the poses, for recordings with several.
         poses: file with the poses of the LiDAR, see `open_drive`.
         columns: number of columns of `.bin` files.
+        pose_gap: greatest time between two poses of a bag that are interpolated
+            [s], see `open_drive`.
         processes: number of processes that localise single scans.
         on_note: is called with notes for the user.
 
@@ -145,7 +148,12 @@ def localise(
     chosen = default_settings(str(method)).with_values(values, str(method))
     make_estimator(str(method), chosen)
     readings = Reading.each(
-        2, lidar=lidar, odometry=odometry, poses=poses, columns=columns
+        2,
+        lidar=lidar,
+        odometry=odometry,
+        poses=poses,
+        columns=columns,
+        pose_gap=pose_gap,
     )
     opened = open_pair((place, query), readings, align, on_note)
     source, asked = opened.drives

@@ -123,6 +123,7 @@ def recognise(
     odometry: str | Sequence[str] | None = None,
     poses: Path | Sequence[Path] | None = None,
     columns: int | Sequence[int] | None = None,
+    pose_gap: float | None = None,
     exact_overlaps: Path | None = None,
     on_note: Callable[[str], None] = note,
     **fields: Any,
@@ -152,6 +153,8 @@ def recognise(
         odometry: topic of the poses, for recordings with several.
         poses: file with the poses of the LiDAR, see `open_drive`.
         columns: number of columns of `.bin` files.
+        pose_gap: greatest time between two poses of a bag that are interpolated
+            [s], see `open_drive`.
         exact_overlaps: file with exact overlaps; by default overlaps are
             estimated from the scans. It needs the field `overlap`.
         on_note: is called with notes for the user.
@@ -187,7 +190,12 @@ def recognise(
             f" {_named(query)} is not {_named(database)}"
         )
     readings = Reading.each(
-        2, lidar=lidar, odometry=odometry, poses=poses, columns=columns
+        2,
+        lidar=lidar,
+        odometry=odometry,
+        poses=poses,
+        columns=columns,
+        pose_gap=pose_gap,
     )
     opened = open_pair(
         (database, query), readings, align, on_note, across_maps=across_maps

@@ -245,7 +245,10 @@ CONTRADICTIONS: dict[
     "a far point": (_changed(_far_point, _LIDAR, False), r"at \d+ ns: [xyz]:"),
     "another width": (_changed(_other_size, _LIDAR), "bytes|overlap"),
     "another height": (_changed(_more_rows, _LIDAR), "bytes instead of"),
-    "another encoding": (_add_channel(encoding="json"), "in cdr and .* json"),
+    "another encoding": (
+        _add_channel(encoding="json"),
+        "PointCloud2 and .* in json",
+    ),
     "another type": (_another_type, "and .* instead of"),
 }
 

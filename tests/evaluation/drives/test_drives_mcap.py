@@ -483,8 +483,10 @@ def test_a_local_frame_is_of_one_recording(tmp_path, frame):
     """By REP 105, `odom` begins anew; equal words name different frames."""
 
     def drive(name):
-        return open_drive(record(tmp_path / name, world_frame=frame)[0].parent)
+        return open_drive(tmp_path / name)
 
+    for name in "abc":
+        record(tmp_path / name, world_frame=frame)
     first, second = drive("a"), drive("b")
     assert first.has_own_world
     assert first.world == drive("a").world != second.world
@@ -493,7 +495,6 @@ def test_a_local_frame_is_of_one_recording(tmp_path, frame):
             check_same_world(first, one)
     check_same_world(first, drive("a"))
     for name, city in (("a", "town"), ("b", "maps/town"), ("c", "village")):
-        (tmp_path / name).mkdir(exist_ok=True)
         (tmp_path / name / "scenario.yaml").write_text(f"map: {city}\n")
     # A user says that both are in one world.
     check_same_world(drive("a"), drive("b"))
