@@ -134,10 +134,9 @@ def open_pair(
             moved.append(number)
     world = _world(drives, clouds, aligned=bool(moved))
     on_note(f"world: {world.why}")
-    for drive in drives:
-        for text in drive.notes:
-            on_note(text)
-    for text in _misfits(drives, placed=not moved and not clouds):
+    notes = [text for drive in drives for text in drive.notes]
+    notes += _misfits(drives, placed=not moved and not clouds)
+    for text in dict.fromkeys(notes):
         on_note(text)
     reports = []
     for number in moved:

@@ -441,7 +441,23 @@ def read_truth(pair: SessionPair) -> PairLabels:
     """
     return PairLabels(
         *(
-            read_labels(session.folder / "truth.npy", session, truth=True)
+            read_labels(_truth_of(session), session, truth=True)
             for session in pair
         )
     )
+
+
+def _truth_of(session: Session) -> Path:
+    """Returns the file with the ground truth of a session.
+
+    Raises:
+        InputError: there is none.
+    """
+    path = session.folder / "truth.npy"
+    if not is_there(path):
+        raise InputError(
+            f"{path}: not there; labels are scored against it: what happened to"
+            " each point of map.ply (cns-drake truth makes it of simulated"
+            " drives)"
+        )
+    return path

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from evaluation.alignment import When, open_pair
 from evaluation.base import json_values, note
 from evaluation.change import (
@@ -22,6 +24,11 @@ from evaluation.drives import NOT_FINITE, Drive, Reading
 from evaluation.recognition import numbers_of
 from evaluation.results import LAST, OWN, STAGE, QueryRows, Results
 from evaluation.verbs.measured import Measured, map_of, pair_key, rows_of
+
+# What registration corrects is told above this angle [deg] ...
+_TURNED_DEG = 0.25
+# ... and this distance [m].
+_MOVED = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,12 +134,19 @@ def change_between(
     if report.note is not None:
         on_note(report.note)
     world = opened.world
-    if report.note is not None:
-        world = replace(
-            world,
-            why=f"{world.why}; the poses decide a part of the change:"
-            f" {report.note}",
+    off = report.registered
+    if off is not None and (
+        abs(off.yaw_deg) > _TURNED_DEG or np.linalg.norm(off.offset) > _MOVED
+    ):
+        x, y, z = off.offset
+        text = (
+            f"the recorded poses decide: registration turns {after.name} by"
+            f" {off.yaw_deg:.2f} deg and moves it by ({x:.2f}, {y:.2f},"
+            f" {z:.2f}) m"
         )
+        world = replace(world, why=f"{world.why}; {text}")
+        if report.note is None:
+            on_note(text)
     names = before.name, after.name
     rows = []
     for stage, (found, newer) in compared.items():

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from evaluation.alignment import When, open_pair
+from evaluation.alignment import When, World, open_pair
 from evaluation.base import InputError, json_values, note
 from evaluation.drives import Drive, Reading
 from evaluation.localisation import (
@@ -19,6 +19,7 @@ from evaluation.localisation import (
     OneScan,
     Starts,
     default_settings,
+    is_right,
     localisation_columns,
     localised,
     make_estimator,
@@ -37,6 +38,12 @@ from evaluation.verbs.measured import (
 
 # Drift of the odometry by default, as a share of the distance.
 _USUAL_DRIFT = 0.01
+# The poses decide if this part of the scans is localised, and lies ...
+_MOSTLY = 0.5
+# ... this far [m] ...
+_MOVED = 0.25
+# ... or turned [deg] from the poses, in the median.
+_TURNED_DEG = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,11 +221,12 @@ def localise(
     answers = Answers(
         **key, method=name, verified=False, columns=localisation_columns(rows)
     )
+    world = _with_offset(opened.world, rows, on_note)
     return Localisation(
         {one.metric: one for one in numbers},
-        Results.of(rows_of(numbers, key, opened.world)),
+        Results.of(rows_of(numbers, key, world)),
         QueryRows.of([answers]),
-        opened.world,
+        world,
         name,
         source.name,
         drive.name,
@@ -226,6 +234,33 @@ def localise(
         odometry_drift,
         rows,
     )
+
+
+def _with_offset(
+    world: World, rows: np.ndarray, on_note: Callable[[str], None]
+) -> World:
+    """Adds to the verdict how far poses lie from registration, if far.
+
+    Args:
+        world: the verdict.
+        rows: the results, see `Localisation`.
+        on_note: is called with what is added.
+    """
+    right = is_right(rows)
+    if right.mean() < _MOSTLY:
+        return world
+    off, turn_deg = (
+        float(np.median(rows[name][right]))
+        for name in ("translation_error", "rotation_error_deg")
+    )
+    if off < _MOVED and turn_deg < _TURNED_DEG:
+        return world
+    text = (
+        "the recorded poses decide: scans that are registered to the map lie"
+        f" {off:.2f} m and {turn_deg:.2f} deg from them, in the median"
+    )
+    on_note(text)
+    return replace(world, why=f"{world.why}; {text}")
 
 
 def _check(

@@ -13,6 +13,7 @@ from scipy.spatial.distance import cdist
 
 from evaluation.alignment import When, open_pair
 from evaluation.base import (
+    NS_PER_S,
     InputError,
     check_regular,
     json_values,
@@ -33,6 +34,7 @@ from evaluation.recognition import (
     compared_frames,
     load_metrics,
     measure_places,
+    never_returns,
     overlap_matrix,
     read_overlaps,
 )
@@ -201,6 +203,7 @@ def recognise(
         (database, query), readings, align, on_note, across_maps=across_maps
     )
     places, queries = drives = [_scans_of(one) for one in opened.drives]
+    _check_returns(places, queries, protocol)
     overlaps = _overlaps(places, queries, protocol, exact_overlaps)
     ((outcomes, _),) = measure_places(
         noting(on_note),
@@ -328,6 +331,25 @@ def _is_itself(database: Drive | Path | str, query: Drive | Path | str) -> bool:
 
 def _named(given: Drive | Path | str) -> str:
     return given.name if isinstance(given, Drive) else str(given)
+
+
+def _check_returns(
+    places: Drive, queries: Drive, protocol: RetrievalProtocol
+) -> None:
+    """Refuses a drive that never returns, before its scans are described.
+
+    Raises:
+        InputError: the drive never returns.
+    """
+    recent_s = protocol.exclude_recent
+    if recent_s is None or protocol.overlap is not None:
+        return
+    rows, columns = compared_frames(places, queries, protocol)
+    away = cdist(queries.X_WS[rows, :3, 3], places.X_WS[columns, :3, 3])
+    age_ns = queries.stamps_ns[rows, None] - places.stamps_ns[columns]
+    is_old = age_ns >= recent_s * NS_PER_S
+    if not (is_old & (away.round(9) <= protocol.radius)).any():
+        raise InputError(never_returns(queries.name, protocol))
 
 
 def _overlaps(
