@@ -25,7 +25,8 @@ When = Literal["auto", "always", "never"]
 _PAUSE = 10.0
 # The mounts of two LiDARs are told if their heights differ by more [m].
 _MOUNT = 0.2
-# Drives that are nowhere closer than this have no place in common [m].
+# Drives that are nowhere closer than this have no place in common, and the
+# verdict says so [m].
 _APART = 200.0
 
 
@@ -135,7 +136,7 @@ def open_pair(
     world = _world(drives, clouds, aligned=bool(moved))
     on_note(f"world: {world.why}")
     notes = [text for drive in drives for text in drive.notes]
-    notes += _misfits(drives, placed=not moved and not clouds)
+    notes += _misfits(drives)
     for text in dict.fromkeys(notes):
         on_note(text)
     reports = []
@@ -204,16 +205,12 @@ def _world(
         return replace(
             found, aligned=True, why=f"{found.why}; aligned by their scans"
         )
-    return found
+    places = "".join(_apart(drives[0], one) for one in drives[1:])
+    return replace(found, why=f"{found.why}{places}")
 
 
-def _misfits(drives: Sequence[Drive], *, placed: bool) -> list[str]:
-    """Returns notes on pauses, mounts and places that do not fit.
-
-    Args:
-        drives: the drives.
-        placed: whether they are in one world already.
-    """
+def _misfits(drives: Sequence[Drive]) -> list[str]:
+    """Returns notes on pauses of drives, and on mounts that do not fit."""
     notes = []
     for drive in dict.fromkeys(drives):
         steps = np.diff(drive.stamps_ns) / NS_PER_S
@@ -235,14 +232,18 @@ def _misfits(drives: Sequence[Drive], *, placed: bool) -> list[str]:
             f"the LiDARs are mounted at different heights above their vehicles:"
             f" {listed} m"
         )
-    if placed and len(drives) > 1:
-        first, second = (one.X_WS[:, :3, 3] for one in drives[:2])
-        low = np.maximum(first.min(axis=0), second.min(axis=0))
-        high = np.minimum(first.max(axis=0), second.max(axis=0))
-        apart = float(np.linalg.norm(np.maximum(low - high, 0.0)[:2]))
-        if apart > _APART:
-            notes.append(
-                f"{drives[1].name}: nowhere within {apart:.0f} m of"
-                f" {drives[0].name}; --align always aligns them"
-            )
     return notes
+
+
+def _apart(first: Drive, second: Drive) -> str:
+    """Returns that two drives in one world are nowhere near; "" if they are."""
+    p, q = (one.X_WS[:, :2, 3] for one in (first, second))
+    low = np.maximum(p.min(axis=0), q.min(axis=0))
+    high = np.minimum(p.max(axis=0), q.max(axis=0))
+    away = float(np.linalg.norm(np.maximum(low - high, 0.0)))
+    if away <= _APART:
+        return ""
+    return (
+        f"; {second.name} is nowhere within {away:.0f} m of {first.name}"
+        " (--align always aligns them)"
+    )

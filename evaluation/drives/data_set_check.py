@@ -130,7 +130,6 @@ def check_data_set(drive: Drive | Path | str, **options: Any) -> None:
     with errors_at(place, f"{opened.name}: "):
         for check in data_set_checks:
             check(opened)
-    note(f"{opened.name}: {len(data_set_checks)} checks passed")
 
 
 _Faults = Callable[[Drive], Iterator[str]]

@@ -423,6 +423,29 @@ def test_what_is_missing_is_named(tmp_path, options, fault):
         _ = open_drive(path, **options).X_WS
 
 
+@pytest.mark.parametrize("gap", [None, 1.0, 1.25])
+def test_poses_of_a_receiver_at_1_hz_need_an_option(tmp_path, gap):
+    """Its clock jitters about a second, which is the limit."""
+    times = [T0_NS, T0_NS + 1_200_000_000]
+    rows = list(odometry("/odom", "map", "os", X_BS))
+    few = [(*rows[0][:2], t, {**rows[0][3], "header": header(t, "map")})
+           for t in times]  # fmt: skip
+    path = write_bag(tmp_path / "a", [*clouds("/points", "os"), *few])
+    if gap == 1.25:
+        assert len(open_drive(path, pose_gap=gap)) == NUM_SCANS
+        return
+    said = r"1\.2 s apart, more than 1 s \(--pose-gap SECONDS allows more\)"
+    with pytest.raises(InputError, match=said):
+        _ = open_drive(path, pose_gap=gap).X_WS
+
+
+@pytest.mark.parametrize("gap", [0.0, -1.0, np.inf, np.nan])
+def test_a_gap_that_is_none_is_refused(tmp_path, gap):
+    path = session(tmp_path / "a.bag", 0.0)
+    with pytest.raises(InputError, match=r"--pose-gap: .* is not above 0"):
+        open_drive(path, pose_gap=gap)
+
+
 def test_a_bag_of_ros_1_that_is_cut_off_names_its_cure(tmp_path):
     path = write(tmp_path, [*clouds("/points", "os")], ending=".bag")
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
@@ -542,6 +565,32 @@ def test_a_recording_that_goes_on_is_named(tmp_path):
     (tmp_path / "a_1.bag.active").write_bytes(b"#ROSBAG V2.0")
     with pytest.raises(InputError, match=r"a_1\.bag\.active: .*not finished"):
         open_drive(tmp_path)
+
+
+def test_what_is_no_bag_of_ros_1_is_not_reindexed(tmp_path):
+    path = tmp_path / "ride.bag"
+    path.write_text("This is a text.\n" * 100)
+    with pytest.raises(InputError, match="does not begin as a bag") as error:
+        open_drive(path)
+    assert "reindex" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["ride.bag", "ride.mcap", "ride.db3"])
+def test_a_pointer_of_git_lfs_is_named(tmp_path, name):
+    (tmp_path / name).write_text(
+        "version https://git-lfs.github.com/spec/v1\n"
+        f"oid sha256:{'0' * 64}\nsize 123456\n"
+    )
+    for path in (tmp_path / name, tmp_path):
+        with pytest.raises(InputError, match=rf"{name}: a pointer of Git LFS"):
+            open_drive(path)
+
+
+def test_topics_of_ros_1_are_named_in_its_words(tmp_path):
+    path = session(tmp_path / "a.bag", 0.0)
+    with pytest.raises(InputError, match="/odometry: nav_msgs/msg/Odo") as e:
+        open_drive(path, lidar="/odometry")
+    assert "cdr" not in str(e.value)
 
 
 @pytest.mark.parametrize("options", [{}, {"lidar": "/velodyne"}])
