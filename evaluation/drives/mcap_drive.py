@@ -1,13 +1,12 @@
 """Drives in bags of ROS: recordings of cns-drake, and those of robots."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 import re
 from typing import Any, NamedTuple, NoReturn
-import zlib
 
 import numpy as np
 
@@ -207,6 +206,11 @@ class McapDrive(Drive):
         ):
             if topic in self._file.topics:
                 self._topics.require(topic, kind)
+        poses_and_mounts = [self._pose_topic, _TF_STATIC_TOPIC]
+        self._topics.read_together(
+            self._lidar_topic,
+            [one for one in poses_and_mounts if one and one in self._topics],
+        )
         self._has_tf = _TF_TOPIC in self._topics.find(ros_types.TF)
         self._images = _McapImages(self._topics)
 
@@ -749,19 +753,18 @@ class _Topics:
                 the same stamp.
         """
         kind = self._types[topic]
-        places = self.file.locate(topic)
         with self.faults(topic):
             if kind == ros_types.PATH:
                 found = self._path(topic)
             elif kind in (ros_types.ODOMETRY, ros_types.IMU):
-                rows = MessageRows(kind, len(places))
-                for index, data in self.file.visit(places):
+                rows = MessageRows(kind, len(self.file.locate(topic)))
+                for index, data in self.visit(topic):
                     rows.add(index, data)
                 found = rows.rows()
             else:
                 made = [
                     row
-                    for _, data in self.file.visit(places)
+                    for _, data in self.visit(topic)
                     for row in POSE_ROWS[kind](mcap_messages.decode(data, kind))
                 ]
                 found = np.array(made, ODOMETRY_DTYPE)
@@ -804,17 +807,37 @@ class _Topics:
             self._by_stamp[topic] = self._sorted(topic)
         return self._by_stamp[topic]
 
+    def read_together(self, clouds: str, small: Sequence[str]) -> None:
+        """Names the topics of a drive, so that the bag is read once for all.
+
+        Args:
+            clouds: topic of the scans.
+            small: topics with messages whose contents are kept.
+        """
+        # Of a bag whose log times are stamps, not all messages are read.
+        if self.logged_stamps_ns(clouds) is None:
+            self.file.index.prepare(
+                [(clouds, False), *((one, True) for one in small)]
+            )
+
+    def visit(self, topic: str) -> Iterator[tuple[int, memoryview]]:
+        """Yields the number and the content of each message of a topic."""
+        if topic in self.file.index:
+            index = self.file.index.of(topic)
+            if index.has_contents:
+                for number in range(len(index.log_times_ns)):
+                    yield number, index.message(number)
+                return
+        yield from self.file.visit(self.file.locate(topic))
+
     def _sorted(self, topic: str) -> tuple[np.ndarray, np.ndarray]:
-        places = self.file.locate(topic)
         logged_ns = self.logged_stamps_ns(topic)
+        places = self.file.locate(topic)
         if logged_ns is not None and (np.diff(logged_ns) > 0).all():
             return logged_ns, places
-        stamps_ns = np.zeros(len(places), np.int64)
-        digests = {}
+        found = self.file.index.of(topic)
+        stamps_ns, digests = found.stamps_ns, found.checksums
         with self.faults(topic):
-            for index, data in self.file.visit(places):
-                stamps_ns[index] = mcap_messages.read_stamp(data) or 0
-                digests[index] = zlib.crc32(data)
             if (stamps_ns == 0).any() and len(places) > 1:
                 raise ValueError("a message has no stamp")
             order = np.argsort(stamps_ns, kind="stable")
@@ -834,8 +857,10 @@ class _Topics:
         The result is None if the file does not state that the log times of the
         topic are stamps.
         """
-        places = self.file.locate(topic)
         records = self.file.metadata(mcap_messages.STAMPED_RECORD)
+        if not records:
+            return None
+        places = self.file.locate(topic)
         if [record.get(topic) for record in records] != [str(len(places))]:
             return None
         for place in places[[0, -1]]:

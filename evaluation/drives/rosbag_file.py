@@ -5,12 +5,19 @@ These are rosbag2 with SQLite, of several files or compressed, and ROS 1.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 import contextlib
+from dataclasses import dataclass
+import heapq
 import itertools
+import operator
+import os
 from pathlib import Path
 import re
+import struct
+import threading
 from typing import Any
+import zlib
 
 import numpy as np
 from rosbags.highlevel import AnyReader
@@ -22,7 +29,8 @@ from evaluation.base import (
     is_there,
     listed,
 )
-from evaluation.drives import ros_types
+from evaluation.drives import mcap_messages, ros_types
+from evaluation.drives.bag_index import BagIndex, Entry
 from evaluation.drives.mcap_file import LOCATION
 
 # How to read a damaged bag of ROS 1, for error messages.
@@ -30,6 +38,8 @@ _ADVICE = " (rosbag reindex FILE, of ROS 1, saves what is intact)"
 # How a bag of ROS 1 begins; its header has the place of the index.
 _MAGIC = b"#ROSBAG V2.0"
 _START_BYTES = 4200
+# A header of ROS 1 begins with a number, seconds and nanoseconds.
+_HEADER_1 = struct.Struct("<III")
 # A file of a recording begins this long after the end of the one before, at
 # most [ns].
 _NEXT_NS = 5 * NS_PER_S
@@ -48,7 +58,8 @@ _UNFINISHED = {
 class RosbagFile:
     """A bag, open for reading single messages, like `McapFile`.
 
-    The locations of a topic's messages are found by reading the topic once. In
+    Threads, and forks of a process, each open the bag for themselves. The
+    locations of a topic's messages are found by reading the topic once. In
     a location, `offset` is the number of the message in its topic, and
     `channel_id` is the number of the topic.
 
@@ -77,22 +88,48 @@ class RosbagFile:
             tuple(listed(self.path)) if self.path.is_dir() else tuple(paths)
         )
         check_finished(self.files)
-        with self._faults():
-            self._reader = AnyReader(
-                paths, default_typestore=ros_types.known_types()
-            )
-            self._reader.open()
+        self._paths = list(paths)
+        self._local = threading.local()
+        self._opened: list[_Opened] = []
         self.joints_ns = self._joints(paths)
-        self._connections: dict[str, list[Any]] = {}
-        for one in self._reader.connections:
-            self._connections.setdefault(one.topic, []).append(one)
-        self._names = sorted(self._connections)
+        connections = self._here.connections
+        self._names = sorted(connections)
+        self._counts = {
+            topic: sum(one.msgcount for one in of_topic)
+            for topic, of_topic in connections.items()
+        }
+        self._kinds = {
+            topic: sorted({one.msgtype for one in of_topic})
+            for topic, of_topic in connections.items()
+        }
+        self.index = BagIndex(self.files, self._entries)
         self._locations: dict[str, np.ndarray] = {}
+
+    @property
+    def _here(self) -> _Opened:
+        """The bag as this thread of this process has opened it.
+
+        Threads would move each other's place in the file, and so would a
+        process and its fork, which share it.
+        """
+        found: _Opened | None = getattr(self._local, "opened", None)
+        if found is None or found.pid != os.getpid():
+            with self._faults():
+                found = _Opened.of(self._paths)
+            self._local.opened = found
+            # What a parent has opened stays open: closing it would remove the
+            # files that it uncompressed.
+            self._opened.append(found)
+        return found
 
     def __del__(self) -> None:
         """Closes the bag, and removes what was uncompressed for it."""
-        with contextlib.suppress(Exception):
-            self._reader.close()
+        for one in getattr(self, "_opened", ()):
+            if one.pid == os.getpid():
+                with contextlib.suppress(Exception):
+                    one.reader.close()
+            else:
+                _OF_PARENTS.append(one)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -116,7 +153,7 @@ class RosbagFile:
             InputError: a file does not continue the one before it.
         """
         readers: Any = sorted(
-            self._reader.readers, key=lambda one: one.start_time
+            self._here.reader.readers, key=lambda one: one.start_time
         )
         for before, after in itertools.pairwise(readers):
             gap_ns = after.start_time - before.end_time
@@ -150,9 +187,9 @@ class RosbagFile:
     def topics(self) -> dict[str, list[str]]:
         """Maps topics with messages to types, as `McapFile.topics`."""
         return {
-            topic: sorted({one.msgtype for one in connections})
-            for topic, connections in self._connections.items()
-            if any(one.msgcount for one in connections)
+            topic: kinds
+            for topic, kinds in self._kinds.items()
+            if self._counts[topic]
         }
 
     @property
@@ -164,16 +201,10 @@ class RosbagFile:
     def locate(self, topic: str) -> np.ndarray:
         """Returns the locations (N,) of a topic's messages, in their order."""
         if topic not in self._locations:
-            with self._faults():
-                times = [
-                    time_ns
-                    for _, time_ns, _ in self._reader.messages(
-                        self._connections[topic]
-                    )
-                ]
-            found = np.zeros(len(times), LOCATION)
-            found["offset"] = np.arange(len(times))
-            found["log_time_ns"] = times
+            times_ns = self.index.of(topic).log_times_ns
+            found = np.zeros(len(times_ns), LOCATION)
+            found["offset"] = np.arange(len(times_ns))
+            found["log_time_ns"] = times_ns
             found["channel_id"] = self._names.index(topic)
             self._locations[topic] = found
         return self._locations[topic]
@@ -194,21 +225,36 @@ class RosbagFile:
             stop = int(locations["log_time_ns"][rows].max()) + 1
             within = (times_ns >= start) & (times_ns < stop)
             offsets = np.flatnonzero(within).tolist()
+            index = self.index.of(topic)
+            if index.has_contents:
+                for row in rows.tolist():
+                    offset = int(locations["offset"][row])
+                    yield row, index.message(offset)
+                continue
+            here = self._here
             with self._faults():
-                found = self._reader.messages(
-                    self._connections[topic], start, stop
-                )
+                found = here.messages([topic], start, stop)
                 for offset, (connection, _, data) in zip(
                     offsets, found, strict=True
                 ):
-                    if offset not in row_of:
-                        continue
-                    if self._reader.is2:
-                        yield row_of[offset], memoryview(data)
-                        continue
-                    message = self._reader.deserialize(data, connection.msgtype)
-                    packed = ros_types.serialize(message)
-                    yield row_of[offset], memoryview(packed)
+                    if offset in row_of:
+                        yield row_of[offset], here.packed(connection, data)
+
+    def _entries(
+        self, topics: Collection[str], kept: Collection[str]
+    ) -> Iterator[Entry]:
+        """Yields all messages of topics, see `BagIndex`."""
+        here = self._here
+        with self._faults():
+            for connection, time_ns, data in here.messages(topics):
+                topic = connection.topic
+                yield Entry(
+                    topic,
+                    time_ns,
+                    here.stamp_ns(data),
+                    zlib.crc32(data),
+                    here.packed(connection, data) if topic in kept else None,
+                )
 
     def attachment(self, name: str) -> bytes | None:
         """Returns None: such bags have no attachments."""
@@ -246,6 +292,72 @@ class RosbagFile:
             if not 0 < place < file.stat().st_size:
                 return _ADVICE
         return ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Opened:
+    """A bag that a thread of a process has opened.
+
+    Attributes:
+        pid: number of the process.
+        reader: the package's reader.
+        connections: topic -> its connections.
+    """
+
+    pid: int
+    reader: AnyReader
+    connections: dict[str, list[Any]]
+
+    @classmethod
+    def of(cls, paths: Sequence[Path]) -> _Opened:
+        """Opens a bag."""
+        reader = AnyReader(paths, default_typestore=ros_types.known_types())
+        reader.open()
+        connections: dict[str, list[Any]] = {}
+        for one in reader.connections:
+            connections.setdefault(one.topic, []).append(one)
+        return cls(os.getpid(), reader, connections)
+
+    def messages(
+        self,
+        topics: Iterable[str],
+        start: int | None = None,
+        stop: int | None = None,
+    ) -> Iterator[tuple[Any, int, bytes]]:
+        """Yields the messages of topics by log time, and then by file.
+
+        The package's own order of equal times differs between processes.
+        """
+        wanted = [one for topic in topics for one in self.connections[topic]]
+        readers: list[Any] = list(self.reader.readers)
+        found = []
+        for reader in readers:
+            own = [one for one in wanted if one in reader.connections]
+            if own:
+                found.append(reader.messages(own, start=start, stop=stop))
+        return heapq.merge(*found, key=operator.itemgetter(1))
+
+    def packed(self, connection: Any, data: bytes) -> memoryview:
+        """Returns a message in CDR."""
+        if self.reader.is2:
+            return memoryview(data)
+        message = self.reader.deserialize(data, connection.msgtype)
+        return memoryview(ros_types.serialize(message))
+
+    def stamp_ns(self, data: bytes) -> int:
+        """Returns the stamp of a message that begins with a header; else 0."""
+        if self.reader.is2:
+            with contextlib.suppress(ValueError):
+                return mcap_messages.read_stamp(data) or 0
+            return 0
+        if len(data) < _HEADER_1.size:
+            return 0
+        _, sec, nanosec = _HEADER_1.unpack_from(data)
+        return int(sec * NS_PER_S + nanosec)
+
+
+# Bags that were opened before this process was forked.
+_OF_PARENTS: list[_Opened] = []
 
 
 def check_finished(files: Sequence[Path]) -> None:
