@@ -15,6 +15,7 @@ import os
 from pathlib import Path
 import re
 import struct
+import tempfile
 import threading
 from typing import Any
 import zlib
@@ -38,6 +39,8 @@ _ADVICE = " (rosbag reindex FILE, of ROS 1, saves what is intact)"
 # How a bag of ROS 1 begins; its header has the place of the index.
 _MAGIC = b"#ROSBAG V2.0"
 _START_BYTES = 4200
+# Characters with a meaning in an address.
+_IN_ADDRESSES = re.compile("[?#%]")
 # A header of ROS 1 begins with a number, seconds and nanoseconds.
 _HEADER_1 = struct.Struct("<III")
 # A file of a recording begins this long after the end of the one before, at
@@ -302,21 +305,31 @@ class _Opened:
         pid: number of the process.
         reader: the package's reader.
         connections: topic -> its connections.
+        link: folder with links by which the bag was opened, if any.
     """
 
     pid: int
     reader: AnyReader
     connections: dict[str, list[Any]]
+    link: tempfile.TemporaryDirectory[str] | None
 
     @classmethod
     def of(cls, paths: Sequence[Path]) -> _Opened:
         """Opens a bag."""
+        link = None
+        # rosbags puts the path of a SQLite file into an address as it is.
+        if any(_IN_ADDRESSES.search(str(one)) for one in paths):
+            link = tempfile.TemporaryDirectory(prefix="cns-drake-")
+            paths = [
+                _linked(Path(link.name) / str(number), one.absolute())
+                for number, one in enumerate(paths)
+            ]
         reader = AnyReader(paths, default_typestore=ros_types.known_types())
         reader.open()
         connections: dict[str, list[Any]] = {}
         for one in reader.connections:
             connections.setdefault(one.topic, []).append(one)
-        return cls(os.getpid(), reader, connections)
+        return cls(os.getpid(), reader, connections, link)
 
     def messages(
         self,
@@ -354,6 +367,14 @@ class _Opened:
             return 0
         _, sec, nanosec = _HEADER_1.unpack_from(data)
         return int(sec * NS_PER_S + nanosec)
+
+
+def _linked(folder: Path, path: Path) -> Path:
+    """Returns the path of a link, of the same name if it is a file's."""
+    folder.mkdir()
+    link = folder / (f"bag{path.suffix}" if path.is_file() else "bag")
+    link.symlink_to(path)
+    return link
 
 
 # Bags that were opened before this process was forked.
