@@ -49,10 +49,10 @@ class World:
 
     @property
     def state(self) -> str:
-        """The verdict in a word: `aligned`, `shared`, `apart` or `unknown`."""
+        """The verdict in a word: `aligned`, `shared` or `unknown`."""
         if self.aligned:
             return "aligned"
-        return {True: "shared", False: "apart", None: "unknown"}[self.shared]
+        return "shared" if self.shared else "unknown"
 
     def to_json(self) -> dict[str, Any]:
         """Returns the verdict, ready for JSON."""

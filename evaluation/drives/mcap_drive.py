@@ -955,7 +955,7 @@ def _open_bag(path: Path) -> McapFile | RosbagFile:
     number, ending = (len(mcap), ".mcap") if mcap else (len(sqlite), ".db3")
     raise InputError(
         f"{path}: {number} {ending} files instead of one, and no {_METADATA},"
-        " which says that they are one bag"
+        " which says that they are one bag (`ros2 bag reindex` writes it)"
     )
 
 
