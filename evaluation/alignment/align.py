@@ -208,7 +208,7 @@ def align(
         AlignmentReport(
             held=target.name,
             moved=source.name,
-            frames=(target.drive.world, source.drive.world),
+            frames=(target.drive.world_frame, source.drive.world_frame),
             guess=guess,
             candidates=num_candidates,
             model=model,
