@@ -45,6 +45,7 @@ from .ros_types import message_class as message_class
 from .ros_types import message_definition as message_definition
 from .ros_types import message_hash as message_hash
 from .ros_types import serialize as serialize
+from .rosbag_file import NEXT_NS as NEXT_NS
 from .same_world import check_same_map as check_same_map
 from .same_world import check_same_world as check_same_world
 from .sampling import sample_frames as sample_frames

@@ -45,7 +45,7 @@ _IN_ADDRESSES = re.compile("[?#%]")
 _HEADER_1 = struct.Struct("<III")
 # A file of a recording begins this long after the end of the one before, at
 # most [ns].
-_NEXT_NS = 5 * NS_PER_S
+NEXT_NS = 5 * NS_PER_S
 # What SQLite and the recorders leave beside a file that was not closed, by the
 # ending of its name. The package rosbags reads none of these.
 _UNFINISHED = {
@@ -174,7 +174,7 @@ class RosbagFile:
             )
             if -gap_ns > min(NS_PER_S, shorter_ns // 2):
                 why = "are of the same time"
-            elif gap_ns > _NEXT_NS:
+            elif gap_ns > NEXT_NS:
                 why = f"have {gap_ns / NS_PER_S:.0f} s between them"
             elif first != second:
                 why = "have other topics of point clouds"

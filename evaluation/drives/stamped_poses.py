@@ -101,7 +101,7 @@ class StampedPoses:
                 raise InputError(
                     f"{source}: time: pose {numbers[row]} at {stamps_ns[row]}"
                     " ns is not later than the one before, and the poses in the"
-                    " order of time jump to and fro"
+                    " order of time jump back and forth"
                 )
             notes.append(
                 f"{source}: {len(back)} poses are earlier than the one before;"

@@ -146,7 +146,7 @@ def test_rows_of_two_drives_are_refused(tmp_path):
         *table_of(times + 0.005, 10.0 * times + 40.0),
     ]
     with pytest.raises(
-        InputError, match=r"pose 31 at 5000000 ns .* to and fro"
+        InputError, match=r"pose 31 at 5000000 ns .* back and forth"
     ):
         open_posed(tmp_path, rows)
 
