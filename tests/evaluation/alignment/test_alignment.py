@@ -28,11 +28,13 @@ from evaluation.alignment import open_pair
 from evaluation.base import InputError, poses, xyz
 from evaluation.change import temporal_change
 from evaluation.drives import Drive, Reading, RecordingSource, open_drive
+from evaluation.map_update import write_session
 from evaluation.maps import map_drive
 from evaluation.study import (
     RecordingInfo,
     drives_by_map,
 )
+from evaluation.verbs import update_map
 
 pytestmark = pytest.mark.slow
 
@@ -285,6 +287,40 @@ def test_recordings_of_a_city_are_aligned_once(recordings, drives):
     moved = city.stages["first"].source
     assert moved.identity() != RecordingSource(moved.path).identity()
     assert moved.identity() == pickle.loads(pickle.dumps(moved)).identity()
+
+
+def test_maps_of_sessions_follow_their_scans(drives, tmp_path):
+    """The newer map was made in another frame; its labels stay with it."""
+    notes = []
+    folder = tmp_path / "maps"
+    moved = drives.second(rigid([4.0, -3.0, 0.0], 8.0) @ drives.X_second)
+    for side, drive in (("A", drives.first()), ("B", moved)):
+        session, _ = write_session(drive, folder / side, 5.0)
+        kept = np.ones(len(session.points), np.uint8)
+        np.save(folder / side / "truth.npy", kept)
+    labels = (folder / "A/truth.npy", folder / "B/truth.npy")
+    found = {
+        when: update_map(
+            folder, labels=labels, align=when, on_note=notes.append
+        )
+        for when in ("auto", "always")
+    }
+    assert found["auto"].world.to_json() == {
+        "shared": True,
+        "aligned": False,
+        "why": notes[0].removeprefix("world: "),
+    }
+    assert found["always"].world.aligned
+    off = {
+        when: one.scores["updated_map"]["chamfer"]
+        for when, one in found.items()
+    }
+    assert off["always"] < 0.5 * off["auto"]
+    assert found["always"].metrics["miou"] == 1.0
+    # A map without scans has nothing by which it is aligned.
+    (folder / "B/poses.txt").unlink()
+    with pytest.raises(InputError, match="B: no scans and poses, by which"):
+        update_map(folder, labels=labels, align="always", on_note=print)
 
 
 def test_map_files_are_taken_as_they_are(recordings, drives, tmp_path):
