@@ -60,21 +60,33 @@ def report(
     """
     cluster = cluster or choose_cluster(None, None)
     chosen = choose_methods(methods, settings)
-    found = find_recordings(Path(recordings), on_note, lidar, columns)
-    for choice in chosen:
-        made = choice.make()
-        for text in {made.assumption(one.lidar_field) for one in found}:
-            if text is not None:
-                on_note(text)
-    return study_recordings(
-        found,
-        Path(output),
-        cluster,
-        chosen,
-        protocols or {"random-yaw": PROTOCOLS["random-yaw"]},
-        source=str(recordings),
-        with_costs=with_costs,
-        printed=printed,
-        on_note=on_note,
-        align=align,
-    )
+    # The verdict on the world comes before notes on how drives are read.
+    held: list[str] = []
+
+    def told(text: str) -> None:
+        on_note(text)
+        while held and text.startswith("world: "):
+            on_note(held.pop(0))
+
+    try:
+        found = find_recordings(Path(recordings), held.append, lidar, columns)
+        for choice in chosen:
+            made = choice.make()
+            for text in {made.assumption(one.lidar_field) for one in found}:
+                if text is not None:
+                    held.append(text)
+        return study_recordings(
+            found,
+            Path(output),
+            cluster,
+            chosen,
+            protocols or {"random-yaw": PROTOCOLS["random-yaw"]},
+            source=str(recordings),
+            with_costs=with_costs,
+            printed=printed,
+            on_note=told,
+            align=align,
+        )
+    finally:
+        for text in held:
+            on_note(text)
