@@ -27,6 +27,7 @@ from cns_drake.studies.pairs.simulated_pairs import (
 )
 from cns_drake.studies.tasks.map_task import DrivenMapTask
 from cns_drake.studies.tasks.seen_task import SeenTask
+from evaluation.alignment import When
 from evaluation.base import (
     Cluster,
     InputError,
@@ -85,6 +86,7 @@ def run_study(
     source: str = "",
     printed: PrintStyle | None = None,
     on_note: Callable[[str], None] = lambda text: None,
+    align: When = "auto",
 ) -> Path:
     """Measures all conditions of an experiment; writes tables and a page.
 
@@ -101,6 +103,8 @@ def run_study(
         printed: style of the charts for print; None for the default.
         on_note: is called with notes on what is left out, and on how long the
             study takes.
+        align: when recordings are aligned, see `open_pair` of
+            `evaluation.alignment`.
 
     Returns:
         The path of the page.
@@ -116,7 +120,7 @@ def run_study(
         cluster,
         on_note,
     )
-    cities = plan_study(study, maps)
+    cities = plan_study(study, maps, align)
     results, queries = study.measure()
     own = [one.name for one, _ in study.methods.values() if one.file]
     notes = [one.to_text() for one in study.protocols]
@@ -166,12 +170,15 @@ def _unlike_shipped(study: Study, maps: Sequence[str]) -> str:
     return f"{other[0]} is no shipped map" if other else ""
 
 
-def plan_study(study: Study, maps: Sequence[str] = ()) -> list[ShownCity]:
+def plan_study(
+    study: Study, maps: Sequence[str] = (), align: When = "auto"
+) -> list[ShownCity]:
     """Plans how all pairs of drives in all conditions are measured.
 
     Args:
         study: the study.
         maps: names or folders of maps that replace the experiment's maps.
+        align: see `run_study`.
 
     Returns:
         What the page shows of recorded cities.
@@ -194,7 +201,7 @@ def plan_study(study: Study, maps: Sequence[str] = ()) -> list[ShownCity]:
             study,
             maps,
             lambda folder: drives_by_map(
-                find_recordings(folder, study.on_note), study.on_note
+                find_recordings(folder, study.on_note), study.on_note, align
             ),
         )
     )

@@ -1,6 +1,7 @@
 """Alignment of drives with poses in different worlds: a public noun.
 
-`align` aligns two drives: guesses of the pose, loops between submaps, and a
+`open_pair` opens what is compared, and says in which world it is. Drives in
+different worlds are aligned: guesses of the pose, loops between submaps, and a
 pose graph fitted to the loops.
 """
 

@@ -1,7 +1,9 @@
 from .align import AlignmentReport as AlignmentReport
-from .align import When as When
-from .align import in_one_world as in_one_world
-from .opening import open_in_one_world as open_in_one_world
+from .opening import Opened as Opened
+from .opening import When as When
+from .opening import World as World
+from .opening import open_pair as open_pair
+from .opening import world_of_frames as world_of_frames
 from .registration import NUM_NEIGHBOURS as NUM_NEIGHBOURS
 from .registration import Surface as Surface
 from .registration import covariances as covariances

@@ -19,10 +19,7 @@ robust:
    needs.
 """
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -41,15 +38,8 @@ from evaluation.alignment.pose_graph import (
 )
 from evaluation.alignment.pose_guesses import find_candidates, find_guesses
 from evaluation.alignment.submaps import Submaps
-from evaluation.base import InputError, doing, poses
-from evaluation.drives import (
-    Drive,
-    MovedDrive,
-    check_same_map,
-    check_same_world,
-)
-
-When = Literal["auto", "always", "never"]
+from evaluation.base import InputError, poses
+from evaluation.drives import Drive, MovedDrive
 
 # Number of keyframes that test a guess.
 _NUM_PROBES = 8
@@ -167,53 +157,6 @@ class Alignment:
     report: AlignmentReport
 
 
-def in_one_world(
-    opened: Sequence[Drive | Path],
-    when: When = "auto",
-    *,
-    across_maps: bool = False,
-) -> tuple[list[Drive | Path], list[AlignmentReport]]:
-    """Returns drives in one world, for all commands and studies.
-
-    Args:
-        opened: the drives. Paths of maps stay as they are; they must be in the
-            world of the first drive.
-        when: when all other drives are aligned with the first drive: `auto`
-            (only if the names of their world frames differ), `always` or
-            `never`.
-        across_maps: whether the drives may be from maps with different names.
-
-    Returns:
-        The drives in the given order, and a report on each alignment.
-
-    Raises:
-        InputError: a drive cannot be aligned, is of another map or, with
-            `never`, of another world; or a map should be aligned. The error
-            says how recordings of this format get a common world.
-    """
-    found = list(opened)
-    drives = [i for i, one in enumerate(found) if isinstance(one, Drive)]
-    if when == "always" and len(drives) < len(found):
-        (path, *_) = (one for one in found if not isinstance(one, Drive))
-        raise InputError(f"--align always: {path} is no drive, and stays")
-    reports: list[AlignmentReport] = []
-    for number, i in enumerate(drives[1:]):
-        first, other = found[drives[0]], found[i]
-        assert isinstance(first, Drive)
-        assert isinstance(other, Drive)
-        if not across_maps:
-            check_same_map(first, other)
-        differ = first.world_frame != other.world_frame
-        if when == "never" or (when == "auto" and not differ):
-            check_same_world(first, other, across_maps=True)
-            continue
-        doing(f"aligning {other.name} to {first.name}")
-        pair = align(first, other, hold_first=number > 0)
-        found[drives[0]], found[i] = pair.first, pair.second
-        reports.append(pair.report)
-    return found, reports
-
-
 def align(
     first: Drive,
     second: Drive,
@@ -252,7 +195,7 @@ def align(
     if abs(ground) < _GROUND_TOLERANCE:
         ground = 0.0
     X_TS = source.bend(X_TK)
-    frame = target.drive.world_frame
+    frame = target.drive.world
     if ground != 0.0 or target_drift > 0.0:
         # The name of the drive's world frame no longer names this frame.
         frame = f"{frame}, corrected by {target.name}"
@@ -315,7 +258,7 @@ def _search_from_a_guess(
 
 def _common_coordinates(source: Drive, target: Drive) -> str | None:
     """Returns what two drives name as common, in words; None if nothing."""
-    if source.world_frame == target.world_frame:
+    if source.world == target.world:
         return "the common frame"
     if source.datum is not None and source.datum == target.datum:
         return f"the common datum {source.datum}"
@@ -519,7 +462,5 @@ def _without_drift(drive: Drive) -> tuple[Submaps, float]:
             break
         worst = max(worst, disagreement)
         X_WS = submaps.bend(fitted_to_loops(loops, submaps))
-        submaps = Submaps(
-            MovedDrive(drive, X_WS, drive.world_frame, drive.datum)
-        )
+        submaps = Submaps(MovedDrive(drive, X_WS, drive.world, drive.datum))
     return submaps, worst

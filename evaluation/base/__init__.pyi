@@ -27,6 +27,7 @@ from .csv_files import read_rows as read_rows
 from .csv_files import unquoted_cell as unquoted_cell
 from .csv_files import write_csv as write_csv
 from .digests import file_digests as file_digests
+from .digests import settled_state as settled_state
 from .elementary import arcsin as arcsin
 from .elementary import arctan2 as arctan2
 from .elementary import cos as cos

@@ -51,6 +51,19 @@ def file_digests(files: Sequence[Path]) -> list[str]:
     return [found[path][1] for path in paths]
 
 
+def settled_state(path: Path) -> list[int] | None:
+    """Returns what the file system says of a file; None while it may change.
+
+    If two results are equal, so are the contents. The result is also None if
+    the file is not there.
+    """
+    with contextlib.suppress(OSError):
+        state = _state(os.path.realpath(path))
+        if time.time_ns() - max(state[1:3]) > _SETTLED_NS:
+            return state
+    return None
+
+
 def _state_and_digest(path: str, known: list | None) -> list:
     """Returns the state of a file, and its digest.
 

@@ -33,6 +33,11 @@ def user_errors(path: Path | str) -> Iterator[None]:
         raise InputError(f"{path}: {error.strerror or error}") from error
 
 
+# How a file begins that stands for one in Git LFS, and its greatest size.
+_POINTER = b"version https://git-lfs.github.com/spec/"
+_POINTER_BYTES = 1024
+
+
 def check_regular(path: Path) -> None:
     """Raises an error unless a path is a regular file.
 
@@ -40,11 +45,19 @@ def check_regular(path: Path) -> None:
         InputError: the path does not exist, or is a folder, device or pipe.
     """
     with user_errors(path):
-        mode = path.stat().st_mode
+        status = path.stat()
+    mode = status.st_mode
     if stat.S_ISDIR(mode):
         raise InputError(f"{path}: Is a directory")
     if not stat.S_ISREG(mode):
         raise InputError(f"{path}: not a regular file")
+    if status.st_size <= _POINTER_BYTES:
+        with user_errors(path), path.open("rb") as stream:
+            if stream.read(len(_POINTER)) == _POINTER:
+                raise InputError(
+                    f"{path}: a pointer of Git LFS instead of the file; `git"
+                    " lfs pull` fetches it"
+                )
 
 
 def is_there(path: Path) -> bool:

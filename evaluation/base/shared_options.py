@@ -137,11 +137,22 @@ Columns = Annotated[
 ]
 
 
+PoseGap = Annotated[
+    float | None,
+    typer.Option(
+        metavar="SECONDS",
+        help="Greatest time between two poses of a bag that are interpolated; "
+        "by default 1.",
+    ),
+]
+
+
 def readings(
     lidar: list[str] | None,
     odometry: list[str] | None,
     poses: list[Path] | None,
     columns: list[int] | None,
+    pose_gap: float | None = None,
 ) -> dict[str, Any]:
     """Returns how drives are read, from the options that were given."""
     given = {
@@ -149,5 +160,10 @@ def readings(
         "odometry": odometry,
         "poses": poses,
         "columns": columns,
+        "pose_gap": pose_gap,
     }
-    return {name: values for name, values in given.items() if values}
+    return {
+        name: values
+        for name, values in given.items()
+        if values is not None and values != []
+    }

@@ -19,7 +19,9 @@ Align = Annotated[
     When,
     typer.Option(
         help="Whether to align the drives to each other before the comparison. "
-        "auto aligns only drives with different world frames."
+        "auto aligns drives unless something says that they share a world: a "
+        "frame map, utm, earth, world or enu, their format, or one map that "
+        "their scenarios name."
     ),
 ]
 MethodName = Annotated[

@@ -5,6 +5,7 @@ from .deskewing import deskew as deskew
 from .deskewing import deskewed_notes as deskewed_notes
 from .deskewing import deskewed_scan as deskewed_scan
 from .drive import POSES_FRAME as POSES_FRAME
+from .drive import SHARED_FRAMES as SHARED_FRAMES
 from .drive import Drive as Drive
 from .drive import ImuSamples as ImuSamples
 from .drive import index_instances as index_instances
@@ -44,6 +45,7 @@ from .ros_messages import message_class as message_class
 from .ros_messages import message_definition as message_definition
 from .ros_messages import message_hash as message_hash
 from .ros_messages import serialize as serialize
+from .rosbag_file import NEXT_NS as NEXT_NS
 from .same_world import check_same_map as check_same_map
 from .same_world import check_same_world as check_same_world
 from .sampling import sample_frames as sample_frames

@@ -114,6 +114,12 @@ class CnsFolderDrive(FileDrive):
                 "map": place.parent.name.lower(),
                 "stage": place.name,
             }
+        if mount is None and scenario is None:
+            chosen.append(
+                f"{path}: no {_MOUNT} in it or up to two folders above, and no"
+                f" {SCENARIO}: the name of its map is unknown, and the LiDAR is"
+                f" taken as {_LIDAR_HEIGHT:g} m above the vehicle's origin"
+            )
         if poses:
             scans = posed_by(poses, files, stamps_ns)
         else:

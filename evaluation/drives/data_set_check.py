@@ -361,8 +361,8 @@ def check_frames(drive: Drive) -> Iterator[str]:
     measured, claimed = lengths
     if max(lengths) < _LEAST_MOTION:
         note(
-            f"{drive.name}: frames: not checked: neither the poses nor the"
-            f" scans move by {_LEAST_MOTION:g} m"
+            f"{drive.name}: frames: not checked: from scan to scan, neither the"
+            f" poses nor the points move by {_LEAST_MOTION:g} m"
         )
         return
     if claimed < _STILL * measured:
@@ -389,8 +389,9 @@ def check_frames(drive: Drive) -> Iterator[str]:
             yield f"poses: turned by {deg:.0f} deg against the points{line}"
             return
         note(
-            f"{drive.name}: frames: not checked: what the scans measure differs"
-            f" by {best.error:.0%} from what the poses claim, in no known way"
+            f"{drive.name}: frames: what the scans measure differs by"
+            f" {best.error:.0%} from what the poses claim, and no turn, axis or"
+            " unit explains it"
         )
         return
     if name != _AS_GIVEN:

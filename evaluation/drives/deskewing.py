@@ -1,5 +1,7 @@
 """Removal of the motion distortion from scans of a moving LiDAR."""
 
+import re
+
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
@@ -11,6 +13,13 @@ from evaluation.drives.drive import Drive
 # The splines have free ends; the error that this causes falls to about a
 # quarter with each pose.
 _REACH = 4
+# Times of points from here on do not count from a scan's stamp, in any unit.
+_SINCE_1970 = 1e9
+# Points lie no further outside of the time from a scan's stamp to the next
+# one's than this multiple of it.
+_MOST_OUTSIDE = 0.75
+# Names of fields with times of points, whatever their unit or zero.
+_TIMES = re.compile(r"t|.*time.*|.*stamp.*", re.IGNORECASE)
 # Largest ratio between the duration of a scan and the time between scans, or
 # its inverse. The two times are about equal; in a wrong unit of time they
 # differ by a factor of 1,000.
@@ -67,7 +76,7 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
     if "t" not in (points.dtype.names or ()):
         raise InputError(
             f"{drive.name}: scan {index}: no field t, the time of each point"
-            " [ns]"
+            f" since the stamp [ns]{_unused(points)}"
         )
     # Most points share their firing time with a whole column.
     t_ns, column = np.unique(points["t"], return_inverse=True)
@@ -85,6 +94,14 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
             f"{drive.name}: scan {index}: t: from {t_ns[0]:g} to {t_ns[-1]:g};"
             f" no nanoseconds of a scan, where scans are {step_s:.3g} s apart"
         )
+    span_s = max(scan_s, step_s)
+    ends_s = t_ns[[0, -1]] * 1e-9 if len(t_ns) else np.zeros(2)
+    if (np.abs(ends_s) > (1.0 + _MOST_OUTSIDE) * span_s).any():
+        raise InputError(
+            f"{drive.name}: scan {index}: t: the points lie from"
+            f" {ends_s[0]:.3g} to {ends_s[1]:.3g} s after the stamp, outside of"
+            f" the scan's time (scans are {step_s:.3g} s apart)"
+        )
     # Differences of int64 are exact; stamps as doubles would not be.
     stamps_ns, X_WS = drive.motion
     times_ns = stamps_ns - drive.stamps_ns[index]
@@ -100,6 +117,33 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
     for axis, values in zip("xyz", p_S.T, strict=True):
         points[axis] = values
     return points
+
+
+def _unused(points: np.ndarray) -> str:
+    """Returns which field of times is there, and why it is not used; or ""."""
+    for name in points.dtype.names or ():
+        if not _TIMES.fullmatch(name) or points.dtype[name].shape:
+            continue
+        values = points[name].astype(float)
+        if not len(values):
+            continue
+        low, high = values.min(), values.max()
+        if not np.isfinite([low, high]).all():
+            why = "not finite"
+        elif low < 0.0:
+            why = "times before the stamp"
+        elif high >= _SINCE_1970:
+            why = "times since 1970 or since the LiDAR began, not the stamp"
+        elif low == high:
+            why = "the same for all points"
+        else:
+            why = "of an unknown unit"
+        kind = points.dtype[name].name
+        return (
+            f"; the field {name} ({kind}) is not used: {why}, {low:g} to"
+            f" {high:g}"
+        )
+    return ""
 
 
 def _interpolate_poses(

@@ -57,6 +57,9 @@ class ImuSamples(NamedTuple):
 
 
 _Made = TypeVar("_Made", bound="Drive")
+# Frames that drives share by convention. By REP 105 of ROS, other frames, such
+# as `odom`, begin anew in each drive.
+SHARED_FRAMES = ("map", "utm", "earth", "world", "enu")
 # How the name of the world frame of a user's file of poses begins.
 POSES_FRAME = "poses"
 
@@ -74,7 +77,9 @@ class Drive(abc.ABC):
         name: short name for tables and messages, e.g. `metropolis_04`.
         world_frame: name of W, as stated in the recording.
         has_own_world: whether W is a frame of this drive alone, because nothing
-            says where its poses are in a frame that others share.
+            says where its poses are in a frame that others share. None if the
+            name of W decides: frames other than `SHARED_FRAMES` are of one
+            drive, unless its scenario names a map.
         placing: how drives of this format get a common world frame, for errors;
             in brackets, after a space.
 
@@ -87,7 +92,7 @@ class Drive(abc.ABC):
 
     name: str
     world_frame: str
-    has_own_world: bool = False
+    has_own_world: bool | None = None
     placing: str = ""
     _made_of: tuple[tuple, dict]
 
@@ -113,6 +118,16 @@ class Drive(abc.ABC):
     @abc.abstractmethod
     def X_WS(self) -> np.ndarray:
         """(N, 4, 4) float64 pose of the LiDAR at each scan's stamp."""
+
+    @property
+    def world(self) -> str:
+        """Name of the world W: equal for two drives only if they share it."""
+        if self.has_own_world is not None or is_shared(
+            self.world_frame, self.scenario
+        ):
+            return self.world_frame
+        home = self.files[0].resolve() if self.files else f"/{self.name}"
+        return f"{self.world_frame}{home}"
 
     @property
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
@@ -299,6 +314,16 @@ class Drive(abc.ABC):
 
 def _opened_again(kind: type[Drive], args: tuple, kwargs: dict) -> Drive:
     return kind(*args, **kwargs)
+
+
+def is_shared(frame: str, scenario: Mapping | None) -> bool:
+    """Returns whether drives with poses in a frame of this name share it.
+
+    Args:
+        frame: name of the frame.
+        scenario: the drive's scenario, if any; it may name the map.
+    """
+    return frame in SHARED_FRAMES or (scenario or {}).get("map") is not None
 
 
 def poses_frame(path: Path) -> str:

@@ -48,6 +48,8 @@ class DriveView(Drive):
 class MovedDrive(DriveView):
     """The scans of another drive at corrected poses."""
 
+    has_own_world = False  # Its world is that which its maker names.
+
     def __init__(
         self,
         drive: Drive,
@@ -102,7 +104,7 @@ class CountedDrive(MovedDrive):
     """
 
     def __init__(self, drive: Drive):
-        super().__init__(drive, drive.X_WS, drive.world_frame, drive.datum)
+        super().__init__(drive, drive.X_WS, drive.world, drive.datum)
         self._ignored: dict[int, int] = {}
 
     def scan(self, index: int) -> np.ndarray:
@@ -138,6 +140,10 @@ class RecentScans(DriveView):
     @property
     def world_frame(self) -> str:  # type: ignore[override]  # Read late.
         return self._drive.world_frame
+
+    @property
+    def world(self) -> str:
+        return self._drive.world
 
     def scan(self, index: int) -> np.ndarray:
         if index not in self._recent:

@@ -20,6 +20,8 @@ class JoinedDrive(Drive):
             the number of frames of all drives.
     """
 
+    has_own_world = False  # It is that of the first drive.
+
     def __init__(self, sources: Sequence[Callable[[], Drive]]):
         """Opens each drive once, for its poses.
 
@@ -36,7 +38,7 @@ class JoinedDrive(Drive):
             drive = self._open(number)
             if number == 0:
                 self.name = drive.name
-                self.world_frame = drive.world_frame
+                self.world_frame = drive.world
             else:
                 check_same_world(self, drive, across_maps=True)
             stamps.append(drive.stamps_ns)

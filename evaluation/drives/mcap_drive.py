@@ -1,17 +1,18 @@
 """Drives in bags of ROS: recordings of cns-drake, and those of robots."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 import contextlib
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 import re
 from typing import Any, NamedTuple, NoReturn
-import zlib
 
 import numpy as np
 
 from evaluation.base import (
     FARTHEST_RETURN,
+    NS_PER_S,
     InputError,
     check_range,
     is_there,
@@ -19,6 +20,7 @@ from evaluation.base import (
     parse_json,
     poses,
     read_text,
+    read_yaml,
     value_errors,
     xyz,
 )
@@ -29,6 +31,7 @@ from evaluation.drives.drive import (
     Drive,
     as_given,
     index_instances,
+    is_shared,
     poses_frame,
 )
 from evaluation.drives.drive_scenario import SCENARIO, read_scenario
@@ -52,19 +55,26 @@ from evaluation.drives.point_cloud2 import (
     to_records,
 )
 from evaluation.drives.point_layouts import from_layout
-from evaluation.drives.rosbag_file import RosbagFile
-from evaluation.drives.stamped_poses import PosedScans, StampedPoses
+from evaluation.drives.rosbag_file import RosbagFile, check_finished
+from evaluation.drives.stamped_poses import (
+    LONGEST_GAP,
+    PosedScans,
+    StampedPoses,
+)
 from evaluation.drives.trajectories import read_trajectory
 
 _IMU_TOPIC = "/imu/data"
 _TF_TOPIC = "/tf"
 _TF_STATIC_TOPIC = "/tf_static"
 _KALIBR = "imu.yaml"
-# By REP 105 of ROS, other frames, such as `odom`, may start anew in each drive.
-_SHARED_FRAME = "map"
 _METADATA = "metadata.yaml"
 # rosbag2 compresses each file or message if its metadata say so.
 _PACKED = r"^\s*compression_mode: *[\"']?(file|message)"
+_GAP_ADVICE = " (--pose-gap SECONDS allows more)"
+# Files are not joined where the poses jump by more than this [m] ...
+_JUMP = 2.0
+# ... and this speed of a vehicle allow [m/s].
+_FASTEST = 50.0
 # A function that returns the poses of the LiDAR, given the scans' stamps [ns].
 _Poses = Callable[[np.ndarray], StampedPoses]
 # `image_transport` adds this to the names of topics of depth images.
@@ -100,7 +110,7 @@ _CLOUDS = _Stream(
     "point clouds",
     "LiDAR",
     _LIDAR_TOPIC,
-    ((ros_messages.POINT_CLOUD, ros_messages.LIVOX, ros_messages.LIVOX_1),),
+    (ros_messages.CLOUDS,),
     "--lidar TOPIC",
     "/points",
 )
@@ -144,8 +154,9 @@ class McapDrive(Drive):
     """
 
     placing = (
-        " (recordings share a world if their poses are in one frame; --odometry"
-        " TOPIC and --poses FILE choose others)"
+        " (bags share a world if their poses are in a frame map, utm, earth,"
+        " world or enu, or a scenario.yaml in the folder of each names one map;"
+        " --odometry TOPIC and --poses FILE choose other poses)"
     )
 
     def __init__(
@@ -154,6 +165,7 @@ class McapDrive(Drive):
         lidar: str | None = None,
         odometry: str | None = None,
         poses: _Poses | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a recording.
 
@@ -165,6 +177,8 @@ class McapDrive(Drive):
             odometry: topic of the poses.
             poses: function that returns poses of the LiDAR, which are used
                 instead of those of a topic.
+            pose_gap: greatest time between two poses that are interpolated [s];
+                by default a second.
 
         Raises:
             InputError: if there is no complete recording at `path`, or no such
@@ -179,6 +193,7 @@ class McapDrive(Drive):
             self.name = str((self.scenario or {}).get("name", self.name))
         self._lidar_topic = self._topics.choose(_CLOUDS, lidar)
         self._given = poses
+        self._longest_gap = LONGEST_GAP if pose_gap is None else pose_gap
         self._pose_topic = None
         if poses is None:
             self._pose_topic = self._topics.choose(_POSES, odometry)
@@ -191,6 +206,11 @@ class McapDrive(Drive):
         ):
             if topic in self._file.topics:
                 self._topics.require(topic, kind)
+        poses_and_mounts = [self._pose_topic, _TF_STATIC_TOPIC]
+        self._topics.read_together(
+            self._lidar_topic,
+            [one for one in poses_and_mounts if one and one in self._topics],
+        )
         self._has_tf = _TF_TOPIC in self._topics.find(ros_messages.TF)
         self._images = _McapImages(self._topics)
 
@@ -257,11 +277,24 @@ class McapDrive(Drive):
     def world_frame(self) -> str:  # type: ignore[override]  # Read late.
         if self._pose_topic is None:
             return poses_frame(Path(str(self._posed_by.source)))
+        frame = self._pose_frame
+        return f"{frame}{self._path.resolve()}" if self.has_own_world else frame
+
+    @property
+    def has_own_world(self) -> bool:  # type: ignore[override]  # Read late.
+        return self._pose_topic is not None and not is_shared(
+            self._pose_frame, self.scenario
+        )
+
+    @property
+    def _pose_frame(self) -> str:
+        """Name of the frame of the poses of a topic, as recorded."""
+        assert self._pose_topic is not None
         return frame_name(self._topics.first(self._pose_topic).header.frame_id)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        notes = [*self._posed.notes, *self._mounted[1]]
+        notes = [*self._file.notes, *self._posed.notes, *self._mounted[1]]
         missing = self._posed.kept.stop - self._kept.stop
         if missing:
             notes.append(
@@ -274,12 +307,6 @@ class McapDrive(Drive):
                 f"{self._path}: {self._lidar_topic}: row_step is not width x"
                 " point_step; the points are read one after the other, which"
                 " the length of the data shows"
-            )
-        if self._pose_topic is not None and self.world_frame != _SHARED_FRAME:
-            notes.append(
-                f"{self._path}: {self._pose_topic}: all drives with poses in a"
-                f" frame {self.world_frame!r} count as drives in one world"
-                " (--align always aligns them nevertheless)"
             )
         return (*notes, *filter(None, [self.distortion_note]))
 
@@ -449,7 +476,11 @@ class McapDrive(Drive):
     def _posed_by(self) -> StampedPoses:
         """The poses of the vehicle, or those of the LiDAR from a file."""
         if self._given is not None:
-            return self._given(self._all_scans[0])
+            return replace(
+                self._given(self._all_scans[0]),
+                longest_gap=self._longest_gap,
+                advice=_GAP_ADVICE,
+            )
         return self._trajectory()
 
     def _trajectory(self, *later: np.ndarray) -> StampedPoses:
@@ -460,12 +491,43 @@ class McapDrive(Drive):
         known = np.isfinite(rows["position"]).all(axis=1) & (length > 0.0)
         num_unknown = len(rows) - int(known.sum())
         rows = rows[known] if known.any() else rows
-        stamps_ns, kept = np.unique(rows["stamp_ns"], return_index=True)
         X_WB = checked_poses(
-            rows["position"][kept], rows["quat_xyzw"][kept], str(self._path)
+            rows["position"], rows["quat_xyzw"], str(self._path)
         )
         source = f"{self._path}: {self._pose_topic}"
-        return StampedPoses(source, stamps_ns, X_WB, num_unknown)
+        found = StampedPoses.of(
+            source,
+            rows["stamp_ns"],
+            X_WB,
+            num_unknown=num_unknown,
+            longest_gap=self._longest_gap,
+            advice=_GAP_ADVICE,
+        )
+        self._check_joints(source, found.stamps_ns, found.X_WB[:, :3, 3])
+        return found
+
+    def _check_joints(
+        self, source: str, stamps_ns: np.ndarray, p_WB: np.ndarray
+    ) -> None:
+        """Refuses files that are joined where the poses begin anew.
+
+        Args:
+            source: file and topic of the poses, for errors.
+            stamps_ns: (N,) stamps of the poses [ns].
+            p_WB: (N, 3) positions of the vehicle [m].
+        """
+        for joint_ns in self._file.joints_ns:
+            after = int(np.searchsorted(stamps_ns, joint_ns, side="right"))
+            if not 0 < after < len(stamps_ns):
+                continue
+            step_s = (stamps_ns[after] - stamps_ns[after - 1]) / NS_PER_S
+            jump = np.linalg.norm(p_WB[after] - p_WB[after - 1])
+            if jump > _JUMP + _FASTEST * step_s:
+                raise InputError(
+                    f"{source}: several recordings: the poses jump by"
+                    f" {jump:.1f} m where a file ends and the next begins; give"
+                    f" one of {' '.join(one.name for one in self._file.files)}"
+                )
 
     @property
     def X_BS(self) -> np.ndarray:
@@ -491,7 +553,7 @@ class McapDrive(Drive):
         """Whether points are in the frame of the poses, as of FAST-LIO's."""
         if self._pose_topic is None:
             return self._lidar_frame in _WORLD_FRAMES
-        return self._lidar_frame == self.world_frame
+        return self._lidar_frame == self._pose_frame
 
     @cached_property
     def _mounted(self) -> tuple[np.ndarray, list[str]]:
@@ -642,10 +704,10 @@ class _Topics:
             InputError: the topic has messages of other types.
         """
         found = self.file.topics[topic]
-        if found != [f"{message_type} in cdr"]:
+        if found != [message_type]:
             raise InputError(
                 f"{self.path}: {topic}: {' and '.join(found)} instead of"
-                f" {message_type} in cdr{_ros_1_advice(found)}"
+                f" {message_type}{_ros_1_advice(found)}"
             )
         self._types[topic] = message_type
 
@@ -657,7 +719,7 @@ class _Topics:
         found = [
             topic
             for topic, kinds in self.file.topics.items()
-            if kinds == [f"{message_type} in cdr"]
+            if kinds == [message_type]
         ]
         self._types |= dict.fromkeys(found, message_type)
         return found
@@ -691,23 +753,23 @@ class _Topics:
                 the same stamp.
         """
         kind = self._types[topic]
-        places = self.file.locate(topic)
         with self.faults(topic):
             if kind == ros_messages.PATH:
                 found = self._path(topic)
             elif kind in (ros_messages.ODOMETRY, ros_messages.IMU):
-                rows = MessageRows(kind, len(places))
-                for index, data in self.file.visit(places):
+                rows = MessageRows(kind, len(self.file.locate(topic)))
+                for index, data in self.visit(topic):
                     rows.add(index, data)
                 found = rows.rows()
             else:
                 made = [
                     row
-                    for _, data in self.file.visit(places)
+                    for _, data in self.visit(topic)
                     for row in POSE_ROWS[kind](mcap_messages.decode(data, kind))
                 ]
                 found = np.array(made, ODOMETRY_DTYPE)
-            check_agreement(found)
+            if kind == ros_messages.IMU:
+                check_agreement(found)
         return found[np.argsort(found["stamp_ns"], kind="stable")]
 
     def _path(self, topic: str) -> np.ndarray:
@@ -745,17 +807,37 @@ class _Topics:
             self._by_stamp[topic] = self._sorted(topic)
         return self._by_stamp[topic]
 
+    def read_together(self, clouds: str, small: Sequence[str]) -> None:
+        """Names the topics of a drive, so that the bag is read once for all.
+
+        Args:
+            clouds: topic of the scans.
+            small: topics with messages whose contents are kept.
+        """
+        # Of a bag whose log times are stamps, not all messages are read.
+        if self.logged_stamps_ns(clouds) is None:
+            self.file.index.prepare(
+                [(clouds, False), *((one, True) for one in small)]
+            )
+
+    def visit(self, topic: str) -> Iterator[tuple[int, memoryview]]:
+        """Yields the number and the content of each message of a topic."""
+        if topic in self.file.index:
+            index = self.file.index.of(topic)
+            if index.has_contents:
+                for number in range(len(index.log_times_ns)):
+                    yield number, index.message(number)
+                return
+        yield from self.file.visit(self.file.locate(topic))
+
     def _sorted(self, topic: str) -> tuple[np.ndarray, np.ndarray]:
-        places = self.file.locate(topic)
         logged_ns = self.logged_stamps_ns(topic)
+        places = self.file.locate(topic)
         if logged_ns is not None and (np.diff(logged_ns) > 0).all():
             return logged_ns, places
-        stamps_ns = np.zeros(len(places), np.int64)
-        digests = {}
+        found = self.file.index.of(topic)
+        stamps_ns, digests = found.stamps_ns, found.checksums
         with self.faults(topic):
-            for index, data in self.file.visit(places):
-                stamps_ns[index] = mcap_messages.read_stamp(data) or 0
-                digests[index] = zlib.crc32(data)
             if (stamps_ns == 0).any() and len(places) > 1:
                 raise ValueError("a message has no stamp")
             order = np.argsort(stamps_ns, kind="stable")
@@ -775,8 +857,10 @@ class _Topics:
         The result is None if the file does not state that the log times of the
         topic are stamps.
         """
-        places = self.file.locate(topic)
         records = self.file.metadata(mcap_messages.STAMPED_RECORD)
+        if not records:
+            return None
+        places = self.file.locate(topic)
         if [record.get(topic) for record in records] != [str(len(places))]:
             return None
         for place in places[[0, -1]]:
@@ -851,8 +935,15 @@ def _open_bag(path: Path) -> McapFile | RosbagFile:
         return McapFile(path)
     files = {ending: listed(path, f"*{ending}") for ending in _ENDINGS}
     mcap, sqlite, ros1 = (files[ending] for ending in _ENDINGS)
+    for file in listed(path, "*.bag.active"):
+        check_finished([file.with_suffix("")])
+    if sum(map(bool, files.values())) > 1:
+        names = " ".join(one.name for some in files.values() for one in some)
+        raise InputError(f"{path}: several recordings; give one of {names}")
     metadata = path / _METADATA
     told = read_text(metadata) if metadata.is_file() else ""
+    if told:
+        _check_listed(metadata, [*mcap, *sqlite])
     if len(mcap) == 1 and not re.search(_PACKED, told, re.I | re.M):
         return McapFile(mcap[0])
     if told:
@@ -864,8 +955,38 @@ def _open_bag(path: Path) -> McapFile | RosbagFile:
     number, ending = (len(mcap), ".mcap") if mcap else (len(sqlite), ".db3")
     raise InputError(
         f"{path}: {number} {ending} files instead of one, and no {_METADATA},"
-        " which says that they are one bag"
+        " which says that they are one bag (`ros2 bag reindex` writes it)"
     )
+
+
+def _check_listed(metadata: Path, files: Sequence[Path]) -> None:
+    """Refuses a bag of which rosbag2's list names fewer or more files.
+
+    Raises:
+        InputError: the list is no list, or other files are there.
+    """
+    content = read_yaml(metadata)
+    try:
+        told = content["rosbag2_bagfile_information"]["relative_file_paths"]
+        names = {Path(str(one)).name for one in told}
+    except (TypeError, KeyError):
+        return  # The reader says what is wrong.
+    packed = (".zstd", ".lz4")
+    there = {one.name for one in files} | {
+        one.name
+        for ending in packed
+        for one in listed(metadata.parent, f"*{ending}")
+    }
+    if len(names) == len(there):
+        return
+    for name in sorted(there - names):
+        raise InputError(
+            f"{metadata.parent / name}: not one of the files in"
+            f" {metadata.name} ({' '.join(sorted(names))}); `ros2 bag reindex`"
+            " lists all, or move it to a folder of its own"
+        )
+    missing = " ".join(sorted(names - there))
+    raise InputError(f"{metadata}: names files that are not there: {missing}")
 
 
 def _drive_name(path: Path) -> str:
@@ -899,10 +1020,11 @@ def _open(
     lidar: str | None = None,
     odometry: str | None = None,
     poses: Path | None = None,
+    pose_gap: float | None = None,
 ) -> McapDrive:
     """Opens a bag; the arguments are those of `open_drive`."""
     given = None if poses is None else partial(read_trajectory, Path(poses))
-    return McapDrive(path, lidar, odometry, given)
+    return McapDrive(path, lidar, odometry, given, pose_gap)
 
 
 DATA_SET = DataSet(

@@ -16,7 +16,7 @@ reserved, and every checksum is checked.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 import contextlib
 from dataclasses import dataclass, field
 import functools
@@ -47,7 +47,9 @@ from mcap.records import (
 import numpy as np
 import zstandard
 
-from evaluation.base import InputError, check_regular, user_errors
+from evaluation.base import InputError, check_regular, user_errors, value_errors
+from evaluation.drives.bag_index import BagIndex, Entry
+from evaluation.drives.mcap_messages import read_stamp
 
 _MAGIC = b"\x89MCAP0\r\n"
 # Opcode and length.
@@ -123,7 +125,11 @@ class McapFile:
 
     Attributes:
         path: path of the file.
+        notes, joints_ns: as of `RosbagFile`; there is one file.
     """
+
+    notes: tuple[str, ...] = ()
+    joints_ns: tuple[int, ...] = ()
 
     def __init__(self, path: Path):
         """Opens a file and reads its index.
@@ -146,11 +152,14 @@ class McapFile:
         for _, channel in sorted(self._contents.channels.items()):
             self._channels.setdefault(channel.topic, []).append(channel)
         self._locations: dict[str, np.ndarray] = {}
+        self.index = BagIndex(self.files, self._entries)
         self._chunk = functools.lru_cache(_CHUNKS_KEPT)(self._unpack)
 
     @property
     def topics(self) -> dict[str, list[str]]:
-        """Maps topics to sorted types of messages, as `<type> in <encoding>`.
+        """Maps topics to sorted types of messages.
+
+        A type of messages that are not in CDR is `<type> in <encoding>`.
 
         In an intact recording each topic has exactly one such entry. Channels
         without a message do not count: `ros2 bag record` writes them for all
@@ -225,6 +234,32 @@ class McapFile:
         for index, place in zip(order.tolist(), places, strict=True):
             yield index, self._message(self._chunk(place[0]), place)
 
+    def _entries(
+        self, topics: Collection[str], kept: Collection[str]
+    ) -> Iterator[Entry]:
+        """Yields all messages of topics, each topic by time, in file order."""
+        places = [self.locate(topic) for topic in topics]
+        names = [
+            topic
+            for topic, of_topic in zip(topics, places, strict=True)
+            for _ in of_topic
+        ]
+        joined = np.concatenate([np.zeros(0, LOCATION), *places])
+        found: dict[int, Entry] = {}
+        for number, data in self.visit(joined):
+            topic = names[number]
+            with value_errors(f"{self.path}: {topic}"):
+                stamp_ns = read_stamp(data) or 0
+            found[number] = Entry(
+                topic,
+                int(joined["log_time_ns"][number]),
+                stamp_ns,
+                zlib.crc32(data),
+                bytes(data) if topic in kept else None,
+            )
+        for number in range(len(names)):
+            yield found[number]
+
     def attachment(self, name: str) -> bytes | None:
         """Returns the content of the attachment of this name, if any.
 
@@ -285,7 +320,8 @@ class McapFile:
     def _kind(self, channel: Channel) -> str:
         schema = self._contents.schemas.get(channel.schema_id)
         name = "a message without a type" if schema is None else schema.name
-        return f"{name} in {channel.message_encoding}"
+        encoding = channel.message_encoding
+        return name if encoding == "cdr" else f"{name} in {encoding}"
 
     def _read_locations(self, topic: str) -> np.ndarray:
         numbers = [channel.id for channel in self._channels[topic]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 import inspect
+import math
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +22,14 @@ class Reading:
     """What a recording does not say itself: how it is read.
 
     Attributes:
-        lidar, columns, odometry, poses: see `open_drive`.
+        lidar, columns, odometry, poses, pose_gap: see `open_drive`.
     """
 
     lidar: str | None = None
     columns: int | None = None
     odometry: str | None = None
     poses: Path | None = None
+    pose_gap: float | None = None
 
     @classmethod
     def each(cls, count: int, **options: Any) -> list[Reading]:
@@ -78,6 +80,7 @@ def open_drive(
     *,
     odometry: str | None = None,
     poses: Path | None = None,
+    pose_gap: float | None = None,
 ) -> Drive:
     """Opens a recorded drive with the reader for its format.
 
@@ -94,6 +97,8 @@ def open_drive(
             of the recording: in the form of TUM (seconds, x y z, quaternion
             x y z w), of a table whose header names these columns, or of KITTI
             (3 x 4 matrices, one for each scan).
+        pose_gap: greatest time between two poses of a bag that are interpolated
+            [s]; by default 1.
 
     Raises:
         InputError: if nothing at `path` can be read as a drive, or the drive
@@ -124,7 +129,18 @@ def open_drive(
                 f"{path}: {found.title}: has no topics of poses, as --odometry"
                 " names one"
             )
-        named: dict[str, Any] = {"odometry": odometry, "poses": poses}
+        if pose_gap is not None:
+            if not 0.0 < pose_gap < math.inf:
+                raise InputError(f"--pose-gap: {pose_gap:g} is not above 0")
+            if "pose_gap" not in arguments:
+                raise InputError(
+                    f"{path}: {found.title}: --pose-gap is for bags of ROS"
+                )
+        named: dict[str, Any] = {
+            "odometry": odometry,
+            "poses": poses,
+            "pose_gap": pose_gap,
+        }
         given = lidar if found.has_lidars else columns
         asked = {name: one for name, one in named.items() if name in arguments}
         if found.is_own:

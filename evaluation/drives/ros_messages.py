@@ -27,6 +27,8 @@ TRANSFORM = "geometry_msgs/msg/TransformStamped"
 # Points of Livox's driver for ROS 2, and of the one for ROS 1, which are alike.
 LIVOX = "livox_ros_driver2/msg/CustomMsg"
 LIVOX_1 = "livox_ros_driver/msg/CustomMsg"
+# Types of point clouds.
+CLOUDS = (POINT_CLOUD, LIVOX, LIVOX_1)
 COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
 DETECTIONS_3D = "vision_msgs/msg/Detection3DArray"
 SCENE_UPDATE = "foxglove_msgs/msg/SceneUpdate"

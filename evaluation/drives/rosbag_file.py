@@ -5,26 +5,64 @@ These are rosbag2 with SQLite, of several files or compressed, and ROS 1.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 import contextlib
+from dataclasses import dataclass
+import heapq
+import itertools
+import operator
+import os
 from pathlib import Path
+import re
+import struct
+import tempfile
+import threading
 from typing import Any
+import zlib
 
 import numpy as np
 from rosbags.highlevel import AnyReader
 
-from evaluation.base import InputError, listed
-from evaluation.drives import ros_messages
+from evaluation.base import (
+    NS_PER_S,
+    InputError,
+    check_regular,
+    is_there,
+    listed,
+)
+from evaluation.drives import mcap_messages, ros_messages
+from evaluation.drives.bag_index import BagIndex, Entry
 from evaluation.drives.mcap_file import LOCATION
 
 # How to read a damaged bag of ROS 1, for error messages.
 _ADVICE = " (rosbag reindex FILE, of ROS 1, saves what is intact)"
+# How a bag of ROS 1 begins; its header has the place of the index.
+_MAGIC = b"#ROSBAG V2.0"
+_START_BYTES = 4200
+# Characters with a meaning in an address.
+_IN_ADDRESSES = re.compile("[?#%]")
+# A header of ROS 1 begins with a number, seconds and nanoseconds.
+_HEADER_1 = struct.Struct("<III")
+# A file of a recording begins this long after the end of the one before, at
+# most [ns].
+NEXT_NS = 5 * NS_PER_S
+# What SQLite and the recorders leave beside a file that was not closed, by the
+# ending of its name. The package rosbags reads none of these.
+_UNFINISHED = {
+    "-wal": "messages of the bag are in this log only; on a copy of the folder,"
+    " `sqlite3 {file} 'PRAGMA wal_checkpoint(TRUNCATE)'` moves them",
+    "-journal": "the bag was not closed, and this log undoes a half-written"
+    " change; open a copy of the folder once with `sqlite3 {file} .tables`",
+    ".active": "the recording was not finished; `rosbag reindex` of a copy"
+    " without `.active` saves what is intact",
+}
 
 
 class RosbagFile:
     """A bag, open for reading single messages, like `McapFile`.
 
-    The locations of a topic's messages are found by reading the topic once. In
+    Threads, and forks of a process, each open the bag for themselves. The
+    locations of a topic's messages are found by reading the topic once. In
     a location, `offset` is the number of the message in its topic, and
     `channel_id` is the number of the topic.
 
@@ -32,6 +70,8 @@ class RosbagFile:
         path: the bag, for messages.
         files: its files.
         library: name of the program that wrote it, which is unknown.
+        joints_ns: log times at which a file of ROS 1 ends and the next begins
+            [ns].
     """
 
     library = ""
@@ -43,35 +83,116 @@ class RosbagFile:
             paths: the folder or file of rosbag2, or the files of ROS 1.
 
         Raises:
-            InputError: there is no readable bag.
+            InputError: there is no readable bag, its recorder left a file
+                behind that is not read, or the files are not one recording.
         """
         self.path = paths[0] if len(paths) == 1 else paths[0].parent
         self.files = (
             tuple(listed(self.path)) if self.path.is_dir() else tuple(paths)
         )
-        with self._faults():
-            self._reader = AnyReader(
-                paths, default_typestore=ros_messages.known_types()
-            )
-            self._reader.open()
-        self._connections: dict[str, list[Any]] = {}
-        for one in self._reader.connections:
-            self._connections.setdefault(one.topic, []).append(one)
-        self._names = sorted(self._connections)
+        check_finished(self.files)
+        self._paths = list(paths)
+        self._local = threading.local()
+        self._opened: list[_Opened] = []
+        self.joints_ns = self._joints(paths)
+        connections = self._here.connections
+        self._names = sorted(connections)
+        self._counts = {
+            topic: sum(one.msgcount for one in of_topic)
+            for topic, of_topic in connections.items()
+        }
+        self._kinds = {
+            topic: sorted({one.msgtype for one in of_topic})
+            for topic, of_topic in connections.items()
+        }
+        self.index = BagIndex(self.files, self._entries)
         self._locations: dict[str, np.ndarray] = {}
+
+    @property
+    def _here(self) -> _Opened:
+        """The bag as this thread of this process has opened it.
+
+        Threads would move each other's place in the file, and so would a
+        process and its fork, which share it.
+        """
+        found: _Opened | None = getattr(self._local, "opened", None)
+        if found is None or found.pid != os.getpid():
+            with self._faults():
+                found = _Opened.of(self._paths)
+            self._local.opened = found
+            # What a parent has opened stays open: closing it would remove the
+            # files that it uncompressed.
+            self._opened.append(found)
+        return found
 
     def __del__(self) -> None:
         """Closes the bag, and removes what was uncompressed for it."""
-        with contextlib.suppress(Exception):
-            self._reader.close()
+        for one in getattr(self, "_opened", ()):
+            if one.pid == os.getpid():
+                with contextlib.suppress(Exception):
+                    one.reader.close()
+            else:
+                _OF_PARENTS.append(one)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Notes on the files that were joined."""
+        names = [
+            one.name
+            for one in self.files
+            if {".bag", ".db3", ".mcap"} & set(one.suffixes)
+        ]
+        if len(names) < 2:
+            return ()
+        return (
+            f"{self.path}: {len(names)} files are read as one recording:"
+            f" {' '.join(names)}",
+        )
+
+    def _joints(self, paths: Sequence[Path]) -> list[int]:
+        """Returns where files of ROS 1 are joined; checks that they may be.
+
+        Raises:
+            InputError: a file does not continue the one before it.
+        """
+        readers: Any = sorted(
+            self._here.reader.readers, key=lambda one: one.start_time
+        )
+        for before, after in itertools.pairwise(readers):
+            gap_ns = after.start_time - before.end_time
+            first, second = (
+                {
+                    (one.topic, one.msgtype)
+                    for one in reader.connections
+                    if one.msgtype in ros_messages.CLOUDS
+                }
+                for reader in (before, after)
+            )
+            why = ""
+            shorter_ns = min(
+                one.end_time - one.start_time for one in (before, after)
+            )
+            if -gap_ns > min(NS_PER_S, shorter_ns // 2):
+                why = "are of the same time"
+            elif gap_ns > NEXT_NS:
+                why = f"have {gap_ns / NS_PER_S:.0f} s between them"
+            elif first != second:
+                why = "have other topics of point clouds"
+            if why:
+                names = [Path(one.path).name for one in (before, after)]
+                raise InputError(
+                    f"{self.path}: several recordings: {' and '.join(names)}"
+                    f" {why}; give one of {' '.join(p.name for p in paths)}"
+                )
+        return [one.end_time for one in readers[:-1]]
 
     @property
     def topics(self) -> dict[str, list[str]]:
         """Maps topics with messages to types, as `McapFile.topics`."""
         return {
-            topic: sorted({f"{one.msgtype} in cdr" for one in connections})
-            for topic, connections in self._connections.items()
-            if any(one.msgcount for one in connections)
+            topic: kinds
+            for topic, kinds in self._kinds.items()
+            if self._counts[topic]
         }
 
     @property
@@ -83,16 +204,10 @@ class RosbagFile:
     def locate(self, topic: str) -> np.ndarray:
         """Returns the locations (N,) of a topic's messages, in their order."""
         if topic not in self._locations:
-            with self._faults():
-                times = [
-                    time_ns
-                    for _, time_ns, _ in self._reader.messages(
-                        self._connections[topic]
-                    )
-                ]
-            found = np.zeros(len(times), LOCATION)
-            found["offset"] = np.arange(len(times))
-            found["log_time_ns"] = times
+            times_ns = self.index.of(topic).log_times_ns
+            found = np.zeros(len(times_ns), LOCATION)
+            found["offset"] = np.arange(len(times_ns))
+            found["log_time_ns"] = times_ns
             found["channel_id"] = self._names.index(topic)
             self._locations[topic] = found
         return self._locations[topic]
@@ -113,21 +228,36 @@ class RosbagFile:
             stop = int(locations["log_time_ns"][rows].max()) + 1
             within = (times_ns >= start) & (times_ns < stop)
             offsets = np.flatnonzero(within).tolist()
+            index = self.index.of(topic)
+            if index.has_contents:
+                for row in rows.tolist():
+                    offset = int(locations["offset"][row])
+                    yield row, index.message(offset)
+                continue
+            here = self._here
             with self._faults():
-                found = self._reader.messages(
-                    self._connections[topic], start, stop
-                )
+                found = here.messages([topic], start, stop)
                 for offset, (connection, _, data) in zip(
                     offsets, found, strict=True
                 ):
-                    if offset not in row_of:
-                        continue
-                    if self._reader.is2:
-                        yield row_of[offset], memoryview(data)
-                        continue
-                    message = self._reader.deserialize(data, connection.msgtype)
-                    packed = ros_messages.serialize(message)
-                    yield row_of[offset], memoryview(packed)
+                    if offset in row_of:
+                        yield row_of[offset], here.packed(connection, data)
+
+    def _entries(
+        self, topics: Collection[str], kept: Collection[str]
+    ) -> Iterator[Entry]:
+        """Yields all messages of topics, see `BagIndex`."""
+        here = self._here
+        with self._faults():
+            for connection, time_ns, data in here.messages(topics):
+                topic = connection.topic
+                yield Entry(
+                    topic,
+                    time_ns,
+                    here.stamp_ns(data),
+                    zlib.crc32(data),
+                    here.packed(connection, data) if topic in kept else None,
+                )
 
     def attachment(self, name: str) -> bytes | None:
         """Returns None: such bags have no attachments."""
@@ -146,8 +276,121 @@ class RosbagFile:
             raise
         except Exception as error:
             # rosbags, SQLite and the compression raise errors of any class.
-            is_1 = any(file.suffix == ".bag" for file in self.files)
             raise InputError(
                 f"{self.path}: the bag cannot be read"
-                f" ({type(error).__name__}: {error}){_ADVICE if is_1 else ''}"
+                f" ({type(error).__name__}: {error}){self._advice()}"
             ) from error
+
+    def _advice(self) -> str:
+        """Returns what helps against the error of a bag of ROS 1, if known."""
+        for file in self.files:
+            if file.suffix != ".bag" or not file.is_file():
+                continue
+            with open(file, "rb") as stream:
+                start = stream.read(_START_BYTES)
+            if not start.startswith(_MAGIC):
+                return f" ({file.name} does not begin as a bag of ROS 1)"
+            found = re.search(rb"index_pos=(.{8})", start, re.DOTALL)
+            place = int.from_bytes(found[1], "little") if found else 0
+            if not 0 < place < file.stat().st_size:
+                return _ADVICE
+        return ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Opened:
+    """A bag that a thread of a process has opened.
+
+    Attributes:
+        pid: number of the process.
+        reader: the package's reader.
+        connections: topic -> its connections.
+        link: folder with links by which the bag was opened, if any.
+    """
+
+    pid: int
+    reader: AnyReader
+    connections: dict[str, list[Any]]
+    link: tempfile.TemporaryDirectory[str] | None
+
+    @classmethod
+    def of(cls, paths: Sequence[Path]) -> _Opened:
+        """Opens a bag."""
+        link = None
+        # rosbags puts the path of a SQLite file into an address as it is.
+        if any(_IN_ADDRESSES.search(str(one)) for one in paths):
+            link = tempfile.TemporaryDirectory(prefix="cns-drake-")
+            paths = [
+                _linked(Path(link.name) / str(number), one.absolute())
+                for number, one in enumerate(paths)
+            ]
+        reader = AnyReader(paths, default_typestore=ros_messages.known_types())
+        reader.open()
+        connections: dict[str, list[Any]] = {}
+        for one in reader.connections:
+            connections.setdefault(one.topic, []).append(one)
+        return cls(os.getpid(), reader, connections, link)
+
+    def messages(
+        self,
+        topics: Iterable[str],
+        start: int | None = None,
+        stop: int | None = None,
+    ) -> Iterator[tuple[Any, int, bytes]]:
+        """Yields the messages of topics by log time, and then by file.
+
+        The package's own order of equal times differs between processes.
+        """
+        wanted = [one for topic in topics for one in self.connections[topic]]
+        readers: list[Any] = list(self.reader.readers)
+        found = []
+        for reader in readers:
+            own = [one for one in wanted if one in reader.connections]
+            if own:
+                found.append(reader.messages(own, start=start, stop=stop))
+        return heapq.merge(*found, key=operator.itemgetter(1))
+
+    def packed(self, connection: Any, data: bytes) -> memoryview:
+        """Returns a message in CDR."""
+        if self.reader.is2:
+            return memoryview(data)
+        message = self.reader.deserialize(data, connection.msgtype)
+        return memoryview(ros_messages.serialize(message))
+
+    def stamp_ns(self, data: bytes) -> int:
+        """Returns the stamp of a message that begins with a header; else 0."""
+        if self.reader.is2:
+            with contextlib.suppress(ValueError):
+                return mcap_messages.read_stamp(data) or 0
+            return 0
+        if len(data) < _HEADER_1.size:
+            return 0
+        _, sec, nanosec = _HEADER_1.unpack_from(data)
+        return int(sec * NS_PER_S + nanosec)
+
+
+def _linked(folder: Path, path: Path) -> Path:
+    """Returns the path of a link, of the same name if it is a file's."""
+    folder.mkdir()
+    link = folder / (f"bag{path.suffix}" if path.is_file() else "bag")
+    link.symlink_to(path)
+    return link
+
+
+# Bags that were opened before this process was forked.
+_OF_PARENTS: list[_Opened] = []
+
+
+def check_finished(files: Sequence[Path]) -> None:
+    """Refuses a bag beside which its recorder left what is not read.
+
+    Raises:
+        InputError: there is such a file.
+    """
+    for file in files:
+        if is_there(file):  # Of a recording that goes on, the file is not.
+            check_regular(file)
+        for ending, fault in _UNFINISHED.items():
+            left = file.with_name(file.name + ending)
+            if is_there(left) and left.stat().st_size:
+                raise InputError(f"{left}: {fault.format(file=file.name)}")

@@ -20,8 +20,10 @@ def check_same_world(
         InputError: if the drives name different world frames, or different
             maps.
     """
-    frames = first.world_frame, second.world_frame
-    if frames[0] != frames[1]:
+    if first.world != second.world:
+        frames = first.world_frame, second.world_frame
+        if frames[0] == frames[1]:  # Each is of one drive.
+            frames = first.world, second.world
         raise InputError(
             f"{second.name}: poses in frame {frames[1]!r}, those of"
             f" {first.name} in {frames[0]!r}{second.placing}"

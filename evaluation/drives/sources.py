@@ -64,7 +64,7 @@ class Placement:
     def of(cls, drive: Drive) -> "Placement":
         """Returns where a drive is."""
         digest = hashlib.sha256(drive.X_WS.tobytes()).hexdigest()
-        return cls(drive.X_WS, drive.world_frame, digest)
+        return cls(drive.X_WS, drive.world, digest)
 
 
 @dataclass(frozen=True)

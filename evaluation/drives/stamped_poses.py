@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from evaluation.base import InputError, poses
+from evaluation.base import NS_PER_S, InputError, poses
 
-# Greatest time between two poses that are interpolated [ns].
-_LONGEST_GAP_NS = 1_000_000_000
+# Greatest time between two poses that are interpolated, by default [s].
+LONGEST_GAP = 1.0
+# Poses with one stamp are one pose if they are within this distance [m] ...
+_SAME_PLACE = 0.05
+# ... and this angle [rad].
+_SAME_TURN = np.radians(1.0)
 # A pose has a scan's stamp if they differ by no more: a double rounds
 # nanoseconds since 1970 [ns].
 _SAME_NS = 1000
@@ -41,12 +45,92 @@ class StampedPoses:
         X_WB: (N, 4, 4) float64 poses.
         num_unknown: number of rows or messages that were left out, because they
             have NaN or no rotation in the place of a pose.
+        longest_gap: greatest time between two poses that are interpolated [s].
+        notes: notes for the user on poses that were left out or moved.
+        advice: what else may be done about a longer gap, for errors.
     """
 
     source: object
     stamps_ns: np.ndarray
     X_WB: np.ndarray
     num_unknown: int = 0
+    longest_gap: float = LONGEST_GAP
+    notes: tuple[str, ...] = ()
+    advice: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        source: object,
+        stamps_ns: np.ndarray,
+        X_WB: np.ndarray,
+        rows: np.ndarray | None = None,
+        **fields: Any,
+    ) -> StampedPoses:
+        """Returns poses in the order of their stamps, each stamp once.
+
+        Rows in another order, and poses with one stamp, are no fault if they
+        do not change the pose at any time: the rows are then sorted, and the
+        first pose of a stamp counts.
+
+        Args:
+            source: see the class.
+            stamps_ns: (N,) int64, in any order [ns].
+            X_WB: (N, 4, 4) poses.
+            rows: (N,) number of the row of each, for errors; by default they
+                are counted.
+            fields: further attributes.
+
+        Raises:
+            InputError: poses of one stamp are apart, or the poses in the order
+                of their stamps are of several drives.
+        """
+        numbers = np.arange(1, len(stamps_ns) + 1) if rows is None else rows
+        order = np.argsort(stamps_ns, kind="stable")
+        stamps, X = stamps_ns[order], X_WB[order]
+        notes: list[str] = []
+        back = np.flatnonzero(np.diff(stamps_ns) < 0)
+        if len(back):
+            lengths = [
+                np.linalg.norm(np.diff(p[:, :3, 3], axis=0), axis=1).sum()
+                for p in (X_WB, X)
+            ]
+            # Rows that were shuffled make a shorter path in order.
+            if lengths[1] > lengths[0] + _SAME_PLACE:
+                row = int(back[0]) + 1
+                raise InputError(
+                    f"{source}: time: pose {numbers[row]} at {stamps_ns[row]}"
+                    " ns is not later than the one before, and the poses in the"
+                    " order of time jump back and forth"
+                )
+            notes.append(
+                f"{source}: {len(back)} poses are earlier than the one before;"
+                " the poses are sorted by time"
+            )
+        twice = np.flatnonzero(np.diff(stamps) == 0) + 1
+        if len(twice):
+            first = np.searchsorted(stamps, stamps[twice])
+            away = np.linalg.norm((X[twice] - X[first])[:, :3, 3], axis=1)
+            # The chord of a small angle is as long as its arc.
+            chords = (X[twice] - X[first])[:, :3, :3]
+            turn = np.linalg.norm(chords, axis=(1, 2)) / np.sqrt(2.0)
+            is_far = (away > _SAME_PLACE) | (turn > _SAME_TURN)
+            if is_far.any():
+                k = int(is_far.argmax())
+                row = numbers[order[twice[k]]]
+                raise InputError(
+                    f"{source}: time: pose {row} at {stamps[twice[k]]} ns is"
+                    f" not later than the one before: two poses of one time,"
+                    f" {away[k]:.3g} m and {np.degrees(turn[k]):.3g} deg apart"
+                )
+            if away.max() > 0.0 or turn.max() > 0.0:
+                notes.append(
+                    f"{source}: {len(twice)} poses have the time of another, up"
+                    f" to {1000.0 * away.max():.2g} mm apart; the first counts"
+                )
+            kept = np.delete(np.arange(len(stamps)), twice)
+            stamps, X = stamps[kept], X[kept]
+        return cls(source, stamps, X, notes=tuple(notes), **fields)
 
     def at_scans(self, stamps_ns: np.ndarray) -> PosedScans:
         """Returns the poses at the stamps of scans.
@@ -59,7 +143,7 @@ class StampedPoses:
 
         Raises:
             InputError: no scan has a pose, or a scan lies in a gap of more than
-                a second.
+                `longest_gap`.
         """
         own = self.stamps_ns
         spanned = np.flatnonzero(
@@ -84,14 +168,14 @@ class StampedPoses:
         off = np.flatnonzero(away > _SAME_NS)
         X_WB = self.X_WB[nearest]
         gaps = (from_before + to_after)[off]
-        if (gaps > _LONGEST_GAP_NS).any():
+        if (gaps > self.longest_gap * NS_PER_S).any():
             worst = off[gaps.argmax()]
             raise InputError(
                 f"{self.source}: no pose for the scan at {wanted[worst]} ns:"
-                f" the poses there are {gaps.max() * 1e-9:.2f} s apart, more"
-                f" than {_LONGEST_GAP_NS * 1e-9:g} s"
+                f" the poses there are {gaps.max() * 1e-9:.4g} s apart, more"
+                f" than {self.longest_gap:g} s{self.advice}"
             )
-        notes = []
+        notes = [*self.notes]
         if self.num_unknown:
             notes.append(
                 f"{self.source}: {self.num_unknown} poses without numbers or"

@@ -11,7 +11,6 @@ from evaluation.base import NS_PER_S, InputError, poses, value_errors
 from evaluation.drives.stamped_poses import StampedPoses
 from evaluation.drives.text_tables import (
     check_finite,
-    check_increasing,
     form_of,
     parse_microseconds,
     parse_seconds,
@@ -19,9 +18,11 @@ from evaluation.drives.text_tables import (
     read_stamped_rows,
 )
 
-# Greatest error of a rotation matrix or quaternion, as in numbers that are
-# written with four digits.
+# Greatest error of a rotation matrix, as in numbers that are written with four
+# digits.
 _ROTATION_TOLERANCE = 1e-3
+# Greatest error of a quaternion's length, as in numbers with two digits.
+_LENGTH_TOLERANCE = 0.02
 # Columns of a table of poses.
 _COLUMNS = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")
 
@@ -37,7 +38,7 @@ def read_matrices(path: Path) -> StampedPoses:
             a pose is no rotation, or the poses are not in order of time.
     """
     stamps_ns, values = read_stamped_rows(path, 12, ",")
-    return _increasing_poses(path, stamps_ns, pose_matrices(path, values))
+    return StampedPoses.of(path, stamps_ns, pose_matrices(path, values))
 
 
 def read_quaternions(path: Path, separator: str | None) -> StampedPoses:
@@ -61,7 +62,8 @@ def _turned_poses(
     """Returns poses from times (N,) and positions with quaternions (N, 7)."""
     with np.errstate(over="ignore"):
         lengths = np.linalg.norm(values[:, 3:], axis=1)
-    bad = np.flatnonzero(np.abs(lengths - 1.0) > _ROTATION_TOLERANCE)
+    # A quaternion of another length has the same axis and angle.
+    bad = np.flatnonzero(np.abs(lengths - 1.0) > _LENGTH_TOLERANCE)
     if len(bad):
         raise InputError(
             f"{path}: row {bad[0] + 1}: quaternion: of length"
@@ -69,7 +71,7 @@ def _turned_poses(
         )
     R = poses.rotation_from_quaternion(values[:, 3:])
     _check_positions(path, values[:, :3])
-    return _increasing_poses(path, stamps_ns, poses.make_pose(R, values[:, :3]))
+    return StampedPoses.of(path, stamps_ns, poses.make_pose(R, values[:, :3]))
 
 
 def read_trajectory(
@@ -120,7 +122,7 @@ def read_trajectory(
                 raise InputError(f"{path}: no row has the number of a scan")
             own_ns, values = own_ns[has_scan], values[has_scan]
             own_ns = stamps_ns[np.searchsorted(of_scans, own_ns)]
-        return _increasing_poses(path, own_ns, pose_matrices(path, values))
+        return StampedPoses.of(path, own_ns, pose_matrices(path, values))
     if columns != 12:
         raise InputError(
             f"{path}: rows of {columns} numbers; TUM has 8 (seconds x y z qx qy"
@@ -170,7 +172,7 @@ def read_angles(path: Path, num_velocities: int = 0) -> StampedPoses:
     _check_positions(path, values[:, :3])
     R = Rotation.from_euler("xyz", values[:, 3:]).as_matrix()
     X_WB = poses.make_pose(R, values[:, :3])
-    found = _increasing_poses(path, stamps_ns, X_WB)
+    found = StampedPoses.of(path, stamps_ns, X_WB)
     return replace(found, num_unknown=len(rows) - len(known))
 
 
@@ -226,13 +228,3 @@ def _check_positions(path: Path, positions: np.ndarray) -> None:
             f"{path}: row {row + 1}: {np.abs(positions[row]).max():g} m from"
             " the origin"
         )
-
-
-def _increasing_poses(
-    path: Path, stamps_ns: np.ndarray, X_WB: np.ndarray
-) -> StampedPoses:
-    # Loggers may repeat lines; equal rows are harmless.
-    news = np.append(True, np.diff(stamps_ns) != 0)
-    news[1:] |= (np.diff(X_WB, axis=0) != 0.0).any(axis=(1, 2))
-    check_increasing(path, stamps_ns[news], "pose")
-    return StampedPoses(path, stamps_ns[news], X_WB[news])

@@ -15,6 +15,7 @@ from .measurements import measure_localisation as measure_localisation
 from .results import QUERY as QUERY
 from .results import RIGHT_TRANSLATION as RIGHT_TRANSLATION
 from .results import Localised as Localised
+from .results import is_right as is_right
 from .results import localisation_columns as localisation_columns
 from .results import note_sparse as note_sparse
 from .results import write_rows as write_rows

@@ -10,6 +10,7 @@ from .scores import score as score
 from .scores import score_methods as score_methods
 from .sessions import SPACING as SPACING
 from .sessions import Session as Session
+from .sessions import SessionDrive as SessionDrive
 from .sessions import SessionPair as SessionPair
 from .sessions import read_labels as read_labels
 from .sessions import read_pair as read_pair

@@ -349,6 +349,7 @@ def score_methods(
     maps: Path,
     methods: tuple[str, ...],
     given: tuple[Path, ...] = (),
+    pair: SessionPair | None = None,
 ) -> dict[str, MapScores]:
     """Scores the labels of change detectors against exact labels.
 
@@ -359,6 +360,7 @@ def score_methods(
             labels themselves.
         given: files with labels of the older and of the newer map. These labels
             are scored under the name `GIVEN`.
+        pair: the maps, if they are not where the folder has them.
 
     Returns:
         Method -> its scores.
@@ -366,7 +368,7 @@ def score_methods(
     Raises:
         InputError: the folder cannot be read, or a detector cannot run.
     """
-    pair = read_pair(maps)
+    pair = pair or read_pair(maps)
     truth = read_truth(pair)
     number = {
         "gone": int((truth.A == Label.GONE).sum()),

@@ -29,6 +29,7 @@ from evaluation.base import (
     completing,
     draft_folder,
     encode_pcd,
+    from_xyz,
     is_there,
     listed,
     poses,
@@ -375,6 +376,40 @@ def _g2o_poses(X: np.ndarray) -> Iterable[str]:
     return [" ".join(map(repr, row)) for row in numbers]
 
 
+class SessionDrive(Drive):
+    """The scans of a session as a drive, which can be aligned."""
+
+    def __init__(self, session: Session):
+        """Wraps a session.
+
+        Raises:
+            InputError: it has no scans.
+        """
+        if len(session.X_WS) == 0:
+            raise InputError(
+                f"{session.folder}: no scans and poses, by which maps are"
+                " aligned"
+            )
+        self.name = session.side
+        # Both maps of a folder are in one world, by the form of the folder.
+        self.world_frame = "map"
+        self._session = session
+
+    def __len__(self) -> int:
+        return len(self._session.X_WS)
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        return np.arange(len(self), dtype=np.int64)
+
+    @property
+    def X_WS(self) -> np.ndarray:
+        return self._session.X_WS
+
+    def scan(self, index: int) -> np.ndarray:
+        return from_xyz(self._session.scan(index))
+
+
 class SessionPair(NamedTuple):
     """The two sessions of a folder: the older drive A and the newer drive B."""
 
@@ -406,7 +441,23 @@ def read_truth(pair: SessionPair) -> PairLabels:
     """
     return PairLabels(
         *(
-            read_labels(session.folder / "truth.npy", session, truth=True)
+            read_labels(_truth_of(session), session, truth=True)
             for session in pair
         )
     )
+
+
+def _truth_of(session: Session) -> Path:
+    """Returns the file with the ground truth of a session.
+
+    Raises:
+        InputError: there is none.
+    """
+    path = session.folder / "truth.npy"
+    if not is_there(path):
+        raise InputError(
+            f"{path}: not there; labels are scored against it: what happened to"
+            " each point of map.ply (cns-drake truth makes it of simulated"
+            " drives)"
+        )
+    return path

@@ -31,7 +31,7 @@ class UpkeptDrive(MovedDrive):
             updates: what the drives of the map changed.
             number: number of the drive among the drives of the map.
         """
-        super().__init__(drive, drive.X_WS, drive.world_frame, drive.datum)
+        super().__init__(drive, drive.X_WS, drive.world, drive.datum)
         self._updates = updates
         later = updates.added[number + 1 :]
         self._added = np.concatenate([np.zeros((0, 3)), *later])

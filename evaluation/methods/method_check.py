@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from evaluation.base import InputError, did_you_mean, errors_at, read_only
+from evaluation.base import InputError, did_you_mean, errors_at, note, read_only
 from evaluation.methods.method import (
     Method,
     check_class,
@@ -43,7 +43,7 @@ def check_method(method: Method) -> None:
 
     Raises:
         InputError: the method breaks the interface. The error says in one line
-            what is wrong.
+            what is wrong. If all is well, a note says so.
 
     Example:
         from evaluation import check_method, make_method
@@ -52,6 +52,7 @@ def check_method(method: Method) -> None:
     """
     for check in method_checks:
         check(method)
+    note(f"{method.name}: {len(method_checks)} checks passed")
 
 
 def check_attributes(method: Method) -> None:

@@ -38,6 +38,7 @@ from .place_measurements import shown_overlaps as shown_overlaps
 from .place_outcome import PlaceOutcome as PlaceOutcome
 from .place_outcome import QueryDrive as QueryDrive
 from .place_outcome import check_has_match as check_has_match
+from .place_outcome import never_returns as never_returns
 from .place_selection import KEEP_ALL as KEEP_ALL
 from .place_selection import checked_keep as checked_keep
 from .place_selection import kept_places as kept_places

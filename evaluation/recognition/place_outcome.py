@@ -200,6 +200,14 @@ class PlaceOutcome:
         )
 
 
+def never_returns(name: str, protocol: RetrievalProtocol) -> str:
+    """Returns what is wrong with a drive that never returns to a place."""
+    return (
+        f"{name}: never within {protocol.radius:g} m of where it was"
+        f" {protocol.exclude_recent:g} s or more before"
+    )
+
+
 def check_has_match(outcome: PlaceOutcome) -> None:
     """Checks that at least one query has a match.
 
@@ -210,10 +218,7 @@ def check_has_match(outcome: PlaceOutcome) -> None:
         return
     protocol, database = outcome.protocol, outcome.database
     if protocol.exclude_recent is not None and database == outcome.query:
-        raise InputError(
-            f"{outcome.query}: never within {protocol.radius:g} m of where it"
-            f" was {protocol.exclude_recent:g} s or more before"
-        )
+        raise InputError(never_returns(outcome.query, protocol))
     if protocol.overlap is not None:
         raise InputError(
             f"{outcome.query}: no place of {database} shows"

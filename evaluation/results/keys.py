@@ -29,6 +29,8 @@ KEYS = (*NEEDED_KEYS, *OPTIONAL_KEYS)
 MEASURED = ("metric", "value", "low", "high", "n")
 # The last column of a row, in a table whose experiment names its baselines.
 BASELINE = "baseline"
+# A column before it: how the drives of a row came into one world.
+WORLD = "world"
 # Factor: the stage of the city in which both drives are.
 STAGE = "both.stage"
 # Its value if each drive is in its own stage.
@@ -45,7 +47,7 @@ LEVEL = "level"
 # The cause of the condition without a change.
 NO_CAUSE = "none"
 # Names that no factor can have.
-RESERVED = frozenset(("label", *KEYS, *MEASURED, BASELINE))
+RESERVED = frozenset(("label", *KEYS, *MEASURED, BASELINE, WORLD))
 
 
 def check_metric_names(

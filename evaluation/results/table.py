@@ -51,6 +51,7 @@ from evaluation.results.keys import (
     NEEDED_KEYS,
     OPTIONAL_KEYS,
     RESERVED,
+    WORLD,
     Key,
     check_columns,
     key_columns,
@@ -113,6 +114,8 @@ class Row(Key):
         baseline: the values of factors that the experiment names for the
             condition with which this one is compared, such as
             `both.stage=last`; "" for the first values, or if unknown.
+        world: how the recordings came into one world: `shared` or `aligned`, or
+            `unknown` for maps' files; "" for simulated drives.
     """
 
     metric: str
@@ -121,6 +124,7 @@ class Row(Key):
     high: float = math.nan
     n: int | None = None
     baseline: str = ""
+    world: str = ""
 
     @classmethod
     def of(cls, number: Number, **key: Any) -> Row:
@@ -213,7 +217,7 @@ class Results:
                 twice, or contains an impossible value. The error names the
                 line, the column and the fault.
         """
-        table = TableLines.read(path, RESULTS, MEASURED, [BASELINE])
+        table = TableLines.read(path, RESULTS, MEASURED, [BASELINE, WORLD])
         rows: list[Row] = []
         lines: dict[tuple[object, ...], int] = {}
         for line, key, identity in table.keyed():
@@ -230,7 +234,11 @@ class Results:
         Raises:
             InputError: the file cannot be written, or a value is impossible.
         """
-        last = (BASELINE,) if any(row.baseline for row in self.rows) else ()
+        last = tuple(
+            name
+            for name in (WORLD, BASELINE)
+            if any(row[name] for row in self.rows)
+        )
         with errors_at(str(path)):
             lines = [
                 (
@@ -524,9 +532,11 @@ def _measured_values(line: TableLine) -> dict[str, Any]:
         "low": low,
         "high": high,
         "n": None if n < 0 else n,
-        "baseline": line.value(BASELINE, TEXT)
-        if BASELINE in line.columns
-        else "",
+        **{
+            name: line.value(name, TEXT)
+            for name in (WORLD, BASELINE)
+            if name in line.columns
+        },
     }
 
 

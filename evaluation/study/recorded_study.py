@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from evaluation.alignment import When
 from evaluation.base import Cluster, InputError, Job, Space
 from evaluation.paper import paper, paper_section
 from evaluation.recognition import (
@@ -72,6 +73,7 @@ def study_recordings(
     pages: Mapping[str, str] | None = None,
     printed: PrintStyle | None = None,
     on_note: Callable[[str], None] = lambda text: None,
+    align: When = "auto",
 ) -> Path:
     """Measures the experiment `stages` on recordings; returns its page.
 
@@ -97,6 +99,7 @@ def study_recordings(
         printed: style of the charts for print; None for the default.
         on_note: is called with notes on what is left out, and on how long the
             study takes.
+        align: when recordings are aligned, see `open_pair`.
 
     Raises:
         InputError: two recordings have the same map and stage, there is nothing
@@ -107,7 +110,7 @@ def study_recordings(
     study.choose(_TASKS, methods)
     main, *_ = protocols
     with_itself = protocols[main].exclude_recent is not None
-    cities = drives_by_map(recordings, on_note)
+    cities = drives_by_map(recordings, on_note, align)
     # Only the main protocol has the control, which would double the cost of a
     # further protocol.
     conditions = [

@@ -323,12 +323,21 @@ class Study(ExperimentRun):
             charts=experiment.charts,
             metrics=choose_metrics(experiment.metrics),
             experiment_text=experiment.text,
-            notes=notes,
+            notes=[*self._worlds(), *notes],
             sections=sections,
             own_methods=own_methods,
             printed=printed,
             on_note=self.on_note,
         )
+
+    def _worlds(self) -> list[str]:
+        """Returns what the page says of the worlds of recordings."""
+        found = (
+            f"World of {one.map_name}: {one.world.why}."
+            for one in self.results
+            if one.world is not None
+        )
+        return list(dict.fromkeys(found))
 
     def tables(self) -> tuple[Results, QueryRows]:
         """Returns the tables of results and of queries of finished jobs.
@@ -363,6 +372,7 @@ class Study(ExperimentRun):
                     before = baselines.get((base, name))
                 for number in task.numbers(found, before):
                     key = self._key(one, name, number.method, number.verified)
+                    key["world"] = one.world.state if one.world else ""
                     rows.append(Row.of(number, baseline=baseline, **key))
                 for method, verified, columns in task.answers(found):
                     key = self._key(one, name, method, verified)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from evaluation.alignment import When, open_in_one_world
+from evaluation.alignment import When, World, open_pair
 from evaluation.base import InputError, json_values, note
 from evaluation.drives import Drive, Reading
 from evaluation.localisation import (
@@ -19,6 +19,7 @@ from evaluation.localisation import (
     OneScan,
     Starts,
     default_settings,
+    is_right,
     localisation_columns,
     localised,
     make_estimator,
@@ -37,6 +38,12 @@ from evaluation.verbs.measured import (
 
 # Drift of the odometry by default, as a share of the distance.
 _USUAL_DRIFT = 0.01
+# The poses decide if this part of the scans is localised, and lies ...
+_MOSTLY = 0.5
+# ... this far [m] ...
+_MOVED = 0.25
+# ... or turned [deg] from the poses, in the median.
+_TURNED_DEG = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +77,7 @@ class Localisation(Measured):
             "start": self.starts.radius,
             "start_turn_deg": self.starts.turn_deg,
             "seed": self.starts.seed,
+            "world": self.world.to_json(),
             **self.metrics,
             "seconds_mean": float(self.rows["seconds"].mean()),
         }
@@ -95,6 +103,7 @@ def localise(
     odometry: str | Sequence[str] | None = None,
     poses: Path | Sequence[Path] | None = None,
     columns: int | Sequence[int] | None = None,
+    pose_gap: float | None = None,
     processes: int = 1,
     on_note: Callable[[str], None] = note,
 ) -> Localisation:
@@ -114,13 +123,15 @@ def localise(
         track: whether to track the whole drive.
         odometry_drift: drift of the odometry with which the drive is tracked,
             as a share of the distance; by default 0.01. Only with `track`.
-        align: whether to align the drives: `auto` (if their world frames
-            differ), `always` or `never`.
+        align: whether to align the drives: `auto` (unless something says
+            that they share a world), `always` or `never`.
         lidar: name of the LiDAR, for recordings with several LiDARs; like the
             next three, one value for all drives, or a list with one for each.
         odometry: topic of the poses, for recordings with several.
         poses: file with the poses of the LiDAR, see `open_drive`.
         columns: number of columns of `.bin` files.
+        pose_gap: greatest time between two poses of a bag that are interpolated
+            [s], see `open_drive`.
         processes: number of processes that localise single scans.
         on_note: is called with notes for the user.
 
@@ -144,11 +155,15 @@ def localise(
     chosen = default_settings(str(method)).with_values(values, str(method))
     make_estimator(str(method), chosen)
     readings = Reading.each(
-        2, lidar=lidar, odometry=odometry, poses=poses, columns=columns
+        2,
+        lidar=lidar,
+        odometry=odometry,
+        poses=poses,
+        columns=columns,
+        pose_gap=pose_gap,
     )
-    (source, asked), _ = open_in_one_world(
-        (place, query), readings, align, on_note
-    )
+    opened = open_pair((place, query), readings, align, on_note)
+    source, asked = opened.drives
     # A point cloud is a drive of one scan.
     if isinstance(asked, Drive):
         drive = asked
@@ -206,10 +221,12 @@ def localise(
     answers = Answers(
         **key, method=name, verified=False, columns=localisation_columns(rows)
     )
+    world = _with_offset(opened.world, rows, on_note)
     return Localisation(
         {one.metric: one for one in numbers},
-        Results.of(rows_of(numbers, key)),
+        Results.of(rows_of(numbers, key, world)),
         QueryRows.of([answers]),
+        world,
         name,
         source.name,
         drive.name,
@@ -217,6 +234,33 @@ def localise(
         odometry_drift,
         rows,
     )
+
+
+def _with_offset(
+    world: World, rows: np.ndarray, on_note: Callable[[str], None]
+) -> World:
+    """Adds to the verdict how far poses lie from registration, if far.
+
+    Args:
+        world: the verdict.
+        rows: the results, see `Localisation`.
+        on_note: is called with what is added.
+    """
+    right = is_right(rows)
+    if right.mean() < _MOSTLY:
+        return world
+    off, turn_deg = (
+        float(np.median(rows[name][right]))
+        for name in ("translation_error", "rotation_error_deg")
+    )
+    if off < _MOVED and turn_deg < _TURNED_DEG:
+        return world
+    text = (
+        "the recorded poses decide: scans that are registered to the map lie"
+        f" {off:.2f} m and {turn_deg:.2f} deg from them, in the median"
+    )
+    on_note(text)
+    return replace(world, why=f"{world.why}; {text}")
 
 
 def _check(

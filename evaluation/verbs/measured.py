@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from evaluation.alignment import World
 from evaluation.base import Reporter, one_line
 from evaluation.drives import Drive
 from evaluation.recognition import (
@@ -27,11 +28,13 @@ class Measured:
             `evaluation.recognition.METRICS`.
         results: the rows of `results.csv`.
         queries: the rows of `queries.csv`.
+        world: the world in which they were compared.
     """
 
     numbers: Mapping[str, Number]
     results: Results
     queries: QueryRows
+    world: World
 
     @property
     def metrics(self) -> dict[str, float]:
@@ -78,9 +81,11 @@ def pair_key(
     }
 
 
-def rows_of(numbers: Iterable[Number], key: Mapping[str, Any]) -> list[Row]:
+def rows_of(
+    numbers: Iterable[Number], key: Mapping[str, Any], world: World
+) -> list[Row]:
     """Returns numbers as rows of `results.csv` with the columns of a key."""
-    return [Row.of(number, **key) for number in numbers]
+    return [Row.of(number, world=world.state, **key) for number in numbers]
 
 
 def map_of(opened: Drive | Path) -> str:

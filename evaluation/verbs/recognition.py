@@ -11,8 +11,9 @@ from typing import Any, get_args
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from evaluation.alignment import When, open_in_one_world
+from evaluation.alignment import When, open_pair
 from evaluation.base import (
+    NS_PER_S,
     InputError,
     check_regular,
     json_values,
@@ -33,6 +34,7 @@ from evaluation.recognition import (
     compared_frames,
     load_metrics,
     measure_places,
+    never_returns,
     overlap_matrix,
     read_overlaps,
 )
@@ -78,6 +80,7 @@ class Recognition(Measured):
                 "mode": self.mode,
                 "database": outcome.database,
                 "query": outcome.query,
+                "world": self.world.to_json(),
                 **metrics,
                 "intervals_95": {
                     name: one.to_json()
@@ -122,6 +125,7 @@ def recognise(
     odometry: str | Sequence[str] | None = None,
     poses: Path | Sequence[Path] | None = None,
     columns: int | Sequence[int] | None = None,
+    pose_gap: float | None = None,
     exact_overlaps: Path | None = None,
     on_note: Callable[[str], None] = note,
     **fields: Any,
@@ -143,14 +147,16 @@ def recognise(
         sensor_height: height of the LiDAR above the ground for a named method
             [m].
         metrics: Python files that register metrics of your own.
-        align: whether to align the drives: `auto` (if their world frames
-            differ), `always` or `never`.
+        align: whether to align the drives: `auto` (unless something says
+            that they share a world), `always` or `never`.
         across_maps: whether the drives may be through maps of different names.
         lidar: name of the LiDAR, for recordings with several LiDARs; like the
             next three, one value for all drives, or a list with one for each.
         odometry: topic of the poses, for recordings with several.
         poses: file with the poses of the LiDAR, see `open_drive`.
         columns: number of columns of `.bin` files.
+        pose_gap: greatest time between two poses of a bag that are interpolated
+            [s], see `open_drive`.
         exact_overlaps: file with exact overlaps; by default overlaps are
             estimated from the scans. It needs the field `overlap`.
         on_note: is called with notes for the user.
@@ -186,12 +192,18 @@ def recognise(
             f" {_named(query)} is not {_named(database)}"
         )
     readings = Reading.each(
-        2, lidar=lidar, odometry=odometry, poses=poses, columns=columns
+        2,
+        lidar=lidar,
+        odometry=odometry,
+        poses=poses,
+        columns=columns,
+        pose_gap=pose_gap,
     )
-    opened, _ = open_in_one_world(
+    opened = open_pair(
         (database, query), readings, align, on_note, across_maps=across_maps
     )
-    places, queries = drives = [_scans_of(one) for one in opened]
+    places, queries = drives = [_scans_of(one) for one in opened.drives]
+    _check_returns(places, queries, protocol)
     overlaps = _overlaps(places, queries, protocol, exact_overlaps)
     ((outcomes, _),) = measure_places(
         noting(on_note),
@@ -241,7 +253,7 @@ def recognise(
             row
             for task in key
             for one in outcomes
-            for row in rows_of(one.numbers(task), key[task])
+            for row in rows_of(one.numbers(task), key[task], opened.world)
         ),
         QueryRows.of(
             Answers(
@@ -252,6 +264,7 @@ def recognise(
             )
             for one in outcomes
         ),
+        opened.world,
         made,
         outcome,
         mode,
@@ -318,6 +331,25 @@ def _is_itself(database: Drive | Path | str, query: Drive | Path | str) -> bool:
 
 def _named(given: Drive | Path | str) -> str:
     return given.name if isinstance(given, Drive) else str(given)
+
+
+def _check_returns(
+    places: Drive, queries: Drive, protocol: RetrievalProtocol
+) -> None:
+    """Refuses a drive that never returns, before its scans are described.
+
+    Raises:
+        InputError: the drive never returns.
+    """
+    recent_s = protocol.exclude_recent
+    if recent_s is None or protocol.overlap is not None:
+        return
+    rows, columns = compared_frames(places, queries, protocol)
+    away = cdist(queries.X_WS[rows, :3, 3], places.X_WS[columns, :3, 3])
+    age_ns = queries.stamps_ns[rows, None] - places.stamps_ns[columns]
+    is_old = age_ns >= recent_s * NS_PER_S
+    if not (is_old & (away.round(9) <= protocol.radius)).any():
+        raise InputError(never_returns(queries.name, protocol))
 
 
 def _overlaps(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
+from evaluation.alignment import When
 from evaluation.base import Cluster, choose_cluster, note
 from evaluation.recognition import PROTOCOLS, RetrievalProtocol, choose_methods
 from evaluation.results import PrintStyle
@@ -20,6 +21,7 @@ def report(
     protocols: Mapping[str, RetrievalProtocol] | None = None,
     lidar: str | None = None,
     columns: int | None = None,
+    align: When = "auto",
     cluster: Cluster | None = None,
     with_costs: bool = True,
     printed: PrintStyle | None = None,
@@ -40,6 +42,8 @@ def report(
             `random-yaw`.
         lidar: name of the LiDAR, for recordings with several LiDARs.
         columns: number of columns of `.bin` files.
+        align: whether to align the recordings of a map: `auto` (if their worlds
+            differ), `always` or `never`.
         cluster: runs the jobs; by default a job for each core.
         with_costs: whether the page shows the times and memory of methods.
         printed: style of the charts for print.
@@ -56,20 +60,33 @@ def report(
     """
     cluster = cluster or choose_cluster(None, None)
     chosen = choose_methods(methods, settings)
-    found = find_recordings(Path(recordings), on_note, lidar, columns)
-    for choice in chosen:
-        made = choice.make()
-        for text in {made.assumption(one.lidar_field) for one in found}:
-            if text is not None:
-                on_note(text)
-    return study_recordings(
-        found,
-        Path(output),
-        cluster,
-        chosen,
-        protocols or {"random-yaw": PROTOCOLS["random-yaw"]},
-        source=str(recordings),
-        with_costs=with_costs,
-        printed=printed,
-        on_note=on_note,
-    )
+    # The verdict on the world comes before notes on how drives are read.
+    held: list[str] = []
+
+    def told(text: str) -> None:
+        on_note(text)
+        while held and text.startswith("world: "):
+            on_note(held.pop(0))
+
+    try:
+        found = find_recordings(Path(recordings), held.append, lidar, columns)
+        for choice in chosen:
+            made = choice.make()
+            for text in {made.assumption(one.lidar_field) for one in found}:
+                if text is not None:
+                    held.append(text)
+        return study_recordings(
+            found,
+            Path(output),
+            cluster,
+            chosen,
+            protocols or {"random-yaw": PROTOCOLS["random-yaw"]},
+            source=str(recordings),
+            with_costs=with_costs,
+            printed=printed,
+            on_note=told,
+            align=align,
+        )
+    finally:
+        for text in held:
+            on_note(text)

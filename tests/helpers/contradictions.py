@@ -232,8 +232,11 @@ def _another_type(messages: list[RecordedMessage], rng) -> None:
 CONTRADICTIONS: dict[
     str, tuple[Callable[[list[RecordedMessage], Any], None], str]
 ] = {
-    "two poses": (_said_twice(_move, _ODOMETRY), r"position at \d+ ns: \["),
-    "two attitudes": (_said_twice(_turn, _ODOMETRY), "quat_xyzw at"),
+    "two poses": (_said_twice(_move, _ODOMETRY), "m and 0 deg apart"),
+    "two attitudes": (
+        _said_twice(_turn, _ODOMETRY),
+        "two poses of one time, 0 m",
+    ),
     "two mounts": (_said_twice(_move_mount, _MOUNTS), "lidar: at .* before"),
     "two parents": (_said_twice(_other_parent, _MOUNTS), "lidar: at .* before"),
     "another sensor frame": (_changed(_rename, _LIDAR), "in frame 'lidar"),
@@ -245,7 +248,10 @@ CONTRADICTIONS: dict[
     "a far point": (_changed(_far_point, _LIDAR, False), r"at \d+ ns: [xyz]:"),
     "another width": (_changed(_other_size, _LIDAR), "bytes|overlap"),
     "another height": (_changed(_more_rows, _LIDAR), "bytes instead of"),
-    "another encoding": (_add_channel(encoding="json"), "in cdr and .* json"),
+    "another encoding": (
+        _add_channel(encoding="json"),
+        "and .* in json",
+    ),
     "another type": (_another_type, "and .* instead of"),
 }
 

@@ -14,6 +14,7 @@ from evaluation.base import (
     shared_options,
     terminal,
 )
+from evaluation.command_line import Align
 
 GROUP = "Study what change costs"
 
@@ -27,6 +28,7 @@ def study(
     quick: Annotated[bool, typer.Option("--quick")] = False,
     task: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
     method: shared_options.Methods = None,
+    align: Align = "auto",
     override: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="METHOD.NAME=VALUE|FIELD=VALUE"),
@@ -119,5 +121,6 @@ def study(
             source=name,
             printed=printed,
             on_note=note,
+            align=align,
         )
     show_results(page)

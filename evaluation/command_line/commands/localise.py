@@ -34,6 +34,7 @@ def localise(
     lidar: shared_options.Lidars = None,
     odometry: shared_options.Odometry = None,
     poses: shared_options.Poses = None,
+    pose_gap: shared_options.PoseGap = None,
     columns: shared_options.ColumnsOfEach = None,
     jobs: shared_options.Jobs = None,
     output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
@@ -96,7 +97,7 @@ def localise(
         track=track,
         odometry_drift=odometry_drift,
         align=align,
-        **shared_options.readings(lidar, odometry, poses, columns),
+        **shared_options.readings(lidar, odometry, poses, columns, pose_gap),
         processes=choose_cluster(jobs, None).num_workers,
     )
     if output is not None:

@@ -24,6 +24,7 @@ def map_update(
     baseline: BaselineName | None = None,
     labels_a: Annotated[Path | None, typer.Option(metavar="FILE")] = None,
     labels_b: Annotated[Path | None, typer.Option(metavar="FILE")] = None,
+    align: options.Align = "auto",
     output: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
     json: shared_options.Json = False,
 ) -> None:
@@ -66,6 +67,7 @@ def map_update(
         folder,
         baseline=(baseline or BaselineName.FREE_SPACE).value,
         labels=(labels_a, labels_b) if labels_a and labels_b else None,
+        align=align,
     )
     if output is not None:
         options.write_tables(found, output)

@@ -40,6 +40,7 @@ def pr(
     lidar: shared_options.Lidars = None,
     odometry: shared_options.Odometry = None,
     poses: shared_options.Poses = None,
+    pose_gap: shared_options.PoseGap = None,
     columns: shared_options.ColumnsOfEach = None,
     across_maps: Annotated[bool, typer.Option("--across-maps")] = False,
     truth: Annotated[
@@ -127,7 +128,9 @@ def pr(
             metrics=metric or (),
             align=align,
             across_maps=across_maps,
-            **shared_options.readings(lidar, odometry, poses, columns),
+            **shared_options.readings(
+                lidar, odometry, poses, columns, pose_gap
+            ),
             exact_overlaps=exact_overlaps,
             hide_sector=hide_sector,
             seed=seed,

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from evaluation.base import shared_options, terminal
+from evaluation.command_line import options
 from evaluation.recognition import RetrievalProtocol, with_protocols
 
 GROUP = "Recognise places"
@@ -19,6 +20,7 @@ def report(
     output: Annotated[Path, typer.Option()],
     method: shared_options.Methods = None,
     parameter: shared_options.MethodSettings = None,
+    align: options.Align = "auto",
     lidar: shared_options.LidarName = None,
     columns: shared_options.Columns = None,
     jobs: shared_options.Jobs = None,
@@ -55,6 +57,7 @@ def report(
         method or (),
         settings=parameter or (),
         protocols=protocols,
+        align=align,
         lidar=lidar,
         columns=columns,
         printed=PrintStyle.checked(width, font, title),

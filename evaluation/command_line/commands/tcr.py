@@ -25,6 +25,7 @@ def tcr(
     lidar: shared_options.Lidars = None,
     odometry: shared_options.Odometry = None,
     poses: shared_options.Poses = None,
+    pose_gap: shared_options.PoseGap = None,
     columns: shared_options.ColumnsOfEach = None,
     output: options.Tables = None,
     json: shared_options.Json = False,
@@ -57,7 +58,7 @@ def tcr(
         target,
         no_change=no_change,
         align=align,
-        **shared_options.readings(lidar, odometry, poses, columns),
+        **shared_options.readings(lidar, odometry, poses, columns, pose_gap),
     )
     report = found.report
     if output is not None:

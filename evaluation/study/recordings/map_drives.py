@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 
-from evaluation.alignment import in_one_world
+from evaluation.alignment import When, World, open_pair
 from evaluation.base import InputError, fingerprint, natural_key, read_text
 from evaluation.drives import (
     Drive,
@@ -71,8 +71,8 @@ class RecordingInfo:
         scenario: digest of the drive's scenario, see `scenario_digest`; empty
             if unknown.
         length, num_scans: see `NamedDrive`.
-        world_frame: name of the world frame of its poses; None if the recording
-            does not exist yet.
+        world: name of the world of its poses, see `Drive.world`; None if the
+            recording does not exist yet.
     """
 
     name: str
@@ -87,7 +87,7 @@ class RecordingInfo:
     scenario: str = ""
     length: float = USUAL_LENGTH
     num_scans: float = math.inf
-    world_frame: str | None = None
+    world: str | None = None
 
     @property
     def source(self) -> DriveSource:
@@ -123,11 +123,14 @@ class MapDrives:
         stages: stage -> the drive through this stage.
         others: further drives, such as controls. A control follows the route of
             the drive through one stage, but goes through another stage.
+        world: the world of the drives; None if they do not exist yet, or none
+            is compared.
     """
 
     name: str
     stages: dict[str, RecordingInfo]
     others: tuple[RecordingInfo, ...]
+    world: World | None = None
 
     @property
     def recordings(self) -> tuple[RecordingInfo, ...]:
@@ -187,19 +190,28 @@ class MapDrives:
         return None
 
 
-def _aligned(city: MapDrives, on_note: Callable[[str], None]) -> MapDrives:
+def _in_one_world(
+    city: MapDrives, on_note: Callable[[str], None], align: When
+) -> MapDrives:
     """Returns a map's recordings in the world of the last stage's drive."""
     last = city.last
     there = [last, *(one for one in city.recordings if one is not last)]
-    frames = {one.world_frame for one in there} - {None}
-    if len(frames) <= 1 or not city.change_pairs():
+    if any(one.world is None for one in there) or not city.change_pairs():
         return city
-    drives, reports = in_one_world([one.source() for one in there])
-    for report in reports:
-        on_note(report.to_text())
+    drives = [one.source() for one in there]
+    # Those who found the recordings have told how they are read.
+    told = {text for one in drives for text in one.notes}
+    opened = open_pair(
+        drives,
+        when=align,
+        on_note=lambda text: None if text in told else on_note(text),
+    )
+    city = replace(city, world=opened.world)
+    if not opened.world.aligned:
+        return city
     placed = {
         one.name: replace(one, made_by=_placed(one, drive))
-        for one, drive in zip(there, drives, strict=True)
+        for one, drive in zip(there, opened.drives, strict=True)
     }
     return replace(
         city,
@@ -239,15 +251,16 @@ def nothing_to_compare(cities: Iterable[MapDrives]) -> list[str]:
 def drives_by_map(
     recordings: Iterable[RecordingInfo],
     on_note: Callable[[str], None] = lambda text: None,
+    align: When = "auto",
 ) -> list[MapDrives]:
     """Groups recordings by map, and sorts the maps by name.
 
-    The recordings of a map are then in one world: if their world frames differ,
-    they are aligned.
+    The recordings of a map are then in one world, see `open_pair`.
 
     Args:
         recordings: the recordings.
-        on_note: is called with a note on each alignment.
+        on_note: is called with notes on the world, and on each alignment.
+        align: when they are aligned, see `open_pair`.
 
     Raises:
         InputError: if two recordings have the same name, or the same map and
@@ -263,9 +276,10 @@ def drives_by_map(
             )
         paths[one.name] = one.path
     return [
-        _aligned(
+        _in_one_world(
             _drives_of_map(name, [r for r in recordings if r.map_name == name]),
             on_note,
+            align,
         )
         for name in sorted({recording.map_name for recording in recordings})
     ]

@@ -90,6 +90,7 @@ def recorded_pairs(
                 database=database,
                 query=query,
                 protocol=protocol,
+                world=city.world,
             )
 
 
@@ -213,4 +214,5 @@ def _composed_pair(
         protocol=protocol,
         beside=tuple(named[1:]),
         keep=keep,
+        world=city.world,
     )

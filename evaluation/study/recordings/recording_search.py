@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+import itertools
 import os
 from pathlib import Path
 import re
 
 from evaluation.base import InputError, listed, natural_key, one_line
 from evaluation.drives import (
+    NEXT_NS,
     SCENARIO,
     RecordingSource,
     driven_way,
@@ -68,9 +70,12 @@ def find_recordings(
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
     paths = _find_drives(folder, on_note)
+    spans: dict[Path, tuple[int, int]] = {}
     placed = {
-        path: _recording_info(path, on_note, lidar, columns) for path in paths
+        path: _recording_info(path, on_note, lidar, columns, spans)
+        for path in paths
     }
+    _check_no_splits(spans)
     found = [one for one in placed.values() if one is not None]
     if not found:
         raise InputError(f"{paths[0]}: {_UNKNOWN_STAGE}")
@@ -167,14 +172,41 @@ def _holds_drive(path: Path) -> bool:
     return path.suffix != ".part" and bool(find_data_sets(path))
 
 
+def _check_no_splits(spans: Mapping[Path, tuple[int, int]]) -> None:
+    """Refuses files of one recording, which would count as drives.
+
+    Raises:
+        InputError: a file continues another in its folder.
+    """
+    ordered = sorted(spans, key=lambda one: spans[one])
+    for before, after in itertools.pairwise(ordered):
+        gap_ns = spans[after][0] - spans[before][1]
+        if before.parent == after.parent and 0 < gap_ns <= NEXT_NS:
+            raise InputError(
+                f"{before.parent}: {after.name} continues {before.name}, as"
+                " files of one recording do; give each recording a folder of"
+                " its own"
+            )
+
+
 def _recording_info(
     path: Path,
     on_note: Callable[[str], None],
     lidar: str | None,
     columns: int | None,
+    spans: dict[Path, tuple[int, int]],
 ) -> RecordingInfo | None:
-    """Returns a recording; None if its map or stage is unknown."""
+    """Returns a recording; None if its map or stage is unknown.
+
+    Args:
+        path: its file or folder.
+        on_note, lidar, columns: see `find_recordings`.
+        spans: file of a recording -> its first and its last stamp [ns], to
+            which those of this one are added if it is a file.
+    """
     drive = open_drive(path, lidar, columns)
+    if path.is_file():
+        spans[path] = int(drive.stamps_ns[0]), int(drive.stamps_ns[-1])
     for note in drive.notes:
         on_note(note)
     scenario = drive.scenario or {}
@@ -205,5 +237,5 @@ def _recording_info(
         scenario=scenario_digest(scenario),
         length=float(travelled(drive.X_WS[:, :3, 3])[-1]),
         num_scans=len(drive),
-        world_frame=drive.world_frame,
+        world=drive.world,
     )

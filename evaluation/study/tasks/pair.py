@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import math
 from typing import Any, Protocol
 
+from evaluation.alignment import World
 from evaluation.drives import DriveSource
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, Role
 
@@ -87,6 +88,7 @@ class Pair:
             drives then skips the pair if it has measured these drives before.
         methods: names of the methods that are measured; None for all methods
             of the study.
+        world: the world of the recordings; None for simulated drives.
     """
 
     map_name: str
@@ -104,6 +106,7 @@ class Pair:
     keep: str | int = KEEP_ALL
     may_repeat: bool = False
     methods: Collection[str] | None = None
+    world: World | None = None
 
     def has_method(self, name: str) -> bool:
         """Returns whether a method of the study is measured, by its name."""

@@ -24,15 +24,17 @@ from helpers.towns import (
 import numpy as np
 import pytest
 
-from evaluation.alignment import in_one_world, open_in_one_world
+from evaluation.alignment import open_pair
 from evaluation.base import InputError, poses, xyz
 from evaluation.change import temporal_change
 from evaluation.drives import Drive, Reading, RecordingSource, open_drive
+from evaluation.map_update import write_session
 from evaluation.maps import map_drive
 from evaluation.study import (
     RecordingInfo,
     drives_by_map,
 )
+from evaluation.verbs import update_map
 
 pytestmark = pytest.mark.slow
 
@@ -83,7 +85,9 @@ def apart(X, Y):
 
 def aligned(first: Drive, second: Drive, when: str) -> SimpleNamespace:
     """Returns two drives in one world, with the report."""
-    (first, second), (report,) = in_one_world([first, second], when)
+    opened = open_pair([first, second], when=when)
+    (first, second), (report,) = opened.drives, opened.world.alignments
+    assert opened.world.to_json()["aligned"] is True
     return SimpleNamespace(first=first, second=second, report=report)
 
 
@@ -92,7 +96,7 @@ def test_a_wrong_datum(drives, truth):
     recorded = ELSEWHERE @ drives.X_second
     first, second = drives.first(), drives.second(recorded, frame="odom")
     with pytest.raises(InputError, match="second: poses in frame 'odom', th"):
-        in_one_world([first, second], "never")
+        open_pair([first, second], when="never")
     result = aligned(first, second, "auto")
     assert apart(result.second.X_WS, drives.X_second) < 0.03
     np.testing.assert_array_equal(result.first.X_WS, drives.X_first)
@@ -120,7 +124,13 @@ def test_a_small_error_in_a_common_frame(drives, truth):
     recorded = rigid([1.5, -2.0, 0.8], 1.5) @ drives.X_second
     first, second = drives.first(), drives.second(recorded)
     for when in ("auto", "never"):
-        assert in_one_world([first, second], when) == ([first, second], [])
+        opened = open_pair([first, second], when=when)
+        assert opened.drives == [first, second]
+        assert opened.world.to_json() == {
+            "shared": True,
+            "aligned": False,
+            "why": "all poses are in frame 'map', which drives share",
+        }
     result = aligned(first, second, "always")
     assert result.report.guess == "the common frame"
     assert result.report.candidates is None
@@ -171,10 +181,12 @@ def test_the_drive_that_drifts_gives_way(drives):
     good = change(TownDrive("good", scans, X), drives.second())
     assert change(result.first, result.second) == pytest.approx(good, abs=0.01)
     # This does not hold if others are aligned to it already.
-    (held, *_), reports = in_one_world(
-        [bad, TownDrive("same", scans, recorded, frame="odom"), drives.second()]
+    bad = TownDrive("bad", scans, recorded, frame="enu")
+    opened = open_pair(
+        [bad, TownDrive("same", scans, recorded, frame="enu"), drives.second()]
     )
-    assert [one.held for one in reports] == ["bad"]
+    held, *_ = opened.drives
+    assert [one.held for one in opened.world.alignments] == ["bad"]
     np.testing.assert_array_equal(held.X_WS, recorded)
 
 
@@ -250,21 +262,23 @@ def recordings(drives, tmp_path_factory):
 
 
 def test_a_control_joins_the_same_world(recordings, drives):
-    opened, reports = in_one_world(list(map(open_drive, recordings.values())))
-    assert [report.moved for report in reports] == ["second", "third"]
-    for one in opened[1:]:
+    opened = open_pair(list(recordings.values()))
+    moved = [report.moved for report in opened.world.alignments]
+    assert moved == ["second", "third"]
+    for one in opened.drives[1:]:
         assert apart(one.X_WS, drives.X_second) < 0.05
-    assert apart(opened[0].X_WS, drives.X_first) < 1e-9
+    assert apart(opened.drives[0].X_WS, drives.X_first) < 1e-9
 
 
 def test_recordings_of_a_city_are_aligned_once(recordings, drives):
     notes = []
     infos = [
-        RecordingInfo(name, path, "town", name, None, world_frame=name)
+        RecordingInfo(name, path, "town", name, None, world=name)
         for name, path in recordings.items()
     ]
     (city,) = drives_by_map(infos, notes.append)
-    assert [note.split()[0] for note in notes] == ["first", "second"]
+    assert [note.split()[0] for note in notes] == ["world:", "first", "second"]
+    assert (city.world.state, city.world.shared) == ("aligned", False)
     X_WS = {one.name: one.source().X_WS for one in city.recordings}
     X_TW = X_WS["first"][0] @ poses.inverse(drives.X_first[0])
     for name in ("second", "third"):
@@ -275,19 +289,51 @@ def test_recordings_of_a_city_are_aligned_once(recordings, drives):
     assert moved.identity() == pickle.loads(pickle.dumps(moved)).identity()
 
 
+def test_maps_of_sessions_follow_their_scans(drives, tmp_path):
+    """The newer map was made in another frame; its labels stay with it."""
+    notes = []
+    folder = tmp_path / "maps"
+    moved = drives.second(rigid([4.0, -3.0, 0.0], 8.0) @ drives.X_second)
+    for side, drive in (("A", drives.first()), ("B", moved)):
+        session, _ = write_session(drive, folder / side, 5.0)
+        kept = np.ones(len(session.points), np.uint8)
+        np.save(folder / side / "truth.npy", kept)
+    labels = (folder / "A/truth.npy", folder / "B/truth.npy")
+    found = {
+        when: update_map(
+            folder, labels=labels, align=when, on_note=notes.append
+        )
+        for when in ("auto", "always")
+    }
+    assert found["auto"].world.to_json() == {
+        "shared": True,
+        "aligned": False,
+        "why": notes[0].removeprefix("world: "),
+    }
+    assert found["always"].world.aligned
+    off = {
+        when: one.scores["updated_map"]["chamfer"]
+        for when, one in found.items()
+    }
+    assert off["always"] < 0.5 * off["auto"]
+    assert found["always"].metrics["miou"] == 1.0
+    # A map without scans has nothing by which it is aligned.
+    (folder / "B/poses.txt").unlink()
+    with pytest.raises(InputError, match="B: no scans and poses, by which"):
+        update_map(folder, labels=labels, align="always", on_note=print)
+
+
 def test_map_files_are_taken_as_they_are(recordings, drives, tmp_path):
     np.save(tmp_path / "map.npy", make_town())
     paths = [recordings["first"], tmp_path / "map.npy"]
     readings = Reading.each(2)
-    opened, reports = open_in_one_world(paths, readings, "auto", print)
-    assert reports == []
-    assert opened[1] == paths[1]
+    opened = open_pair(paths, readings, "auto", print)
+    assert opened.drives[1] == paths[1]
+    assert (opened.world.shared, opened.world.state) == (None, "unknown")
     with pytest.raises(InputError, match=r"--align always: .*map\.npy"):
-        open_in_one_world(paths, readings, "always", print)
+        open_pair(paths, readings, "always", print)
     with pytest.raises(InputError, match="--lidar roof: a map file has no"):
-        open_in_one_world(
-            paths[1:] * 2, Reading.each(2, lidar="roof"), "auto", print
-        )
+        open_pair(paths[1:] * 2, Reading.each(2, lidar="roof"), "auto", print)
 
 
 def test_options_count_for_one_drive_or_for_all():

@@ -157,13 +157,22 @@ def test_queries_are_turned(capsys, towns):
         assert_refused(capsys, [*both, option, value], f"{option}: {value}")
 
 
+# The verdict on drives of cns-drake, which is told first.
+SHARED = "world: all poses are in frame 'map', which drives share\n"
+
+
 def test_tcr_json(capsys, towns):
     status, out, err = run(
         capsys, "tcr", towns / "town_01", towns / "town_02", "--json"
     )
     values = json.loads(out)
     assert status == 0
-    assert err == ""
+    assert err == SHARED
+    assert json.loads(out)["world"] == {
+        "shared": True,
+        "aligned": False,
+        "why": "all poses are in frame 'map', which drives share",
+    }
     assert {
         "tcr_sym",
         "tcr_source_to_target",
@@ -213,7 +222,12 @@ def test_pr_json(capsys, towns):
         "--json",
     )
     assert status == 0
-    assert err == ""
+    assert err == SHARED
+    assert json.loads(out)["world"] == {
+        "shared": True,
+        "aligned": False,
+        "why": "all poses are in frame 'map', which drives share",
+    }
     values = json.loads(out)
     assert {
         "method",

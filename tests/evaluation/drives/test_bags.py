@@ -138,7 +138,7 @@ BAGS = {
         [*clouds("/velodyne_points", "velodyne", "x y z intensity ring time"),
          *clouds("/kiss/local_map", "odom_lidar", in_world=True),
          *odometry("/kiss/odometry", "odom_lidar", "velodyne", X_BS)],
-        {}, {"lidar": "/velodyne_points"}, "'odom_lidar' count as drives",
+        {}, {"lidar": "/velodyne_points"}, "poses are interpolated",
     ),
     "robot_localization": (
         [*static(BASE), *clouds("/velodyne_points", "velodyne"),
@@ -423,12 +423,174 @@ def test_what_is_missing_is_named(tmp_path, options, fault):
         _ = open_drive(path, **options).X_WS
 
 
+@pytest.mark.parametrize("gap", [None, 1.0, 1.25])
+def test_poses_of_a_receiver_at_1_hz_need_an_option(tmp_path, gap):
+    """Its clock jitters about a second, which is the limit."""
+    times = [T0_NS, T0_NS + 1_200_000_000]
+    rows = list(odometry("/odom", "map", "os", X_BS))
+    few = [(*rows[0][:2], t, {**rows[0][3], "header": header(t, "map")})
+           for t in times]  # fmt: skip
+    path = write_bag(tmp_path / "a", [*clouds("/points", "os"), *few])
+    if gap == 1.25:
+        assert len(open_drive(path, pose_gap=gap)) == NUM_SCANS
+        return
+    said = r"1\.2 s apart, more than 1 s \(--pose-gap SECONDS allows more\)"
+    with pytest.raises(InputError, match=said):
+        _ = open_drive(path, pose_gap=gap).X_WS
+
+
+@pytest.mark.parametrize("gap", [0.0, -1.0, np.inf, np.nan])
+def test_a_gap_that_is_none_is_refused(tmp_path, gap):
+    path = session(tmp_path / "a.bag", 0.0)
+    with pytest.raises(InputError, match=r"--pose-gap: .* is not above 0"):
+        open_drive(path, pose_gap=gap)
+
+
 def test_a_bag_of_ros_1_that_is_cut_off_names_its_cure(tmp_path):
     path = write(tmp_path, [*clouds("/points", "os")], ending=".bag")
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     said = r"ride_0.bag: the bag cannot be read .* \(rosbag reindex FILE"
     with pytest.raises(InputError, match=said):
         open_drive(path)
+
+
+def session(path, later_s, away=0.0, topic="/points", frame="odom"):
+    """Writes a bag of ROS 1 that begins later, and elsewhere."""
+    later = int(later_s * 10**9)
+    entries = [
+        (name, kind, stamp + later, moved_to(fields, stamp + later, away))
+        for name, kind, stamp, fields in [
+            *clouds(topic, "os"),
+            *odometry("/odometry", frame, "os", X_BS),
+        ]
+    ]
+    return write_bag(path, sorted(entries, key=lambda one: one[2]))
+
+
+def moved_to(fields, stamp_ns, away):
+    fields = {
+        **fields,
+        "header": header(stamp_ns, fields["header"]["frame_id"]),
+    }
+    if "pose" in fields and away:
+        of_pose = dict(fields["pose"]["pose"])
+        x, y, z = of_pose["position"]
+        of_pose["position"] = [x + away, y, z]
+        fields["pose"] = {"pose": of_pose}
+    return fields
+
+
+def test_files_that_continue_each_other_are_one_drive(tmp_path):
+    days = tmp_path / "ride"
+    days.mkdir()
+    # The files of ROS 1's `rosbag record --split` overlap a little.
+    for k in range(3):
+        session(days / f"ride_{k}.bag", 1.25 * k, 3.0 * k)
+    drive = open_drive(days)
+    assert len(drive) == 3 * NUM_SCANS
+    assert np.ptp(drive.stamps_ns) == 3_600_000_000
+    said = "3 files are read as one recording: ride_0.bag ride_1.bag ride_2.bag"
+    assert said in drive.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (
+            {"later_s": 86400.0},
+            r"a\.bag and b\.bag have 863\d\d s between them",
+        ),
+        ({"later_s": 7.0}, r"have 6 s between them"),
+        ({"later_s": 0.0}, "are of the same time"),
+        ({"later_s": 2.0, "topic": "/rear"}, "other topics of point clouds"),
+        ({"later_s": 1.25, "away": -200.0}, r"the poses jump by 20\d\.\d m"),
+    ],
+)
+def test_files_of_several_sessions_are_no_drive(tmp_path, options, why):
+    session(tmp_path / "a.bag", 0.0)
+    session(tmp_path / "b.bag", **options)
+    with pytest.raises(InputError, match=rf"several recordings: .*{why}") as e:
+        _ = open_drive(tmp_path).X_WS
+    assert "give one of a.bag b.bag" in str(e.value)
+    assert len(open_drive(tmp_path / "b.bag")) == NUM_SCANS
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_files_that_the_list_of_rosbag2_lacks_are_named(tmp_path, storage):
+    entries = [*clouds("/points", "os"), *odometry("/odom", "map", "os", X_BS)]
+    path = write_bag(tmp_path / "ride", entries, storage=storage)
+    (file,) = (one for one in path.iterdir() if one.suffix != ".yaml")
+    other = file.with_stem("ride_9")
+    other.write_bytes(file.read_bytes())
+    with pytest.raises(InputError, match=rf"{other.name}: not one of the file"):
+        open_drive(path)
+    other.unlink()
+    text = (path / "metadata.yaml").read_text()
+    two = f"- {file.name}\n  - gone{file.suffix}"
+    (path / "metadata.yaml").write_text(text.replace(f"- {file.name}", two, 1))
+    with pytest.raises(InputError, match="that are not there: gone"):
+        open_drive(path)
+
+
+def test_recordings_of_two_kinds_in_a_folder_are_named(tmp_path):
+    session(tmp_path / "a.bag", 0.0)
+    (tmp_path / "a.mcap").write_bytes(b"")
+    with pytest.raises(InputError, match=r"give one of a\.mcap a\.bag"):
+        open_drive(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("beside", "words"),
+    [
+        ("ride_0.db3-wal", "in this log only.*wal_checkpoint"),
+        ("ride_0.db3-journal", "undoes a half-written change"),
+    ],
+)
+def test_a_log_beside_a_bag_is_named(tmp_path, beside, words):
+    """The package rosbags ignores it, and would read a part of the drive."""
+    entries = [*clouds("/points", "os"), *odometry("/odom", "map", "os", X_BS)]
+    path = write_bag(tmp_path / "ride", entries, storage="sqlite3")
+    (file,) = path.glob("*.db3")
+    file = file.rename(path / "ride_0.db3")
+    (path / beside).write_bytes(b"")
+    assert len(open_drive(file)) == NUM_SCANS
+    (path / beside).write_bytes(b"1")
+    for one in (file, path):
+        with pytest.raises(InputError, match=rf"{beside}: .*{words}"):
+            open_drive(one)
+
+
+def test_a_recording_that_goes_on_is_named(tmp_path):
+    session(tmp_path / "a_0.bag", 0.0)
+    (tmp_path / "a_1.bag.active").write_bytes(b"#ROSBAG V2.0")
+    with pytest.raises(InputError, match=r"a_1\.bag\.active: .*not finished"):
+        open_drive(tmp_path)
+
+
+def test_what_is_no_bag_of_ros_1_is_not_reindexed(tmp_path):
+    path = tmp_path / "ride.bag"
+    path.write_text("This is a text.\n" * 100)
+    with pytest.raises(InputError, match="does not begin as a bag") as error:
+        open_drive(path)
+    assert "reindex" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["ride.bag", "ride.mcap", "ride.db3"])
+def test_a_pointer_of_git_lfs_is_named(tmp_path, name):
+    (tmp_path / name).write_text(
+        "version https://git-lfs.github.com/spec/v1\n"
+        f"oid sha256:{'0' * 64}\nsize 123456\n"
+    )
+    for path in (tmp_path / name, tmp_path):
+        with pytest.raises(InputError, match=rf"{name}: a pointer of Git LFS"):
+            open_drive(path)
+
+
+def test_topics_of_ros_1_are_named_in_its_words(tmp_path):
+    path = session(tmp_path / "a.bag", 0.0)
+    with pytest.raises(InputError, match="/odometry: nav_msgs/msg/Odo") as e:
+        open_drive(path, lidar="/odometry")
+    assert "cdr" not in str(e.value)
 
 
 @pytest.mark.parametrize("options", [{}, {"lidar": "/velodyne"}])

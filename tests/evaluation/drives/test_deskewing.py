@@ -96,3 +96,36 @@ def test_the_last_scan_is_corrected_by_the_poses_on_tf(tmp_path):
     np.testing.assert_allclose(
         deskew(open_drive(path), 5)["x"], np.add(20.0, moved), atol=5e-4
     )
+
+
+@pytest.mark.parametrize(("start", "is_far"), [(0.05, False), (0.4, True)])
+def test_times_that_lie_outside_of_the_scan_are_refused(
+    tmp_path, start, is_far
+):
+    """As of a driver whose times grow from message to message."""
+    values = np.rint((start + SECONDS) * 1e9)
+    drive = open_drive(record(tmp_path, "t", "<u4", values))
+    if not is_far:
+        assert len(deskew(drive, 2)) == NUM
+        return
+    fault = r"t: the points lie from 0\.4 to 0\.5 s after the stamp, outside"
+    with pytest.raises(InputError, match=fault):
+        deskew(drive, 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "why"),
+    [
+        ("time", SECONDS - TURN, "times before the stamp"),
+        ("timestamp", 1.7e9 + SECONDS, "times since 1970"),
+        ("timestamp", 0.0 * SECONDS, "the same for all points"),
+        ("time_offset", SECONDS, "of an unknown unit"),
+    ],
+)
+def test_a_field_of_times_that_is_not_used_is_named(
+    tmp_path, name, values, why
+):
+    drive = open_drive(record(tmp_path, name, "<f8", values))
+    fault = rf"no field t, .*; the field {name} \(float64\) is not used: {why}"
+    with pytest.raises(InputError, match=fault):
+        deskew(drive, 2)

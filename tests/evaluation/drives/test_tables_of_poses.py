@@ -3,6 +3,7 @@
 from decimal import Decimal
 
 from helpers.dataset_folders import make_points, write_bytes, xyzi
+import numpy as np
 import pytest
 
 from evaluation.base import InputError
@@ -99,3 +100,61 @@ def test_one_of_the_scans_that_are_counted_has_no_pose(tmp_path):
     rows[1] = "1 nan 0 0 0 0 0 1"
     drive = open_posed(tmp_path, rows, ["0", "0.1", "0.4"])
     assert drive.X_WS[:, 0, 3] == pytest.approx([0.0, 0.5, 2.0])
+
+
+def table_of(times, x, quat="0 0 0 1"):
+    """Returns rows of TUM's form along x [m]."""
+    return [
+        f"{t:.4f} {a:.4f} 0 0 {quat}" for t, a in zip(times, x, strict=True)
+    ]
+
+
+def test_a_stamp_that_stands_twice_is_no_fault_if_the_pose_is_one(tmp_path):
+    """As in the ground truth of TUM, whose times have 0.1 ms."""
+    times = [0.0, 0.05, 0.05, 0.1, 0.1, 0.2]
+    x = [0.0, 0.5, 0.5013, 1.0, 1.0, 2.0]
+    drive = open_posed(tmp_path, table_of(times, x))
+    assert drive.X_WS[:, 0, 3].tolist() == [0.0, 1.0, 2.0]
+    assert "2 poses have the time of another, up to 1.3 mm" in drive.notes[-1]
+
+
+@pytest.mark.parametrize("away", [0.049, 0.051])
+def test_poses_of_one_stamp_are_apart_from_5_cm_on(tmp_path, away):
+    rows = table_of([0.0, 0.1, 0.1, 0.2], [0.0, 1.0, 1.0 + away, 2.0])
+    if away < 0.05:
+        assert open_posed(tmp_path, rows).X_WS[1, 0, 3] == 1.0
+        return
+    fault = r"poses\.csv: time: pose 3 at 100000000 ns .* 0\.051 m and 0 deg"
+    with pytest.raises(InputError, match=fault):
+        open_posed(tmp_path, rows)
+
+
+def test_rows_in_any_order_are_sorted(tmp_path):
+    times = np.arange(-5, 30) * 0.01
+    order = np.random.default_rng(3).permutation(len(times))
+    rows = table_of(times[order], 10.0 * times[order])
+    drive = open_posed(tmp_path, rows)
+    np.testing.assert_allclose(drive.X_WS[:, 0, 3], [0.0, 1.0, 2.0], atol=1e-9)
+    assert "the poses are sorted by time" in drive.notes[-1]
+
+
+def test_rows_of_two_drives_are_refused(tmp_path):
+    """Two logs in one file, whose times overlap, are no trajectory."""
+    times = np.arange(30) * 0.01
+    rows = [
+        *table_of(times, 10.0 * times),
+        *table_of(times + 0.005, 10.0 * times + 40.0),
+    ]
+    with pytest.raises(
+        InputError, match=r"pose 31 at 5000000 ns .* back and forth"
+    ):
+        open_posed(tmp_path, rows)
+
+
+@pytest.mark.parametrize("length", [0.99, 1.01])
+def test_the_length_of_a_quaternion_turns_nothing(tmp_path, length):
+    """As of numbers with two digits."""
+    quat = f"0 0 {0.6 * length:.3f} {0.8 * length:.3f}"
+    rows = table_of([0.0, 0.1, 0.2], [0.0, 1.0, 2.0], quat)
+    drive = open_posed(tmp_path, rows)
+    assert drive.X_WS[0, 0, 0] == pytest.approx(0.28, abs=1e-3)

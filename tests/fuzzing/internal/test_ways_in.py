@@ -1094,7 +1094,7 @@ def drive(folder):
 
 
 DRIVES = (
-    "evaluation.alignment.open_in_one_world",
+    "evaluation.alignment.open_pair",
     "evaluation.drives.open_drive",
     "evaluation.study.find_recordings",
 )

@@ -76,7 +76,7 @@ def test_the_map_is_made_of_the_scans_that_are_kept(keep):
 
 
 def test_drives_of_other_worlds_are_refused():
-    with pytest.raises(InputError, match="poses in frame 'other'"):
+    with pytest.raises(InputError, match="poses in frame 'other"):
         joined((0, 3), (3, 3, 0.0, "other"))
 
 

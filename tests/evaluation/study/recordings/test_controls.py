@@ -1,8 +1,11 @@
 """Controls: drives on exactly the same route through a city."""
 
+from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
 from helpers.small_towns import ROUTES, drive
+import numpy as np
 import pytest
 
+from evaluation.base import InputError
 from evaluation.drives import driven_way
 from evaluation.study import drives_by_map, find_recordings
 
@@ -54,3 +57,25 @@ def test_fields_without_effect_make_no_other_way():
     assert way != driven_way({"waypoints": "way.csv"})
     assert driven_way({"map": "town", "aside": 1.0}) is None
     assert driven_way(None) is None
+
+
+@pytest.mark.parametrize(("later_s", "is_split"), [(4.9, True), (5.1, False)])
+def test_files_of_one_recording_are_no_two_drives(tmp_path, later_s, is_split):
+    poses = [yaw_pose(3.0 * k, 0.0, 0.0, 0.0) for k in range(4)]
+    for k in range(2):
+        # From the last scan of one to the first of the next.
+        start = T0_NS + k * (3 * 10**6 + round(later_s * 1e9))
+        stamps = start + np.arange(4) * 10**6
+        path = write_recording(
+            tmp_path / f"{k}",
+            [make_scan(np.ones((5, 3)))] * 4,
+            poses,
+            stamps_ns=stamps.tolist(),
+        )
+        (tmp_path / "all").mkdir(exist_ok=True)
+        path.rename(tmp_path / "all" / f"town_0{k}.mcap")
+    if is_split:
+        with pytest.raises(InputError, match=r"01\.mcap continues town_00"):
+            find_recordings(tmp_path / "all")
+    else:
+        assert len(find_recordings(tmp_path / "all")) == 2

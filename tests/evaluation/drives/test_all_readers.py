@@ -1,0 +1,280 @@
+"""What holds of every reader of drives, whatever the format.
+
+Each library that reads for the program leaves something out, or demands more
+than the format; `LEFT_OUT` lists what is known of each.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+import multiprocessing
+import os
+import pickle
+import shutil
+
+from helpers.bags import cloud, header, pose, write_bag
+from helpers.dataset_folders import (
+    make_points,
+    write_bytes,
+    write_matrices,
+    xyzi,
+)
+from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
+import numpy as np
+import pytest
+
+from evaluation.base import InputError
+from evaluation.drives import open_drive
+
+NUM = 12
+STAMPS = [T0_NS + 100_000_000 * k for k in range(NUM)]
+CLOUD = "sensor_msgs/msg/PointCloud2"
+ODOMETRY = "nav_msgs/msg/Odometry"
+# Every printable character of ASCII but the slash, and some others.
+NAMES = "".join(map(chr, range(32, 127))).replace("/", "") + "äß字"
+
+
+def scan_of(k):
+    return make_scan(np.random.default_rng(k).uniform(-20.0, 20.0, (50 + k, 3)))
+
+
+def entries():
+    """Returns clouds, and more poses than clouds, in the order of time."""
+    found = [
+        ("/points", CLOUD, ns, cloud(scan_of(k), "os", ns))
+        for k, ns in enumerate(STAMPS)
+    ]
+    for k in range(-2, 3 * NUM):
+        ns = T0_NS + 33_000_000 * k
+        fields = {
+            "header": header(ns, "map"),
+            "child_frame_id": "os",
+            "pose": {"pose": pose(yaw_pose(0.5 * k, 0.0, 0.0, 0.01 * k))},
+        }
+        found.append(("/odom", ODOMETRY, ns, fields))
+    return sorted(found, key=lambda one: one[2])
+
+
+def bag(storage, ending=""):
+    def make(folder, log_times=None):
+        return write_bag(
+            folder / f"ride{ending}", entries(), storage, log_times=log_times
+        )
+
+    return make
+
+
+def recording(folder):
+    poses = [yaw_pose(3.0 * k, 0.0, 0.0, 0.0) for k in range(NUM)]
+    scans = [scan_of(k) for k in range(NUM)]
+    return write_recording(folder / "ride", scans, poses).parent
+
+
+def kitti(folder):
+    path = folder / "sequences" / "11"
+    for k in range(NUM):
+        write_bytes(
+            path / f"velodyne/{k:06d}.bin", xyzi(make_points(50, seed=k))
+        )
+    (path / "times.txt").write_text("\n".join(f"{k / 10}" for k in range(NUM)))
+    rows = "1 0 0 {} 0 1 0 0 0 0 1 0"
+    text = "\n".join(rows.format(2 * k) for k in range(NUM))
+    (path / "poses.txt").write_text(text)
+    return path
+
+
+def mulran(folder):
+    path = folder / "KAIST01"
+    for k, ns in enumerate(STAMPS):
+        write_bytes(path / f"Ouster/{ns}.bin", xyzi(make_points(50, seed=k)))
+    X = np.array([yaw_pose(3e5 + 3.0 * k, 4e6, 20.0, 0.0) for k in range(NUM)])
+    write_matrices(path / "global_pose.csv", STAMPS, X)
+    return path
+
+
+BAGS = {
+    "ROS 1": bag("none", ".bag"),
+    "ROS 1, bz2": bag("bz2", ".bag"),
+    "SQLite": bag("sqlite3"),
+    "SQLite, files compressed": bag("sqlite3-file"),
+    "MCAP": bag("mcap"),
+    "MCAP, files compressed": bag("mcap-file"),
+}
+READERS = {**BAGS, "cns-drake": recording, "KITTI": kitti, "MulRan": mulran}
+
+
+@pytest.fixture(params=READERS)
+def made(request, tmp_path):
+    return READERS[request.param](tmp_path)
+
+
+def contents(drive):
+    """Returns everything that is read of a drive, as bytes."""
+    return [
+        drive.stamps_ns.tobytes(),
+        drive.X_WS.tobytes(),
+        *(drive.scan(k).tobytes() for k in range(len(drive))),
+    ]
+
+
+def scan_bytes(drive, k):
+    return drive.scan(k).tobytes()
+
+
+def test_opened_twice_and_pickled(made):
+    first = open_drive(made)
+    known = contents(first)
+    assert len(known) == NUM + 2
+    second = open_drive(made)
+    # The two are read in turn.
+    for k in range(NUM):
+        assert scan_bytes(second, k) == scan_bytes(first, k)
+    assert contents(second) == known
+    assert contents(pickle.loads(pickle.dumps(first))) == known
+    assert second.notes == first.notes
+
+
+def test_read_by_threads(made):
+    """One drive is read by threads in any order, while it is not read yet."""
+    known = contents(open_drive(made))
+    drive = open_drive(made)
+    order = np.random.default_rng(5).integers(0, NUM, 120).tolist()
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(lambda k: scan_bytes(drive, k), order))
+    assert found == [known[2 + k] for k in order]
+
+
+def _read_in_fork(drive, order, sender):
+    try:
+        sender.send([scan_bytes(drive, k) for k in order])
+    except Exception as error:
+        sender.send(error)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_read_by_forks(made):
+    """Forks share the opened files with their parent, which reads on."""
+    drive = open_drive(made)
+    known = contents(drive)
+    context = multiprocessing.get_context("fork")
+    rng = np.random.default_rng(6)
+    workers = []
+    for _ in range(3):
+        order = rng.permutation(NUM).tolist() * 3
+        receiver, sender = context.Pipe(False)
+        worker = context.Process(
+            target=_read_in_fork, args=(drive, order, sender)
+        )
+        worker.start()
+        workers.append((worker, receiver, order))
+    for k in rng.integers(0, NUM, 60).tolist():
+        assert scan_bytes(drive, k) == known[2 + k]
+    for worker, receiver, order in workers:
+        assert receiver.recv() == [known[2 + k] for k in order]
+        worker.join()
+    # No fork has taken away what its parent reads.
+    assert contents(drive) == known
+
+
+@pytest.mark.parametrize("name", BAGS)
+@pytest.mark.parametrize("order", ["reversed", "shuffled", "equal"])
+def test_any_order_of_log_times(tmp_path, name, order):
+    (tmp_path / "own").mkdir()
+    known = contents(open_drive(BAGS[name](tmp_path / "own")))
+    stamps = np.array([one[2] for one in entries()])
+    log_times = {
+        "reversed": stamps[::-1],
+        "shuffled": np.random.default_rng(7).permutation(stamps),
+        "equal": np.full(len(stamps), T0_NS),
+    }[order]
+    assert contents(open_drive(BAGS[name](tmp_path, log_times))) == known
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_path_with_every_character(tmp_path, name):
+    (tmp_path / "plain").mkdir()
+    path = READERS[name](tmp_path / "plain")
+    known = contents(open_drive(path))
+    odd = tmp_path / NAMES
+    shutil.copytree(tmp_path / "plain", odd)
+    drive = open_drive(odd / path.relative_to(tmp_path / "plain"))
+    assert contents(drive) == known
+    assert contents(pickle.loads(pickle.dumps(drive))) == known
+
+
+@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("share", [0.3, 0.8])
+def test_a_truncated_end_is_refused_by_name(tmp_path, name, share):
+    """Of the greatest file, as after a full disk or a broken download."""
+    path = READERS[name](tmp_path)
+    files = [path] if path.is_file() else [*path.rglob("*.*")]
+    files = [one for one in files if one.is_file() and one.suffix != ".yaml"]
+    largest = max(files, key=lambda one: one.stat().st_size)
+    size = int(share * largest.stat().st_size)
+    largest.write_bytes(largest.read_bytes()[: size - size % 16 + 5])
+    with pytest.raises(InputError) as error:
+        contents(open_drive(path))
+    assert str(path) in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+# What a library does not read of a bag, or demands beyond its format: what
+# makes such a bag, and how it is refused by name. What is missing here is read:
+# of rosbags, bags of several files, compressed files, `callerid` of
+# connections, several connections of a topic, and definitions of unknown types.
+LEFT_OUT = {
+    "rosbags: SQLite's write-ahead log": ("SQLite", "ride.db3-wal", "log only"),
+    "rosbags: SQLite's journal": ("SQLite", "ride.db3-journal", "undoes"),
+    "rosbags: files that metadata.yaml does not list": (
+        "SQLite", "ride_7.db3", r"ride_7.db3: not one of the files",
+    ),
+    "mcap: further files of a bag": (
+        "MCAP", "ride_7.mcap", r"ride_7.mcap: not one of the files",
+    ),
+    "rosbags: a bag of ROS 1 that is being written": (
+        "ROS 1", "ride_7.bag.active", "not finished",
+    ),
+    "rosbags: bags of ROS 1 of other times are joined": (
+        "ROS 1", "copy.bag", "several recordings: .* of the same time",
+    ),
+    "a bag beside one of another kind": (
+        "MCAP", "old.bag", "several recordings; give one of",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", LEFT_OUT)
+def test_what_libraries_leave_out_is_refused_by_name(tmp_path, case):
+    name, beside, words = LEFT_OUT[case]
+    path = BAGS[name](tmp_path)
+    folder = path.parent if path.is_file() else path
+    (file,) = (one for one in folder.iterdir() if one.suffix != ".yaml")
+    if "-" in beside:
+        beside = file.name + beside[beside.index("-") :]
+    assert len(open_drive(folder)) == NUM
+    (folder / beside).write_bytes(file.read_bytes())
+    with pytest.raises(InputError, match=words) as error:
+        open_drive(folder)
+    assert beside in str(error.value)
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_a_cache_that_is_cut_or_foreign_is_made_again(
+    tmp_path, monkeypatch, name
+):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "one").mkdir()
+    path = BAGS[name](tmp_path / "one")
+    # Files that have just changed are not in the cache.
+    for file in [path] if path.is_file() else path.iterdir():
+        os.utime(file, ns=(T0_NS, T0_NS))
+    known = contents(open_drive(path))
+    cached = [*(tmp_path / "cache").rglob("*.npz")]
+    for file in cached:
+        for data in (
+            file.read_bytes()[:-40],
+            b"",
+            file.read_bytes().replace(b"\x01", b"\x02"),
+            cached[-1].read_bytes(),
+        ):
+            file.write_bytes(data)
+            assert contents(open_drive(path)) == known
