@@ -39,7 +39,7 @@ from cns_drake.sensors import (
     OdometrySection,
     WeatherConfig,
 )
-from cns_drake.studies import DrawnRoute, Fleet, Losses
+from cns_drake.studies import DrawnRoute, Fleet
 from evaluation import command_line as evaluation_cli
 from evaluation.drives import data_sets
 from evaluation.lidar_sheets import (
@@ -135,7 +135,6 @@ CITY: Sections = {
 EXPERIMENT: Sections = {
     "Experiment": Experiment,
     "A map to make": MadeMap,
-    "What is missing": Losses,
     "A route at random": DrawnRoute,
     "A fleet": Fleet,
 }

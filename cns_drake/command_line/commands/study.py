@@ -65,7 +65,7 @@ def study(
         override: New value for a setting of a method, such as
             btc.candidates=20, or for a field of the experiment, such as
             seeds=[1,2]. For a field inside another field, join both names by a
-            dot, such as database.years=[0,5]. A list in brackets makes a
+            dot, such as query.city.years=[0,5]. A list in brackets makes a
             setting a factor, which varies. If a setting has several numbers,
             separate them by commas without brackets. May be repeated.
         allow_code: Allow the experiment to run the Python files that it names;

@@ -80,7 +80,7 @@ def load_experiment(
         name_or_file: a shipped experiment by name, or a file.
         overrides: fields to change. Each is a text `FIELD=VALUE`, or a pair of
             a top-level field and its value. In a text, VALUE is YAML and dots
-            separate nested fields, as in `database.years=[0, 5]`.
+            separate nested fields, as in `database.city.missing=[0, 0.3]`.
         quick: whether the fields in the section `quick` of the experiment
             replace its other fields.
         tasks: tasks to measure instead of the experiment's tasks; the settings
