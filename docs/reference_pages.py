@@ -26,7 +26,9 @@ import typer
 from cns_drake import command_line as cli
 from cns_drake.export import export_formats
 from cns_drake.scenarios import (
+    CityConfig,
     DriverConfig,
+    OffsetConfig,
     RideConfig,
     Scenario,
     TrafficConfig,
@@ -97,7 +99,9 @@ SCENARIO: Sections = {
     "Driver": DriverConfig,
     "Ride": RideConfig,
     "Traffic": TrafficConfig,
+    "City": CityConfig,
     "Transient": TransientConfig,
+    "Offset": OffsetConfig,
     "LiDARs": LidarSection,
     "Cameras": CameraSection,
     "IMU": ImuSection,

@@ -84,8 +84,8 @@ def city_step(scenario: Scenario, cities: Path) -> MakeMap | None:
     last = list(MapFolder(folder).stages())[-1]
     if scenario.stage != last:
         raise InputError(
-            f"{source}.years: the last stage, {last}, ages, not the stage"
-            f" {scenario.stage} of the drive"
+            f"{source}.years: the last stage ages; give the drive stage:"
+            f" '{last}', not '{scenario.stage}'"
         )
     name = f"{folder.name}_y{city.years:02d}_s{city.seed}"
     if dict(rates) != dict(DEFAULT_RATES):

@@ -221,7 +221,7 @@ FAULTS = [
     ("cases: {a: {query: {stage: next}}}", "cases.a.query.stage: 'next'"),
     (
         "database: {stage: '01', city: {years: 5}}",
-        ".*city.years: the last stage, 04, ages, not the stage 01",
+        ".*city.years: the last stage ages; give the drive stage: .04., not",
     ),
     (
         "database: {city: {redraw: 3, years: 5}}",
