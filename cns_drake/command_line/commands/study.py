@@ -11,6 +11,7 @@ from evaluation.base import (
     InputError,
     ended_by_interrupts,
     note,
+    read_yaml,
     shared_options,
     terminal,
 )
@@ -85,8 +86,8 @@ def study(
         )
 
     if list_all:
-        for known in shipped_experiments():
-            typer.echo(f"{known:<10}  {load_experiment(known).about}")
+        for known, path in shipped_experiments().items():
+            typer.echo(f"{known:<10}  {read_yaml(path)['about']}")
         return
     if name is None:
         raise InputError("study: give an experiment, or --list")

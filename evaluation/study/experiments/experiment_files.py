@@ -24,7 +24,7 @@ from evaluation.base import (
 )
 from evaluation.methods import SETTINGS
 from evaluation.recognition import expanded_names
-from evaluation.results import as_factor, chart_factors, check_factors
+from evaluation.results import as_factor
 from evaluation.study.experiments.cause_files import ALL, with_cases
 from evaluation.study.experiments.experiment import (
     Experiment,
@@ -270,6 +270,11 @@ def _check_charts(experiment: Experiment, known: _Measured, path: Path) -> None:
     Raises:
         InputError: a chart names something else, or cannot be used.
     """
+    if not experiment.charts:
+        return
+    # It needs Matplotlib, which takes long to load.
+    from evaluation.results import chart_factors, check_factors
+
     has_own = bool(named_programs(experiment.metrics))
     factors = [*dict.fromkeys(known.factors)]
     for chart in experiment.charts:

@@ -128,7 +128,7 @@ def test_every_lidar_gets_the_fields_of_the_star(drive):
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("city.mising=0.3", "--set: city.mising: .*missing"),
+        ("city.seeds=3", "--set: city.seeds: .*seed"),
         ("city.towards=09", "city.towards: map .* has no stage '09'; it has"),
         ("city={years: 3, redraw: 2}", "city.redraw: a city drawn anew does"),
         ("city.years=201", "city.years: "),
