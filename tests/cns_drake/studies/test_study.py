@@ -621,3 +621,21 @@ def test_a_map_with_one_drive_has_no_stages_to_compare(
     )
     assert "lonely: no two drives to compare" in notes
     assert {row.map for row in results.rows} == {"town"}
+
+
+def test_a_condition_more_leaves_those_before_as_they_are(
+    town, tmp_path, jobs_done
+):
+    """Also where two conditions share a drive, which then is in files."""
+
+    def ask(*depths):
+        snow = {"transient": {"snow": [*depths]}}
+        measure(experiment(town, query=snow), tmp_path)
+
+    ask(0.1)
+    ask(0.2, 0.1)
+    first, second = jobs_done
+    assert not {one for one in first if one.startswith("place ")} & {*second}
+    assert any(one.startswith("place ") for one in second)
+    ask(0.1)
+    assert jobs_done[2] == []
