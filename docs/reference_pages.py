@@ -26,7 +26,9 @@ import typer
 from cns_drake import command_line as cli
 from cns_drake.export import export_formats
 from cns_drake.scenarios import (
+    CityConfig,
     DriverConfig,
+    OffsetConfig,
     RideConfig,
     Scenario,
     TrafficConfig,
@@ -39,7 +41,7 @@ from cns_drake.sensors import (
     OdometrySection,
     WeatherConfig,
 )
-from cns_drake.studies import DrawnRoute, Fleet, Losses
+from cns_drake.studies import DrawnRoute, Fleet
 from evaluation import command_line as evaluation_cli
 from evaluation.drives import data_sets
 from evaluation.lidar_sheets import (
@@ -97,7 +99,9 @@ SCENARIO: Sections = {
     "Driver": DriverConfig,
     "Ride": RideConfig,
     "Traffic": TrafficConfig,
+    "City": CityConfig,
     "Transient": TransientConfig,
+    "Offset": OffsetConfig,
     "LiDARs": LidarSection,
     "Cameras": CameraSection,
     "IMU": ImuSection,
@@ -135,7 +139,6 @@ CITY: Sections = {
 EXPERIMENT: Sections = {
     "Experiment": Experiment,
     "A map to make": MadeMap,
-    "What is missing": Losses,
     "A route at random": DrawnRoute,
     "A fleet": Fleet,
 }

@@ -65,7 +65,7 @@ def lines() -> Iterator[tuple[object, ...]]:
         others = [
             row
             for row in rows
-            if row.map != "metropolis" or row["both.redraw.frozen"] is None
+            if row.map != "metropolis" or row["both.city.redraw.frozen"] is None
         ]
         for one in judge_survival(others):
             yield "figure-1", "7.5", "0", *_cells(verified, one)

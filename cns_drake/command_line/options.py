@@ -43,7 +43,8 @@ Vary = Annotated[
         metavar="NAME|FILE.yaml",
         help="Shipped experiment, or experiment file, whose drives are added "
         "to the drives that you name. Its scenario files and generated cities "
-        "are in the folders scenarios and cities of --output.",
+        "are in the folders scenarios and cities of --output, and the pairs "
+        "that it compares in pairs.csv.",
     ),
 ]
 Maps = Annotated[

@@ -13,6 +13,7 @@ from cns_drake.scenarios import (
     describe_scenario,
     digest_inputs,
     load_scenario,
+    make_city,
 )
 from cns_drake.simulation import (
     SimulatedDrive,
@@ -87,7 +88,9 @@ def open_labelled(place: str | Path) -> LabelledDrive:
         )
     drive = McapDrive(path)
     _check_instances(drive, path)
-    scenario = load_scenario(folder / "scenario.yaml")
+    # Where the simulation of the recording has made its city.
+    cities = folder.absolute().parent / "cities"
+    scenario = make_city(load_scenario(folder / "scenario.yaml"), cities)
     _check_unchanged(drive, path, scenario)
     simulated = SimulatedDrive(scenario)
     planned = simulated.X_WS[: len(drive)]

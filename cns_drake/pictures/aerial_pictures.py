@@ -13,7 +13,7 @@ import numpy as np
 
 from cns_drake.pictures.camera_views import View
 from cns_drake.pictures.stage_scene import StageScene
-from cns_drake.scenarios import Scenario, plan_drive
+from cns_drake.scenarios import Scenario, lost_structures, plan_drive
 from evaluation.base import (
     distances_along,
     figure_style,
@@ -84,7 +84,8 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     pictures: dict[tuple, np.ndarray] = {}
     for axes, (title, positions) in zip(panels, drives.items(), strict=False):
         scenario = scenarios[title]
-        world = scenario.world_file, scenario.without, scenario.model_paths
+        without = (*scenario.without, *lost_structures(scenario))
+        world = scenario.world_file, without, scenario.model_paths
         if world not in pictures:
             pictures[world] = StageScene(*world).photograph(
                 view, _SIDE, _SIDE, haze_length=np.inf

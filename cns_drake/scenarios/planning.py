@@ -19,6 +19,7 @@ from cns_drake.motion import (
 )
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.recording import frames_within
+from cns_drake.scenarios.missing_structures import lost_structures
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scene import (
@@ -384,6 +385,8 @@ def load_scenario_world(
 ) -> World:
     """Loads the world of a scenario's stage, without its temporary changes.
 
+    What the field `city` removes is left out.
+
     Args:
         scenario: the scenario.
         without: names of structures that are left out, besides those of the
@@ -394,11 +397,17 @@ def load_scenario_world(
     Raises:
         InputError: the world cannot be loaded.
     """
+    if scenario.lacks_city:
+        raise InputError(
+            f"{scenario.source}: city: its map has not been made; record the"
+            " drive (cns-drake simulate)"
+        )
+    lost = lost_structures(scenario)
     with errors_at_option(f"{scenario.source}: without", "without"):
         return load_world(
             scenario.world_file,
             vehicle=vehicle,
-            without=(*scenario.without, *without),
+            without=(*scenario.without, *lost, *without),
             model_paths=scenario.model_paths,
             in_sight=in_sight,
         )

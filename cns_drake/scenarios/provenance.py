@@ -65,8 +65,8 @@ def digest_inputs(
     Returns:
         Kind of file -> hexadecimal digest. The kinds are `world` and `vehicle`
         and, if used, `structures`, `suspension`, `roads`, `traffic`,
-        `waypoints`, `fcd` and `kalibr`. The digests depend only on contents and
-        relative names, not on the folder of the files.
+        `waypoints`, `fcd`, `towards` and `kalibr`. The digests depend only on
+        contents and relative names, not on the folder of the files.
 
     Raises:
         InputError: a file cannot be read.
@@ -91,6 +91,8 @@ def _input_files(scenario: Scenario) -> dict[str, Path]:
     """Returns the input files by kind, except the file of the IMU's noise."""
     inputs = {"world": scenario.world_file, "vehicle": vehicle_file()}
     folder = scenario.folder
+    if scenario.city.towards is not None:
+        inputs["towards"] = folder.stage(scenario.city.towards)
     structures = folder.structures
     if is_there(structures):
         inputs["structures"] = structures

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 import operator
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -303,6 +303,120 @@ class TransientConfig(Section):
         return self == TransientConfig(seed=self.seed)
 
 
+# The key of `scattered` that is no class.
+_SEED = "seed"
+
+
+class CityConfig(Section):
+    """How the city of a drive differs from its stage.
+
+    Attributes:
+        missing: share of the buildings and plants to remove, from 0 to 1. The
+            seed selects a place, and the structures nearest to this place are
+            removed.
+        scattered: structures to remove at random all over the map, in addition
+            to the share `missing`: for each class that you name, the share of
+            its structures to remove, such as `{pole: 0.3}`. The key `seed`
+            replaces the seed of the section, so that two drives can lack
+            different structures.
+        towards: another stage of the map, usually an earlier stage. Only
+            structures that do not exist in that stage are missing. A structure
+            that exists in that stage does not change, even if it has another
+            height in that stage.
+        years: number of years by which the city has aged since the last stage
+            of the map, which must be the stage of the drive; see
+            `cns-drake age`.
+        rates: factor by which all rates of change of these years are
+            multiplied; or event -> rate per year, of which the key `factor`
+            multiplies the rates that are not given.
+        redraw: number of a city that is sampled anew along the same streets; by
+            default the map's own city. A number gives the same city in all
+            drives.
+        seed: seed of the random choices of `missing`, `scattered` and `years`.
+    """
+
+    missing: float = field_off_by_default(0.0, ge=0.0, le=1.0)
+    scattered: dict[str, float] = field_off_by_default({})
+    towards: Name | None = field_off_by_default(None)
+    years: int = field_off_by_default(0, ge=0, le=200, strict=True)
+    rates: float | dict[str, float] = field_off_by_default(1.0)
+    redraw: int | None = field_off_by_default(None, ge=0, lt=2**31, strict=True)
+    seed: int = Field(default=1, ge=0)
+
+    @field_validator("scattered")
+    @classmethod
+    def _check_scattered(cls, scattered: dict[str, float]) -> dict[str, float]:
+        for kind, share in scattered.items():
+            if kind == _SEED:
+                if share < 0 or share != int(share):
+                    raise ValueError(
+                        f"{kind}: {share} is no whole number from 0"
+                    )
+            elif not 0.0 <= share <= 1.0:
+                raise ValueError(f"{kind}: {share} is not from 0 to 1")
+        return scattered
+
+    @field_validator("redraw")
+    @classmethod
+    def _check_redraw(
+        cls, redraw: int | None, info: ValidationInfo
+    ) -> int | None:
+        if redraw is not None and info.data.get("years"):
+            raise ValueError("a city drawn anew does not age; leave out years")
+        return redraw
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Class -> share of its structures that are removed at random."""
+        return {n: one for n, one in self.scattered.items() if n != _SEED}
+
+    @property
+    def scattered_seed(self) -> int:
+        """The seed of the structures that are removed at random."""
+        return int(self.scattered.get(_SEED, self.seed))
+
+    @property
+    def loses_nothing(self) -> bool:
+        """Whether no structure is missing."""
+        return not (self.missing or any(self.shares.values()))
+
+    @property
+    def is_made(self) -> bool:
+        """Whether the city is another map, which must be made."""
+        return self.years > 0 or self.redraw is not None
+
+    @property
+    def is_off(self) -> bool:
+        """Whether the city is that of the stage."""
+        return self.loses_nothing and not self.is_made
+
+    @property
+    def is_random(self) -> bool:
+        """Whether the city depends on the field `seed`."""
+        scattered = any(self.shares.values()) and _SEED not in self.scattered
+        return self.missing > 0.0 or self.years > 0 or scattered
+
+
+class OffsetConfig(Section):
+    """Where the LiDARs pass, beside where they are mounted on the car.
+
+    It moves the LiDARs of a drive through its world without another route.
+
+    Attributes:
+        ahead: how far ahead [m].
+        left: how far to the left [m].
+        yaw_deg: angle by which they are rotated to the left [deg].
+    """
+
+    ahead: float = Field(default=0.0, ge=-100.0, le=100.0)
+    left: float = Field(default=0.0, ge=-100.0, le=100.0)
+    yaw_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
+
+
+# The key of `lidars` for every LiDAR of a drive.
+_EVERY = "*"
+
+
 class Scenario(Section):
     """A vehicle with sensors that follows a route through a stage.
 
@@ -324,6 +438,8 @@ class Scenario(Section):
             GZ_SIM_RESOURCE_PATH.
         without: names of structures to leave out of the world; the names are in
             the map's `structures.csv`.
+        city: how the city differs from the stage: what is missing, how long it
+            has aged, or which other city lies along the streets.
         title: one line for readers that says what the drive shows.
         route: lanes to follow, road by road. Give either `route` or
             `waypoints`.
@@ -343,6 +459,8 @@ class Scenario(Section):
             snow.
         lidars: LiDARs by name. The name of a LiDAR is also the name of its
             frame and its topic. By default there is one LiDAR, named `lidar`.
+            The fields of the name `*` are given to every LiDAR.
+        offset: how far the LiDARs pass from where they are mounted.
         cameras: cameras by name. The name of a camera is also the name of its
             optical frame (x right, y down, z ahead) and its topics. By default
             there is no camera.
@@ -366,6 +484,9 @@ class Scenario(Section):
     world: str | None = _Optional
     model_paths: tuple[str, ...] = field_off_by_default(())
     without: tuple[str, ...] = ()
+    city: CityConfig = Field(
+        default=CityConfig(), exclude_if=lambda value: value.is_off
+    )
     title: str = ""
     route: Route | None = None
     aside: float = Field(default=0.0, ge=-3.0, le=3.0)
@@ -381,6 +502,7 @@ class Scenario(Section):
     lidars: dict[Name, LidarSection] = Field(
         default={"lidar": LidarSection()}, min_length=1
     )
+    offset: OffsetConfig = field_off_by_default(OffsetConfig())
     cameras: dict[Name, CameraSection] = field_off_by_default({})
     imu: ImuSection = ImuSection()
     weather: WeatherConfig = field_off_by_default(WeatherConfig())
@@ -398,6 +520,8 @@ class Scenario(Section):
 
     # The file of the scenario, and those of its bases.
     _files: tuple[Path, ...] = PrivateAttr(())
+    # Folder and stage of the map that was made of `city`.
+    _made: tuple[Path, str] | None = PrivateAttr(None)
 
     @field_validator("base")
     @classmethod
@@ -436,6 +560,13 @@ class Scenario(Section):
                 "waypoints have no lanes for lane_changes; give a route"
             )
         return driver
+
+    @field_validator("lidars", mode="before")
+    @classmethod
+    def _give_to_every_lidar(cls, lidars: Any) -> Any:
+        if not (isinstance(lidars, Mapping) and _EVERY in lidars):
+            return lidars
+        return _for_every(lidars, ("lidar",) if len(lidars) == 1 else ())
 
     @field_validator("lidars")
     @classmethod
@@ -526,7 +657,17 @@ class Scenario(Section):
 
     @property
     def folder(self) -> MapFolder:
-        """The folder of the map or, without a map, of the world's file."""
+        """The folder of the map or, without a map, of the world's file.
+
+        If a city was made for the drive, the map is that of this city.
+        """
+        if self._made is not None:
+            return MapFolder(self._made[0])
+        return self.map_folder
+
+    @property
+    def map_folder(self) -> MapFolder:
+        """The folder of the field `map`, or of the world's file."""
         if self.world is not None:
             return MapFolder(Path(self.world).parent)
         assert self.map is not None  # Either a map or a world is given.
@@ -537,7 +678,30 @@ class Scenario(Section):
         """The SDF file of the stage or of the world."""
         if self.world is not None:
             return Path(self.world)
-        return self.folder.stage(str(self.stage))
+        return self.folder.stage(self.stage_in_folder)
+
+    @property
+    def stage_in_folder(self) -> str:
+        """The name of the stage in `folder`."""
+        return str(self.stage) if self._made is None else self._made[1]
+
+    @property
+    def lacks_city(self) -> bool:
+        """Whether the city of the drive must be made, and is not."""
+        return self.city.is_made and self._made is None
+
+    def in_folder(self, made: tuple[Path, str] | None) -> Scenario:
+        """Returns the scenario with its city read from a map that was made.
+
+        The fields stay the same: what is recorded does not depend on the place
+        of the folder.
+
+        Args:
+            made: folder and stage of the map; None for the field `map`.
+        """
+        copy = self.replaced()
+        copy._made = made
+        return copy
 
     @property
     def fastest_rate(self) -> int:
@@ -548,6 +712,21 @@ class Scenario(Section):
     def frame_period(self) -> float:
         """Time between two frames, the scans of the first LiDAR [s]."""
         return 1.0 / next(iter(self.lidars.values())).rate
+
+    @property
+    def mounted_lidars(self) -> dict[str, LidarSection]:
+        """The LiDARs where they pass: moved by `offset`."""
+        ahead, left, yaw_deg = (one for _, one in self.offset)
+        if not (ahead or left or yaw_deg):
+            return self.lidars
+        found = {}
+        for name, lidar in self.lidars.items():
+            (x, y, z), (roll, pitch, yaw) = lidar.xyz, lidar.rpy_deg
+            found[name] = lidar.replaced(
+                xyz=(x + ahead, y + left, z),
+                rpy_deg=(roll, pitch, yaw + yaw_deg),
+            )
+        return found
 
     @property
     def further_sensors(self) -> dict[str, SensorConfig]:
@@ -597,12 +776,15 @@ class Scenario(Section):
                 `aside`, setting `map` removes `world`, setting `route` removes
                 `waypoints` and `u_turns`, and setting `waypoints` removes
                 `route` and `aside`. Of a LiDAR, setting `unit` removes
-                `preset`, and setting `preset` removes `unit`.
+                `preset`, setting `preset` removes `unit`, and each of them
+                removes `rings`, `columns`, `min_range` and `max_range`.
             source: the file or argument that error messages name.
 
         Raises:
             InputError: a field is unknown, or its value is not usable.
         """
+        if isinstance(lidars := changes.get("lidars"), Mapping):
+            changes = {**changes, "lidars": _for_every(lidars, self.lidars)}
         scenario = validated(Scenario, _merged(self, changes), source)
         scenario._files = self._files
         return scenario
@@ -684,6 +866,26 @@ def _merged(
         else:
             merged[field] = change
     return merged
+
+
+def _for_every(
+    lidars: Mapping[str, Any], names: Iterable[str]
+) -> dict[str, Any]:
+    """Returns fields of LiDARs, with those of `*` under each name.
+
+    Args:
+        lidars: name -> fields of the LiDAR, or None for no such LiDAR.
+        names: further names of LiDARs.
+    """
+    every = lidars.get(_EVERY)
+    found = {name: one for name, one in lidars.items() if name != _EVERY}
+    if not isinstance(every, Mapping):
+        return dict(lidars)
+    for name in dict.fromkeys([*found, *names]):
+        own = found.get(name, {})
+        if isinstance(own, Mapping):
+            found[name] = {**every, **own}
+    return found
 
 
 def _fastest_rate(lidars: dict[str, LidarSection]) -> int:

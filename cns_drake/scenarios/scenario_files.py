@@ -272,8 +272,12 @@ def check_files(scenario: Scenario, source: object = None) -> None:
             )
     if scenario.imu.kalibr is not None:
         scenario.imu.sample_rate(scenario.fastest_rate)
-    traffic = scenario.traffic
+    traffic, city = scenario.traffic, scenario.city
     if scenario.map is None:
+        if not city.is_off:
+            raise InputError(
+                f"{source}: city: a world is no city; give a map and its stage"
+            )
         if not traffic.is_off:
             raise InputError(
                 f"{source}: traffic: a world has no roads; give a map with some"
@@ -292,6 +296,11 @@ def check_files(scenario: Scenario, source: object = None) -> None:
         raise InputError(
             f"{source}: stage: map '{scenario.map}' has no stage "
             f"'{scenario.stage}'; it has: {stages}"
+        )
+    if city.towards is not None and city.towards not in folder.stages():
+        raise InputError(
+            f"{source}: city.towards: map '{scenario.map}' has no stage "
+            f"'{city.towards}'; it has: {', '.join(folder.stages())}"
         )
     if traffic.queues and not folder.roads.is_file():
         raise InputError(

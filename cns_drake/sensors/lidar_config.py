@@ -135,6 +135,10 @@ def _find_unit(given: Any) -> Any:
     return given
 
 
+# Fields in which another model has values of its own.
+_OF_MODEL = ("rings", "columns", "min_range", "max_range")
+
+
 class LidarSection(LidarDescription, Mount):
     """A LiDAR on the vehicle.
 
@@ -171,8 +175,8 @@ class LidarSection(LidarDescription, Mount):
 
     # A field -> the fields that a change of it removes.
     replaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "preset": ("unit",),
-        "unit": ("preset",),
+        "preset": ("unit", *_OF_MODEL),
+        "unit": ("preset", *_OF_MODEL),
     }
 
     @model_validator(mode="before")
@@ -261,9 +265,7 @@ class LidarSection(LidarDescription, Mount):
             InputError: there is no such preset, or the file is no data sheet.
         """
         new = make_lidar_config(unit)
-        names = (
-            "preset", "unit", "rings", "columns", "min_range", "max_range",
-        )  # fmt: skip
+        names = ("preset", "unit", *_OF_MODEL)
         return self.replaced(**{name: getattr(new, name) for name in names})
 
 

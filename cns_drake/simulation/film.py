@@ -133,7 +133,7 @@ def make_film(
     scenario = scenario.replaced(cameras=views)
     stages = (
         [scenario.stage]
-        if scenario.stage is None
+        if scenario.stage is None or scenario.city.is_made
         else list(scenario.folder.stages())
     )
     of_view = max(1, round(seconds * RATE / len(stages) / len(views)))

@@ -179,7 +179,7 @@ class LoadedDrive:
     @property
     def X_BSs(self) -> dict[str, RigidTransform]:
         """LiDAR name -> pose of the LiDAR in base_link."""
-        lidars = self.scenario.lidars
+        lidars = self.scenario.mounted_lidars
         return {name: sensor_pose(lidar) for name, lidar in lidars.items()}
 
 

@@ -27,7 +27,7 @@ from cns_drake.scenarios import (
     digest_inputs,
 )
 from cns_drake.scene import structures_in
-from cns_drake.sensors import BeamPattern, sensor_pose
+from cns_drake.sensors import BeamPattern
 from cns_drake.simulation.loaded_drive import load_drive
 from cns_drake.simulation.station import make_station
 from evaluation.base import doing, poses
@@ -86,7 +86,7 @@ class SimulatedDrive(Drive):
         self.world_frame = MAP_FRAME
         self.trajectory = trajectory
         self.period = scenario.frame_period
-        self._X_BS = sensor_pose(next(iter(scenario.lidars.values())))
+        self._X_BS = next(iter(drive.X_BSs.values()))
         self._scenario = scenario
         self._num_frames = drive.num_frames
         self._instances = index_instances(drive.structures, self.name)

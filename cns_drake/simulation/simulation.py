@@ -31,6 +31,7 @@ from cns_drake.scenarios import (
     dependency_versions,
     describe_scenario,
     digest_inputs,
+    make_city,
     recording_fingerprint,
 )
 from cns_drake.scene import FileWatch, InSight
@@ -107,7 +108,8 @@ def simulate(
     """Simulates a scenario and records it in the folder `<output>/<name>`.
 
     The recording is whole or not there: an interrupted run leaves nothing, and
-    what a killed run leaves is replaced.
+    what a killed run leaves is replaced. If the city of the drive must be made
+    (`city.years`, `city.redraw`), its map stays in `<output>/cities`.
 
     Args:
         scenario: the scenario to run.
@@ -149,6 +151,7 @@ def simulate(
             other = read_drive_page(Path(beside), _city(scenario))
         RecordingFolder(folder).check(overwrite)
         check_folder_writable(folder.parent)
+        scenario = make_city(scenario, folder.parent / "cities")
         plan = DrivePlan(scenario)
         if scenario.cameras:
             check_renderer()
@@ -280,7 +283,9 @@ def _make_page(drive: LoadedDrive, in_sight: InSight | None) -> MeshcatRecorder:
     scenario = drive.scenario
     other, other_name, is_earlier = other_stage(scenario)
     stage = scenario.stage
-    stages = () if stage is None else tuple(scenario.folder.stages())
+    stages: tuple[str, ...] = ()
+    if not (stage is None or scenario.city.is_made):
+        stages = tuple(scenario.folder.stages())
     return MeshcatRecorder(
         drive.world,
         X_BSs=drive.X_BSs,

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+import math
 
 import numpy as np
 
@@ -44,6 +45,7 @@ def sight_along(plan: DrivePlan, *, with_page: bool) -> InSight | None:
         and scenario.transient.is_off
         and not (scenario.cameras or scenario.further_sensors)
         and not scenario.without
+        and scenario.city.loses_nothing
     ):
         return None
     reach = _SURROUNDINGS if with_page else 0.0
@@ -51,6 +53,7 @@ def sight_along(plan: DrivePlan, *, with_page: bool) -> InSight | None:
         model = make_lidar_model(config, name, scenario.seed, scenario.weather)
         measured = model.returns or model.measurement
         reach = max(reach, measured.reach(model.pattern.max_range))
+    reach += math.hypot(scenario.offset.ahead, scenario.offset.left)
     frames = count_frames(scenario, plan.trajectory)
     times = np.arange(frames + 1) * scenario.frame_period
     way = Way(plan.trajectory.poses(times)[1][:, :2])

@@ -225,7 +225,7 @@ def _add_lidars(
             builder,
             world.scene_graph,
             drive.base_link,
-            sensor_pose(config),
+            drive.X_BSs[name],
             name=name,
             **model._asdict(),
             unseen=[

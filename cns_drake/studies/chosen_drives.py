@@ -1,7 +1,9 @@
 """The drives that a user names, and those that an experiment makes."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from cns_drake.scenarios import (
     Scenario,
@@ -9,9 +11,17 @@ from cns_drake.scenarios import (
     load_scenario,
     write_scenarios,
 )
-from cns_drake.studies.maps.experiment_maps import pairs_by_map
+from cns_drake.studies.maps.experiment_maps import MapPairs, pairs_by_map
 from cns_drake.studies.pairs.changed_pairs import changed_pairs
-from evaluation.base import Cluster, InputError, note
+from cns_drake.studies.pairs.comparisons import ChangedPair
+from evaluation.base import (
+    Cluster,
+    InputError,
+    check_writable,
+    note,
+    write_csv,
+)
+from evaluation.results import CAUSE
 from evaluation.study import ExperimentRun, load_experiment
 from worlds.maps import recordable_drives
 
@@ -22,8 +32,9 @@ def named_drives(
     """Returns the named drives, and after them those of an experiment.
 
     If neither is given, these are all shipped drives. The scenario files of an
-    experiment's drives are written to `<output>/scenarios`, and cities that it
-    makes to `<output>/cities`.
+    experiment's drives are written to `<output>/scenarios`, the pairs that it
+    compares to `<output>/pairs.csv`, and cities that it makes to
+    `<output>/cities`.
 
     Args:
         names: names of shipped drives, or scenario files.
@@ -49,9 +60,12 @@ def _varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
     unused = {"tasks": {"place": {}}, "methods": {"solid": {}}, "charts": []}
     experiment = load_experiment(vary, list(unused.items()))
     check_written_scenarios(output / "scenarios")
+    check_writable(output / "pairs.csv")
     run = ExperimentRun(experiment, output.absolute(), vary, cluster, note)
-    members = study_drives(run)
+    found = _study_pairs(run, ())
+    members = _drives_of(found, vary)
     write_scenarios(members, output / "scenarios")
+    _write_pairs(found, output / "pairs.csv")
     return members
 
 
@@ -68,13 +82,53 @@ def study_drives(
         InputError: a map cannot be used, no drive of it can be simulated, or
             two drives have the same name.
     """
+    return _drives_of(_study_pairs(run, maps), run.source)
+
+
+def _study_pairs(
+    run: ExperimentRun, maps: Sequence[str]
+) -> list[tuple[MapPairs, ChangedPair]]:
     found = list(pairs_by_map(run, maps))
+    return [
+        (some, one)
+        for some, pairs in zip(found, changed_pairs(run, found), strict=True)
+        for one in pairs
+    ]
+
+
+def _drives_of(
+    found: Iterable[tuple[MapPairs, ChangedPair]], source: str
+) -> list[Scenario]:
     drives: dict[str, Scenario] = {}
-    for changed in changed_pairs(run, found):
-        for one in changed:
-            for drive in one.drives:
-                if drives.setdefault(drive.name, drive) != drive:
-                    raise InputError(
-                        f"{run.source}: two drives are named {drive.name}"
-                    )
+    for _, pair in found:
+        for drive in pair.drives:
+            if drives.setdefault(drive.name, drive) != drive:
+                raise InputError(f"{source}: two drives are named {drive.name}")
     return list(drives.values())
+
+
+# Columns of a table of pairs before those of factors and of the protocol.
+_PAIR = ("map", "database", "query", "case", "seed")
+
+
+def _write_pairs(
+    found: Sequence[tuple[MapPairs, ChangedPair]], path: Path
+) -> None:
+    """Writes the pairs of an experiment, by the names of their recordings.
+
+    Several drives of a database are separated by spaces. The protocol's seed
+    is the column `protocol_seed`; the others have the names of its fields.
+    """
+    rows: list[dict[str, Any]] = []
+    for some, pair in found:
+        *database, query = (drive.name for drive in pair.drives)
+        factors = {**some.factors, **pair.condition.factors}
+        protocol = asdict(pair.protocol)
+        protocol["protocol_seed"] = protocol.pop("seed")
+        case = factors.get(CAUSE)
+        values = some.map_name, " ".join(database), query, case, pair.seed
+        rows.append(
+            {**dict(zip(_PAIR, values, strict=True)), **factors, **protocol}
+        )
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    write_csv(path, names, ([row.get(name) for name in names] for row in rows))

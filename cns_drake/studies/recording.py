@@ -14,6 +14,7 @@ from cns_drake.scenarios import (
     Scenario,
     digest_file,
     digest_inputs,
+    in_made_city,
     recording_fingerprint,
 )
 from cns_drake.simulation import simulate
@@ -94,7 +95,8 @@ def plan_recordings(
             raise InputError(f"{name}: {count} drives have this name")
     output = output.absolute()
     waiting = []
-    for scenario in scenarios:
+    for one in scenarios:
+        scenario = in_made_city(one, output / "cities")
         page = (pages or {}).get(scenario.name)
         if page is not None:
             page = page.absolute()
@@ -224,6 +226,9 @@ def is_recorded(scenario: Scenario, folder: Path) -> bool:
     """
     files = RecordingFolder(folder / scenario.name)
     if not files.is_finished() or not files.mcap.is_file():
+        return False
+    scenario = in_made_city(scenario, folder / "cities")
+    if scenario.city.is_made and not scenario.world_file.is_file():
         return False
     try:
         # A recording that was damaged later does not count as finished.

@@ -1,24 +1,25 @@
 """Makes and measures the pairs of drives of an experiment on maps."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 import itertools
 from pathlib import Path
 
 import numpy as np
 
 from cns_drake.scenarios import (
+    OffsetConfig,
     Scenario,
     combined_digest,
     count_frames,
     digest_inputs,
     load_scenario,
+    make_maps,
     plan_drive,
+    redrawn_city,
 )
-from cns_drake.studies.cause_check import check_causes
-from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
+from cns_drake.studies.cause_check import cause_fault
 from cns_drake.studies.maps.experiment_maps import MapPairs, pairs_by_map
-from cns_drake.studies.maps.map_step import make_maps
-from cns_drake.studies.maps.redrawing import redrawn_city
 from cns_drake.studies.pairs.changed_pairs import changed_pairs
 from cns_drake.studies.pairs.comparisons import ChangedPair
 from cns_drake.studies.pairs.simulated_pairs import (
@@ -191,8 +192,7 @@ def plan_study(
     check_folder_writable(study.output)
     experiment = study.experiment
     study.choose(TASKS)
-    known = causes()
-    check_causes(known[one] for one in experiment.cases if one in known)
+    experiment = study.experiment = _with_usable_causes(study)
     if experiment.frozen is not None:
         with errors_at(f"{study.source}: frozen"):
             frozen_drives(experiment.frozen)
@@ -243,6 +243,25 @@ def plan_study(
     return cities
 
 
+def _with_usable_causes(study: Study) -> Experiment:
+    """Returns the experiment without cases of causes that cannot be used."""
+    cases, known = study.experiment.cases, causes()
+    unusable = set()
+    for name in cases:
+        if name in known and (fault := cause_fault(known[name])):
+            study.on_note(f"left out: {fault}")
+            unusable.add(name)
+    if not unusable:
+        return study.experiment
+    kept = {}
+    for name, case in cases.items():
+        if isinstance(case, tuple):
+            case = tuple(one for one in case if one not in unusable)
+        if case and name not in unusable:
+            kept[name] = case
+    return study.experiment.replaced(cases=kept)
+
+
 # Number of drives after which a note reports the search for places elsewhere.
 _NOTED_DRIVES = 20
 
@@ -267,8 +286,6 @@ def _distractors(
         return []
     # The same LiDARs see all places.
     database, _ = some.pairs[0]
-    if study.experiment.drives == "same-route":
-        database = with_lidars_beside(database, *VIEWPOINTS["near"])
     study.on_note(f"{database.name}: looking for {most} places elsewhere")
     spacing = study.protocols[0].place_spacing
     drives: list[Scenario] = []
@@ -278,7 +295,7 @@ def _distractors(
     ):
         if number >= most:
             break
-        drive = drive.replaced(lidars=database.lidars)
+        drive = drive.replaced(lidars=database.lidars, offset=database.offset)
         drives.append(drive)
         trajectory = plan_drive(drive)
         frames = np.arange(count_frames(drive, trajectory))
@@ -351,9 +368,18 @@ def drives_fingerprint(pair: ChangedPair, worlds: dict[tuple, str]) -> str:
     for drive, key in zip(pair.drives, keys, strict=True):
         if key not in worlds:
             worlds[key] = combined_digest(digest_inputs(drive))
+    # Where the LiDARs pass counts, not by which field.
+    passing = [
+        one._replace(
+            drive=one.drive.replaced(
+                lidars=one.drive.mounted_lidars, offset=OffsetConfig()
+            )
+        )
+        for one in pair.dated
+    ]
     return fingerprint(
         {
-            "drives": pair.fingerprint(),
+            "drives": replace(pair, dated=tuple(passing)).fingerprint(),
             "worlds": [worlds[key] for key in keys],
         }
     )

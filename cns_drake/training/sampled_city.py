@@ -17,13 +17,10 @@ import yaml
 from cns_drake.scenarios import (
     Scenario,
     load_scenario,
-)
-from cns_drake.studies import (
     marked_yaml,
     redrawn_inputs,
-    turned_content,
-    with_lidars_moved,
 )
+from cns_drake.studies import turned_content
 from evaluation.base import draft_folder
 from evaluation.lidar_sheets import make_sheet
 from worlds.city import City, generate_city, make_city, start_city
@@ -164,9 +161,8 @@ class SampledCity:
         if self.returns and returns:
             drive = drive.with_returns("calibrated")
             fields["weather"] = {"visibility": fog}
-        return with_lidars_moved(drive, 0.0, aside, 0.0).with_fields(
-            fields, drive.name
-        )
+        fields["offset"] = {"left": aside}
+        return drive.with_fields(fields, drive.name)
 
     def _rng(self, purpose: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, self.number, purpose])

@@ -57,6 +57,7 @@ from .figures import UNSEEN_RGB as UNSEEN_RGB
 from .figures import figure_style as figure_style
 from .figures import font_settings as font_settings
 from .figures import save_figure as save_figure
+from .file_locks import exclusive as exclusive
 from .file_locks import lock_file as lock_file
 from .files import cache_folder as cache_folder
 from .files import check_regular as check_regular

@@ -40,7 +40,7 @@ LAST = "last"
 # Factor: name of the protocol, if an experiment has several.
 PROTOCOL_BASE = "protocol.base"
 # The factor of the frozen redraws of the shipped maps.
-FROZEN_REDRAW = "both.redraw.frozen"
+FROZEN_REDRAW = "both.city.redraw.frozen"
 # The factors of an experiment with cases: the name of the case, and its level.
 CAUSE = "cause"
 LEVEL = "level"

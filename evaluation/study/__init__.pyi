@@ -15,6 +15,7 @@ from .experiments.experiment_files import (
 from .experiments.experiment_run import ExperimentRun as ExperimentRun
 from .experiments.factors import FLEET as FLEET
 from .experiments.factors import SESSIONS as SESSIONS
+from .experiments.factors import SIDES as SIDES
 from .experiments.factors import Case as Case
 from .experiments.factors import Changes as Changes
 from .recorded_city import ShownCity as ShownCity

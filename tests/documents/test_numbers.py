@@ -158,7 +158,7 @@ def test_survival_is_judged_by_the_cities_means():
                     and row["both.stage"] == "own"
                     and row["method"] == "layered-overlap"
                 ):
-                    city = name, row["map"], row.get("both.redraw.frozen")
+                    city = name, row["map"], row.get("both.city.redraw.frozen")
                     loss = max(0.0, 1.0 - float(row["value"]))
                     losses.setdefault(city, []).append(loss)
     cities = [sum(some) / len(some) for some in losses.values()]

@@ -130,4 +130,4 @@ def test_examples_of_several_drives_have_one_query(name, number, years):
     found = load_experiment(path).conditions
     assert len(found) == number
     for one in (*found, *load_experiment(path, quick=True).conditions):
-        assert one.changes["database"]["years"] == years
+        assert one.changes["query"]["city"]["years"] == years

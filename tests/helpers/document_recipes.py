@@ -488,7 +488,8 @@ RECIPES = {
         changes=(
             (
                 "study trend",
-                "study trend town --set database.missing=[0,0.6] --set seeds=0",
+                "study trend town --set database.city.missing=[0,0.6]"
+                " --set seeds=0",
             ),
         ),
         after=("start a city",),
@@ -574,11 +575,20 @@ RECIPES = {
     "years": Recipe(
         ".venv/bin/cns-drake study years suburbia",
         changes=(
-            ("suburbia --quick", "town --quick --set database.years=[0,20]"),
+            ("suburbia --quick", "town --quick --set query.city.years=[0,20]"),
         ),
         after=("start a city",),
         prints=("years/index.html",),
         makes=("years/results.csv",),
+    ),
+    "aged drive": Recipe(
+        ".venv/bin/cns-drake simulate suburbia_02 --set city.years=20",
+        changes=(
+            ("suburbia_02", "town/sequence_02.yaml"),
+            ("years=20", "years=2 --frames 3"),
+        ),
+        after=("start a city",),
+        makes=("aged/town_02/metadata.yaml", "aged.html"),
     ),
     "help: age": Recipe(
         "cns-drake age suburbia",
@@ -607,7 +617,7 @@ RECIPES = {
         all_methods=True,
     ),
     "redrawn cities": Recipe(
-        "both: {redraw: [1, 2, 3]}\nmaps: riverside",
+        "both: {city: {redraw: [1, 2, 3]}}\nmaps: riverside",
         changes=(("riverside", "town"), ("1, 2, 3", "1")),
         file="redrawn.yaml",
     ),

@@ -110,9 +110,9 @@ def _write_town(folder: Path) -> None:
     experiment = {
         "maps": str(folder),
         "both": {
-            "missing": {"from": 0.0, "to": 0.5, "count": 2},
+            "city": {"missing": {"from": 0.0, "to": 0.5, "count": 2}},
             "route": {"length": 60.0, "seed": [1, 2]},
-            "lidar": ["cns", "vlp-16"],
+            "lidars": {"*": {"preset": ["cns", "vlp-16"]}},
         },
         "seeds": [0, 1],
     }

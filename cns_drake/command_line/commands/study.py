@@ -11,6 +11,7 @@ from evaluation.base import (
     InputError,
     ended_by_interrupts,
     note,
+    read_yaml,
     shared_options,
     terminal,
 )
@@ -67,7 +68,7 @@ def study(
         override: New value for a setting of a method, such as
             btc.candidates=20, or for a field of the experiment, such as
             seeds=[1,2]. For a field inside another field, join both names by a
-            dot, such as database.years=[0,5]. A list in brackets makes a
+            dot, such as query.city.years=[0,5]. A list in brackets makes a
             setting a factor, which varies. If a setting has several numbers,
             separate them by commas without brackets. May be repeated.
         allow_code: Allow the experiment to run the Python files that it names;
@@ -87,8 +88,8 @@ def study(
         )
 
     if list_all:
-        for known in shipped_experiments():
-            typer.echo(f"{known:<10}  {load_experiment(known).about}")
+        for known, path in shipped_experiments().items():
+            typer.echo(f"{known:<10}  {read_yaml(path)['about']}")
         return
     if name is None:
         raise InputError("study: give an experiment, or --list")

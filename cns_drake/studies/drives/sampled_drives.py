@@ -5,11 +5,18 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from cns_drake.studies.drives.viewpoints import VIEWPOINTS
 from evaluation.base import Section
 from worlds.ageing import LAST_YEAR
 
 _RouteLength = Annotated[float, Field(gt=0.0, le=100_000.0)]
+
+
+# Where the LiDARs of a car can pass: to the left [m], and turned [deg].
+_OFFSETS = {
+    "near": {"left": 0.5},
+    "lane": {"left": 5.0},
+    "reversed": {"left": 5.0, "yaw_deg": 180.0},
+}
 
 
 class DrawnRoute(Section):
@@ -27,15 +34,17 @@ class DrawnRoute(Section):
 class Fleet(Section):
     """Cars that drive through a city year by year, and make a database.
 
-    Each drive has a route that is sampled at random, one of the viewpoints
-    `near`, `lane` and `reversed`, and trees with or without leaves. The random
-    choices for a car in a year do not depend on the numbers of cars and of
-    years, so a larger fleet contains the drives of a smaller fleet.
+    Each drive has a route that is sampled at random, its LiDARs near the
+    query's, in the next lane, or there and facing backwards; and trees with or
+    without leaves. The random choices for a car in a year do not depend on the
+    numbers of cars and of years, so a larger fleet contains the drives of a
+    smaller fleet.
 
     Attributes:
         cars: number of drives per year.
         years: number of years. The first drives take place this number of years
-            before the query, and the last drives one year before the query.
+            before the query, whose city has aged by at least as many
+            (`query.city.years`), and the last drives one year before it.
         length: smallest length of a route [m].
         seed: seed of the random choices.
     """
@@ -45,8 +54,12 @@ class Fleet(Section):
     length: _RouteLength
     seed: int = Field(ge=0)
 
-    def sessions(self) -> list[dict[str, Any]]:
-        """Returns the fields of each drive, from older to newer."""
+    def sessions(self, query_years: int) -> list[dict[str, Any]]:
+        """Returns the fields of each drive, from older to newer.
+
+        Args:
+            query_years: number of years by which the query's city has aged.
+        """
         found = []
         for years in range(self.years, 0, -1):
             for car in range(self.cars):
@@ -54,9 +67,9 @@ class Fleet(Section):
                 number = int(rng.integers(2**31))
                 found.append(
                     {
-                        "years": years,
+                        "city": {"years": query_years - years},
                         "route": {"length": self.length, "seed": number},
-                        "viewpoint": str(rng.choice(list(VIEWPOINTS))),
+                        "offset": _OFFSETS[str(rng.choice(list(_OFFSETS)))],
                         "transient": {
                             "leaves": float(rng.integers(2)),
                             "seed": number,

@@ -8,10 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cns_drake.scenarios import Scenario, load_scenario
+from cns_drake.scenarios import (
+    OffsetConfig,
+    Scenario,
+    load_scenario,
+    make_maps,
+)
 from cns_drake.studies.maps.frozen_redraws import redraw_frozen
 from cns_drake.studies.maps.made_maps import made_map_step
-from cns_drake.studies.maps.map_step import make_maps
 from evaluation.base import InputError, errors_at, natural_key
 from evaluation.results import FROZEN_REDRAW
 from evaluation.study import ExperimentRun, MadeMap
@@ -134,6 +138,16 @@ def _pairs_of(
     yield MapPairs(path.name, {}, _drive_pairs(recordable_map(one), kind))
 
 
+# The LiDARs of the database pass this far from the query's, because no two
+# drives stop at exactly the same places [m].
+_BESIDE = OffsetConfig(ahead=1.25, left=0.5)
+
+
+def database_drive(query: Scenario) -> Scenario:
+    """Returns the drive of a database along the route of a query drive."""
+    return query.replaced(name=f"{query.name}_database", offset=_BESIDE)
+
+
 def _drive_pairs(folder: Path, kind: str) -> list[tuple[Scenario, Scenario]]:
     """Returns the pairs of drives of a map: database and query.
 
@@ -157,7 +171,7 @@ def _drive_pairs(folder: Path, kind: str) -> list[tuple[Scenario, Scenario]]:
     drives = [load_scenario(path) for path in files]
     if kind == "same-route":
         query = drives[-1]
-        return [(query.replaced(name=f"{query.name}_database"), query)]
+        return [(database_drive(query), query)]
     query = max(drives, key=lambda drive: natural_key(drive.stage or ""))
     pairs = [(one, query) for one in drives if one is not query]
     if kind == "both-ways" and len(drives) == 2:

@@ -14,9 +14,9 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from cns_drake.studies.maps.map_step import make_maps
-from cns_drake.studies.maps.redrawing import (
+from cns_drake.scenarios import (
     RedrawCity,
+    make_maps,
     marked_yaml,
     redrawn_inputs,
 )

@@ -1,11 +1,14 @@
 """Pairs of simulated drives, changed as the conditions of an experiment say."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 
+from cns_drake.scenarios import city_step, in_made_city, make_maps
 from cns_drake.studies.drives.named_stages import MissingError
 from cns_drake.studies.maps.experiment_maps import MapPairs
-from cns_drake.studies.maps.made_maps import MadeMaps
 from cns_drake.studies.pairs.comparisons import ChangedPair, PairMaker
+from evaluation.base import InputError
 from evaluation.results import CAUSE
 from evaluation.study import ExperimentRun
 
@@ -16,41 +19,46 @@ def changed_pairs(
     """Returns the pairs of each map, changed as its conditions say.
 
     All pairs are built before a city is made, because faults come before
-    slow work. Only the pairs of a map whose drives need new cities are
-    then built anew.
+    slow work.
 
     Raises:
         InputError: a field of a condition cannot be used, or a city cannot
             be made.
     """
-    made = MadeMaps(run.output / "cities")
+    cities = run.output / "cities"
     found = []
     for some in maps:
-        before = made.num_requests
-        built = _built(run, some, made)
-        found.append((some, *built, made.num_requests > before))
-    made.make(run.cluster)
-    pairs = []
-    for some, changed, notes, lacks_cities in found:
-        if lacks_cities:
-            changed, notes = _built(run, some, made)
-        for text in notes:
+        noted: dict[str, None] = {}
+        found.append(_built(run, some, noted.setdefault))
+        for text in noted:
             run.on_note(f"{some.map_name}: {text}")
-        pairs.append(changed)
-    return pairs
+    steps = {}
+    for one in (one for pairs in found for one in pairs):
+        for drive in one.drives:
+            try:
+                step = city_step(drive, cities)
+            except InputError as error:
+                raise InputError(f"{run.source}: {error}") from None
+            if step is not None:
+                steps[step.folder] = step
+    make_maps([*steps.values()], cities, run.cluster)
+    return [[_in_cities(one, cities) for one in pairs] for pairs in found]
+
+
+def _in_cities(pair: ChangedPair, cities: Path) -> ChangedPair:
+    """Returns a pair whose drives go through the cities that were made."""
+    dated = [
+        one._replace(drive=in_made_city(one.drive, cities))
+        for one in pair.dated
+    ]
+    return replace(pair, dated=tuple(dated))
 
 
 def _built(
-    run: ExperimentRun, some: MapPairs, made: MadeMaps
-) -> tuple[list[ChangedPair], Iterable[str]]:
-    """Returns a map's pairs in each possible condition, and notes.
-
-    Args:
-        some: the pairs of the map.
-        made: the maps that conditions need.
-    """
+    run: ExperimentRun, some: MapPairs, on_note: Callable[[str], object]
+) -> list[ChangedPair]:
+    """Returns a map's pairs in each possible condition."""
     experiment, source = run.experiment, run.source
-    noted: dict[str, None] = {}
     found = []
     for database, query in some.pairs:
         pair = PairMaker(
@@ -58,9 +66,7 @@ def _built(
             query,
             experiment.drives == "same-route",
             source,
-            made.aged,
-            made.redrawn,
-            noted.setdefault,
+            on_note,
         )
         known: set[str] = set()
         for condition in experiment.conditions:
@@ -69,11 +75,11 @@ def _built(
                     changed = pair.build(condition, seed)
                 except MissingError as error:
                     label = condition.factors.get(CAUSE, "a condition")
-                    noted.setdefault(f"{label} left out: {error}")
+                    on_note(f"{label} left out: {error}")
                     break
                 # A condition without random numbers is measured once.
                 key = f"{condition.factors} {changed.fingerprint()}"
                 if key not in known:
                     known.add(key)
                     found.append(changed)
-    return found, noted
+    return found

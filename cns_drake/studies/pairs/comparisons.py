@@ -1,19 +1,14 @@
 """Makes the two drives of each condition of an experiment."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
-import math
+from dataclasses import dataclass, field
 import re
 from typing import Any, NamedTuple
 
 from cns_drake.scenarios import Scenario
 from cns_drake.studies.drives.changed_drives import (
     DATABASE_FIELDS,
-    QUERY_FIELDS,
-    Age,
-    Ageing,
     DriveChanger,
-    Redraw,
     check_side,
     checked_maintainer,
     control_drive,
@@ -21,7 +16,6 @@ from cns_drake.studies.drives.changed_drives import (
 )
 from cns_drake.studies.drives.named_stages import MissingError, find_stage
 from cns_drake.studies.drives.sampled_drives import Fleet
-from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
 from evaluation.base import (
     InputError,
     errors_at,
@@ -43,6 +37,8 @@ from evaluation.study import (
     protocol_from_fields,
 )
 
+# Fields of the protocol that change the scans of the queries at random.
+_QUERY_SCANS = ("turn_queries", "tilt_queries", "hide_sector")
 # Mean speed of the shipped drives [m/s].
 _USUAL_SPEED = 10.0
 # Greatest length of a value in the name of a drive, which names its folder.
@@ -136,11 +132,8 @@ class PairMaker:
     Attributes:
         database: the drive that makes the database, without any change.
         query: the drive that makes the queries, without any change.
-        same_route: whether the database drive follows the query's route, with
-            its LiDAR at another viewpoint.
+        same_route: whether the database drive follows the query's route.
         source: file of the experiment, for errors.
-        age: function that returns an aged map.
-        redraw: function that returns a redrawn map.
         on_note: is called with a note on everything that is left out.
     """
 
@@ -148,9 +141,7 @@ class PairMaker:
     query: Scenario
     same_route: bool
     source: str
-    age: Age
-    redraw: Redraw
-    on_note: Callable[[str], None]
+    on_note: Callable[[str], object]
 
     def __post_init__(self) -> None:
         # The names of drives change, but not their drivers.
@@ -163,21 +154,11 @@ class PairMaker:
             key=natural_key,
         )
         self._changer = DriveChanger(
-            self.source,
-            self._last_stage,
-            same_route=self.same_route,
-            age=self.age,
-            redraw=self.redraw,
-            on_note=self.on_note,
+            self.source, self._last_stage, self.on_note
         )
-        plain = dict(self._unchanged)
-        if self.same_route:
-            plain["database"] = with_lidars_beside(
-                plain["database"], *VIEWPOINTS["near"]
-            )
         self._names = {
             side: _UniqueNames(side, drive, with_controls=not self.same_route)
-            for side, drive in plain.items()
+            for side, drive in self._unchanged.items()
         }
 
     def build(self, condition: Condition, seed: int) -> ChangedPair:
@@ -203,7 +184,7 @@ class PairMaker:
         both = fields.get("both", {})
         database = merged(both, fields.get("database", {}))
         query = merged(both, fields.get("query", {}))
-        sessions = _session_fields(database, seed, self.source)
+        sessions = _session_fields(database, _years(query), seed, self.source)
         if CAUSE not in condition.factors:
             # Years of cases may need the rates of all conditions.
             self._check_rates(fields, sessions, query)
@@ -212,21 +193,17 @@ class PairMaker:
         if SESSIONS in database:
             check_side("database", database, self.source)
         check_side("query", query, self.source)
-        drives = self._database_drives(
-            sessions, database, query, condition, seed
-        )
-        years = _years_aged(database, sessions)
-        ageing = Ageing(years, database.get("rates", 1.0))
+        drives = self._database_drives(sessions, query, condition, seed)
         query_drive = self._names["query"].named(
             self._changer.changed(
-                self._unchanged["query"], "query", query, ageing, seed
+                self._unchanged["query"], "query", query, seed
             ),
             condition.factors,
             seed,
         )
-        asked = self._asked(query, seed)
-        protocol = self._protocol(
-            {**fields.get("protocol", {}), **asked}, database
+        asked = self._asked(fields, condition, seed)
+        protocol = protocol_from_fields(
+            {**fields.get("protocol", {}), **asked}, self.source
         )
         where = f"{self.source}: database"
         keep = checked_keep(database.get("keep", KEEP_ALL), f"{where}.keep")
@@ -236,7 +213,7 @@ class PairMaker:
             f"{where}.maintain",
         )
         asked_drive = DatedDrive(
-            years,
+            query_drive.city.years,
             _drive_length(query, query_drive),
             query_drive,
             self._names["query"].title(query_drive),
@@ -351,109 +328,94 @@ class PairMaker:
             "query": [query],
         }
         for section, values in fields.items():
-            if "rates" in values and not any(
-                "years" in one for one in drives.get(section, drives["both"])
+            if "rates" in _city(values) and not any(
+                "years" in _city(one)
+                for one in drives.get(section, drives["both"])
             ):
                 raise InputError(
-                    f"{self.source}: {section}.rates: those of no years"
+                    f"{self.source}: {section}.city.rates: those of no years"
                 )
 
     def _database_drives(
         self,
         sessions: Mapping[str, Changes],
-        database: Changes,
         query: Changes,
         condition: Condition,
         seed: int,
     ) -> list[DatedDrive]:
         """Returns the drives of a database, from older to newer.
 
-        The field `years` of a drive says how many years before the other side
-        the drive takes place. So the city of the oldest drive is aged by the
-        years of the query, which are 0 in most experiments. The city of each
-        other drive is aged by further years, by which this drive is newer than
-        the oldest drive.
-
         Args:
             sessions: maps the path of each database drive in the experiment's
                 file to the fields of the drive.
-            database: fields of the database.
             query: fields of the query drive.
             condition: the condition.
             seed: seed of the random choices.
         """
-        since = query.get("years", 0)
-        oldest = _years_aged(database, sessions)
-        rates = query.get("rates", 1.0)
-        if any(one.get("years", 0) != oldest for one in sessions.values()):
-            rates = database.get("rates", rates)
         stages = list(self.query.folder.stages())
         stage = self._find_stage("query", "query", query.get("stage", OWN))
         last = stages.index(stage) if stage in stages else len(stages)
         found: list[tuple[tuple[Any, ...], str, Scenario]] = []
+        known: dict[str, str] = {}
         for place, changes in sessions.items():
-            years = since + oldest - changes.get("years", 0)
-            stage = self._find_stage(
-                place, "database", changes.get("stage", OWN)
-            )
-            is_later = stages.index(stage) > last if stage in stages else False
-            if place != "database" and (years > oldest or is_later):
-                raise InputError(
-                    f"{self.source}: {place}: this drive is later than the"
-                    " query"
-                )
             drive = self._names["database"].named(
                 self._changer.changed(
-                    self._unchanged["database"],
-                    place,
-                    changes,
-                    Ageing(years, rates),
-                    seed,
+                    self._unchanged["database"], place, changes, seed
                 ),
                 _session_factors(place, condition.factors),
                 seed,
             )
-            found.append(((years, natural_key(stage)), place, drive))
-        # While maps are only requested, drives of all ages and redraws are in
-        # one map.
-        known: dict[object, str] = {}
-        for time, place, drive in found:
-            city = time, sessions[place].get("redraw")
-            before = known.setdefault((city, drive.name), place)
+            stage, years = str(drive.stage), drive.city.years
+            is_later = stages.index(stage) > last if stage in stages else False
+            if place != "database" and (years > _years(query) or is_later):
+                raise InputError(
+                    f"{self.source}: {place}: this drive is later than the"
+                    " query"
+                )
+            before = known.setdefault(drive.name, place)
             if before != place:
                 raise InputError(
                     f"{self.source}: {place}: the same drive as {before}"
                 )
+            found.append(((years, natural_key(stage)), place, drive))
         found.sort(key=lambda one: one[0])
         return [
             DatedDrive(
-                time[0],
+                drive.city.years,
                 _drive_length(sessions[place], drive),
                 drive,
                 self._names["database"].title(drive),
             )
-            for time, place, drive in found
+            for _, place, drive in found
         ]
 
-    def _asked(self, query: Changes, seed: int) -> dict[str, Any]:
-        """Returns the fields of the protocol that change the queries' scans."""
-        found = {name: query[name] for name in QUERY_FIELDS if name in query}
-        if found:
-            found["seed"] = seed
-            protocol_from_fields(found, self.source, "query")
-        return found
+    def _asked(
+        self, fields: Changes, condition: Condition, seed: int
+    ) -> dict[str, Any]:
+        """Returns the fields with which causes change the queries' scans.
 
-    def _protocol(
-        self, fields: Changes, database: Changes
-    ) -> RetrievalProtocol:
-        """Returns the protocol of the queries, with fields of the condition."""
-        protocol = protocol_from_fields(fields, self.source)
-        if lateral := database.get("lateral"):
-            # On a straight road, the number of matches does not depend on the
-            # offset.
-            radius = math.hypot(protocol.radius, lateral)
-            protocol = replace(protocol, radius=radius)
-        return protocol
+        Their random numbers depend on the seed of the condition.
+        """
+        stated = condition.changes.get("protocol", {})
+        protocol = fields.get("protocol", {})
+        found = {
+            name: protocol[name]
+            for name in _QUERY_SCANS
+            if name in protocol and name not in stated
+        }
+        return {**found, "seed": seed} if found else {}
+
+
+def _city(changes: Changes) -> Changes:
+    """Returns the section `city` of a drive's fields, without a check."""
+    city = changes.get("city")
+    return city if isinstance(city, Mapping) else {}
+
+
+def _years(changes: Changes) -> int:
+    """Returns by how many years the city of a drive has aged, or 0."""
+    years = _city(changes).get("years", 0)
+    return years if type(years) is int else 0
 
 
 def _drive_length(changes: Changes, drive: Scenario) -> float:
@@ -467,8 +429,6 @@ def _drive_length(changes: Changes, drive: Scenario) -> float:
     return min(length, _USUAL_SPEED * drive.frames * drive.frame_period)
 
 
-# Fields that all drives of a database share.
-_SHARED_FIELDS = (*DATABASE_FIELDS, "rates")
 # Fields that describe a database, not its drives.
 _OF_DATABASE = ("keep", "maintain")
 # Fields that put a drive into another frame of reference.
@@ -503,7 +463,7 @@ def _as_written(fault: str, source: str, condition: Condition) -> str:
 
 
 def _session_fields(
-    database: Changes, seed: int, source: str
+    database: Changes, query_years: int, seed: int, source: str
 ) -> dict[str, dict[str, Any]]:
     """Returns the fields of each drive of a database.
 
@@ -512,6 +472,7 @@ def _session_fields(
 
     Args:
         database: fields of the database.
+        query_years: number of years by which the query's city has aged.
         seed: seed of a fleet that has no own seed.
         source: file of the experiment, for errors.
 
@@ -527,7 +488,7 @@ def _session_fields(
     for name in _OF_DATABASE:
         shared.pop(name, None)
     if FLEET in database:
-        sessions: Any = _fleet_sessions(database, seed, source)
+        sessions: Any = _fleet_sessions(database, query_years, seed, source)
         del shared[FLEET]
     elif SESSIONS in database:
         sessions = shared.pop(SESSIONS)
@@ -551,7 +512,7 @@ def _session_fields(
 
 
 def _fleet_sessions(
-    database: Changes, seed: int, source: str
+    database: Changes, query_years: int, seed: int, source: str
 ) -> list[dict[str, Any]]:
     where = f"{source}: database.{FLEET}"
     if SESSIONS in database:
@@ -559,7 +520,14 @@ def _fleet_sessions(
     fleet = database[FLEET]
     if isinstance(fleet, Mapping):
         fleet = {"seed": seed, **fleet}
-    return validated(Fleet, fleet, where).sessions()
+    found = validated(Fleet, fleet, where)
+    if found.years > query_years:
+        raise InputError(
+            f"{where}.years: {found.years} years before a query whose city has"
+            f" aged by {query_years}; give query: {{city: {{years:"
+            f" {found.years}}}}}, or more"
+        )
+    return found.sessions(query_years)
 
 
 def _check_own_fields(own: Any, where: str) -> None:
@@ -571,7 +539,7 @@ def _check_own_fields(own: Any, where: str) -> None:
                 f"{where}.{name}: another map has another frame of reference"
                 " than the other drives"
             )
-    for name in _SHARED_FIELDS:
+    for name in DATABASE_FIELDS:
         if name in own:
             raise InputError(
                 f"{where}.{name}: all drives share it; it is a field of"
@@ -599,20 +567,6 @@ def _session_factors(place: str, factors: Changes) -> dict[str, Any]:
             continue
         found[path] = value
     return found
-
-
-def _years_aged(database: Changes, sessions: Mapping[str, Changes]) -> int:
-    """Returns by how many years the city of the query is aged.
-
-    The result is the greatest of the fields `years` of the drives and of the
-    database. The field of the database counts even if each drive has its own
-    field, so that databases with different drives can have the same query.
-
-    Args:
-        database: fields of the database.
-        sessions: maps the path of each drive in the file to the drive's fields.
-    """
-    return max(one.get("years", 0) for one in (database, *sessions.values()))
 
 
 class _UniqueNames:
@@ -694,11 +648,8 @@ def _own_factors(side: str, given: Changes) -> list[tuple[str, Any]]:
     found = []
     cause, level = factors.pop(CAUSE, NO_CAUSE), factors.pop(LEVEL, 0)
     for path, value in factors.items():
-        name = path.rpartition(".")[2]
-        is_own = path.partition(".")[0] in (side, "both")
-        # The years of a drive age the city of the other side.
-        if is_own != (name in ("years", "rates")) or path.startswith("both."):
-            found.append((name, value))
+        if path.partition(".")[0] in (side, "both"):
+            found.append((path.rpartition(".")[2], value))
     if cause != NO_CAUSE:
         found.append((cause, level))
     return found

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from cns_drake.scenarios import Scenario
+from cns_drake.scenarios import Scenario, in_made_city
 from cns_drake.simulation import SimulationSource
 from cns_drake.studies.maps.experiment_maps import MapPairs
 from cns_drake.studies.pairs.comparisons import ChangedPair
@@ -71,7 +71,10 @@ def simulated_pair(study: Study, some: MapPairs, one: ChangedPair) -> Pair:
     )
     task = study.tasks.get(ChangeTask.name)
     if isinstance(task, ChangeTask) and study.experiment.drives == "same-route":
-        way = simulated_drive(study, _way_through_older_city(one))
+        way = simulated_drive(
+            study,
+            in_made_city(_way_through_older_city(one), study.output / "cities"),
+        )
         way = replace(way, length=asked.length)
         task.ways = {**task.ways, pair: way}
     return pair
@@ -81,7 +84,7 @@ def _way_through_older_city(pair: ChangedPair) -> Scenario:
     """Returns the query's drive, but through the city of the database."""
     first, *_, last = pair.drives
     query = pair.unchanged
-    city = ("map", "stage", "without", "transient")
+    city = ("map", "stage", "without", "city", "transient")
     drive = last.replaced(
         **{name: getattr(first, name) for name in city}, name=query.name
     )

@@ -11,7 +11,7 @@ without this name is left out. `only: [NAME, ...]` beside `each` keeps the cases
 of these causes.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -60,9 +60,12 @@ class Cause(Section):
 
     @property
     def sides(self) -> tuple[str, ...]:
-        """The drives that the cause changes."""
+        """The drives that the cause changes; a protocol changes the query's."""
         some = self.strengths.values()
-        return tuple(side for side in SIDES if any(side in one for one in some))
+        found = {side for one in some for side in one}
+        if "protocol" in found and not found & {*SIDES}:
+            found = {"query"}
+        return tuple(side for side in SIDES if side in found)
 
 
 def causes() -> Mapping[str, Cause]:
@@ -77,12 +80,17 @@ def causes() -> Mapping[str, Cause]:
     return {cause.name: cause for cause in found}
 
 
-def register_cause(cause: Path | str | Mapping[str, Any]) -> Cause:
+def register_cause(
+    cause: Path | str | Mapping[str, Any],
+    check: Callable[[Cause], None] = lambda cause: None,
+) -> Cause:
     """Registers a cause of change of your own, and returns it.
 
     Args:
         cause: a YAML file of the fields of `evaluation.study.Cause`, whose
             name is the default of `name`; or a mapping of these fields.
+        check: function that raises an InputError for a cause that cannot be
+            used.
 
     Raises:
         InputError: the file cannot be read, or a field is unknown, missing or
@@ -118,6 +126,7 @@ def register_cause(cause: Path | str | Mapping[str, Any]) -> Cause:
         with value_errors(where):
             # Nobody else's experiments are to fail.
             _ = validated(Experiment, values, where).conditions
+    check(found)
     _CAUSES.add(found.name, found, found)
     return found
 

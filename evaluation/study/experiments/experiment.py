@@ -50,11 +50,13 @@ from evaluation.recognition import (
 )
 from evaluation.results import CAUSE, FROZEN_REDRAW, LEVEL, NO_CAUSE
 from evaluation.study.experiments.factors import (
+    FACTORED,
     SIDES,
     Case,
     Changes,
     FactorValues,
     check_once,
+    check_words,
     expand_spread,
     leaves,
     set_field,
@@ -69,8 +71,6 @@ from evaluation.study.experiments.method_variants import (
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-# Places in the file of an experiment where a list of values is a factor.
-_FACTORED = (*SIDES, "protocol")
 # Greatest number of conditions x seeds x maps x methods. A study of more would
 # take years.
 _MOST_MEASUREMENTS = 500_000
@@ -114,8 +114,11 @@ def _case(value: Any) -> Case | tuple[str, ...]:
     if not (isinstance(value, dict) and value):
         raise ValueError("neither fields of a side nor names of other cases")
     for side, fields in value.items():
-        if side not in SIDES:
-            raise ValueError(f"{side}: no side (there are: {', '.join(SIDES)})")
+        if side not in FACTORED:
+            raise ValueError(
+                f"{side}: no section of a case (there are:"
+                f" {', '.join(FACTORED)})"
+            )
         if not (isinstance(fields, dict) and fields):
             raise ValueError(f"{side}: no fields")
     return value
@@ -201,10 +204,10 @@ class Experiment(Section):
             the maps.
         query: scenario fields of the drive that makes the queries. A list of
             values makes the field a factor.
-        cases: kinds of change by name. Each sets fields of one or both drives,
-            or is a list of other cases to combine; a list of values sets its
-            levels, the weakest first. Each is compared with the case `none`,
-            which changes nothing.
+        cases: kinds of change by name. Each sets fields of one or both drives
+            or of the protocol, or is a list of other cases to combine; a list
+            of values sets its levels, the weakest first. Each is compared with
+            the case `none`, which changes nothing.
         levels: which levels of each case to measure, as numbers from 1; by
             default all. If a number in this list exceeds the number of a case's
             levels, the last level of the case is measured instead.
@@ -284,15 +287,25 @@ class Experiment(Section):
     charts: tuple[dict[str, Any], ...] = ()
     quick: dict[str, Any] = Field(default_factory=dict)
 
+    @model_validator(mode="after")
+    def _check_words(self) -> Experiment:
+        for side in SIDES:
+            check_words(getattr(self, side), side)
+            for name, case in self.cases.items():
+                if isinstance(case, dict):
+                    check_words(case.get(side, {}), f"cases.{name}.{side}")
+        return self
+
     @property
     def frozen_redraws(self) -> list[int]:
         """Numbers of the frozen redraws on which the experiment runs.
 
         A redraw of a map has other buildings along the same streets. The
-        numbers of the frozen redraws come from the field `both.redraw.frozen`;
-        without this field, the list is empty.
+        numbers of the frozen redraws come from the field
+        `both.city.redraw.frozen`; without this field, the list is empty.
         """
-        redraw = self.both.get("redraw")
+        city = self.both.get("city")
+        redraw = city.get("redraw") if isinstance(city, Mapping) else None
         found: Any = []
         if isinstance(redraw, Mapping):
             found = expand_spread(redraw.get("frozen", []))
@@ -491,7 +504,7 @@ def _fields_and_factors(
     """Returns the fixed fields, and each factor's values by factor path."""
     fixed: dict[str, Any] = {}
     factors: dict[str, list[Any]] = {}
-    for side in _FACTORED:
+    for side in FACTORED:
         single, varied = split_values(getattr(experiment, side), (side,))
         for path, value in single.items():
             if path != FROZEN_REDRAW:

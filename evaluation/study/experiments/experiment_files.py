@@ -24,7 +24,7 @@ from evaluation.base import (
 )
 from evaluation.methods import SETTINGS
 from evaluation.recognition import expanded_names
-from evaluation.results import as_factor, chart_factors, check_factors
+from evaluation.results import as_factor
 from evaluation.study.experiments.cause_files import ALL, with_cases
 from evaluation.study.experiments.experiment import (
     Experiment,
@@ -80,7 +80,7 @@ def load_experiment(
         name_or_file: a shipped experiment by name, or a file.
         overrides: fields to change. Each is a text `FIELD=VALUE`, or a pair of
             a top-level field and its value. In a text, VALUE is YAML and dots
-            separate nested fields, as in `database.years=[0, 5]`.
+            separate nested fields, as in `database.city.missing=[0, 0.3]`.
         quick: whether the fields in the section `quick` of the experiment
             replace its other fields.
         tasks: tasks to measure instead of the experiment's tasks; the settings
@@ -270,6 +270,11 @@ def _check_charts(experiment: Experiment, known: _Measured, path: Path) -> None:
     Raises:
         InputError: a chart names something else, or cannot be used.
     """
+    if not experiment.charts:
+        return
+    # It needs Matplotlib, which takes long to load.
+    from evaluation.results import chart_factors, check_factors
+
     has_own = bool(named_programs(experiment.metrics))
     factors = [*dict.fromkeys(known.factors)]
     for chart in experiment.charts:

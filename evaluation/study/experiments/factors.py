@@ -11,13 +11,15 @@ from evaluation.base import merged, repeated
 Changes = Mapping[str, Any]
 # Sections of an experiment with fields of both drives, or of one of them.
 SIDES = ("both", "database", "query")
+# Sections of an experiment, and of its cases, in which a list of values varies.
+FACTORED = (*SIDES, "protocol")
 # Field of the database with its drives, each with fields of its own.
 SESSIONS = "sessions"
 # Field of the database with drives that are sampled at random.
 FLEET = "fleet"
 # Field of a LiDAR with its data sheet: one value, whatever lists it contains.
 _SHEET = "unit"
-# The section of each drive -> the fields that a case sets there.
+# The section -> the fields that a case sets there.
 Case = dict[str, dict[str, Any]]
 
 
@@ -86,7 +88,6 @@ def expand_spread(value: Any, *, whole: bool = False) -> Any:
 
 # Fields with a list as a single value -> types of what the list contains.
 _LISTS: Mapping[str, tuple[type, ...]] = {
-    "viewpoint": (int, float),
     "without": (str,),
     "route": (dict,),
     "xyz": (int, float),
@@ -205,3 +206,66 @@ def check_once(values: Iterable[object]) -> None:
     """
     for value in repeated(values):
         raise ValueError(f"{value!r} is there twice")
+
+
+def _in_city(name: str) -> str:
+    return f"city: {{{name}: ...}}"
+
+
+def _in_protocol(name: str) -> str:
+    return f"protocol: {{{name}: ...}}, outside of drives"
+
+
+_EVERY_LIDAR = 'lidars: {{"*": {{{}: ...}}}}'
+# Fields of drives in older releases -> what is written now.
+_FORMER: Mapping[str, str] = {
+    **{n: _in_city(n) for n in ("missing", "scattered", "towards", "redraw")},
+    "rates": f"{_in_city('rates')} beside years",
+    "viewpoint": "offset: {left: METRES, yaw_deg: DEGREES}",
+    "lateral": (
+        "offset: {left: METRES}, and protocol: {radius: METRES} if places are"
+        " to match farther away"
+    ),
+    "returns": _EVERY_LIDAR.format("returns"),
+    "lidar": f"{_EVERY_LIDAR.format('preset')}, or unit for a data sheet",
+    **{
+        n: _in_protocol(n)
+        for n in ("turn_queries", "tilt_queries", "hide_sector")
+    },
+}
+# Whose city had aged by the years of each side.
+_AGED = {"database": "query", "query": "database"}
+
+
+def check_words(fields: Changes, place: str) -> None:
+    """Checks that no field of a drive has a name of older releases.
+
+    Args:
+        fields: the fields.
+        place: the section that contains them; a drive of several has a path
+            such as `database.sessions.2`.
+
+    Raises:
+        ValueError: a field has such a name; the error says what to write.
+    """
+    for name, value in fields.items():
+        path = f"{place}.{name}"
+        if name == SESSIONS and isinstance(value, list):
+            for number, one in enumerate(value, start=1):
+                for own in one if isinstance(one, list) else [one]:
+                    if isinstance(own, Mapping):
+                        check_words(own, f"{path}.{number}")
+        if name == "years":
+            side = place.rpartition(".")[2]
+            if side in _AGED:
+                raise ValueError(
+                    f"{path}: the city of the {_AGED[side]} aged by them; write"
+                    f" {_AGED[side]}: {{{_in_city(name)}}}"
+                )
+            raise ValueError(
+                f"{path}: write {_in_city(name)}, the years by which the city"
+                " of this drive has aged (query: {city: {years: ...}} is"
+                " newest)"
+            )
+        if name in _FORMER:
+            raise ValueError(f"{path}: write {_FORMER[name]}")

@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from evaluation.base import Job, MakePart, Part, Reporter, Step
+from evaluation.drives import DriveSource
 from evaluation.recognition import (
+    FeatureExtraction,
     Number,
     PlaceComparison,
     PlaceOutcome,
@@ -109,7 +111,8 @@ def _steps_by_method(pair: Pair, jobs: Jobs) -> tuple[MakePart, ...]:
         )
         for k, one in enumerate(compared.methods)
     )
-    step = _ByMethod(compared, before, steps)
+    sources = tuple(drive.source for drive, _ in pair.roles)
+    step = _ByMethod(compared, sources, before, steps)
     name = f"place {pair.key}"
     jobs.jobs[name] = Job(name, step, tuple(needs), cost, pair.title)
     return steps
@@ -126,6 +129,7 @@ class _ByMethod(Step):
 
     Attributes:
         compared: the comparison by all methods.
+        sources: the drives of the database and of the queries.
         before: steps whose files the comparison needs.
         steps: for each method, the file of its outcomes and their inputs. The
             cost of the search is in a file beside, as it differs from run to
@@ -133,6 +137,7 @@ class _ByMethod(Step):
     """
 
     compared: PlaceComparison
+    sources: tuple[DriveSource, ...]
     before: tuple[MakePart, ...]
     steps: tuple[MakePart, ...]
 
@@ -141,22 +146,48 @@ class _ByMethod(Step):
         return self.steps[0].output
 
     def is_done(self) -> bool:
-        return all(step.is_done() for step in (*self.before, *self.steps))
+        return (
+            all(step.part.path.is_file() for step in self.steps)
+            and all(step.is_done() for step in self.before)
+            and not any(self._inputs_left())
+        )
 
     def run(self, reporter: Reporter) -> None:
         for step in self.before:
             if not step.is_done():
                 step.run(reporter)
-        left = [k for k, one in enumerate(self.steps) if not one.is_done()]
-        steps = [self.steps[k] for k in left]
-        inputs = [one.inputs() for one in steps]
+        inputs = self._inputs_left()
+        left = [k for k, made_of in enumerate(inputs) if made_of]
         measured = measure_places(reporter, self.compared.by_methods(left))
-        for step, made_of, (found, cost) in zip(
-            steps, inputs, measured, strict=True
-        ):
-            (beside,) = step.figures
-            Part(beside).write(made_of, cost)
-            step.part.write(made_of, found)
+        for k, (found, cost) in zip(left, measured, strict=True):
+            (beside,) = self.steps[k].figures
+            Part(beside).write(inputs[k], cost)
+            self.steps[k].part.write(inputs[k], found)
+
+    def _inputs_left(self) -> list[dict[str, object]]:
+        """Returns the inputs of each step, empty if its files are current.
+
+        They do not depend on whether the drives were described before: if
+        another pair needs the descriptors, too, they are in files.
+        """
+        drives = [source.identity() for source in self.sources]
+        found = []
+        for k, step in enumerate(self.steps):
+            compared = self.compared.by_methods([k])._asdict()
+            asked = tuple(
+                value
+                for name, value in compared.items()
+                if name not in ("database", "query", "overlaps")
+            )
+            described = FeatureExtraction.version
+            made_of = replace(
+                step, arguments=(drives, described, asked)
+            ).inputs()
+            is_current = step.part.is_current(made_of) and all(
+                file.is_file() for file in step.figures
+            )
+            found.append({} if is_current else made_of)
+        return found
 
 
 class PlaceTask(PoseTask):

@@ -57,11 +57,11 @@ def test_options_replace_fields(capsys, tmp_path, asked):
     path = tmp_path / "mine.yaml"
     path.write_text(
         """
-        database: {years: [0, 5, 20]}
+        database: {frames: [9, 5, 20]}
         tasks: {place: {}, change: {spacing: 5.0}}
         methods: {solid: {ranges: [20, 40]}, btc: {}}
         protocol: recorded
-        quick: {database: {years: [0, 20]}}
+        quick: {database: {frames: [9, 20]}}
         """
     )
     words = ["study", path, "town", "village", "--output", tmp_path / "out"]
@@ -80,7 +80,7 @@ def test_options_replace_fields(capsys, tmp_path, asked):
     # Tasks and methods keep the settings of the file.
     assert quick.tasks == {"change": {"spacing": 5.0}, "pose": {}}
     assert quick.methods == {"solid": {"ranges": [20, 40]}}
-    assert quick.database == {"years": [0, 20]}
+    assert quick.database == {"frames": [9, 20]}
     assert quick.protocol == {"base": "recorded", "radius": 5}
     assert quick.seeds == (3, 4)
 

@@ -50,7 +50,7 @@ def test_simulated_and_recorded_drives_agree(tmp_path, jobs_done):
         "drives": "stages",
         "database": {
             "stage": "last",
-            "missing": [0.0, 0.5],
+            "city": {"missing": [0.0, 0.5]},
             "ride": {"roughness": "C"},
         },
         "seeds": [4],
@@ -66,7 +66,9 @@ def test_simulated_and_recorded_drives_agree(tmp_path, jobs_done):
         (0.0, "town_01_missing_0p0_4"),
         (0.5, "town_01_missing_0p5_4"),
     ):
-        here = results.where(**{"database.missing": part, "verified": False})
+        here = results.where(
+            **{"database.city.missing": part, "verified": False}
+        )
         change = change_between(recorded / member, recorded / "town_02")
         (found,) = here.where(metric="tcr_sym").rows
         assert found.value == pytest.approx(change.metrics["tcr_sym"], abs=1e-9)

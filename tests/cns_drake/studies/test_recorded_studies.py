@@ -177,13 +177,19 @@ def test_drives_without_a_control(tmp_path):
             "query.transient.snow: the recordings of metropolis are as",
         ),
         ({"query": {"transient": {"snow": 0.2}}}, "query.transient: the rec"),
-        ({"database": {"years": [0, 5]}}, "database.years: the recordings"),
+        (
+            {"database": {"city": {"years": [0, 5]}}},
+            "database.city.years: the recordings",
+        ),
         ({"database": {"distractors": 9}}, "database.distractors: the rec"),
-        ({"query": {"hide_sector": 90}}, "query.hide_sector: the recordings"),
+        ({"query": {"offset": {"left": 9}}}, "query.offset: the recordings"),
         ({"database": {"keep": 2}}, "database.keep: .* database.sessions; "),
         ({"query": {"stage": "last"}}, "query.stage: the recordings"),
         ({"database": {"stage": "last"}}, "database.stage: the recordings"),
-        ({"both": {"lidar": "vlp-16"}}, "both.lidar: the recordings"),
+        (
+            {"both": {"lidars": {"*": {"preset": "vlp-16"}}}},
+            "both.lidars: the recordings",
+        ),
         ({"cases": {"a": {"database": {"stage": "last"}}}}, "cause: the rec"),
         (
             {"both": {"stage": "01"}},
@@ -191,8 +197,8 @@ def test_drives_without_a_control(tmp_path):
         ),
         ({"both": {"stage": ["own", "first"]}}, "both.stage: 'first'"),
         (
-            {"both": {"redraw": {"frozen": [1]}}},
-            "both.redraw.frozen: .*: no shipped map",
+            {"both": {"city": {"redraw": {"frozen": [1]}}}},
+            "both.city.redraw.frozen: .*: no shipped map",
         ),
     ],
 )
@@ -258,7 +264,7 @@ def test_several_recordings_are_a_database(folder, tmp_path):
         (["metropolis_4"], "metropolis: no recording 'metropolis_4'"),
         (["metropolis_04"], "metropolis_04: this drive is the query"),
         ([[]], "a list without a value"),
-        ([{"years": 3}], "not a list of names of recordings"),
+        ([{"frames": 3}], "not a list of names of recordings"),
     ],
 )
 def test_faults_of_recorded_sessions(folder, tmp_path, sessions, fault):

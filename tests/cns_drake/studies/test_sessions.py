@@ -23,20 +23,20 @@ def experiment(**fields):
 def test_sessions_keep_and_their_fields_are_factors(town):
     wanted = experiment(
         database={
-            "sessions": [{"years": [5, 10]}, {"years": 0}],
+            "sessions": [{"city": {"years": [5, 10]}}, {"frames": 9}],
             "keep": ["all", 1],
         }
     )
     assert [one.factors for one in wanted.conditions] == [
-        {"database.sessions.1.years": years, "database.keep": keep}
+        {"database.sessions.1.city.years": years, "database.keep": keep}
         for years in (5, 10)
         for keep in ("all", 1)
     ]
-    sets = [[{"years": 5}], [{"years": 5}, {"years": 0}]]
+    sets = [[{"frames": 5}], [{"frames": 5}, {"frames": 9}]]
     wanted = experiment(database={"sessions": sets})
     assert [one.factors for one in wanted.conditions] == [
         {"database.sessions": text}
-        for text in ("[{years: 5}]", "[{years: 5},{years: 0}]")
+        for text in ("[{frames: 5}]", "[{frames: 5},{frames: 9}]")
     ]
 
 
@@ -60,8 +60,8 @@ def test_rows_of_one_session_are_those_without_sessions(
     """Bit for bit, in both tables."""
     tables = []
     for name, database in (
-        ("plain", {"viewpoint": "lane"}),
-        ("one", {"sessions": [{"viewpoint": "lane"}], "keep": "all"}),
+        ("plain", {"offset": {"left": 5.0}}),
+        ("one", {"sessions": [{"offset": {"left": 5.0}}], "keep": "all"}),
     ):
         measure(
             town, tmp_path / name, database=database, tasks=["place", "pose"]
@@ -80,7 +80,7 @@ def test_rows_of_one_session_are_those_without_sessions(
 def test_places_memory_and_answers_of_several_sessions(
     town, tmp_path, jobs_done
 ):
-    near, lane = {"viewpoint": "near"}, {"viewpoint": "lane"}
+    near, lane = {"offset": {"left": 0.5}}, {"offset": {"left": 5.0}}
     results = measure(
         town,
         tmp_path,
@@ -109,20 +109,20 @@ def test_places_memory_and_answers_of_several_sessions(
 def test_a_file_with_sessions_is_read(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text(
-        "database:\n  sessions: [{years: 10}, {years: 5}]\n  keep: [all, 1]\n"
-        "quick:\n  database: {sessions: [{years: 10}], keep: [all]}\n"
+        "database:\n  sessions: [{frames: 10}, {frames: 5}]\n  keep: [all, 1]\n"
+        "quick:\n  database: {sessions: [{frames: 10}], keep: [all]}\n"
     )
     assert len(load_experiment(path).conditions) == 2
     quick = load_experiment(path, quick=True)
     (one,) = quick.conditions
-    assert one.changes["database"]["sessions"] == {"1": {"years": 10}}
+    assert one.changes["database"]["sessions"] == {"1": {"frames": 10}}
     assert load_experiment(path, ["database.keep=latest"])
 
 
 @pytest.mark.slow
 def test_maps_are_maintained(town, tmp_path, jobs_done):
     """Cars park elsewhere on the second day, as they do at the query."""
-    days = [{"viewpoint": "near"}, {"viewpoint": "lane"}]
+    days = [{"offset": {"left": 0.5}}, {"offset": {"left": 5.0}}]
     days[1]["transient"] = {"parked_cars": 1.0}
     fields = {
         "database": {

@@ -267,7 +267,7 @@ def test_each_lidar_is_compared_with_its_own_baseline(
 ):
     wanted = experiment(
         town,
-        both={"lidar": ["vlp-16", "os1-32"]},
+        both={"lidars": {"*": {"preset": ["vlp-16", "os1-32"]}}},
         database={"stage": ["own", "last"]},
         protocol={"base": "random-yaw", "query_spacing": 20},
         baseline={"database.stage": "last"},
@@ -277,7 +277,11 @@ def test_each_lidar_is_compared_with_its_own_baseline(
     assert {row.baseline for row in results.rows} == {"database.stage=last"}
     for lidar in ("vlp-16", "os1-32"):
         own, last = (
-            values(results, both__lidar=lidar, database__stage=s, verified=0)
+            values(
+                results.where({"both.lidars.*.preset": lidar}),
+                database__stage=s,
+                verified=0,
+            )
             for s in ("own", "last")
         )
         assert last["auc"] > 0.0
@@ -322,12 +326,12 @@ def test_an_unchanged_city_has_no_change(town, tmp_path, jobs_done):
     wanted = experiment(
         town,
         tasks={"change": {"spacing": 5}},
-        database={"viewpoint": ["near", "reversed"]},
+        database={"offset": {"yaw_deg": [0, 180]}},
         methods=["solid"],
     )
     results = measure(wanted, tmp_path)
-    for viewpoint in ("near", "reversed"):
-        found = values(results, database__viewpoint=viewpoint)
+    for yaw_deg in (0, 180):
+        found = values(results, database__offset__yaw_deg=yaw_deg)
         assert found["tcr_sym"] == 0.0
     assert {row.method for row in results.rows} == {""}
 
@@ -491,8 +495,8 @@ def test_an_own_method(town, tmp_path, jobs_done, own_methods):
         ),
         ({"metrics": ["none.py"]}, "metrics: none.py: no such file"),
         (
-            {"database": {"yeers": [0, 5]}},
-            "database: yeers: no such field; did you mean years",
+            {"database": {"asid": [0, 5]}},
+            "database: asid: no such field; did you mean aside",
         ),
         ({"query": {"frame": 9}}, "query: frame: no such field; .* frames"),
         (
@@ -516,7 +520,7 @@ def test_faults_before_any_work(town, tmp_path, fields, fault):
     [
         ({"database": {"foo": 1}}, "mine: database: foo: Extra"),
         (
-            {"database": {"years": [0, 5], "foo": 1}},
+            {"database": {"frames": [9, 5], "foo": 1}},
             "mine: database: foo: Extra",
         ),
         ({"maps": ["atlantis"]}, "mine: maps: unknown map 'atlantis'"),
@@ -529,24 +533,30 @@ def test_faults_before_any_work(town, tmp_path, fields, fault):
             },
             "mine: maps: unknown map 'atlantis'",
         ),
-        ({"database": {"years": 1.5}}, "mine: database.years: 1.5 is not"),
-        ({"query": {"years": 0.5}}, "mine: query.years: 0.5 is not"),
         (
-            {"both": {"redraw": {"frozen": 1}}},
-            "mine: both.redraw.frozen: .*town: no shipped map",
+            {"database": {"city": {"years": 1.5}}},
+            "mine: database: city.years: ",
+        ),
+        ({"query": {"city": {"years": 201}}}, "mine: query: city.years: "),
+        (
+            {"both": {"city": {"redraw": {"frozen": 1}}}},
+            "mine: both.city.redraw.frozen: .*town: no shipped map",
         ),
         (
             {
                 "maps": [
                     {"name": "a", "age": "suburbia", "years": 1, "seed": 1}
                 ],
-                "both": {"redraw": {"frozen": 1}},
+                "both": {"city": {"redraw": {"frozen": 1}}},
             },
-            "mine: both.redraw.frozen: a: no shipped map",
+            "mine: both.city.redraw.frozen: a: no shipped map",
         ),
         (
-            {"maps": ["suburbia"], "both": {"redraw": {"frozen": [1, 6]}}},
-            "mine: both.redraw.frozen of suburbia: no frozen redraw 6",
+            {
+                "maps": ["suburbia"],
+                "both": {"city": {"redraw": {"frozen": [1, 6]}}},
+            },
+            "mine: both.city.redraw.frozen of suburbia: no frozen redraw 6",
         ),
         (
             {"database": {"stage": "earlier 1"}},
@@ -565,14 +575,14 @@ def test_a_case_with_fewer_levels_is_noted(town, tmp_path):
         town,
         cases={
             "snow": {"query": {"transient": {"snow": [0.1, 0.2]}}},
-            "returns": {"query": {"returns": "calibrated"}},
+            "driver": {"query": {"driver": {"wander": 0.3}}},
         },
         levels=[2],
     )
     notes = []
     with pytest.raises(InputError, match="no-map"):
         run_study(wanted, tmp_path, Cluster(), ["no-map"], on_note=notes.append)
-    assert notes == ["measured at their last level: returns (1)"]
+    assert notes == ["measured at their last level: driver (1)"]
 
 
 @pytest.mark.parametrize("name", ["results.csv", "queries.csv", "index.html"])
@@ -611,3 +621,21 @@ def test_a_map_with_one_drive_has_no_stages_to_compare(
     )
     assert "lonely: no two drives to compare" in notes
     assert {row.map for row in results.rows} == {"town"}
+
+
+def test_a_condition_more_leaves_those_before_as_they_are(
+    town, tmp_path, jobs_done
+):
+    """Also where two conditions share a drive, which then is in files."""
+
+    def ask(*depths):
+        snow = {"transient": {"snow": [*depths]}}
+        measure(experiment(town, query=snow), tmp_path)
+
+    ask(0.1)
+    ask(0.2, 0.1)
+    first, second = jobs_done
+    assert not {one for one in first if one.startswith("place ")} & {*second}
+    assert any(one.startswith("place ") for one in second)
+    ask(0.1)
+    assert jobs_done[2] == []

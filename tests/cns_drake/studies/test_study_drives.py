@@ -28,9 +28,9 @@ CHANGED = {
     "hidden": ("query", set()),
     "turn": ("query", set()),
     "tilt": ("query", set()),
-    "driver": ("database", {"driver", "traffic", "lidars"}),
-    "viewpoint": ("database", {"lidars"}),
-    "lateral": ("database", {"lidars"}),
+    "driver": ("database", {"driver", "traffic", "offset"}),
+    "viewpoint": ("database", {"offset"}),
+    "lateral": ("database", {"offset"}),
     "size": ("database", set()),
 }
 
@@ -78,7 +78,7 @@ def test_a_cause_changes_one_drive_in_its_fields(drives, town, cause):
     query = found.pop("town_04")
     assert query == load_scenario(town / "sequence_04.yaml")
     database = found.pop("town_04_database")
-    assert differences(database, query) == {"name", "lidars"}
+    assert differences(database, query) == {"name", "offset"}
     side, fields = CHANGED[cause]
     plain = {"database": database, "query": query}[side]
     assert bool(found) == bool(fields)
@@ -103,9 +103,12 @@ def test_a_cause_changes_one_drive_in_its_fields(drives, town, cause):
         ({"query": {"traffic": {"vehicles": 0}}}, False),
         ({"query": {"traffic": {"walkers": 1}}}, True),
         ({"database": {"ride": {"roughness": "A"}}}, True),
-        ({"query": {"lidar": "vlp-16"}}, False),
-        ({"query": {"returns": "calibrated"}}, True),
-        ({"database": {"viewpoint": "lane", "stage": "first"}}, False),
+        ({"query": {"lidars": {"*": {"preset": "vlp-16"}}}}, False),
+        ({"query": {"city": {"missing": 0, "towards": "01"}}}, False),
+        ({"query": {"city": {"scattered": {"building": 1}}}}, True),
+        ({"query": {"city": {"scattered": {"building": 1, "seed": 3}}}}, False),
+        ({"query": {"lidars": {"*": {"returns": "calibrated"}}}}, True),
+        ({"database": {"offset": {"left": 5}, "stage": "first"}}, False),
     ],
 )
 def test_seeds_change_what_is_random_alone(drives, fields, draws):
@@ -125,16 +128,16 @@ def test_names_tell_drives_apart(drives):
     found = drives(
         {
             "maps": ["town"],
-            "database": {"viewpoint": ["near", "lane", [5.0, 0], [2, 0]]},
+            "database": {"offset": {"left": [0.5, 5, 2]}},
             "query": {
                 "transient": {"snow": [0.2, 0, 0.1]},
-                "lidar": ["vlp-16", "os1-64"],
+                "lidars": {"*": {"preset": ["vlp-16", "os1-64"]}},
             },
             "baseline": {"query": {"transient": {"snow": 0}}},
             "seeds": [1, 2],
         }
     )
-    # Two viewpoints are the same; without snow there is nothing to draw.
+    # Without snow there is nothing to draw.
     assert len(found) == 3 + 2 * (1 + 2 * 2)
     found = drives(
         {
@@ -154,16 +157,16 @@ def test_lateral_offsets_are_5_m_a_level(drives, level):
         ladder.replaced(cases={"lateral": ladder.cases["lateral"]})
     )
     drive = found[f"town_04_database_lateral_{level}_1"]
-    assert drive.lidars["lidar"].xyz[:2] == (1.25, 5.0 * level)
+    assert drive.mounted_lidars["lidar"].xyz[:2] == (1.25, 5.0 * level)
 
 
 @pytest.mark.parametrize(
     ("sessions", "number"),
     [
-        ([{"viewpoint": "near"}], 1),
-        ([{"viewpoint": "near"}, {"viewpoint": "lane"}], 2),
+        ([{"offset": {"left": 0.5}}], 1),
+        ([{"offset": {"left": 0.5}}, {"offset": {"left": 5}}], 2),
         # Equal drives are one.
-        ([[{"viewpoint": "near"}], [{"viewpoint": "lane"}]], 2),
+        ([[{"offset": {"left": 0.5}}], [{"offset": {"left": 5}}]], 2),
     ],
 )
 def test_sessions_are_drives_of_the_database(drives, sessions, number):
@@ -182,16 +185,20 @@ def test_data_sheets_as_a_factor(drives, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "work")
     source = str(tmp_path / "mine.yaml")
     lidars = "{lidars: {lidar: {unit: [a.yaml, b.yaml]}}}"
-    for query in (lidars, "{lidar: [a.yaml, b.yaml, vlp-16]}"):
+    for query in (lidars, "{lidars: {'*': {unit: [a.yaml, b.yaml]}}}"):
         found = drives(f"maps: [town]\nquery: {query}\nseeds: 1\n", source)
         rings = {
             make_pattern(one.lidars["lidar"]).num_rings
             for name, one in found.items()
             if "database" not in name
         }
-        assert rings == ({48, 12, 16} if "vlp" in query else {48, 12})
-    with pytest.raises(InputError, match=rf"^{source}: query.lidar: .*there"):
-        drives("maps: [town]\nquery: {lidar: there}\nseeds: 1\n", source)
+        assert rings == {48, 12}
+    # A file of the working folder is not meant.
+    with pytest.raises(InputError, match=rf"^{source}: query: .*there"):
+        drives(
+            f"maps: [town]\nquery: {lidars}\n".replace("a.yaml", "there"),
+            source,
+        )
     (tmp_path / "b.yaml").write_text("columns: 64\n")
     with pytest.raises(
         InputError, match=rf"^{source}: query: lidars.lidar.unit: .*b.yaml: "
@@ -212,10 +219,13 @@ FAULTS = [
     ("database: {stage: 1}", "database.stage: 1: town has"),
     ("database: {stage: earlier 5}", "database.stage: 'earlier 5'"),
     ("cases: {a: {query: {stage: next}}}", "cases.a.query.stage: 'next'"),
-    ("{database: {stage: '01'}, query: {years: 5}}", "years: stage last ages"),
     (
-        "{database: {redraw: 3}, query: {years: 5}}",
-        "database.redraw: a city drawn anew does not age by query.years",
+        "database: {stage: '01', city: {years: 5}}",
+        ".*city.years: the last stage ages; give the drive stage: .04., not",
+    ),
+    (
+        "database: {city: {redraw: 3, years: 5}}",
+        "database: city.redraw: a city drawn anew does not age",
     ),
     ("query: {without: [nothing]}", "query.without: no structure 'nothing'"),
     ("both: {without: [nothing]}", "both.without: no structure 'nothing'"),
@@ -238,52 +248,50 @@ FAULTS = [
         "cases.a.query: ride: ",
     ),
     ("query: {imu: {kalibr: no.yaml}}", "query: imu.kalibr: no.yaml: no such"),
-    ("database: {rates: 2}", "database.rates: those of no years"),
-    ("both: {rates: 2}", "both.rates: those of no years"),
+    ("database: {city: {rates: 2}}", "database.city.rates: those of no years"),
+    ("both: {city: {rates: 2}}", "both.city.rates: those of no years"),
     (
-        "{database: {rates: 2}, query: {years: 5}}",
-        "database.rates: those of no years",
+        "{database: {city: {rates: 2}}, query: {city: {years: 5}}}",
+        "database.city.rates: those of no years",
     ),
     ("query: {distractors: 3}", "query.distractors: it is a field of database"),
-    ("both: {lateral: 3}", "both.lateral: it is a field of database"),
-    ("database: {hide_sector: 3}", "database.hide_sector: .* field of query"),
-    ("database: {redraw: {frozen: 1}}", "database.redraw: give a number"),
     (
-        "cases: {a: {both: {redraw: {frozen: 1}}}}",
-        "cases.a.both.redraw: give a number",
+        "database: {city: {redraw: {frozen: 1}}}",
+        "database.city.redraw: give a number",
+    ),
+    (
+        "cases: {a: {both: {city: {redraw: {frozen: 1}}}}}",
+        "cases.a.both.city.redraw: give a number",
     ),
     ("database: {distractors: -1}", "database.distractors: -1 is not from 0"),
     ("database: {distractors: 100001}", "database.distractors: 100001 is not"),
     ("database: {distractors: 1.5}", "database.distractors: 1.5 is not"),
     ("database: {distractors: true}", "database.distractors: True is not"),
-    ("database: {lateral: 100.1}", "database.lateral: 100.1 is not from 0"),
-    ("database: {lateral: far}", "database.lateral: 'far' is not"),
-    ("database: {lateral: 3, viewpoint: near}", "database.lateral: give it or"),
-    ("database: {viewpoint: left}", "database.viewpoint: 'left' is neither"),
-    ("database: {viewpoint: [1]}", r"database.viewpoint: \[1\] is neither"),
-    ("database: {viewpoint: [101, 0]}", r"database.viewpoint: \[101, 0\] is"),
-    ("database: {viewpoint: [0, 361]}", r"database.viewpoint: \[0, 361\] is"),
-    ("query: {lidar: sonar}", "query.lidar: .*no preset 'sonar'"),
-    ("query: {lidar: {unit: {ranges: [1, 9]}}}", "query.lidar: .*in lidars"),
-    ("query: {returns: shiny}", "query.returns: 'shiny' is neither ideal nor"),
+    ("database: {offset: {left: 100.1}}", "database: offset.left: "),
+    ("database: {offset: {left: far}}", "database: offset.left: "),
+    ("database: {offset: {yaw_deg: 361}}", "database: offset.yaw_deg: "),
+    ("database: {offset: 3}", "database: offset: "),
+    ("query: {lidars: {'*': {preset: sonar}}}", "query: .*no preset 'sonar'"),
+    ("query: {lidars: {'*': {returns: shiny}}}", "query: lidars.lidar.returns"),
     (
         "query: {weather: {visibility: 50}}",
         "query: .*weather.visibility: .* no effect",
     ),
+    ("query: {weather: {fog: 1}}", "query: weather.fog: Extra"),
+    ("protocol: {hide_sector: 360}", "protocol.hide_sector: 360 is not from 0"),
+    ("protocol: {tilt_queries: -1}", "protocol.tilt_queries: -1 is not from 0"),
+    ("protocol: {tilt_queries: steep}", "protocol: tilt_queries: "),
+    ("protocol: {turn_queries: 1}", "protocol: turn_queries: "),
+    ("database: {city: {missing: 1.1}}", "database: city.missing: "),
+    ("database: {city: {missing: much}}", "database: city.missing: "),
     (
-        "query: {returns: ideal, weather: {visibility: 50}}",
-        "query.weather: no effect on ideal returns",
+        "database: {city: {scattered: {palm: 0.5}}}",
+        "database: city.scattered: no 'palm' in ",
     ),
     (
-        "query: {returns: calibrated, weather: {fog: 1}}",
-        "query.weather: fog: Extra",
+        "database: {city: {towards: '09'}}",
+        "database: city.towards: map .* has no stage '09'",
     ),
-    ("query: {hide_sector: 360}", "query.hide_sector: 360 is not from 0"),
-    ("query: {tilt_queries: -1}", "query.tilt_queries: -1 is not from 0"),
-    ("query: {tilt_queries: steep}", "query: tilt_queries: "),
-    ("query: {turn_queries: 1}", "query: turn_queries: "),
-    ("database: {missing: 1.1}", "database: missing: "),
-    ("database: {missing: much}", "database: missing: "),
     (
         "protocol: quick",
         "protocol.base: no protocol 'quick' .*random-yaw, paper",
@@ -332,36 +340,44 @@ SESSION_FAULTS = [
         r"database\.sessions\.2\.world: another map has another frame",
     ),
     (
-        {"sessions": [{"years": 3}, {"years": 3}]},
+        {"sessions": [{"frames": 9}, {"frames": 9}]},
         r"database\.sessions\.2: the same drive as database\.sessions\.1",
     ),
     (
-        {"sessions": [{}, {"years": 2}, {"viewpoint": "near"}]},
+        {"sessions": [{}, {"aside": 1.0}, {"offset": {"left": 0.5}}]},
         r"database\.sessions\.3: the same drive as database\.sessions\.1",
     ),
     (
-        {"sessions": [{"years": 3}, {"distractors": 5}]},
+        {"sessions": [{"city": {"years": 2}}, {}]},
+        r"database\.sessions\.1: this drive is later than the query",
+    ),
+    (
+        {"fleet": FLEET},
+        r"database\.fleet\.years: 3 years before a query .* aged by 0; give",
+    ),
+    (
+        {"sessions": [{}, {"distractors": 5}]},
         r"database\.sessions\.2\.distractors: all drives share it",
     ),
     ({"sessions": [{"keep": 1}]}, r"database\.sessions\.1\.keep: all drives"),
-    ({"sessions": [{"rates": 2}]}, r"database\.sessions\.1\.rates: all dri"),
-    ({"years": -1, "sessions": [{"years": 2}]}, r"database\.years: -1 is"),
-    ({"sessions": [{"years": 201}]}, r"database\.sessions\.1\.years: 201 is"),
-    ({"sessions": [{"years": True}]}, r"database\.sessions\.1\.years: True"),
     (
-        {"sessions": [{"hide_sector": 30}]},
-        r"database\.sessions\.1\.hide_sector: it is a field of query",
+        {"sessions": [{"city": {"years": 201}}]},
+        r"database\.sessions\.1: city\.years: ",
+    ),
+    (
+        {"sessions": [{"city": {"years": True}}]},
+        r"database\.sessions\.1: city\.years: ",
     ),
     ({"sessions": [{"snow": 1}]}, r"database\.sessions\.1: snow: "),
     ({"keep": 0}, r"database\.keep: 0 is neither all, latest nor a positive"),
     ({"keep": True}, r"database\.keep: True is neither"),
     ({"keep": "newest"}, r"database\.keep: 'newest' is neither"),
     (
-        {"sessions": [{}, {"years": 2}], "maintain": "magic"},
+        {"sessions": [{}, {"aside": 1.0}], "maintain": "magic"},
         r"database\.maintain: no maintainer 'magic' .*none, free-space",
     ),
     (
-        {"sessions": [{"years": 2}], "maintain": "truth"},
+        {"sessions": [{"aside": 1.0}], "maintain": "truth"},
         r"database\.maintain: truth: no later drive updates the map of a",
     ),
     ({"maintain": "distance"}, r"database\.maintain: distance: no later"),

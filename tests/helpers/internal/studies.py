@@ -49,8 +49,8 @@ def jobs_here(patch):
     Returns:
         A list that gets the names of the jobs of each study.
     """
+    from cns_drake.scenarios import map_step
     from cns_drake.studies import recording
-    from cns_drake.studies.maps import map_step
 
     runs = []
     run_here(patch, map_step, recording)

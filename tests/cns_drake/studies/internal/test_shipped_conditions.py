@@ -31,7 +31,7 @@ def test_a_shipped_experiment_is_as_it_ships(name):
 @pytest.mark.parametrize(
     ("changes", "fields"),
     [
-        (["both.lidar=os1"], "both"),
+        (["both.frames=9"], "both"),
         (["seeds=[1,2]", "drives=stages"], "drives, seeds"),
         (["protocol.radius=5"], "protocol"),
     ],

@@ -5,8 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cns_drake.scenarios import load_scenario
-from cns_drake.studies.maps.redrawing import marked_yaml
+from cns_drake.scenarios import load_scenario, marked_yaml
 from cns_drake.training import TrainingPlan, batches, descent
 from cns_drake.training.batches import BatchSampler, TrainingScans
 from cns_drake.training.descent import train

@@ -6,14 +6,14 @@ from evaluation.base import InputError
 from evaluation.study import load_experiment, shipped_experiments
 
 TEXT = """
-database: {years: [0, 10]}
+database: {aside: [0, 10]}
 query: {transient: {snow: [0, 0.2]}}
-cases: {lost: {query: {missing: [0.1, 0.2]}}}
+cases: {lost: {query: {aside: [0.1, 0.2]}}}
 methods: {solid: {ranges: [20, 40]}, norms.py: {order: [1, 2]}}
 charts:
 """
 NAMES = (
-    "cause, level, database.years, query.transient.snow, methods.solid.ranges,"
+    "cause, level, database.aside, query.transient.snow, methods.solid.ranges,"
     " methods.norms.order"
 )
 
@@ -45,7 +45,7 @@ def test_other_names_are_refused_with_all_factors(read, chart):
     [
         ("task: pose", "task: 'pose' is none of place, cost"),
         ("task: [place, map]", "task: 'map' is none of place, cost"),
-        ("database.years: 5", "database.years: 5 is none of 0, 10"),
+        ("database.aside: 5", "database.aside: 5 is none of 0, 10"),
         ("cause: found", "cause: 'found' is none of none, lost"),
     ],
 )
@@ -64,18 +64,18 @@ def test_lines_are_over_numbers(read):
 def test_values_that_quick_or_an_option_leaves_out_are_known(read):
     chart = (
         "  - {kind: lines, over: query.transient.snow, metric: auc,"
-        " database.years: 10, task: place}\nquick: {database: {years: [0]}}"
+        " database.aside: 10, task: place}\nquick: {database: {aside: [0]}}"
     )
     read(TEXT + chart)
-    read(TEXT + chart, "database.years=[0, 20]", "tasks=[pose]")
+    read(TEXT + chart, "database.aside=[0, 20]", "tasks=[pose]")
 
 
 def test_a_factor_that_an_option_fixes_is_known(read):
-    text = f"{TEXT}  - {{kind: lines, over: database.years, metric: auc}}"
-    found = read(text, "database.years=10")
-    assert "database.years" not in found.factor_names
-    with pytest.raises(InputError, match=r"no factor 'database\.year'"):
-        read(text.replace("years,", "year,"), "database.years=10")
+    text = f"{TEXT}  - {{kind: lines, over: database.aside, metric: auc}}"
+    found = read(text, "database.aside=10")
+    assert "database.aside" not in found.factor_names
+    with pytest.raises(InputError, match=r"no factor 'database\.asid'"):
+        read(text.replace("aside,", "asid,"), "database.aside=10")
 
 
 def test_a_metric_of_the_user_is_checked_later(read):

@@ -5,7 +5,7 @@ def test_lists_of_whole_numbers_can_be_spread(read):
     experiment = read(
         """
         seeds: {from: 3, to: 5, count: 3}
-        both: {redraw: {frozen: {from: 1, to: 5, count: 2}}}
+        both: {city: {redraw: {frozen: {from: 1, to: 5, count: 2}}}}
         database: {distractors: {from: 0, to: 1000, count: 3}}
         """
     )

@@ -27,15 +27,15 @@ def test_settings_of_optional_methods_need_no_entry_in_the_file(read):
 
 def test_a_smaller_experiment(read):
     text = """
-    database: {years: [0, 5, 20], rates: 2}
+    database: {aside: [0, 5, 20], u: 2}
     protocol: random-yaw
     quick:
-      database: {years: [0, 20]}
+      database: {aside: [0, 20]}
       protocol: {query_spacing: 30.0}
     """
-    assert read(text).database["years"] == [0, 5, 20]
+    assert read(text).database["aside"] == [0, 5, 20]
     found = read(text, quick=True)
-    assert found.database == {"years": [0, 20], "rates": 2}
+    assert found.database == {"aside": [0, 20], "u": 2}
     assert found.protocol == {"base": "random-yaw", "query_spacing": 30.0}
     with pytest.raises(InputError, match=r"mine\.yaml: quick: missing"):
         read("about: all of it\n", quick=True)
@@ -120,10 +120,10 @@ def test_causes_that_cannot_be_chosen(override, fault):
 def test_own_cases_beside_those_of_causes(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text(
-        "causes: {each: ladder}\ncases: {turn: {query: {tilt_queries: 9}}}\n"
+        "causes: {each: ladder}\ncases: {turn: {protocol: {tilt_queries: 9}}}\n"
     )
     cases = load_experiment(path).cases
-    wanted = {"query": {"turn_queries": True, "tilt_queries": 9}}
+    wanted = {"protocol": {"turn_queries": True, "tilt_queries": 9}}
     assert cases["turn"] == wanted
     assert "snow" in cases
 
@@ -151,17 +151,26 @@ FAULTS = [
     ("design: half", "design: "),
     ("database: [years]", "database: "),
     ("database:", "database: "),
-    ("database: {years: []}", "database.years: a list without a value"),
+    (
+        "database: {aside: []}",
+        "database.aside: a list without a value",
+    ),
     ("database: {a: {b: []}}", "database.a.b: a list without a value"),
     (
-        "both: {redraw: {frozen: []}}",
-        "both.redraw.frozen: a list without a value",
+        "both: {city: {redraw: {frozen: []}}}",
+        "both.city.redraw.frozen: a list without a value",
     ),
-    ("database: {years: [0, 5, 0]}", "database.years: 0 is there twice"),
-    ("database: {years: [1, 1.0]}", "database.years: 1 is there twice"),
     (
-        "both: {redraw: {frozen: [2, 2]}}",
-        "both.redraw.frozen: 2 is there twice",
+        "database: {aside: [0, 5, 0]}",
+        "database.aside: 0 is there twice",
+    ),
+    (
+        "database: {aside: [1, 1.0]}",
+        "database.aside: 1 is there twice",
+    ),
+    (
+        "both: {city: {redraw: {frozen: [2, 2]}}}",
+        "both.city.redraw.frozen: 2 is there twice",
     ),
     ("protocol: {radius: [5, 5]}", "protocol.radius: 5 is there twice"),
     ("database: {a: [null, {}]}", "database.a: 'none' is there twice"),
@@ -186,9 +195,12 @@ FAULTS = [
         "maps: [town, {name: town, age: town, years: 2, seed: 1}]",
         "maps: 'town' is there twice",
     ),
-    ("database: {missing: .nan}", "database.missing: nan is not finite"),
+    (
+        "database: {aside: .nan}",
+        "database.aside: nan is not finite",
+    ),
     ("query: {a: {b: [0, .inf]}}", "query.a.b: .*inf.* is not finite"),
-    ("query: {viewpoint: [[.nan, 0]]}", "query.viewpoint: .* not finite"),
+    ("query: {offset: {left: [.nan, 0]}}", "query.offset.left: .* not finite"),
     ("database: {a: {from: 0, to: .inf, count: 3}}", "database.a: from and"),
     ("database: {a: {from: x, to: 1, count: 3}}", "database.a: from and"),
     ("database: {a: {from: 0, to: true, count: 3}}", "database.a: from and"),
@@ -230,16 +242,16 @@ FAULTS = [
     ("methods: {solid: {x: .inf}}", "methods.solid.x: inf is not finite"),
     ("protocol: 3", "protocol: "),
     (
-        "baseline: {database: {years: 0}}",
-        "baseline.database.years: this",
+        "baseline: {database: {aside: 0}}",
+        "baseline.database.aside: this",
     ),
     (
-        "database: {years: [0, 1]}\nbaseline: {database: {years: 2}}",
-        "baseline.database.years: 2 is no value of it",
+        "database: {aside: [0, 1]}\nbaseline: {database: {aside: 2}}",
+        "baseline.database.aside: 2 is no value of it",
     ),
     (
-        "database: {years: [0, 1]}\nbaseline: {database: {years: [0]}}",
-        r"baseline.database.years: \[0\] is no value of it",
+        "database: {aside: [0, 1]}\nbaseline: {database: {aside: [0]}}",
+        r"baseline.database.aside: \[0\] is no value of it",
     ),
     ("baseline: {query: 3}", "baseline.query: this is no factor"),
     ("baseline: {cause: none}", "baseline.cause: this is no factor"),
@@ -251,7 +263,7 @@ FAULTS = [
     ("cases: {snow: 3}", "cases.snow: "),
     ("cases: {snow: {query: {}}}", "cases.snow: query: no fields"),
     ("cases: {snow: {query: [1]}}", "cases.snow: query: no fields"),
-    ("cases: {snow: {protocol: {radius: 3}}}", "cases.snow: protocol: no side"),
+    ("cases: {snow: {seeds: {radius: 3}}}", "cases.snow: seeds: no section"),
     ("cases: {snow: {query: {x: []}}}", "cases.snow.query.x: a list without"),
     ("cases: {all: []}", "cases.all: "),
     ("cases: {all: [snow]}", "cases.all: snow is no case with fields"),
@@ -278,10 +290,13 @@ FAULTS = [
     ("charts: [3]", "charts.0: "),
     ("quick: 3", "quick: "),
     ("quick: {metods: [solid]}", "quick: metods: Extra"),
-    ("quick: {database: {years: []}}", "quick: database.years: a list without"),
     (
-        "quick: {baseline: {database: {years: 0}}}",
-        "quick: baseline.database.years: this is no factor",
+        "quick: {database: {aside: []}}",
+        "quick: database.aside: a list without",
+    ),
+    (
+        "quick: {baseline: {database: {aside: 0}}}",
+        "quick: baseline.database.aside: this is no factor",
     ),
 ]
 
@@ -298,8 +313,11 @@ def test_faults_are_one_line_with_file_and_field(read, text, fault):
     [
         ("years", "--set: 'years' is not FIELD=VALUE"),
         ("=3", "--set: '=3' is not FIELD=VALUE"),
-        ("database.years=[", "--set: database.years: not readable"),
-        ("database.years=[]", "database.years: a list without a value"),
+        ("database.aside=[", "--set: database.aside: not readable"),
+        (
+            "database.aside=[]",
+            "database.aside: a list without a value",
+        ),
         ("metods=[solid]", "metods: Extra inputs"),
     ],
 )
@@ -313,3 +331,40 @@ def test_no_such_experiment(tmp_path):
         load_experiment("nothing")
     with pytest.raises(InputError, match="neither"):
         load_experiment(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("database: {missing: 0.1}", "database.missing: write city: {missing:"),
+        ("both: {redraw: 3}", "both.redraw: write city: {redraw: ...}"),
+        (
+            "database: {years: [0, 5]}",
+            "database.years: .* write query: {city: {years: ...}}",
+        ),
+        (
+            "cases: {a: {query: {years: 5}}}",
+            "cases.a.query.years: .* write database: {city: {years: ...}}",
+        ),
+        (
+            "database: {sessions: [{}, {years: 5}]}",
+            "database.sessions.2.years: write city: {years: ...}",
+        ),
+        (
+            "database: {sessions: [[{viewpoint: lane}], [{}]]}",
+            "database.sessions.1.viewpoint: write offset: {left: METRES",
+        ),
+        ("database: {lateral: 5}", "database.lateral: write offset: .*radius"),
+        ("query: {returns: calibrated}", r'query.returns: write lidars: {"\*"'),
+        ("both: {lidar: vlp-16}", r'both.lidar: write lidars: {"\*": {preset:'),
+        ("query: {turn_queries: true}", "query.turn_queries: write protocol: "),
+    ],
+)
+def test_words_of_older_releases_are_told_with_the_new_ones(
+    tmp_path, text, told
+):
+    path = tmp_path / "mine.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=f"mine.yaml: {told}") as error:
+        load_experiment(path)
+    assert "\n" not in str(error.value)

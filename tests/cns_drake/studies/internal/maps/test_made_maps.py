@@ -9,9 +9,8 @@ from helpers.internal import studies
 from helpers.small_city import write_small_city
 import pytest
 
-from cns_drake.studies.maps import map_step
-from cns_drake.studies.maps.made_maps import AgeCity, made_map_step
-from cns_drake.studies.maps.map_step import MakeMap
+from cns_drake.scenarios import AgeCity, MakeMap, map_step
+from cns_drake.studies.maps.made_maps import made_map_step
 from evaluation.base import InputError, Reporter, draft_folder
 from evaluation.study import Experiment, MadeMap
 from worlds.ageing import DEFAULT_RATES

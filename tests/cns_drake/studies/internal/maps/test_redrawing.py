@@ -7,8 +7,7 @@ from helpers.internal import studies
 from helpers.small_city import ROADS, write_small_city
 import pytest
 
-from cns_drake.studies.maps import map_step
-from cns_drake.studies.maps.redrawing import RedrawCity, redrawn_inputs
+from cns_drake.scenarios import RedrawCity, map_step, redrawn_inputs
 from evaluation.base import Cluster
 from worlds.city import generate_city, load_plan, load_stages, make_city
 from worlds.roads import load_road_network

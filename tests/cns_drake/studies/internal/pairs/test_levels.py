@@ -60,7 +60,7 @@ def test_the_levels_are_as_they_were_frozen(tmp_path):
     "change",
     [
         "seeds=[4709]",
-        "cases.all.database.viewpoint=[[2.0, 0], [2.4, 0], [2.7, 0], [3.1, 0]]",
+        "cases.all.database.offset.left=[2.0, 2.4, 2.7, 3.1]",
         "query.frames=100",
         "levels=[3, 4]",
     ],

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import yaml
 
-from cns_drake.studies.maps.map_step import MakeMap
+from cns_drake.scenarios.map_step import MakeMap
 from evaluation.base import (
     Reporter,
     __version__,
@@ -30,7 +30,7 @@ from worlds.maps import (
 # Start of the first line of each input that is written here.
 _MARK = "# Of a city drawn anew by cns-drake"
 # The only stage of a city that is drawn anew.
-_ONLY_STAGE = "01"
+REDRAWN_STAGE = "01"
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def redrawn_city(map_folder: Path, seed: int, output: Path) -> RedrawCity:
         output: folder of the new cities.
     """
     folder = output / f"{map_folder.name}_c{seed}"
-    return RedrawCity(folder, map_folder, _ONLY_STAGE, seed)
+    return RedrawCity(folder, map_folder, REDRAWN_STAGE, seed)
 
 
 def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
