@@ -46,6 +46,8 @@ class ForeignCity:
         axes: description of the coordinates, if they are not metres east, north
             and up.
         small_objects: small objects, which are placed in a dressed city only.
+        level: height of the ground in W, if the format says that it is level
+            [m]; None if objects say how high the ground is.
     """
 
     objects: list[ImportedObject]
@@ -56,3 +58,4 @@ class ForeignCity:
     keeps_left: bool = False
     axes: tuple[str, ...] = ()
     small_objects: Sequence[SmallObject] = ()
+    level: float | None = None

@@ -110,14 +110,14 @@ def import_city(
     if options.grow is not None:
         staged, changes = grow(staged, options.grow, options.seed)
     doing("looking for streets")
-    ground = ground_of(staged.kept)
+    ground = ground_of(staged.kept, city.level)
     space = find_free_space(staged.kept, ground)
     side = options.drive_on or ("left" if city.keeps_left else "right")
     # The cells of a city in millimetres would be searched for minutes.
     drives = own or (_find_drives(city, space, side) if plausible else [])
     if options.within is not None:
         staged = _cropped_city(staged, drives, options.within, city.faults)
-        ground = ground_of(staged.kept)
+        ground = ground_of(staged.kept, city.level)
     drives = with_ground_heights(drives, ground.height, city.faults)
     bare = staged.kept
     dressing = None

@@ -37,7 +37,11 @@ from worlds.imports.faces import flat_surface, joined_triangles, parts_of
 from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity
 from worlds.imports.ground import Ground, ground_structures
-from worlds.imports.imported_objects import ImportedObject, make_object
+from worlds.imports.imported_objects import (
+    Base,
+    ImportedObject,
+    make_object,
+)
 from worlds.imports.staged_city import StagedCity
 from worlds.imports.streets import (
     KERB_HEIGHT,
@@ -147,11 +151,7 @@ def dress_city(
     kept = staged.kept
     streets = city.streets
     laid = _laid_paving(kept, streets, drives, ground, is_paved)
-    paving = [
-        one.triangles
-        for one in [*kept, *laid]
-        if one.is_ground or one.object_type == "Sidewalk"
-    ]
+    paving = [one.triangles for one in [*kept, *laid] if one.is_paving]
     buildings = dress_buildings(
         kept, drives, streets, ground, seed, always, joined_triangles(paving)
     )
@@ -420,7 +420,8 @@ def missing_sidewalks(
     carriageways = [
         line.buffer(street.width / 2.0, quad_segs=4) for street, line in near
     ]
-    obstacles = _obstacles(near_drives(objects, drives))
+    standing = [one for one in objects if one.base is Base.GROUND]
+    obstacles = _obstacles(near_drives(standing, drives))
     taken = np.concatenate([obstacles, carriageways])
     # The union of a whole city takes long, so only polygons near each street
     # are used.
@@ -468,7 +469,11 @@ def paved_gaps(
     must be level.
     """
     near = near_drives(
-        [imported for imported in objects if imported.object_type != "Tree"],
+        [
+            one
+            for one in objects
+            if one.base is Base.GROUND and one.object_type != "Tree"
+        ],
         drives,
     )
     walks = [

@@ -24,7 +24,11 @@ from worlds.imports import faces
 from worlds.imports.colours import WHITE_PAINT
 from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity, SmallObject
-from worlds.imports.imported_objects import ImportedObject, make_object
+from worlds.imports.imported_objects import (
+    Base,
+    ImportedObject,
+    make_object,
+)
 from worlds.imports.openstreetmap import reading, streets
 from worlds.imports.openstreetmap.area_looks import AreaLook, raised_object
 from worlds.imports.openstreetmap.bridges import (
@@ -201,6 +205,7 @@ def import_openstreetmap(
         driven,
         any(way.tags.get("driving_side") == "left" for way in features.ways),
         small_objects=list(_make_small_objects(features, local)),
+        level=0.0,
     )
 
 
@@ -413,8 +418,9 @@ def _barrier(
         faults.add("barrier that begins above its top, lowered", name)
         low = 0.0
     look = AreaLook("Barrier", usual.semantic_class, None, high)
+    base = Base.RAISED if low > 0.0 else Base.GROUND
     yield from raised_object(
-        f"{tags['barrier']}_{name}", look, areas, where, low
+        f"{tags['barrier']}_{name}", look, areas, where, low, base
     )
 
 
