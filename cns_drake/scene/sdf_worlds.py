@@ -169,7 +169,7 @@ def read_sdf_world(
             cannot be read, or a pose or shape cannot be determined.
         RuntimeError, ValueError, SystemExit: Drake refuses a frame or a shape.
     """
-    root = read_model(path)
+    root = read_model(path, finder)
     worlds = root.findall("world")
     world = worlds[0] if worlds else Element("world", name="world")
     if not worlds:
@@ -493,7 +493,7 @@ class _Reader:
     def _read_included(self, file: Path) -> Element | None:
         """Returns a file's first model, if any; counts all other content."""
         if file not in self._included:
-            self._included[file] = read_model(file)
+            self._included[file] = read_model(file, self._finder)
         # The model is changed as its include says.
         root = copy.deepcopy(self._included[file])
         self._num_included += sum(1 for _ in root.iter())

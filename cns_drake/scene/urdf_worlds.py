@@ -70,7 +70,7 @@ def read_urdf_world(
         InputError: the file cannot be read, or contains macros of xacro.
         RuntimeError, ValueError, SystemExit: Drake refuses the model.
     """
-    robot = read_model(path)
+    robot = read_model(path, finder)
     if robot.tag != "robot":
         raise InputError(f"{path}: <{robot.tag}> is no URDF (<robot>)")
     for element in robot.iter():

@@ -189,7 +189,7 @@ def _parse_models(
         InputError: the file is missing, cannot be parsed, or has no models.
     """
     _check_text(path)
-    check_model(path)
+    check_model(path, ModelFinder(path))
     doing(f"parsing {path.name}")
     with _drake_errors(path):
         models = Parser(plant).AddModels(str(path))
