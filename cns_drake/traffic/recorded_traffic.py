@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meets_ego
+from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meetings_with_ego
 from cns_drake.traffic.traffic_plan import (
     KINDS,
     WALKER_SIZE,
@@ -126,7 +126,9 @@ def play_recorded(
         for part, order, boxes, wanted in zip(
             parts, orders, sizes, (vehicles, walkers), strict=True
         ):
-            met = meets_ego(part, boxes, times, ego, ego_box)
+            met = meetings_with_ego(part, boxes, times, ego, ego_box).any(
+                axis=0
+            )
             kept.append(np.sort(order[~met[order]][:wanted]))
         left_out = vehicles + walkers - sum(map(len, kept))
         if best is None or left_out < best.left_out:
