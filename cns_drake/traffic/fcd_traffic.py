@@ -519,7 +519,7 @@ def play_trace(
         number += int(met.any(axis=0).sum())
     if number:
         notes += (f"traffic: {number} left out while they would meet the car",)
-    return TrafficPlan(tuple(kinds), *apart, notes=notes)
+    return TrafficPlan(tuple(kinds), apart[0], apart[1], notes=notes)
 
 
 def _absent_at(tracks: Tracks, times: np.ndarray, met: np.ndarray) -> Tracks:

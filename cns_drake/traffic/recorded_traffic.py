@@ -126,10 +126,9 @@ def play_recorded(
         for part, order, boxes, wanted in zip(
             parts, orders, sizes, (vehicles, walkers), strict=True
         ):
-            met = meetings_with_ego(part, boxes, times, ego, ego_box).any(
-                axis=0
-            )
-            kept.append(np.sort(order[~met[order]][:wanted]))
+            met = meetings_with_ego(part, boxes, times, ego, ego_box)
+            is_apart = ~np.any(met, axis=0)[order]
+            kept.append(np.sort(order[is_apart][:wanted]))
         left_out = vehicles + walkers - sum(map(len, kept))
         if best is None or left_out < best.left_out:
             best = TrafficPlan(

@@ -166,12 +166,8 @@ def test_autoware_tells_two_echoes_of_a_beam_apart(seed):
             2: ([far + 2, near + 1], [4, 5]),
         }[int(rng.integers(3))]
         for way, kind in zip(ways, types, strict=True):
-            xyz = (
-                50 * way * math.cos(angle),
-                50 * way * math.sin(angle),
-                0.3 * way,
-            )
-            rows.append((*xyz, 0.5, 3, 70))
+            x, y = 50 * math.cos(angle), 50 * math.sin(angle)
+            rows.append((way * x, way * y, way * 0.3, 0.5, 3, 70))
             kinds.append(kind)
     fields = [(name, "f4") for name in ("x", "y", "z", "intensity")]
     points = np.array(rows, [*fields, ("ring", "u2"), ("t", "u4")])
