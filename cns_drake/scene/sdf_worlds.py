@@ -247,6 +247,8 @@ class _Reader:
             "models": Counter(),
             "meshes": Counter(),
         }
+        # Numbers of models, and of visuals, that are read.
+        self._num_read = Counter({"models": 0, "meshes": 0})
         # Names to which poses and frames refer, without their scopes.
         self._referred: set[str] = set()
         # The frames of the world, as SDF, and the visuals of its links.
@@ -267,7 +269,8 @@ class _Reader:
             for what, count in sorted(self._skipped.items())
         ]
         for what, uris in self._missing.items():
-            notes += note_of_missing(self._path, what, uris)
+            whole = self._num_read[what] + sum(uris.values())
+            notes += note_of_missing(self._path, what, uris, whole)
         return tuple(notes)
 
     def skip(self, what: str, count: int = 1, how: str = "ignored") -> None:
@@ -544,6 +547,7 @@ class _Reader:
     def _add_model(
         self, model: Element, target: Element, folder: Path, depth: int
     ) -> None:
+        self._num_read["models"] += 1
         made = Element("model", name=self._names_in(target).free(model))
         if model.get("placement_frame"):
             made.set("placement_frame", model.get("placement_frame", ""))
@@ -567,6 +571,7 @@ class _Reader:
             name = names.free(element)
             visual = self._read_visual(element, name, made, target, folder)
             if visual is not None:
+                self._num_read["meshes"] += 1
                 names.taken.add(name)
                 visuals.append(visual)
 

@@ -141,7 +141,10 @@ def import_city(
             city, options, list(staged.standing), changes, dressing
         )
         map_files.write_facts(draft, source, facts, city.faults)
-        report = _report_of(staged, drives, city)
+        built = {city.sources.get(one.draw_name, one.draw_name) for one in bare}
+        if dressing is not None:
+            built |= dressing.sources
+        report = _report_of(staged, drives, city, len(built))
         map_files.write_report(draft, report)
         map_files.write_drives(
             draft,
@@ -224,7 +227,10 @@ def _find_drives(
 
 
 def _report_of(
-    staged: StagedCity, drives: Sequence[WaypointRoute], city: ForeignCity
+    staged: StagedCity,
+    drives: Sequence[WaypointRoute],
+    city: ForeignCity,
+    num_built: int,
 ) -> ImportReport:
     faults = city.faults
     return ImportReport(
@@ -238,6 +244,8 @@ def _report_of(
         drives=tuple(drive.length for drive in drives),
         faults=faults.rows(),
         parts=faults.parts(),
+        num_elements=city.num_elements,
+        num_built=num_built,
         shares=faults.shares(_volumes(city.objects)),
     )
 

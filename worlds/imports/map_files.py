@@ -183,7 +183,8 @@ def write_facts(
 
 def write_report(draft: Path, report: ImportReport) -> None:
     """Writes all counts of an import to `import.txt` in the map's folder."""
-    lines = [f"{kind}: {number}" for kind, number in report.kinds.items()]
+    lines = [report.told_built()]
+    lines += [f"{kind}: {number}" for kind, number in report.kinds.items()]
     lines += [
         f"{fault.kind}: {report.told(fault)}, such as {fault.example}"
         for fault in report.faults

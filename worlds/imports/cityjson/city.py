@@ -93,6 +93,7 @@ def import_cityjson(
         tuple(origin.tolist()),
         city.system.name,
         city.faults,
+        len(_families(city)),
         axes=() if city.system.is_plain else city.system.axes,
     )
 

@@ -1,7 +1,7 @@
 """Dresses a city: adds details to its buildings and along its streets."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -114,6 +114,7 @@ class Dressing:
             structure of the file with added details, or `lot` for a random
             structure. All other structures are as in the file.
         facts: counts of details from the file and of random details.
+        sources: ids, in the file, of the small objects that were placed.
         guessed_ground: structures of the ground that was guessed; empty if the
             file has a terrain.
     """
@@ -121,6 +122,7 @@ class Dressing:
     city: StagedCity
     origins: Mapping[str, str]
     facts: Mapping[str, Any]
+    sources: Set[str]
     guessed_ground: Sequence[Structure]
 
 
@@ -192,7 +194,7 @@ def dress_city(
         )
     if is_paved:
         guessed_ground = list(map(in_paving_colour, guessed_ground))
-    return Dressing(dressed, origins, facts, guessed_ground)
+    return Dressing(dressed, origins, facts, placed.sources, guessed_ground)
 
 
 def _facts(

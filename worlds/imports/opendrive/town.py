@@ -687,6 +687,8 @@ def _write_drives(draft: Path, town: Town) -> None:
 def _report_of(
     town: Town, sizes: Mapping[str, tuple[int, int]]
 ) -> ImportReport:
+    roads = town.roads.roads
+    of_file = ("roads", "roads in junctions", "signals", "objects")
     return ImportReport(
         kinds=town.kinds,
         triangles=sum(
@@ -698,6 +700,8 @@ def _report_of(
         drives=tuple(drive.length for drive in town.drives),
         faults=town.faults.rows(),
         parts=town.faults.parts(),
+        num_elements=len(roads) + sum(len(road.things) for road in roads),
+        num_built=sum(town.kinds.get(kind, 0) for kind in of_file),
     )
 
 

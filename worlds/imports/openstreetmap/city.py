@@ -202,10 +202,16 @@ def import_openstreetmap(
         (latitude, longitude),
         "WGS 84",
         faults,
+        len(features.kinds),
         driven,
         any(way.tags.get("driving_side") == "left" for way in features.ways),
         small_objects=list(_make_small_objects(features, local)),
         level=0.0,
+        sources={
+            one.structure.name: name
+            for one in objects
+            for name in _ids_in(one.structure.name)
+        },
     )
 
 
@@ -310,11 +316,7 @@ def _count_unused(
         counted: ids of objects that are counted elsewhere, as are the buildings
             that are left out.
     """
-    used = {
-        name
-        for one in objects
-        for name in re.findall(r"_([nwr]-?\d+)", one.structure.name)
-    }
+    used = {name for one in objects for name in _ids_in(one.structure.name)}
     used |= {area.name for area in features.areas if is_building(area.tags)}
     _account_for_tags(features, used, dressed)
     used |= counted
@@ -324,6 +326,11 @@ def _count_unused(
             if kind.startswith(("building=", "building:part=")):
                 continue
             features.faults.add(f"{kind}, left out", name)
+
+
+def _ids_in(name: str) -> list[str]:
+    """Returns the ids of the file's elements in the name of a structure."""
+    return re.findall(r"_([nwr]-?\d+)", name)
 
 
 def _account_for_tags(
