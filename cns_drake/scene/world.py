@@ -220,6 +220,10 @@ def _check_text(path: Path) -> None:
         )
     # Drake would fail when it quotes other text.
     content = read_bytes(path)
+    if path.suffix.lower() == ".erb" or content.lstrip().startswith(b"<%"):
+        raise InputError(
+            f"{path}: a template is not read; the program erb writes the SDF"
+        )
     try:
         content.decode("utf-8")
     except UnicodeDecodeError:

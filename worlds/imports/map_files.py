@@ -78,9 +78,8 @@ def _structure_table(
 ) -> str:
     """Returns the structure table of a city, as the text of a CSV file.
 
-    A dressed city has a column for the origin of structures, and a city with
-    years of construction has a column for these. The arguments are as for
-    `write_world`.
+    There is a column for the origin of structures, and a city with years of
+    construction has a column for these. The arguments are as for `write_world`.
     """
     table = structures_csv(
         [*guessed_ground, *(kept.structure for kept in city.kept)],
@@ -90,11 +89,11 @@ def _structure_table(
             for member in standing
         ),
     )
-    if dressing is not None:
-        names = [kept.structure.name for kept in city.kept]
-        origins = [dressing.origins.get(name, "file") for name in names]
-        cells = ["guess"] * len(guessed_ground) + origins
-        table = with_column(table, "origin", cells)
+    origins = {} if dressing is None else dressing.origins
+    names = [kept.structure.name for kept in city.kept]
+    cells = ["guess"] * len(guessed_ground)
+    cells += [origins.get(name, "file") for name in names]
+    table = with_column(table, "origin", cells)
     years = [kept.year for kept in city.kept]
     if any(years):
         cells = [""] * len(guessed_ground)

@@ -273,3 +273,13 @@ def test_included_files_are_found_and_checked(tmp_path, uri, name, fault):
         read = load_world(world, model_paths=[tmp_path / "shelf"])
         assert not read.notes
         assert len(read_perception_geometry(read.scene_graph.model_inspector()))
+
+
+@pytest.mark.parametrize("name", ["world.sdf.erb", "world.sdf"])
+def test_templates_are_named(tmp_path, name):
+    path = tmp_path / name
+    path.write_text('<% n = 1 %>\n<sdf version="1.9"></sdf>')
+    with pytest.raises(
+        InputError, match="template is not read; the program erb"
+    ):
+        load_world(path)

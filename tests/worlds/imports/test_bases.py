@@ -1,5 +1,7 @@
 """What does not stand on the ground changes no ground, and has an underside."""
 
+import csv
+
 from helpers.imported_cities import bounds, read_city, volume
 from helpers.small_cityjson import CityWriter
 from helpers.small_opendrive import cubic, straight, write_roads
@@ -184,3 +186,30 @@ def test_raised_buildings_of_openstreetmap_are_closed(tmp_path, tags):
     assert volume(raised.triangles) == pytest.approx(
         np.prod(high - low), rel=1e-3
     )
+
+
+@pytest.mark.parametrize(("above", "bridges"), [(2.9, 0), (3.0, 1), (3.1, 1)])
+@pytest.mark.parametrize("z", [0.0, 0.1, 101.3])
+def test_a_road_with_the_headroom_is_a_bridge(tmp_path, above, bridges, z):
+    path = write_roads(
+        tmp_path / "a.xodr",
+        *(
+            straight(name, *ends, elevation=cubic("elevation", 0.0, h, key="s"))
+            for name, ends, h in (
+                ("low", (-80, 0, 80, 0), z),
+                ("high", (0, -80, 0, 80), z + above),
+            )
+        ),
+    )
+    report = import_city(path, tmp_path / "a", ImportOptions(dressed=False))
+    assert report.kinds.get("bridges", 0) == bridges
+
+
+@pytest.mark.parametrize("dressed", [False, True])
+def test_each_structure_has_an_origin(tmp_path, dressed):
+    path = quarter().write(tmp_path / "a.osm")
+    import_city(path, tmp_path / "a", ImportOptions(dressed=dressed))
+    with (tmp_path / "a/structures.csv").open() as file:
+        origins = {row["name"]: row["origin"] for row in csv.DictReader(file)}
+    assert origins["ground"] == "guess"
+    assert set(origins.values()) >= {"guess", "file"}
