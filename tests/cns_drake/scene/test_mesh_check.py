@@ -386,6 +386,7 @@ HEAD, ROWS = ply(BY_INDEX, "4 0 1 2 3\n").split("end_header\n")
 CORNERS = ROWS.splitlines()[:4]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rows", "fault"),
     [
