@@ -28,11 +28,12 @@ COLLECTIONS = (
     tuple, dict, set,
 )  # fmt: skip
 SHAPES = ((0,), (0, 2), (0, 3), (0, 3, 3), (0, 4, 4), (0, 2, 2), (0, 0))
-# Functions of three numbers, of an image, of one outline, and of at least one
-# choice: their sequences cannot be empty.
+# Functions of three numbers, an image, an outline, elevations, and of one
+# choice at least: their sequences cannot be empty.
 NEVER_EMPTY = (
     "cns_drake.recording.make_compressed_image",
     "cns_drake.recording.make_image",
+    "cns_drake.sensors.SpinningPattern",
     "worlds.shapes.block",
     "worlds.shapes.cut_ears",
     "worlds.shapes.pick_key",
