@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 import functools
 import math
@@ -251,7 +251,7 @@ class McapRecorder(LeafSystem):
         further: Mapping[str, RecordedSensor] | None = None,
         layouts: Mapping[str, str] | None = None,
         num_rings: Mapping[str, int] | None = None,
-        calibrated: Collection[str] = (),
+        calibrated: Mapping[str, str] | None = None,
         imu_variances: tuple[float, float] = (0.0, 0.0),
         with_imu_samples: bool = False,
         with_objects: bool = False,
@@ -280,8 +280,8 @@ class McapRecorder(LeafSystem):
             num_rings: LiDAR name -> number of its rings. For a LiDAR in this
                 mapping, the layout `velodyne` counts rings from the lowest
                 ring.
-            calibrated: names of the LiDARs with calibrated intensities, from 0
-                to 255.
+            calibrated: name -> reported echoes (such as `dual`), of the LiDARs
+                with calibrated intensities, which are from 0 to 255.
             imu_variances: variances of specific force [m^2/s^4] and of
                 angular velocity [rad^2/s^2].
             with_imu_samples: whether there is a port `imu_samples`.
@@ -298,6 +298,7 @@ class McapRecorder(LeafSystem):
         """
         super().__init__()
         cameras, further, layouts = cameras or {}, further or {}, layouts or {}
+        calibrated = calibrated or {}
         discrete = discrete or {}
         _check_frames(X_BSs, cameras, further)
         if (period is None) == (schedule is None):
@@ -340,6 +341,7 @@ class McapRecorder(LeafSystem):
                 layout=layouts.get(name, "cns"),
                 num_rings=(num_rings or {}).get(name),
                 is_calibrated=name in calibrated,
+                echoes=calibrated.get(name, "strongest"),
             )
             self._add_scan_port(name, convert, discrete.get(name))
         for name, X_BS in X_BSs.items():

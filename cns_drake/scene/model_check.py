@@ -11,12 +11,15 @@ import re
 from typing import NoReturn, cast
 from xml.etree import ElementTree
 
+from cns_drake.scene.model_finder import ModelFinder, model_file
 from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE
 from evaluation.base import Element, InputError, read_elements, value_errors
 
 # File name extensions of models.
 _MODELS = (".sdf", ".world", ".urdf")
+# Versions of SDF that are read. In older ones, elements have other names.
+_SDF_VERSIONS = tuple(f"1.{minor}" for minor in range(2, 13))
 # Longest name [characters].
 _LONGEST_NAME = 1000
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
@@ -54,17 +57,22 @@ def lacks_size(shape: ElementTree.Element) -> bool:
     return any(shape.find(name) is None for name in SIZES.get(shape.tag, ()))
 
 
-def check_model(path: Path) -> Element | None:
+def check_model(path: Path, finder: ModelFinder) -> Element | None:
     """Checks an SDF or URDF file, and the SDF files that it includes.
+
+    Args:
+        path: the file.
+        finder: finds included models and meshes.
 
     Returns:
         The root element of the file; None for a file of another kind, which is
         not checked.
 
     Raises:
-        InputError: a file cannot be read, is not XML, or has an invalid number,
-            an impossible size, two values for one element, a name that is too
-            long, or an invalid face in the mesh of a collision.
+        InputError: a file cannot be read, is not XML, or has a version of SDF
+            that is not read, an invalid number, an impossible size, two values
+            for one element, a name that is too long, or an invalid face in the
+            mesh of a collision.
     """
     roots: dict[Path, Element] = {}
     waiting = [path]
@@ -72,19 +80,19 @@ def check_model(path: Path) -> Element | None:
         file = waiting.pop()
         if file.resolve() in roots or file.suffix.lower() not in _MODELS:
             continue
-        check = _ModelCheck(file)
+        check = _ModelCheck(file, finder)
         roots[file.resolve()] = check.root
         waiting += check.included
     return roots.get(path.resolve())
 
 
-def read_model(path: Path) -> ElementTree.Element:
+def read_model(path: Path, finder: ModelFinder) -> ElementTree.Element:
     """Returns the root element of a model's file, after `check_model`.
 
     Raises:
         InputError: see `check_model`.
     """
-    root = check_model(path)
+    root = check_model(path, finder)
     return read_elements(path, encoding="utf-8") if root is None else root
 
 
@@ -96,11 +104,22 @@ class _ModelCheck:
         included: files that the file includes.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, finder: ModelFinder):
         self.included: list[Path] = []
         self._path = path
+        self._finder = finder
         self.root = read_elements(path, encoding="utf-8")
+        self._check_version()
         self._walk(self.root, [])
+
+    def _check_version(self) -> None:
+        """Refuses versions of SDF whose elements would not be understood."""
+        version = self.root.get("version", _SDF_VERSIONS[-1]).strip()
+        is_sdf = self.root.tag in ("sdf", "gazebo")
+        if is_sdf and version not in _SDF_VERSIONS:
+            first, last = _SDF_VERSIONS[0], _SDF_VERSIONS[-1]
+            fault = f"version {version} of SDF is not read, but {first} to"
+            self._refuse(self.root, f"{fault} {last}")
 
     def _walk(self, element: Element, parents: list[str]) -> None:
         for key, value in element.items():
@@ -181,15 +200,18 @@ class _ModelCheck:
         return numbers
 
     def _check_uri(self, uri: str, parents: list[str]) -> None:
-        if parents[-1:] == ["include"]:
-            place = self._path.parent / uri
-            self.included += place.glob("*.sdf") if place.is_dir() else [place]
+        is_included = parents[-1:] == ["include"]
         # Visible meshes are checked when they are read.
-        elif "collision" in parents and uri.lower().endswith(".obj"):
-            place = self._path.parent / uri
-            with value_errors(place):
-                if place.is_file():
-                    check_obj(place)
+        is_collision = "collision" in parents and uri.lower().endswith(".obj")
+        if not (is_included or is_collision):
+            return
+        place = self._finder.find(uri, self._path.absolute().parent)
+        file = None if place is None else model_file(place)
+        if file is not None and is_included:
+            self.included.append(file)
+        elif file is not None and file.is_file():
+            with value_errors(file):
+                check_obj(file)
 
     def _refuse(self, element: Element, fault: str) -> NoReturn:
         raise InputError(

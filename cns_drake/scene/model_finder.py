@@ -1,11 +1,11 @@
 """Finds the files to which a world refers, in Gazebo's folders."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 import os
 from pathlib import Path
 from urllib.parse import unquote
 
-from evaluation.base import natural_key, read_elements
+from evaluation.base import InputError, natural_key, read_elements
 
 # Environment variables of old and new Gazebo and of libsdformat that list
 # folders of models.
@@ -15,6 +15,8 @@ _VARIABLES = (
     "IGN_GAZEBO_RESOURCE_PATH",
     "GAZEBO_MODEL_PATH",
 )
+# A world of which more is missing is refused [share].
+_MOST_MISSING = 0.5
 _SCHEMES = ("model://", "package://", "file://")
 
 
@@ -159,16 +161,30 @@ def model_file(path: Path) -> Path | None:
 
 
 def note_of_missing(
-    path: Path, what: str, uris: Collection[str]
+    path: Path, what: str, uris: Mapping[str, int], whole: int
 ) -> tuple[str, ...]:
     """Returns a note on the models or meshes of a file that are missing.
 
     The advice holds for every program and for `load_world`.
+
+    Args:
+        path: the file.
+        what: `models` or `meshes`.
+        uris: URI that leads to no file -> number of those that have it.
+        whole: number of models, or of visuals, of the world.
+
+    Raises:
+        InputError: more than half of the world is missing.
     """
     if not uris:
         return ()
+    number = sum(uris.values())
     some = ", ".join(list(uris)[:3]) + (", ..." if len(uris) > 3 else "")
-    told = f"{path}: {len(uris)} {what} not found, and left out: {some}"
+    of_what = "models" if what == "models" else "visuals"
+    told = (
+        f"{path}: {len(uris)} {what} not found, and left out: {some}"
+        f" ({number} of {whole} {of_what})"
+    )
     first = next(iter(uris))
     if not first.startswith(("file:", "/")):
         words = first.rpartition("://")[2].split("/")
@@ -177,4 +193,6 @@ def note_of_missing(
             f"; name the folder that has {name} in the variable"
             " GZ_SIM_RESOURCE_PATH"
         )
+    if number > _MOST_MISSING * whole:
+        raise InputError(told.replace(", and left out:", ":"))
     return (told,)

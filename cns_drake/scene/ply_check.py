@@ -71,6 +71,8 @@ def check_ply(content: bytes) -> tuple[str, ...]:
     _check_names(elements)
     # The line of the word end_header ends by \n or by \r\n.
     _, _, body = body.partition(b"\n")
+    if encoding == "ascii":
+        _check_values(elements, body)
     least = _CORNERS
     # Open3D refuses damaged files itself.
     with contextlib.suppress(
@@ -133,6 +135,54 @@ def _check_names(elements: Sequence[_Element]) -> None:
                 f"has faces of PLY with the lists {' '.join(lists) or '(none)'}"
                 f", none of {' or '.join(_CORNER_LISTS)}; export it again"
             )
+
+
+def _check_values(elements: Sequence[_Element], body: bytes) -> None:
+    """Checks that a text has as many values as its header says.
+
+    Open3D reads one value after the other, whatever their lines are: with other
+    numbers, faces get wrong corners.
+
+    Raises:
+        ValueError: it has more or fewer.
+    """
+    values = body.split()
+    at = 0
+    for one in elements:
+        kinds = [types for _, types in one.properties]
+        if all(len(types) == 1 for types in kinds):
+            at += one.count * len(kinds)
+            continue
+        for _ in range(one.count):
+            for types in kinds:
+                is_list = len(types) > 1 and values[at : at + 1]
+                with contextlib.suppress(ValueError):
+                    at += max(int(values[at]), 0) if is_list else 0
+                at += 1
+            if at > len(values):
+                break
+    if at != len(values):
+        raise ValueError(_misfit_of_rows(elements, body))
+
+
+def _misfit_of_rows(elements: Sequence[_Element], body: bytes) -> str:
+    """Returns how the rows of a text differ from those in its header."""
+    rows = [row.split() for row in body.splitlines() if row.strip()]
+    wanted = sum(one.count for one in elements)
+    if len(rows) != wanted:
+        return f"has {len(rows)} rows of PLY, not {wanted} as its header says"
+    at = 0
+    for one in elements:
+        number = len(one.properties)
+        if all(len(types) == 1 for _, types in one.properties):
+            for row in rows[at : at + one.count]:
+                if len(row) != number:
+                    return (
+                        f"has {len(row)} values in a row of the element"
+                        f" {one.name} of PLY, not {number} as its header says"
+                    )
+        at += one.count
+    return "has lists of PLY that are longer or shorter than they say"
 
 
 def _ignored_elements(elements: Sequence[_Element]) -> tuple[str, ...]:

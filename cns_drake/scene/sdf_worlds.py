@@ -169,7 +169,7 @@ def read_sdf_world(
             cannot be read, or a pose or shape cannot be determined.
         RuntimeError, ValueError, SystemExit: Drake refuses a frame or a shape.
     """
-    root = read_model(path)
+    root = read_model(path, finder)
     worlds = root.findall("world")
     world = worlds[0] if worlds else Element("world", name="world")
     if not worlds:
@@ -247,6 +247,8 @@ class _Reader:
             "models": Counter(),
             "meshes": Counter(),
         }
+        # Numbers of models, and of visuals, that are read.
+        self._num_read = Counter({"models": 0, "meshes": 0})
         # Names to which poses and frames refer, without their scopes.
         self._referred: set[str] = set()
         # The frames of the world, as SDF, and the visuals of its links.
@@ -267,7 +269,8 @@ class _Reader:
             for what, count in sorted(self._skipped.items())
         ]
         for what, uris in self._missing.items():
-            notes += note_of_missing(self._path, what, uris)
+            whole = self._num_read[what] + sum(uris.values())
+            notes += note_of_missing(self._path, what, uris, whole)
         return tuple(notes)
 
     def skip(self, what: str, count: int = 1, how: str = "ignored") -> None:
@@ -493,7 +496,7 @@ class _Reader:
     def _read_included(self, file: Path) -> Element | None:
         """Returns a file's first model, if any; counts all other content."""
         if file not in self._included:
-            self._included[file] = read_model(file)
+            self._included[file] = read_model(file, self._finder)
         # The model is changed as its include says.
         root = copy.deepcopy(self._included[file])
         self._num_included += sum(1 for _ in root.iter())
@@ -544,6 +547,7 @@ class _Reader:
     def _add_model(
         self, model: Element, target: Element, folder: Path, depth: int
     ) -> None:
+        self._num_read["models"] += 1
         made = Element("model", name=self._names_in(target).free(model))
         if model.get("placement_frame"):
             made.set("placement_frame", model.get("placement_frame", ""))
@@ -567,6 +571,7 @@ class _Reader:
             name = names.free(element)
             visual = self._read_visual(element, name, made, target, folder)
             if visual is not None:
+                self._num_read["meshes"] += 1
                 names.taken.add(name)
                 visuals.append(visual)
 

@@ -70,7 +70,7 @@ def read_urdf_world(
         InputError: the file cannot be read, or contains macros of xacro.
         RuntimeError, ValueError, SystemExit: Drake refuses the model.
     """
-    robot = read_model(path)
+    robot = read_model(path, finder)
     if robot.tag != "robot":
         raise InputError(f"{path}: <{robot.tag}> is no URDF (<robot>)")
     for element in robot.iter():
@@ -83,6 +83,7 @@ def read_urdf_world(
     _leave_out_shapes(robot, counts)
     _reduce(robot, counts)
     _drop_colourless(robot)
+    num_visuals = len(robot.findall("link/visual"))
     missing = _find_meshes(robot, path, finder)
     text = tostring(robot, "unicode")
     Parser(plant).AddModelsFromString(text, "urdf")
@@ -90,7 +91,7 @@ def read_urdf_world(
         f"{path}: {count} {what} ignored"
         for what, count in sorted(counts.items())
     ]
-    return (*notes, *note_of_missing(path, "meshes", missing))
+    return (*notes, *note_of_missing(path, "meshes", missing, num_visuals))
 
 
 def _leave_out_shapes(robot: Element, counts: Counter[str]) -> None:
@@ -134,9 +135,11 @@ def _drop_colourless(robot: Element) -> None:
                 parent.remove(material)
 
 
-def _find_meshes(robot: Element, path: Path, finder: ModelFinder) -> list[str]:
-    """Writes the places of the meshes; removes and returns missing ones."""
-    missing = []
+def _find_meshes(
+    robot: Element, path: Path, finder: ModelFinder
+) -> Counter[str]:
+    """Writes the places of the meshes; removes and counts missing ones."""
+    missing: Counter[str] = Counter()
     for link in robot.iterfind("link"):
         for visual in link.findall("visual"):
             mesh = visual.find("geometry/mesh")
@@ -145,7 +148,7 @@ def _find_meshes(robot: Element, path: Path, finder: ModelFinder) -> list[str]:
             uri = mesh.get("filename", "")
             found = finder.find(uri, path.absolute().parent)
             if found is None or not found.is_file():
-                missing.append(uri)
+                missing[uri] += 1
                 link.remove(visual)
             else:
                 mesh.set("filename", f"file://{found}")

@@ -189,7 +189,7 @@ def _parse_models(
         InputError: the file is missing, cannot be parsed, or has no models.
     """
     _check_text(path)
-    check_model(path)
+    check_model(path, ModelFinder(path))
     doing(f"parsing {path.name}")
     with _drake_errors(path):
         models = Parser(plant).AddModels(str(path))
@@ -220,6 +220,10 @@ def _check_text(path: Path) -> None:
         )
     # Drake would fail when it quotes other text.
     content = read_bytes(path)
+    if path.suffix.lower() == ".erb" or content.lstrip().startswith(b"<%"):
+        raise InputError(
+            f"{path}: a template is not read; the program erb writes the SDF"
+        )
     try:
         content.decode("utf-8")
     except UnicodeDecodeError:

@@ -353,9 +353,11 @@ def _make_recorder(
         num_rings={
             n: make_pattern(lidar).num_rings for n, lidar in lidars.items()
         },
-        calibrated=[
-            n for n, lidar in lidars.items() if lidar.returns == "calibrated"
-        ],
+        calibrated={
+            n: lidar.echoes
+            for n, lidar in lidars.items()
+            if lidar.returns == "calibrated"
+        },
         imu_variances=scenario.imu.noise(scenario.seed).variances(
             scenario.imu.sample_rate(scenario.fastest_rate)
         ),

@@ -61,14 +61,14 @@ class EgoBox(NamedTuple):
 _AT_ONCE = 200
 
 
-def meets_ego(
+def meetings_with_ego(
     tracks: Tracks,
     sizes: Sequence[tuple[float, ...]],
     times: np.ndarray,
     ego: EgoPath,
     box: EgoBox,
 ) -> np.ndarray:
-    """Returns (N,) which bodies overlap the ego car at any of the times.
+    """Returns (K, N) which bodies overlap the ego car at each of the times.
 
     Args:
         tracks: tracks of the N bodies, with the coordinates of `TrafficPlan`.
@@ -79,8 +79,9 @@ def meets_ego(
     """
     half = np.array([size[:2] for size in sizes]).reshape(-1, 2) / 2
     reach = np.hypot(*half.T) + np.hypot(*box.half_size)
-    met = np.zeros(len(half), bool)
-    for some in np.array_split(times, len(times) // _AT_ONCE + 1):
+    met = np.zeros((len(times), len(half)), bool)
+    for first in range(0, len(times), _AT_ONCE):
+        some = times[first : first + _AT_ONCE]
         xy, yaw = ego(some)
         values, _ = tracks.at(some)
         x, y = np.moveaxis(values[:, :, :2], -1, 0)
@@ -92,5 +93,6 @@ def meets_ego(
         long, wide = half[body, :1], half[body, 1:]
         bodies = outlines(own[:, :2], ahead, long, long, wide)
         own_car = box.corners(xy[time], yaw[time])
-        met[body[overlap(own_car, bodies)]] = True
+        do_meet = overlap(own_car, bodies)
+        met[first + time[do_meet], body[do_meet]] = True
     return met

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meets_ego
+from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meetings_with_ego
 from cns_drake.traffic.traffic_plan import (
     KINDS,
     WALKER_SIZE,
@@ -126,8 +126,9 @@ def play_recorded(
         for part, order, boxes, wanted in zip(
             parts, orders, sizes, (vehicles, walkers), strict=True
         ):
-            met = meets_ego(part, boxes, times, ego, ego_box)
-            kept.append(np.sort(order[~met[order]][:wanted]))
+            met = meetings_with_ego(part, boxes, times, ego, ego_box)
+            is_apart = ~np.any(met, axis=0)[order]
+            kept.append(np.sort(order[is_apart][:wanted]))
         left_out = vehicles + walkers - sum(map(len, kept))
         if best is None or left_out < best.left_out:
             best = TrafficPlan(

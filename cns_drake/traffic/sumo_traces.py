@@ -6,13 +6,14 @@ Format: https://sumo.dlr.de/docs/Simulation/Output/FCDOutput.html
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+import math
 from pathlib import Path
 import re
 import zlib
 
 import numpy as np
 
-from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meets_ego
+from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath, meetings_with_ego
 from cns_drake.traffic.traffic_plan import (
     KINDS,
     WALKER_SIZE,
@@ -473,8 +474,8 @@ def play_trace(
 ) -> TrafficPlan:
     """Returns the traffic of a SUMO trace for a drive.
 
-    The first time of the trace is the start of the drive. Road users that would
-    collide with the ego car are left out, because SUMO's simulation did not
+    The first time of the trace is the start of the drive. Road users are absent
+    while they would overlap the ego car, because SUMO's simulation did not
     contain the ego car.
 
     Args:
@@ -507,19 +508,39 @@ def play_trace(
     walkers = _make_tracks(trace, trace.persons, rows)
     step = min(trace.dt, STEP)
     times = np.arange(0.0, min(trace.duration, end) + step, step)
-    sizes = [kind.size for kind in kinds]
-    kept = ~meets_ego(vehicles, sizes, times, ego, ego_box)
-    sizes = [WALKER_SIZE] * len(trace.persons)
-    kept_walkers = ~meets_ego(walkers, sizes, times, ego, ego_box)
-    return TrafficPlan(
-        tuple(
-            kind for kind, is_kept in zip(kinds, kept, strict=True) if is_kept
-        ),
-        vehicles.select(kept),
-        walkers.select(kept_walkers),
-        int((~kept).sum() + (~kept_walkers).sum()),
-        notes=trace.notes,
-    )
+    notes = trace.notes
+    apart, number = [], 0
+    for tracks, sizes in (
+        (vehicles, [kind.size for kind in kinds]),
+        (walkers, [WALKER_SIZE] * len(trace.persons)),
+    ):
+        met = meetings_with_ego(tracks, sizes, times, ego, ego_box)
+        apart.append(_absent_at(tracks, times, met))
+        number += int(met.any(axis=0).sum())
+    if number:
+        notes += (f"traffic: {number} left out while they would meet the car",)
+    return TrafficPlan(tuple(kinds), apart[0], apart[1], notes=notes)
+
+
+def _absent_at(tracks: Tracks, times: np.ndarray, met: np.ndarray) -> Tracks:
+    """Returns tracks without their bodies at some times.
+
+    A body does not disappear during a revolution of a LiDAR, so it is absent
+    from at least 0.1 s before to 0.1 s after.
+
+    Args:
+        tracks: the tracks of N bodies, which say when each is present.
+        times: (K,) times [s].
+        met: (K, N) which bodies are absent at each time.
+    """
+    assert tracks.present is not None
+    present = tracks.present.copy()
+    time, body = np.nonzero(met)
+    margin = math.ceil(STEP / tracks.dt)
+    for shift in range(1 - margin, margin + 1):
+        step = (times[time] / tracks.dt).astype(int) + shift
+        present[np.clip(step, 0, len(present) - 1), body] = False
+    return Tracks(tracks.dt, tracks.values, present)
 
 
 def _check_place(trace: FcdTrace, path: Path, levels: Levels) -> None:

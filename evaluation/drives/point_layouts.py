@@ -25,8 +25,16 @@ _LONGEST_NS = 2.0**32
 # The latest time in a scan, if it is in nanoseconds: in seconds it would be
 # later than any scan ends, and before 2001.
 _NS_OF_A_SCAN = (1e6, 1e9)
-# Autoware's type of the only, and strongest, return of a beam.
-_SINGLE_STRONGEST = 1
+# Echoes that a LiDAR reports -> Autoware's type of a beam's only return. There
+# is none for the first one, which is of the type INVALID.
+_SINGLE_TYPES = {"first": 0, "strongest": 1, "last": 2}
+# Autoware's types of two returns of a beam, of which the strongest is the first
+# one or the last one; and the type of a return without another one.
+_STRONGEST_FIRST, _STRONGEST_LAST, _WEAK_FIRST, _WEAK_LAST, _DUAL_ONLY = range(
+    3, 8
+)
+# Greatest sine of the angle between two returns of one beam.
+_SAME_BEAM = 1e-4
 # The greatest intensity of calibrated returns, and of a byte.
 _FULL = 255.0
 
@@ -73,6 +81,7 @@ def to_layout(
     layout: str,
     num_rings: int | None = None,
     is_calibrated: bool = False,
+    echoes: str = "strongest",
 ) -> np.ndarray:
     """Returns points with the fields of another layout, such as Ouster's.
 
@@ -84,6 +93,9 @@ def to_layout(
             counts rings from the lowest ring, as Velodyne's driver does.
         is_calibrated: whether the intensities are calibrated. Calibrated
             intensities are from 0 to 255, all others from 0 to 1.
+        echoes: the echoes that the LiDAR reports: `first`, `strongest`, `last`
+            or `dual`. Two echoes of a beam follow each other, the stronger one
+            first.
 
     Returns:
         (N,) records. Ranges of `ouster` are in millimetres. `t` and
@@ -105,7 +117,7 @@ def to_layout(
         "range": np.rint(_MM_PER_M * distance),
         "time": points["t"] / NS_PER_S,
         "time_stamp": points["t"],
-        "return_type": np.full(len(points), _SINGLE_STRONGEST),
+        "return_type": _return_types(points, distance, echoes),
         "channel": points["ring"],
         "azimuth": arctan2(y, x) % (2.0 * np.pi),
         "elevation": arctan2(z, np.hypot(x, y)),
@@ -120,6 +132,34 @@ def to_layout(
     for name in dtype.names or ():
         made[name] = columns[name]
     return made
+
+
+def _return_types(
+    points: np.ndarray, distance: np.ndarray, echoes: str
+) -> np.ndarray:
+    """Returns Autoware's type (N,) of each return.
+
+    https://github.com/autowarefoundation/autoware.core (autoware_point_types)
+
+    Args:
+        points, echoes: see `to_layout`.
+        distance: (N,) distances of the points [m].
+    """
+    if echoes in _SINGLE_TYPES:
+        return np.full(len(points), _SINGLE_TYPES[echoes])
+    types = np.full(len(points), _DUAL_ONLY)
+    p = np.stack([points[axis].astype(float) for axis in "xyz"], axis=1)
+    before, after = p[:-1], p[1:]
+    across = np.linalg.norm(np.cross(before, after), axis=1)
+    is_pair = across < _SAME_BEAM * distance[:-1] * distance[1:]
+    is_pair &= (before * after).sum(axis=1) > 0.0
+    for name in ("ring", "t"):
+        is_pair &= points[name][:-1] == points[name][1:]
+    strong = np.flatnonzero(is_pair)
+    is_first = distance[strong] < distance[strong + 1]
+    types[strong] = np.where(is_first, _STRONGEST_FIRST, _STRONGEST_LAST)
+    types[strong + 1] = np.where(is_first, _WEAK_LAST, _WEAK_FIRST)
+    return types
 
 
 def to_labels(points: np.ndarray) -> np.ndarray:

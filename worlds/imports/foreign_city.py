@@ -1,7 +1,7 @@
 """An imported city, independent of its file format."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from worlds.imports.faults import ImportFaults
 from worlds.imports.imported_objects import ImportedObject
@@ -46,13 +46,21 @@ class ForeignCity:
         axes: description of the coordinates, if they are not metres east, north
             and up.
         small_objects: small objects, which are placed in a dressed city only.
+        num_elements: number of elements of the file.
+        sources: name of a structure -> id of its element in the file, where
+            this is another name.
+        level: height of the ground in W, if the format says that it is level
+            [m]; None if objects say how high the ground is.
     """
 
     objects: list[ImportedObject]
     origin: tuple[float, ...]
     reference_system: str
     faults: ImportFaults
+    num_elements: int
     streets: Sequence[Street] = ()
     keeps_left: bool = False
     axes: tuple[str, ...] = ()
     small_objects: Sequence[SmallObject] = ()
+    level: float | None = None
+    sources: Mapping[str, str] = field(default_factory=dict)

@@ -17,6 +17,7 @@ from worlds.imports.faces import (
     joined_triangles,
 )
 from worlds.imports.imported_objects import (
+    Base,
     ImportedObject,
 )
 from worlds.imports.surface_samples import (
@@ -128,22 +129,17 @@ class Ground:
         return Mesh(vertices, tuple(map(tuple, faces.tolist())))
 
 
-def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
+def guess_ground(
+    feet: np.ndarray, grid: tuple[np.ndarray, np.ndarray]
+) -> Ground:
     """Returns a smooth ground through given points.
 
     Args:
         feet: (N, 3) points on the ground, such as the lowest points of
             structures [m].
-        corners: (M, 3) corners of all structures, which the ground must extend
-            beyond [m].
+        grid: coordinates of the grid, as of `Ground`.
     """
-    low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
-    cell = CELL * np.ceil(max(1.0, (high - low).max() / CELL / _MOST_CELLS))
-    low = np.floor((low - MARGIN) / cell) * cell
-    high = high + MARGIN
-    xs = np.arange(low[0], high[0] + cell, cell)
-    ys = np.arange(low[1], high[1] + cell, cell)
-    x, y = np.meshgrid(xs, ys)
+    x, y = np.meshgrid(*grid)
     z = np.full(x.shape, np.nan)
     hull = hull_of(feet[:, :2])
     if len(feet) >= 4 and hull.area > _LEAST_HULL:
@@ -157,41 +153,50 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
     z[outside] = nearest(x[outside], y[outside])
     for axis in (0, 1):
         z = correlate1d(z, _SMOOTHING / _SMOOTHING.sum(), axis, mode="nearest")
-    return Ground(xs, ys, z)
+    return Ground(*grid, z)
 
 
-def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
-    """Returns the lowest corner (N, 3) of each of N solids [m].
+def _grid_over(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the coordinates of a grid that extends beyond corners (M, 3)."""
+    low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
+    cell = CELL * np.ceil(max(1.0, (high - low).max() / CELL / _MOST_CELLS))
+    low = np.floor((low - MARGIN) / cell) * cell
+    high = high + MARGIN
+    return (
+        np.arange(low[0], high[0] + cell, cell),
+        np.arange(low[1], high[1] + cell, cell),
+    )
 
-    Each solid consists of triangles (M, 3, 3).
-    """
-    corners = [triangles.reshape(-1, 3) for triangles in solids]
-    feet = [of_solid[of_solid[:, 2].argmin()] for of_solid in corners]
-    return np.array(feet).reshape(-1, 3)
 
+def ground_of(
+    objects: Sequence[ImportedObject], level: float | None = None
+) -> Ground:
+    """Returns the ground of a city: known, its terrain or, at last, a guess.
 
-def ground_of(objects: Sequence[ImportedObject]) -> Ground:
-    """Returns the ground of a city: its terrain or, without one, a guess.
+    The guess is a smooth ground through the lowest points of structures on the
+    ground, and through streets and other ground. Of a city in which nothing
+    stands on the ground, all structures count.
 
-    The guess is a smooth ground through the lowest points of structures, and
-    through streets and other ground. Bridges and tunnels are ignored, unless
-    the city has no other structures.
+    Args:
+        objects: objects of the city.
+        level: height of the ground [m]; None if it is not known to be level.
     """
     surfaces = joined_triangles(one.triangles for one in objects)
+    grid = _grid_over(surfaces.reshape(-1, 3))
+    if level is not None:
+        return Ground(*grid, np.full((len(grid[1]), len(grid[0])), level))
     terrain = [one for one in objects if one.object_type == "TINRelief"]
     if terrain:
-        feet = [one.triangles.reshape(-1, 3) for one in terrain]
+        points = [one.triangles.reshape(-1, 3) for one in terrain]
     else:
-        spans = ("Bridge", "Tunnel")
-        firm = [o for o in objects if not o.object_type.startswith(spans)]
-        standing = firm or objects
-        feet = [feet_of([o.triangles for o in standing if not o.is_ground])]
-        feet += [
+        standing = [one for one in objects if one.base is Base.GROUND]
+        points = [
             one.triangles.reshape(-1, 3)[::_CORNER_STRIDE]
-            for one in standing
             if one.is_ground
+            else one.foot[None]
+            for one in standing or objects
         ]
-    return guess_ground(np.concatenate(feet), surfaces.reshape(-1, 3))
+    return guess_ground(np.concatenate(points), grid)
 
 
 def ground_structures(

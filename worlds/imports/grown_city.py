@@ -166,7 +166,7 @@ def _lowered_building(
     suffix = "_lower"
     while f"{building.structure.name}{suffix}" in taken:
         suffix += "_"
-    foot = float(building.triangles[:, :, 2].min())
+    foot = float(building.foot[2])
     scale = np.array([1.0, 1.0, share])
     move = np.array([0.0, 0.0, (1.0 - share) * foot])
     model = building.structure.model

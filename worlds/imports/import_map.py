@@ -110,14 +110,14 @@ def import_city(
     if options.grow is not None:
         staged, changes = grow(staged, options.grow, options.seed)
     doing("looking for streets")
-    ground = ground_of(staged.kept)
+    ground = ground_of(staged.kept, city.level)
     space = find_free_space(staged.kept, ground)
     side = options.drive_on or ("left" if city.keeps_left else "right")
     # The cells of a city in millimetres would be searched for minutes.
     drives = own or (_find_drives(city, space, side) if plausible else [])
     if options.within is not None:
         staged = _cropped_city(staged, drives, options.within, city.faults)
-        ground = ground_of(staged.kept)
+        ground = ground_of(staged.kept, city.level)
     drives = with_ground_heights(drives, ground.height, city.faults)
     bare = staged.kept
     dressing = None
@@ -141,7 +141,10 @@ def import_city(
             city, options, list(staged.standing), changes, dressing
         )
         map_files.write_facts(draft, source, facts, city.faults)
-        report = _report_of(staged, drives, city)
+        built = {city.sources.get(one.draw_name, one.draw_name) for one in bare}
+        if dressing is not None:
+            built |= dressing.sources
+        report = _report_of(staged, drives, city, len(built))
         map_files.write_report(draft, report)
         map_files.write_drives(
             draft,
@@ -224,7 +227,10 @@ def _find_drives(
 
 
 def _report_of(
-    staged: StagedCity, drives: Sequence[WaypointRoute], city: ForeignCity
+    staged: StagedCity,
+    drives: Sequence[WaypointRoute],
+    city: ForeignCity,
+    num_built: int,
 ) -> ImportReport:
     faults = city.faults
     return ImportReport(
@@ -238,6 +244,8 @@ def _report_of(
         drives=tuple(drive.length for drive in drives),
         faults=faults.rows(),
         parts=faults.parts(),
+        num_elements=city.num_elements,
+        num_built=num_built,
         shares=faults.shares(_volumes(city.objects)),
     )
 

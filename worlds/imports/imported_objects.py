@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 import re
 
 import numpy as np
@@ -21,6 +22,19 @@ from worlds.shapes import (
 _GROUND_OF_CARS = GROUND_CLASSES - {"sidewalk"}
 
 
+class Base(Enum):
+    """Where an object stands, as the reader of its file knows.
+
+    Only objects on the ground say how high the ground is, and only on their
+    surfaces do cars drive and park.
+    """
+
+    GROUND = "on the ground"
+    RAISED = "above the ground, with room below"
+    DECK = "a bridge"
+    UNDERGROUND = "below the ground"
+
+
 # Compared by identity, because there are thousands and comparing meshes takes
 # long.
 @dataclass(frozen=True, eq=False)
@@ -37,6 +51,7 @@ class ImportedObject:
         year: year in which the object was built; None if unknown.
         triangles: (M, 3, 3) all surfaces that a car could hit or drive over, in
             W [m].
+        base: where the object stands.
         until: year in which the object was demolished; None if unknown.
         tags: tags of the object in its file.
         lod: level of detail; 0 if unknown.
@@ -49,6 +64,7 @@ class ImportedObject:
     object_type: str
     year: int | None
     triangles: np.ndarray
+    base: Base = Base.GROUND
     until: int | None = None
     tags: Mapping[str, str] = field(default_factory=dict)
     lod: float = 0.0
@@ -82,11 +98,27 @@ class ImportedObject:
 
     @property
     def is_ground(self) -> bool:
-        """Whether the class of the structure is ground for cars, such as road.
+        """Whether the object is ground for cars, such as a road on the ground.
 
         The structure may still be too steep to drive on.
         """
-        return self.structure.semantic_class in _GROUND_OF_CARS
+        return (
+            self.base is Base.GROUND
+            and self.structure.semantic_class in _GROUND_OF_CARS
+        )
+
+    @property
+    def is_paving(self) -> bool:
+        """Whether the object is ground for cars or people."""
+        return self.is_ground or (
+            self.base is Base.GROUND and self.object_type == "Sidewalk"
+        )
+
+    @property
+    def foot(self) -> np.ndarray:
+        """The lowest corner (3,) of the surfaces in W [m]."""
+        corners = self.triangles.reshape(-1, 3)
+        return np.asarray(corners[corners[:, 2].argmin()])
 
 
 def make_object(
@@ -100,6 +132,7 @@ def make_object(
     tags: Mapping[str, str] | None = None,
     lod: float = 0.0,
     kind: str = "",
+    base: Base = Base.GROUND,
 ) -> ImportedObject:
     """Returns an object whose structure is made of triangles in the world.
 
@@ -117,6 +150,7 @@ def make_object(
         lod: level of detail of the object; 0 if unknown.
         kind: what the structure is, such as `church` for a Building; by default
             the object's type.
+        base: where the object stands.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))
@@ -138,7 +172,7 @@ def make_object(
         kind=kind_word(kind or object_type),
     )
     return ImportedObject(
-        structure, object_type, year, triangles, until, tags or {}, lod
+        structure, object_type, year, triangles, base, until, tags or {}, lod
     )
 
 

@@ -78,9 +78,8 @@ def _structure_table(
 ) -> str:
     """Returns the structure table of a city, as the text of a CSV file.
 
-    A dressed city has a column for the origin of structures, and a city with
-    years of construction has a column for these. The arguments are as for
-    `write_world`.
+    There is a column for the origin of structures, and a city with years of
+    construction has a column for these. The arguments are as for `write_world`.
     """
     table = structures_csv(
         [*guessed_ground, *(kept.structure for kept in city.kept)],
@@ -90,11 +89,11 @@ def _structure_table(
             for member in standing
         ),
     )
-    if dressing is not None:
-        names = [kept.structure.name for kept in city.kept]
-        origins = [dressing.origins.get(name, "file") for name in names]
-        cells = ["guess"] * len(guessed_ground) + origins
-        table = with_column(table, "origin", cells)
+    origins = {} if dressing is None else dressing.origins
+    names = [kept.structure.name for kept in city.kept]
+    cells = ["guess"] * len(guessed_ground)
+    cells += [origins.get(name, "file") for name in names]
+    table = with_column(table, "origin", cells)
     years = [kept.year for kept in city.kept]
     if any(years):
         cells = [""] * len(guessed_ground)
@@ -183,7 +182,8 @@ def write_facts(
 
 def write_report(draft: Path, report: ImportReport) -> None:
     """Writes all counts of an import to `import.txt` in the map's folder."""
-    lines = [f"{kind}: {number}" for kind, number in report.kinds.items()]
+    lines = [report.told_built()]
+    lines += [f"{kind}: {number}" for kind, number in report.kinds.items()]
     lines += [
         f"{fault.kind}: {report.told(fault)}, such as {fault.example}"
         for fault in report.faults

@@ -24,6 +24,8 @@ class ImportReport:
             frequent first.
         parts: lines on the parts of elements that are read, or that change no
             shape.
+        num_elements: number of elements of the file.
+        num_built: number of those of which something is in the city.
         shares: kind of fault -> share of the volume of all buildings that the
             buildings with this fault have, from 0 to 1.
     """
@@ -36,14 +38,27 @@ class ImportReport:
     drives: tuple[float, ...]
     faults: list[FaultCount]
     parts: list[str]
+    num_elements: int
+    num_built: int
     shares: Mapping[str, float] = field(default_factory=dict)
+
+    def told_built(self) -> str:
+        """Returns how much of the file is in the city, in words."""
+        share = _percent(self.num_built / max(self.num_elements, 1))
+        return (
+            f"in the city: {self.num_built} of {self.num_elements} elements of"
+            f" the file ({share})"
+        )
 
     def told(self, fault: FaultCount) -> str:
         """Returns the number of a fault in words, with its share."""
         share = self.shares.get(fault.kind)
         if share is None:
             return str(fault.number)
-        part = (
-            f"{float(f'{100 * share:.2g}'):g} % of the volume of all buildings"
-        )
+        part = f"{_percent(share)} of the volume of all buildings"
         return f"{fault.number}, {part}"
+
+
+def _percent(share: float) -> str:
+    """Returns a share, from 0 to 1, with two digits in percent."""
+    return f"{float(f'{100 * share:.2g}'):g} %"

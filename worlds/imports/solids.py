@@ -61,7 +61,7 @@ def extruded(
     faults: ImportFaults,
     roof: str = "flat",
     roof_height: float = 0.0,
-    ground: float = 0.0,
+    is_raised: bool = False,
     facing_deg: float | None = None,
     is_across: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -72,8 +72,7 @@ def extruded(
 
     Args:
         polygon: the footprint.
-        low: height of the lowest point [m]; above the ground, the walls
-            include an underside.
+        low: height of the lowest point [m].
         high: height of the highest point [m].
         name: name of the object, as an example in `faults`.
         faults: counts roofs and areas that were replaced or left out.
@@ -82,7 +81,8 @@ def extruded(
             `mansard`, on a footprint without holes; `gabled` or `hipped`, on a
             footprint with four corners.
         roof_height: height of the roof above the eaves [m].
-        ground: height of the ground [m].
+        is_raised: whether the solid begins above the ground. The walls of such
+            a solid include its underside, which can be seen from below.
         facing_deg: direction that a slope of a `skillion`, `gabled` or `hipped`
             roof faces, counter-clockwise from x [deg]; by default that of a
             longest side.
@@ -91,9 +91,8 @@ def extruded(
     """
     polygon = orient(polygon)
     eaves = high - roof_height
-    # A solid that begins above the ground can be seen from below.
     floor = np.zeros((0, 3, 3))
-    if low > ground:
+    if is_raised:
         floor = flat_surface(polygon, low, name, faults)[:, ::-1]
     corners = level_rings(polygon, eaves)[0]
     pitched = None

@@ -34,6 +34,8 @@ from worlds.roads.u_turn import LOOP_RADIUS, loop_corners
 # Radius of the arcs that round corners, where the neighbouring waypoints leave
 # room for it [m].
 _CORNER_RADIUS = 8.0
+# No car turns round between waypoints that are closer together [m].
+_LEAST_APART = 1.0
 # A car cannot turn on the spot: greatest turn at a waypoint.
 _SHARPEST_TURN_DEG = 150.0
 # Waypoints closer than this to the one before count as the same [m].
@@ -151,7 +153,7 @@ def make_waypoint_path(
     turns = np.pi - (np.pi - np.diff(headings)) % (2 * np.pi)
     is_loop = np.abs(turns) > np.radians(_SHARPEST_TURN_DEG)
     if not u_turns:
-        _refuse_loops(turns, is_loop, names)
+        _refuse_loops(turns, is_loop, lengths, names)
     free = _free_lengths(lengths, turns, is_loop, names)
     usable = np.minimum(lengths / 2, free)
     room = np.minimum(usable[:-1], usable[1:])
@@ -177,14 +179,27 @@ def make_waypoint_path(
 
 
 def _refuse_loops(
-    turns: np.ndarray, is_loop: np.ndarray, names: list[str]
+    turns: np.ndarray,
+    is_loop: np.ndarray,
+    lengths: np.ndarray,
+    names: list[str],
 ) -> None:
     """Raises an InputError if any inner waypoint needs a loop.
 
-    `turns` (N - 2,) [rad] and `is_loop` (N - 2,) are for the inner waypoints of
-    N waypoints, and `names` contains the names of all N.
+    Args:
+        turns: (N - 2,) turns at the inner ones of N waypoints [rad].
+        is_loop: (N - 2,) whether such a turn needs a loop.
+        lengths: (N - 1,) distances between neighbouring waypoints [m].
+        names: names of all waypoints.
     """
     for k in np.flatnonzero(is_loop):
+        apart = lengths[k : k + 2].min()
+        if apart < _LEAST_APART:
+            raise InputError(
+                f"{names[k + 1]}: turns back {apart:.2g} m behind the one"
+                " before, as noise does; leave out waypoints that are less"
+                f" than {_LEAST_APART:g} m apart"
+            )
         raise InputError(
             f"{names[k + 1]}: turns by {np.degrees(abs(turns[k])):.0f} "
             f"deg; a car can turn by {_SHARPEST_TURN_DEG:.0f} deg at "

@@ -380,3 +380,32 @@ def test_buffers_of_gltf_that_are_none_are_refused(tmp_path, buffers, suffix):
     path = write(tmp_path, lambda top: top.update(buffers=buffers), suffix)
     with pytest.raises(InputError, match="no valid glTF"):
         notes_of(path)
+
+
+HEAD, ROWS = ply(BY_INDEX, "4 0 1 2 3\n").split("end_header\n")
+CORNERS = ROWS.splitlines()[:4]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("rows", "fault"),
+    [
+        ([*CORNERS, "4 0 1 2 3"], None),
+        # The lines do not matter.
+        ([" ".join([*CORNERS, "4 0 1 2 3"])], None),
+        ([*CORNERS[:3], "4 0 1 2 3"], "4 rows of PLY, not 5"),
+        ([*CORNERS, CORNERS[0], "4 0 1 2 3"], "6 rows of PLY, not 5"),
+        ([*(f"{row} 9" for row in CORNERS), "4 0 1 2 3"], "4 values in a row"),
+        ([*(row[:-2] for row in CORNERS), "4 0 1 2 3"], "2 values in a row"),
+        ([*CORNERS, "4 0 1 2"], "lists of PLY that are longer or shorter"),
+        ([*CORNERS, "-4 0 1 2 3"], "lists of PLY that are longer or shorter"),
+    ],
+)
+def test_rows_of_ply_fit_their_header(tmp_path, rows, fault):
+    path = tmp_path / "thing.ply"
+    path.write_text("\n".join([f"{HEAD}end_header", *rows, ""]))
+    if fault is None:
+        assert len(read_mesh(path).triangles) == 2
+        return
+    with pytest.raises(InputError, match=fault):
+        read_mesh(path)

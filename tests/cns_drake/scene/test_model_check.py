@@ -209,3 +209,77 @@ def test_rows_that_match_nothing_are_noted(tmp_path):
     assert note.startswith(f"{table}: 3 of 3 rows match nothing (such as a)")
     assert "1 of 1 structures have no row" in note
     assert "<structure>/<part>" in note
+
+
+@pytest.mark.parametrize("version", ["1.0", "1.1", "1.13", "2.0", "9", "x", ""])
+@pytest.mark.parametrize("root", ["sdf", "gazebo"])
+@pytest.mark.parametrize("is_included", [False, True])
+def test_versions_of_sdf_that_are_not_read(
+    tmp_path, version, root, is_included
+):
+    old = tmp_path / "old.sdf"
+    old.write_text(
+        f'<{root} version="{version}"><model name="m"><link name="l">'
+        f"{box_visual('a/b', (0, 0, 0, 0, 0, 0), (1, 1, 1))}</link></model>"
+        f"</{root}>"
+    )
+    world = tmp_path / "world.sdf" if is_included else old
+    if is_included:
+        world.write_text(
+            '<sdf version="1.9"><world name="w"><include><uri>old.sdf</uri>'
+            "</include></world></sdf>"
+        )
+    with pytest.raises(InputError) as refusal:
+        load_world(world)
+    assert str(refusal.value) == (
+        f"{old}: line 1: {root}: version {version} of SDF is not read, but 1.2"
+        " to 1.12"
+    )
+
+
+@pytest.mark.parametrize("minor", range(2, 13))
+def test_versions_of_sdf_that_are_read(tmp_path, minor):
+    path = write(tmp_path, "<box><size>1 1 1</size></box>")
+    path.write_text(path.read_text().replace('"1.9"', f'"1.{minor}"'))
+    assert f'"1.{minor}"' in path.read_text()
+    assert len(read_geometry(path)) == 2
+
+
+@pytest.mark.parametrize("fault", ["", "nan"])
+@pytest.mark.parametrize("name", ["a crate.sdf", "a%20crate.sdf"])
+@pytest.mark.parametrize(
+    "uri",
+    ["{}", "package://stock/{}", "model://stock/{}", "file://{folder}/{}"],
+)
+def test_included_files_are_found_and_checked(tmp_path, uri, name, fault):
+    folder = tmp_path / "shelf/stock"
+    folder.mkdir(parents=True)
+    side = f"<box><size>2 2 {fault or 2}</size></box>"
+    model = world_text(
+        [f'<visual name="side"><geometry>{side}</geometry></visual>']
+    )
+    model = model.replace("<world", "<model").replace("</world", "</model")
+    (folder / "a crate.sdf").write_text(model)
+    world = (folder if uri == "{}" else tmp_path) / "world.sdf"
+    uri = uri.format(name, folder=folder)
+    world.write_text(
+        '<sdf version="1.9"><world name="w"><include><name>one</name><uri>'
+        f"{uri}</uri></include></world></sdf>"
+    )
+    if fault:
+        with pytest.raises(InputError, match=r"a crate\.sdf: line .*nan"):
+            load_world(world, model_paths=[tmp_path / "shelf"])
+    else:
+        read = load_world(world, model_paths=[tmp_path / "shelf"])
+        assert not read.notes
+        assert len(read_perception_geometry(read.scene_graph.model_inspector()))
+
+
+@pytest.mark.parametrize("name", ["world.sdf.erb", "world.sdf"])
+def test_templates_are_named(tmp_path, name):
+    path = tmp_path / name
+    path.write_text('<% n = 1 %>\n<sdf version="1.9"></sdf>')
+    with pytest.raises(
+        InputError, match="template is not read; the program erb"
+    ):
+        load_world(path)

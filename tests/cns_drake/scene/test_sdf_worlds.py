@@ -1,6 +1,7 @@
 """SDF worlds, also those that people write for Gazebo."""
 
 from collections import Counter
+import re
 
 from helpers.mesh_texts import L_VERTICES, obj_text
 import numpy as np
@@ -145,7 +146,7 @@ def test_models_are_looked_for_where_gazebo_does(
     tmp_path, models, variable, monkeypatch
 ):
     path = write(tmp_path, include("model://crate", "<pose>5 0 1 0 0 0</pose>"))
-    cure = "no visual.*name the folder that has crate in the variable GZ_SIM"
+    cure = r"\(1 of 1 models\).*folder that has crate in the variable GZ_SIM"
     with pytest.raises(InputError, match=cure):
         load_world(path)
     monkeypatch.setenv(variable, f"/nowhere:{models}")
@@ -169,11 +170,33 @@ def test_missing_models_are_noted_and_left_out(tmp_path, models):
     notes = "\n".join(world.notes)
     assert (
         "2 models not found, and left out: model://lost,"
-        " https://fuel.gazebosim.org/1.0/a/models/Lost Two" in notes
+        " https://fuel.gazebosim.org/1.0/a/models/Lost Two (2 of 5 models)"
+        in notes
     )
-    assert "1 meshes not found, and left out: model://crate/lost.dae" in notes
+    assert (
+        "1 meshes not found, and left out: model://crate/lost.dae (1 of 3"
+        " visuals)" in notes
+    )
     assert "1 actors ignored" in notes
     assert "1 visuals of type heightmap ignored" in notes
+
+
+@pytest.mark.parametrize(("there", "lost"), [(3, 3), (3, 4), (1, 1), (0, 1)])
+def test_a_world_of_which_most_is_missing_is_refused(
+    tmp_path, models, there, lost
+):
+    path = write(
+        tmp_path,
+        *(include("model://crate") for _ in range(there)),
+        *(include("model://lost") for _ in range(lost)),
+    )
+    share = rf"\({lost} of {there + lost} models\)"
+    if lost > there:
+        with pytest.raises(InputError, match=f"{share}; name the folder"):
+            load_world(path, model_paths=[models])
+    else:
+        notes = "\n".join(load_world(path, model_paths=[models]).notes)
+        assert re.search(share, notes)
 
 
 @pytest.mark.slow

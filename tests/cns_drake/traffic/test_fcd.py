@@ -164,24 +164,41 @@ def test_walkers_do_not_walk_in_step(tmp_path):
         assert np.ptp(np.sin(phases)) > 1.0
 
 
-def test_objects_that_would_meet_the_ego_car_are_left_out(trace):
-    def ego(times):
-        # The ego car stands where the traced car passes at 3.5 s.
-        return np.tile((-RADIUS, 4.0), (len(times), 1)), np.zeros(len(times))
+def at_four(times):
+    """The ego car stands where the traced car passes at about 3.5 s."""
+    return np.tile((-RADIUS, 4.0), (len(times), 1)), np.zeros(len(times))
 
-    plan = play(trace, ego=ego)
-    assert [kind.name for kind in plan.kinds] == ["bus"]
-    assert plan.left_out == 1
-    assert plan.walkers.values.shape[1] == 1
+
+def test_objects_are_absent_while_they_would_meet_the_ego_car(trace):
+    plan, free = play(trace, ego=at_four), play(trace)
+    assert [kind.name for kind in plan.kinds] == ["bus", "hatchback"]
+    assert plan.notes == (
+        *free.notes,
+        "traffic: 1 left out while they would meet the car",
+    )
+    times = np.arange(0.0, 7.0, 0.02)
+    there, before = (p.vehicles.is_present(times) for p in (plan, free))
+    np.testing.assert_array_equal(there[:, 0], before[:, 0])
+    # The car's front is at 7 t - 20; the ego car is 2.1 m wide there.
+    y, _ = np.moveaxis(free.vehicles.at(times)[0][:, 1, 1:3], -1, 0)
+    half = plan.kinds[1].size[0] / 2
+    is_over = before[:, 1] & (np.abs(y - 4.0) < half + 1.05)
+    assert is_over.any()
+    assert not (there[:, 1] & is_over).any()
+    # It is away for as long as needed, and at most 0.1 s and 2 steps longer.
+    gone = times[before[:, 1] & ~there[:, 1]]
+    assert times[is_over].min() - gone.min() <= 0.1 + 2 * DT
+    assert gone.min() <= times[is_over].min() - 0.1
+    assert there[:, 1].any()
 
 
 def test_what_meets_the_ego_car_after_its_drive_stays(trace):
-    def ego(times):
-        return np.tile((-RADIUS, 4.0), (len(times), 1)), np.zeros(len(times))
-
     # The traced car is there from 2 s on, and at the ego car after 3 s.
-    assert play(trace, ego=ego, duration=2.5, end=2.5).left_out == 0
-    assert play(trace, ego=ego, duration=2.5, end=3.5).left_out == 1
+    notes = [
+        play(trace, ego=at_four, duration=2.5, end=end).notes
+        for end in (2.5, 3.5)
+    ]
+    assert len(notes[0]) + 1 == len(notes[1])
 
 
 @pytest.mark.parametrize("acceleration", [0.0, -3.0])

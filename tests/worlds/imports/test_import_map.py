@@ -192,6 +192,7 @@ def test_a_summary_of_ten_lines(tmp_path):
     assert len(lines) <= 10
     assert "kinds more" in result.stdout
     counts = (output / "import.txt").read_text().splitlines()
+    assert counts[0] == "in the city: 6 of 18 elements of the file (33 %)"
     assert "Building: 6" in counts
     for k in range(12):
         kind = f"geometry of type Shape{k}, left out"

@@ -35,8 +35,8 @@ def kinds(city):
      ({"highway": "pedestrian", "place": "square"}, "Square", "Square"),
      ({"highway": "platform"}, "Square", None),
      ({"amenity": "parking"}, "Parking", "Parking"),
-     ({"amenity": "parking", "parking": "underground"}, None, "Parking"),
-     ({"natural": "water", "layer": "-1"}, None, "WaterBody"),
+     ({"amenity": "parking", "parking": "underground"}, None, None),
+     ({"natural": "water", "layer": "-1"}, None, None),
      ({"landuse": "grass"}, "LandUse", "LandUse")],
 )  # fmt: skip
 def test_grounds_by_what_they_are_made_of(tmp_path, tags, kind, plain):

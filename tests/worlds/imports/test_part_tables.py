@@ -6,12 +6,17 @@ changes no shape.
 """
 
 import json
+from pathlib import Path
+import re
 
 from helpers.imported_cities import import_osm, read_city, volume
 from helpers.small_cityjson import house
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
+
+from evaluation.base import parse_yaml
+from worlds import imports
 
 # The most used keys on ways and nodes that can describe a thing, by taginfo,
 # with a usual value.
@@ -286,3 +291,82 @@ def test_semantics_of_cityjson_that_do_not_fit_are_counted(
         if "semantics" in fault.kind
     }
     assert told == ({} if count is None else dict([count]))
+
+
+ELEMENTS = {
+    "building": [
+        {"building": "yes"}, {"building": "house"}, {"building:part": "yes"},
+        {"building": "roof"}, {"man_made": "tower"},
+    ],
+    "street": [
+        {"highway": "residential"}, {"highway": "primary"},
+        {"highway": "service"},
+    ],
+    "path": [{"highway": "footway"}, {"highway": "steps"}],
+    "ground": [
+        {"landuse": "grass"}, {"natural": "water"}, {"amenity": "parking"},
+        {"leisure": "pitch"},
+    ],
+    "barrier": [{"barrier": "hedge"}, {"barrier": "wall"}],
+    "tree": [{"natural": "tree"}],
+    "tree row": [{"natural": "tree_row"}],
+    "small object": [{"highway": "street_lamp"}, {"amenity": "bench"}],
+}  # fmt: skip
+VALUES = ("yes", "2", "underground")
+TABLE = parse_yaml(
+    (
+        Path(imports.__file__).with_name("openstreetmap") / "parts.yaml"
+    ).read_bytes()
+)
+
+
+def shapes(city):
+    """Returns the id of an element -> kinds, sizes and heights of its parts."""
+    found = {}
+    for one in city.objects:
+        p = one.triangles.reshape(-1, 3)
+        sizes = [*np.ptp(p[:, :2], axis=0), p[:, 2].min(), p[:, 2].max()]
+        (number,) = re.findall(r"_[nw](\d+)", one.structure.name)
+        found.setdefault(int(number), []).append(
+            (
+                one.object_type,
+                one.structure.semantic_class,
+                one.base,
+                len(p),
+                [round(float(size), 1) for size in sizes],
+            )
+        )
+    for one in city.small_objects:
+        own = found.setdefault(int(one.source[1:]), [])
+        own.append((one.kind, one.yaw, one.height))
+    return found
+
+
+@pytest.mark.parametrize("dressed", [False, True])
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_tags_that_change_no_shape_change_none(tmp_path, element, dressed):
+    """Each alone, with three values, on several things of its kind."""
+    lists = TABLE["elements"][element]["shapeless"] + TABLE["shapeless"]
+    keys = sorted({key.replace("*", "x") for key in " ".join(lists).split()})
+    for number, own in enumerate(ELEMENTS[element]):
+        osm = OsmWriter()
+        ids = {}
+        changes = [{}, *({key: v} for key in keys for v in VALUES)]
+        for k, change in enumerate(changes):
+            x, y = 40 * (k % 40), 40 * (k // 40)
+            tags = {
+                key.replace(":", "__"): v for key, v in (change | own).items()
+            }
+            if element in ("building", "ground"):
+                ids[osm.box(x, y, 12, 8, **tags)] = change
+            elif element in ("tree", "small object"):
+                ids[osm.node(x, y, **tags)] = change
+            else:
+                ids[osm.way([(x, y), (x + 25, y)], **tags)] = change
+        osm.box(-60, -60, 9, 9, building="yes", height="9")
+        city = read_city(osm.write(tmp_path / f"{number}.osm"), dressed=dressed)
+        found = shapes(city)
+        first, *others = ids
+        assert found.get(first) or (element == "tree row" and not dressed)
+        changed = [ids[k] for k in others if found.get(k) != found.get(first)]
+        assert changed == []

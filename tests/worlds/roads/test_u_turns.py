@@ -208,3 +208,13 @@ def test_a_scenario_states_whether_it_turns_round(tmp_path):
     )
     with pytest.raises(InputError, match=r"r\.yaml: u_turns: .*next leg"):
         load_scenario(tmp_path / "r.yaml")
+
+
+def test_noise_of_waypoints_is_no_turn():
+    """Waypoints every 1 cm with 1 cm of noise turn back again and again."""
+    rng = np.random.default_rng(0)
+    line = np.c_[np.arange(0.0, 20.0, 0.01), np.zeros((2000, 2))]
+    noisy = line + rng.normal(0.0, 0.01, line.shape) * [1.0, 1.0, 0.0]
+    with pytest.raises(InputError, match="less than 1 m apart") as refusal:
+        make_waypoint_path(noisy, POINT_SPACING)
+    assert "u_turns" not in str(refusal.value)

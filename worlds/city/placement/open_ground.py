@@ -1,5 +1,6 @@
 """Places objects on a district's own ground: trees, hedges, cars, benches."""
 
+from collections import defaultdict
 import itertools
 import math
 
@@ -138,14 +139,18 @@ def _scatter(
         return
     shapely.prepare(area)
     x0, y0, x1, y1 = area.bounds
-    chosen: list[np.ndarray] = []
+    # Cell of a grid, as wide as the spacing -> the chosen places in it.
+    chosen: defaultdict[tuple[int, int], list[np.ndarray]] = defaultdict(list)
     darts = int(4 * (x1 - x0) * (y1 - y0) / plan.spacing**2) + 1
     for dart in rng.uniform((x0, y0), (x1, y1), (darts, 2)):
         if not shapely.contains_xy(area, *dart):
             continue
-        if chosen and np.hypot(*(chosen - dart).T).min() < plan.spacing:
+        x, y = (dart // plan.spacing).astype(int).tolist()
+        cells = itertools.product((x - 1, x, x + 1), (y - 1, y, y + 1))
+        near = [place for cell in cells for place in chosen.get(cell, ())]
+        if near and np.hypot(*(np.array(near) - dart).T).min() < plan.spacing:
             continue
-        chosen.append(dart)
+        chosen[x, y].append(dart)
         # Two numbers are sampled for every place, kept or not, so that another
         # fill does not move the objects.
         keep = rng.uniform() < plan.fill

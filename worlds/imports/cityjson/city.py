@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 import re
 
@@ -22,8 +23,12 @@ from worlds.imports.cityjson.reading import read_cityjson
 from worlds.imports.faces import face_triangles, joined_triangles, valid_area
 from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity
-from worlds.imports.imported_objects import ImportedObject, make_object
-from worlds.shapes import Finish
+from worlds.imports.imported_objects import (
+    Base,
+    ImportedObject,
+    make_object,
+)
+from worlds.shapes import GROUND_CLASSES, Finish, UpperSides, turned_up
 
 # A geometry of a lower level of detail is left out if a higher one covers more
 # than this share of it.
@@ -55,6 +60,13 @@ _CLASSES: dict[str, tuple[str, Finish | None]] = {
     "CityFurniture": ("other-object", None),
     "GenericCityObject": ("other-structure", None),
 }
+# Beginning of a type -> where its objects are.
+_BASES = {"Bridge": Base.DECK, "Tunnel": Base.UNDERGROUND}
+# An object stands above the terrain if its lowest corner is this far above it,
+# as a canopy is [m].
+_LEAST_ROOM = 2.0
+# The corners of a level face differ in height by at most this [m].
+_LEVEL = 0.05
 # Names are cut to this length.
 _LONGEST_NAME = 80
 
@@ -81,6 +93,7 @@ def import_cityjson(
         tuple(origin.tolist()),
         city.system.name,
         city.faults,
+        len(_families(city)),
         axes=() if city.system.is_plain else city.system.axes,
     )
 
@@ -133,9 +146,60 @@ def import_objects(
                 _first_year(demolished, *where),
                 tags=_tags_of_family(members),
                 lod=max(geometry.lod for geometry in chosen),
+                base=_base_of(object_type, semantic_class, chosen),
             )
         )
-    return made
+    return list(_on_terrain(made))
+
+
+def _base_of(
+    object_type: str, semantic_class: str, geometries: Sequence[CityGeometry]
+) -> Base:
+    """Returns where an object stands, by its type and its semantic surfaces.
+
+    A structure whose lowest face is level and known to be no ground, such as
+    an OuterCeilingSurface, is open below. Without semantics it stands on the
+    ground.
+    """
+    for beginning, base in _BASES.items():
+        if object_type.startswith(beginning):
+            return base
+    kinds = {kind for geometry in geometries for kind in geometry.kinds}
+    if semantic_class in GROUND_CLASSES or "GroundSurface" in kinds:
+        return Base.GROUND
+    faces = [
+        (face[0][:, 2], kind)
+        for geometry in geometries
+        for face, kind in zip(geometry.faces, geometry.kinds, strict=True)
+    ]
+    low = min(z.min() for z, _ in faces)
+    is_open = any(kind and z.max() < low + _LEVEL for z, kind in faces)
+    return Base.RAISED if is_open else Base.GROUND
+
+
+def _on_terrain(objects: Sequence[ImportedObject]) -> Iterator[ImportedObject]:
+    """Yields objects, with the base that the file's terrain shows."""
+    is_terrain = [one.object_type == "TINRelief" for one in objects]
+    terrain = UpperSides(
+        turned_up(
+            joined_triangles(
+                one.triangles
+                for one, is_it in zip(objects, is_terrain, strict=True)
+                if is_it
+            )
+        )
+    )
+    for one, is_it in zip(objects, is_terrain, strict=True):
+        if one.base is Base.GROUND and not is_it:
+            corners = one.triangles.reshape(-1, 3)
+            above = corners[:, 2] - terrain.heights(corners[:, :2])
+            # Where there is no terrain, nothing is known.
+            above = above[np.isfinite(above)]
+            if len(above) and above.min() > _LEAST_ROOM:
+                one = replace(one, base=Base.RAISED)
+            elif len(above) and above.max() < -_LEAST_ROOM:
+                one = replace(one, base=Base.UNDERGROUND)
+        yield one
 
 
 def _first_year(

@@ -33,7 +33,7 @@ from worlds.imports.dressing.wall_panels import (
 from worlds.imports.drives.steerable_drives import WaypointRoute
 from worlds.imports.faces import joined_triangles
 from worlds.imports.ground import Ground
-from worlds.imports.imported_objects import ImportedObject, to_mesh
+from worlds.imports.imported_objects import Base, ImportedObject, to_mesh
 from worlds.imports.named_randomness import random_generator
 from worlds.imports.streets import Street
 from worlds.shapes import (
@@ -234,9 +234,10 @@ def _split_building(
     roof = np.concatenate([surfaces["roof"], body[up]])
     walls, rest = body[upright], body[~upright & ~up]
     corners = building.triangles.reshape(-1, 3)
-    foot = float(corners[:, 2].min())
-    below = float(ground.height(corners[:, :2]).min())
-    base = foot if abs(foot - below) < _MOST_SUNK else below
+    base = float(building.foot[2])
+    if building.base is Base.GROUND:
+        below = float(ground.height(corners[:, :2]).min())
+        base = base if abs(base - below) < _MOST_SUNK else below
     width, depth = np.ptp(corners[:, :2], axis=0)
     standing = walls if len(walls) else building.triangles
     height = max(_LEAST_HEIGHT, float(standing[:, :, 2].max()) - base)

@@ -1,7 +1,7 @@
 """Dresses a city: adds details to its buildings and along its streets."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -37,7 +37,11 @@ from worlds.imports.faces import flat_surface, joined_triangles, parts_of
 from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity
 from worlds.imports.ground import Ground, ground_structures
-from worlds.imports.imported_objects import ImportedObject, make_object
+from worlds.imports.imported_objects import (
+    Base,
+    ImportedObject,
+    make_object,
+)
 from worlds.imports.staged_city import StagedCity
 from worlds.imports.streets import (
     KERB_HEIGHT,
@@ -110,6 +114,7 @@ class Dressing:
             structure of the file with added details, or `lot` for a random
             structure. All other structures are as in the file.
         facts: counts of details from the file and of random details.
+        sources: ids, in the file, of the small objects that were placed.
         guessed_ground: structures of the ground that was guessed; empty if the
             file has a terrain.
     """
@@ -117,6 +122,7 @@ class Dressing:
     city: StagedCity
     origins: Mapping[str, str]
     facts: Mapping[str, Any]
+    sources: Set[str]
     guessed_ground: Sequence[Structure]
 
 
@@ -147,11 +153,7 @@ def dress_city(
     kept = staged.kept
     streets = city.streets
     laid = _laid_paving(kept, streets, drives, ground, is_paved)
-    paving = [
-        one.triangles
-        for one in [*kept, *laid]
-        if one.is_ground or one.object_type == "Sidewalk"
-    ]
+    paving = [one.triangles for one in [*kept, *laid] if one.is_paving]
     buildings = dress_buildings(
         kept, drives, streets, ground, seed, always, joined_triangles(paving)
     )
@@ -192,7 +194,7 @@ def dress_city(
         )
     if is_paved:
         guessed_ground = list(map(in_paving_colour, guessed_ground))
-    return Dressing(dressed, origins, facts, guessed_ground)
+    return Dressing(dressed, origins, facts, placed.sources, guessed_ground)
 
 
 def _facts(
@@ -420,7 +422,8 @@ def missing_sidewalks(
     carriageways = [
         line.buffer(street.width / 2.0, quad_segs=4) for street, line in near
     ]
-    obstacles = _obstacles(near_drives(objects, drives))
+    standing = [one for one in objects if one.base is Base.GROUND]
+    obstacles = _obstacles(near_drives(standing, drives))
     taken = np.concatenate([obstacles, carriageways])
     # The union of a whole city takes long, so only polygons near each street
     # are used.
@@ -468,7 +471,11 @@ def paved_gaps(
     must be level.
     """
     near = near_drives(
-        [imported for imported in objects if imported.object_type != "Tree"],
+        [
+            one
+            for one in objects
+            if one.base is Base.GROUND and one.object_type != "Tree"
+        ],
         drives,
     )
     walks = [

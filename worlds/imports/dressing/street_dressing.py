@@ -116,7 +116,7 @@ def dress_streets(
         if room.is_near(np.array([small.xy] * 2)):
             _place_from_file(room, small, number, near, courses, seed)
     for imported in objects:
-        if imported.object_type == "Parking":
+        if imported.is_ground and imported.object_type == "Parking":
             _fill_car_park(room, imported, seed)
     for row in _streets_to_dress(near, drives):
         if room.is_near(np.array(row.line.coords), _ROWS_WITHIN):

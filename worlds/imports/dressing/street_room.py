@@ -42,9 +42,6 @@ _FROM_WALL = 0.25
 _BETWEEN_OBJECTS = 0.2
 # Nothing stands where the ground below it falls by more than this [m].
 _MOST_FALL = 0.5
-# A street this far above the guessed ground is a bridge or a roof, and no
-# object stands on it [m].
-_BRIDGE_HEIGHT = 1.0
 # Walls are looked for at this height above the ground [m].
 _WALL_PROBE = 0.5
 # Radius around the middle of a trunk that no other object takes [m].
@@ -127,9 +124,9 @@ class StreetRoom:
             lambda o: o.structure.semantic_class in _SOLID_CLASSES
         )
         self._solids = UpperSides(solids)
-        roads = triangles(lambda o: o.object_type == "Road")
+        roads = triangles(lambda o: o.is_ground and o.object_type == "Road")
         self._roads = UpperSides(turned_up(roads))
-        paved = triangles(lambda o: o.is_ground or o.object_type == "Sidewalk")
+        paved = triangles(lambda o: o.is_paving)
         laid = joined_triangles([paved, ground_triangles(guessed_ground)])
         self._laid = UpperSides(turned_up(laid))
         self._taken = Occupancy()
@@ -233,8 +230,7 @@ class StreetRoom:
         file has no ground, on the guessed ground.
         """
         heights, guessed = self._laid.heights(feet), self._ground.height(feet)
-        is_laid = np.isfinite(heights) & (heights < guessed + _BRIDGE_HEIGHT)
-        return np.where(is_laid, heights, guessed)
+        return np.where(np.isfinite(heights), heights, guessed)
 
     def _is_built(self, footprint: BaseGeometry) -> bool:
         """Returns whether a wall stands on a footprint, or close to it."""

@@ -104,7 +104,11 @@ def find_free_space(
     window = (low, high)
     shape = (size[1], size[0])
     on_road = _area_of(
-        [o for o in objects if o.structure.semantic_class == "road"],
+        [
+            one
+            for one in objects
+            if one.is_ground and one.structure.semantic_class == "road"
+        ],
         window,
         shape,
     )

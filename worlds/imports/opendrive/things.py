@@ -277,13 +277,13 @@ class _PlacedOutline(NamedTuple):
     Attributes:
         line: the outline in W [m].
         low: (N,) z of the foot below each corner in W [m].
-        rise: (N,) how far this foot is above the road [m].
+        is_raised: whether any of these feet is above the road.
         heights: (N,) heights of the corners above this foot [m].
     """
 
     line: LineString
     low: np.ndarray
-    rise: np.ndarray
+    is_raised: bool
     heights: np.ndarray
 
 
@@ -421,14 +421,19 @@ def _extruded_object(
         faults.add("object without an area, left out", name)
         return None
     low = outline.low
-    foot, rise = float(low.min()), float(outline.rise.min())
+    foot = float(low.min())
     # Any height will do, because each vertex gets that of the nearest corner.
     triangles = np.concatenate(
         [
             part
             for piece in pieces
             for part in extruded(
-                piece, foot, foot + 1.0, name, faults, ground=foot - rise
+                piece,
+                foot,
+                foot + 1.0,
+                name,
+                faults,
+                is_raised=outline.is_raised,
             )
         ]
     )
@@ -463,7 +468,8 @@ def _placed_outline(road: ImportedRoad, thing: Thing) -> _PlacedOutline | None:
         inside = np.clip(s, _INSIDE, road.length - _INSIDE)
         corners = road.points(s, inside, t)
         line = LineString(corners[:, :2])
-        return _PlacedOutline(line, corners[:, 2] + rise, rise, heights)
+        is_raised = bool(rise.max() > 0.0)
+        return _PlacedOutline(line, corners[:, 2] + rise, is_raised, heights)
     length, width, _ = thing.size
     if thing.outline is not None:
         footprint = LineString(thing.outline[:, :2])
@@ -476,7 +482,8 @@ def _placed_outline(road: ImportedRoad, thing: Thing) -> _PlacedOutline | None:
         heights = rise = np.zeros(len(footprint.coords))
     foot = _foot_of(road, thing)
     line = placed(footprint, (foot.x, foot.y), foot.heading + thing.heading)
-    return _PlacedOutline(line, foot.z + rise, rise, heights)
+    is_raised = bool(thing.z + rise.max() > 0.0)
+    return _PlacedOutline(line, foot.z + rise, is_raised, heights)
 
 
 def _swept_object(

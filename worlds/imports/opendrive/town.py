@@ -590,15 +590,16 @@ def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
     places = np.concatenate(rows)
     xy = places[:, :2]
     z, s, number = places[:, 2:].T
-    if len(places) == 0 or np.ptp(z) < _HEADROOM:
+    if len(places) == 0:
         return {}
     tree = cKDTree(xy)
     raised: dict[str, list[float]] = {}
-    high = np.flatnonzero(z > z.min() + _HEADROOM)
+    high = np.flatnonzero((z - z.min()).round(6) >= _HEADROOM)
     for place, near in zip(
         high, tree.query_ball_point(xy[high], _ABOVE_WITHIN), strict=True
     ):
-        is_below = z[near] < z[place] - _HEADROOM
+        # Rounded, so that exactly this headroom is enough.
+        is_below = (z[place] - z[near]).round(6) >= _HEADROOM
         if (is_below & (number[near] != number[place])).any():
             road = bands[int(number[place])].road.name
             raised.setdefault(road, []).append(float(s[place]))
@@ -687,6 +688,8 @@ def _write_drives(draft: Path, town: Town) -> None:
 def _report_of(
     town: Town, sizes: Mapping[str, tuple[int, int]]
 ) -> ImportReport:
+    roads = town.roads.roads
+    of_file = ("roads", "roads in junctions", "signals", "objects")
     return ImportReport(
         kinds=town.kinds,
         triangles=sum(
@@ -698,6 +701,8 @@ def _report_of(
         drives=tuple(drive.length for drive in town.drives),
         faults=town.faults.rows(),
         parts=town.faults.parts(),
+        num_elements=len(roads) + sum(len(road.things) for road in roads),
+        num_built=sum(town.kinds.get(kind, 0) for kind in of_file),
     )
 
 

@@ -10,7 +10,11 @@ from shapely.geometry.base import BaseGeometry
 from worlds.imports import faces
 from worlds.imports.colours import Rgb
 from worlds.imports.faults import ImportFaults
-from worlds.imports.imported_objects import ImportedObject, make_object
+from worlds.imports.imported_objects import (
+    Base,
+    ImportedObject,
+    make_object,
+)
 from worlds.imports.solids import extruded
 from worlds.shapes import Finish
 
@@ -53,7 +57,7 @@ def flat_object(
         for polygon in faces.valid_parts(area, source, faults)
     ]
     if surface:
-        yield _object_with_look(name, look, "surface", surface)
+        yield _object_with_look(name, look, "surface", surface, Base.GROUND)
 
 
 def raised_object(
@@ -62,8 +66,9 @@ def raised_object(
     areas: Iterable[BaseGeometry],
     source: tuple[str, ImportFaults],
     low: float = 0.0,
+    base: Base = Base.GROUND,
 ) -> Iterator[ImportedObject]:
-    """Yields one solid on the ground that fills areas, if there are any.
+    """Yields one solid that fills areas, if there are any.
 
     Args:
         name: name of the solid.
@@ -72,19 +77,32 @@ def raised_object(
         source: pair of the element's id in the file, for messages, and the
             fault counter that counts invalid areas.
         low: height of the solid's lower side [m].
+        base: where the solid stands.
     """
     solids = [
-        np.concatenate(extruded(polygon, low, look.z, *source))
+        np.concatenate(
+            extruded(
+                polygon,
+                low,
+                look.z,
+                *source,
+                is_raised=base is not Base.GROUND,
+            )
+        )
         for area in areas
         for part in faces.parts_of(area)
         for polygon in faces.valid_parts(part, *source)
     ]
     if solids:
-        yield _object_with_look(name, look, "body", solids)
+        yield _object_with_look(name, look, "body", solids, base)
 
 
 def _object_with_look(
-    name: str, look: AreaLook, part: str, triangles: Sequence[np.ndarray]
+    name: str,
+    look: AreaLook,
+    part: str,
+    triangles: Sequence[np.ndarray],
+    base: Base,
 ) -> ImportedObject:
     surfaces = {part: np.concatenate(triangles)}
     material = "water" if look.object_type == "WaterBody" else None
@@ -96,4 +114,5 @@ def _object_with_look(
         surfaces,
         {part: finish},
         kind=look.kind,
+        base=base,
     )

@@ -11,7 +11,7 @@ from shapely import STRtree
 from shapely.geometry import LineString
 
 from worlds.imports.faults import ImportFaults
-from worlds.imports.imported_objects import ImportedObject
+from worlds.imports.imported_objects import Base, ImportedObject
 from worlds.imports.openstreetmap.area_looks import AreaLook, raised_object
 from worlds.imports.openstreetmap.features import OsmWay
 from worlds.imports.openstreetmap.tags import has_tag
@@ -130,7 +130,9 @@ def decks(
         look = AreaLook("Bridge", "other-structure", _CONCRETE, top)
         source = (name, ImportFaults())
         low = top - _DECK_THICKNESS
-        yield from raised_object(f"bridge_{name}", look, [area], source, low)
+        yield from raised_object(
+            f"bridge_{name}", look, [area], source, low, Base.DECK
+        )
 
 
 def parapets(
@@ -157,7 +159,10 @@ def parapets(
         kind = "Parapet" if is_level else "BridgeParapet"
         look = AreaLook(kind, "fence", _CONCRETE, top)
         source = (name, ImportFaults())
-        yield from raised_object(f"parapet_{name}", look, strips, source, low)
+        base = Base.GROUND if is_level else Base.RAISED
+        yield from raised_object(
+            f"parapet_{name}", look, strips, source, low, base
+        )
 
 
 def _reaches(tags: Mapping[str, str]) -> tuple[float, float]:

@@ -21,7 +21,11 @@ from worlds.imports.building_years import (
 from worlds.imports.colours import RED_ROOF
 from worlds.imports.faces import parts_of, valid_parts
 from worlds.imports.faults import ImportFaults
-from worlds.imports.imported_objects import ImportedObject, make_object
+from worlds.imports.imported_objects import (
+    Base,
+    ImportedObject,
+    make_object,
+)
 from worlds.imports.openstreetmap.building_tags import (
     LEAST_WALL,
     building_kind,
@@ -170,6 +174,7 @@ def make_buildings(
     copies: Counter[str] = Counter()
     for whole, blocks in _grouped_by_building(outlines, parts, faults):
         walls, roofs = [], []
+        base = Base.RAISED
         for block in _solids_with_openings(blocks, through, faults):
             tags, where = block.tags, (block.name, faults)
             facing_deg = tag_value(
@@ -183,9 +188,12 @@ def make_buildings(
                 faults,
                 tags.get("roof:shape", "flat"),
                 block.roof,
+                is_raised=block.low > 0.0,
                 facing_deg=facing_deg,
                 is_across=tags.get("roof:orientation") == "across",
             )
+            if block.low <= 0.0:
+                base = Base.GROUND
             walls.append(wall)
             roofs.append(roof)
         copies[whole.name] += 1
@@ -203,6 +211,7 @@ def make_buildings(
             tags={**blocks[0].tags, **whole.tags},
             lod=1.0,
             kind=building_kind(whole.tags),
+            base=base,
         )
         yield replace(made, is_gone=True) if is_gone(whole.tags) else made
 

@@ -24,7 +24,11 @@ from worlds.imports import faces
 from worlds.imports.colours import WHITE_PAINT
 from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity, SmallObject
-from worlds.imports.imported_objects import ImportedObject, make_object
+from worlds.imports.imported_objects import (
+    Base,
+    ImportedObject,
+    make_object,
+)
 from worlds.imports.openstreetmap import reading, streets
 from worlds.imports.openstreetmap.area_looks import AreaLook, raised_object
 from worlds.imports.openstreetmap.bridges import (
@@ -198,9 +202,16 @@ def import_openstreetmap(
         (latitude, longitude),
         "WGS 84",
         faults,
+        len(features.kinds),
         driven,
         any(way.tags.get("driving_side") == "left" for way in features.ways),
         small_objects=list(_make_small_objects(features, local)),
+        level=0.0,
+        sources={
+            one.structure.name: name
+            for one in objects
+            for name in _ids_in(one.structure.name)
+        },
     )
 
 
@@ -305,11 +316,7 @@ def _count_unused(
         counted: ids of objects that are counted elsewhere, as are the buildings
             that are left out.
     """
-    used = {
-        name
-        for one in objects
-        for name in re.findall(r"_([nwr]-?\d+)", one.structure.name)
-    }
+    used = {name for one in objects for name in _ids_in(one.structure.name)}
     used |= {area.name for area in features.areas if is_building(area.tags)}
     _account_for_tags(features, used, dressed)
     used |= counted
@@ -319,6 +326,11 @@ def _count_unused(
             if kind.startswith(("building=", "building:part=")):
                 continue
             features.faults.add(f"{kind}, left out", name)
+
+
+def _ids_in(name: str) -> list[str]:
+    """Returns the ids of the file's elements in the name of a structure."""
+    return re.findall(r"_([nwr]-?\d+)", name)
 
 
 def _account_for_tags(
@@ -413,8 +425,9 @@ def _barrier(
         faults.add("barrier that begins above its top, lowered", name)
         low = 0.0
     look = AreaLook("Barrier", usual.semantic_class, None, high)
+    base = Base.RAISED if low > 0.0 else Base.GROUND
     yield from raised_object(
-        f"{tags['barrier']}_{name}", look, areas, where, low
+        f"{tags['barrier']}_{name}", look, areas, where, low, base
     )
 
 

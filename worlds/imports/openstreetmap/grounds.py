@@ -14,10 +14,10 @@ from shapely.geometry.base import BaseGeometry
 from worlds.imports import faces
 from worlds.imports.colours import LAWN, WATER, Rgb
 from worlds.imports.faults import ImportFaults
-from worlds.imports.imported_objects import ImportedObject
+from worlds.imports.imported_objects import Base, ImportedObject
 from worlds.imports.openstreetmap.area_looks import AreaLook, flat_object
 from worlds.imports.openstreetmap.features import OsmFeatures, OsmWay, Tags
-from worlds.imports.openstreetmap.tags import TABLES, has_tag
+from worlds.imports.openstreetmap.tags import TABLES, has_tag, is_inside
 from worlds.imports.openstreetmap.way_tags import is_tunnel, path_width
 from worlds.maps import LocalMetres
 
@@ -33,8 +33,14 @@ _PITCH = AreaLook("Pitch", "other-ground", _TARTAN, _PITCH_LEVEL)
 _GRASS_SURFACES = ("grass", "artificial_turf", "natural_grass")
 _SPORTS_ON_GRASS = ("soccer", "rugby", "american_football", "cricket")
 _SURFACE_COLOURS = {"sand": _SAND, "gravel": _GRAVEL, "fine_gravel": _GRAVEL}
-# Car parks of these kinds are below the ground or in a building.
-_NOT_ON_GROUND = ("underground", "multi-storey", "rooftop")
+# Values of `parking` and of `location` -> where an area is.
+_BASES = {
+    "underground": Base.UNDERGROUND,
+    "underwater": Base.UNDERGROUND,
+    "multi-storey": Base.RAISED,
+    "rooftop": Base.RAISED,
+    "roof": Base.RAISED,
+}
 # A coastline that ends within the city is extended by this length [m].
 _COAST_EXTENSION = 3000.0
 # Probes at this distance from a coastline find the side of the sea [m].
@@ -66,10 +72,24 @@ def ground_areas(
         if is_path and tags.get("area") != "yes":
             tags = {k: v for k, v in tags.items() if k != "highway"}
         look = _detailed_look(tags) if dressed else _plain_look(tags)
-        if look is None or has_tag(tags, "building"):
+        is_elsewhere = base_of_area(tags) is not Base.GROUND
+        if look is None or is_elsewhere or has_tag(tags, "building"):
             continue
         outlines = map(local.polygon, polygons)
         yield from flat_object(f"land_{name}", look, outlines, features.faults)
+
+
+def base_of_area(tags: Tags) -> Base:
+    """Returns where an area is, such as below the ground; no base of a bridge.
+
+    A layer above 0 is the order of things that cross, and no height.
+    """
+    if is_tunnel(tags) or is_inside(tags):
+        return Base.UNDERGROUND
+    for key in ("parking", "location"):
+        if (base := _BASES.get(tags.get(key, ""))) is not None:
+            return base
+    return Base.GROUND
 
 
 def _plain_look(tags: Tags) -> AreaLook | None:
@@ -91,13 +111,9 @@ def _plain_look(tags: Tags) -> AreaLook | None:
 
 def _detailed_look(tags: Tags) -> AreaLook | None:
     """Returns the look of ground in a dressed city; None for other areas."""
-    if is_tunnel(tags) or tags.get("layer", "").startswith("-"):
-        return None
     if tags.get("leisure") == "pitch":
         return _pitch_look(tags)
     if tags.get("amenity") == "parking":
-        if tags.get("parking") in _NOT_ON_GROUND:
-            return None
         return AreaLook("Parking", "parking", None, _PARKING_LEVEL)
     for look, entry in _LOOKS:
         if any(

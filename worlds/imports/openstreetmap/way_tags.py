@@ -68,13 +68,38 @@ def street_width(
     width = tag_value(tags, "width", length, _WIDEST, where)
     if width:
         return width
-    lanes = tag_value(tags, "lanes", count, _MOST_STREET_LANES, where)
+    lanes = _num_lanes(tags, where)
     if lanes:
         return LANE_WIDTH * lanes + _EDGE_WIDTH
     is_one_way = not all(driven_directions(tags))
     if is_one_way:
         return max(_ONE_WAY_SHARE * usual, _LEAST_ONE_WAY)
     return usual
+
+
+def _num_lanes(
+    tags: Mapping[str, str], where: tuple[str, ImportFaults] | None
+) -> float | None:
+    """Returns the number of lanes of a street; None if it is unknown.
+
+    Without a tag for the whole street, the lanes of both directions and those
+    in the middle count; a direction without a tag has one lane.
+    """
+    lanes = tag_value(tags, "lanes", count, _MOST_STREET_LANES, where)
+    if lanes:
+        return lanes
+    forward, backward, middle = (
+        tag_value(tags, f"lanes:{side}", count, _MOST_STREET_LANES, where)
+        for side in ("forward", "backward", "both_ways")
+    )
+    if not (forward or backward or middle):
+        return None
+    is_driven = driven_directions(tags)
+    return (middle or 0.0) + sum(
+        lanes or 1.0
+        for lanes, is_open in zip((forward, backward), is_driven, strict=True)
+        if lanes or is_open
+    )
 
 
 def driven_directions(tags: Mapping[str, str]) -> tuple[bool, bool]:
@@ -109,7 +134,7 @@ def lanes_beside(tags: Mapping[str, str], width: float) -> float:
     is_two_way = all(driven_directions(tags))
     if is_two_way and width < _LEAST_PASSING_WIDTH:
         return 0.0
-    lanes = tag_value(tags, "lanes", count, _MOST_STREET_LANES, None)
+    lanes = _num_lanes(tags, None)
     if not lanes:
         lanes = 2.0 if is_two_way else 1.0
     return width / 2.0 * (1.0 - 1.0 / max(lanes, 1.0))

@@ -1,5 +1,7 @@
 """Layouts of points against the documents of drivers, and back."""
 
+import math
+
 from helpers.drive_files import write_recording
 import numpy as np
 import pytest
@@ -145,7 +147,34 @@ def test_derived_fields(points):
         axis=1,
     )
     np.testing.assert_allclose(along * distance[:, None], p, atol=1e-4)
-    assert set(autoware["return_type"]) == {1}
+    for echoes, kind in {"first": 0, "strongest": 1, "last": 2}.items():
+        autoware = to_layout(points, "autoware", echoes=echoes)
+        assert set(autoware["return_type"]) == {kind}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_autoware_tells_two_echoes_of_a_beam_apart(seed):
+    """Beams 0.05 deg apart, all at one time, as a flash LiDAR has them."""
+    rng = np.random.default_rng(seed)
+    rows, kinds = [], []
+    for k in range(400):
+        angle, near, far = k * math.radians(0.05), *np.sort(rng.random(2))
+        # The strongest echo is the first in the message.
+        ways, types = {
+            0: ([near + 1], [7]),
+            1: ([near + 1, far + 2], [3, 6]),
+            2: ([far + 2, near + 1], [4, 5]),
+        }[int(rng.integers(3))]
+        for way, kind in zip(ways, types, strict=True):
+            x, y = 50 * math.cos(angle), 50 * math.sin(angle)
+            rows.append((way * x, way * y, way * 0.3, 0.5, 3, 70))
+            kinds.append(kind)
+    fields = [(name, "f4") for name in ("x", "y", "z", "intensity")]
+    points = np.array(rows, [*fields, ("ring", "u2"), ("t", "u4")])
+    made = to_layout(points, "autoware", echoes="dual")
+    np.testing.assert_array_equal(made["return_type"], kinds)
+    none = to_layout(points[:0], "autoware", echoes="dual")
+    assert len(none) == 0
 
 
 def test_points_of_others_stay_as_they_are():

@@ -6,7 +6,7 @@ import shapely
 from shapely import affinity
 
 from cns_drake.traffic import EgoBox
-from cns_drake.traffic.ego_car import meets_ego
+from cns_drake.traffic.ego_car import meetings_with_ego
 from cns_drake.traffic.traffic_plan import Tracks
 
 BOX = EgoBox(-1.0, 3.0, 1.0)
@@ -40,13 +40,13 @@ def test_those_whose_boxes_overlap_at_a_time(seed):
     tracks = Tracks(1.0, values, np.tile(present, (26, 1)))
     sizes = rng.uniform(0.5, 6.0, (number, 2))
     times = np.arange(0.0, 25.0, 0.1)
-    found = meets_ego(tracks, sizes, times, ego, BOX)
-    expected = np.zeros(number, bool)
-    for t, (x, y), yaw in zip(times, *ego(times), strict=True):
+    found = meetings_with_ego(tracks, sizes, times, ego, BOX)
+    expected = np.zeros((len(times), number), bool)
+    for step, (x, y), yaw in zip(range(len(times)), *ego(times), strict=True):
         middle = x + np.cos(yaw), y + np.sin(yaw)
         car = rectangle(*middle, yaw, 4.0, 2.0)
-        for k, row in enumerate(tracks.at(t)[0]):
+        for k, row in enumerate(tracks.at(times[step])[0]):
             own = rectangle(*row[[0, 1, 3]], *sizes[k])
-            expected[k] |= present[k] and own.intersects(car)
+            expected[step, k] = present[k] and own.intersects(car)
     np.testing.assert_array_equal(found, expected)
-    assert 0 < found.sum() < present.sum()
+    assert 0 < found.any(axis=0).sum() < present.sum()
