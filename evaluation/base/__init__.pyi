@@ -95,7 +95,6 @@ from .json_text import fingerprint as fingerprint
 from .json_text import json_values as json_values
 from .json_text import parse_json as parse_json
 from .launch import start as start
-from .npz_archives import read_npz as read_npz
 from .number_format import is_number as is_number
 from .number_format import is_real as is_real
 from .number_format import other_separator as other_separator
@@ -127,6 +126,8 @@ from .units import NS_PER_S as NS_PER_S
 from .units import nearest_ns as nearest_ns
 from .units import shortly_before as shortly_before
 from .units import wrapped as wrapped
+from .unpacking import read_npz as read_npz
+from .unpacking import unpacked as unpacked
 from .version import __version__ as __version__
 from .version import installed_versions as installed_versions
 from .working_folder import leave_working_folder as leave_working_folder
