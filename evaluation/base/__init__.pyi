@@ -12,12 +12,9 @@ from .compilation import compiled as compiled
 from .compilation import compiled_callback as compiled_callback
 from .complete_files import check_folder_writable as check_folder_writable
 from .complete_files import check_writable as check_writable
-from .complete_files import complete_part as complete_part
 from .complete_files import completing as completing
 from .complete_files import draft_folder as draft_folder
-from .complete_files import part_path as part_path
-from .complete_files import sole_writer as sole_writer
-from .complete_files import write_part as write_part
+from .complete_files import remove_folder as remove_folder
 from .complete_files import write_text as write_text
 from .csv_files import check_separator as check_separator
 from .csv_files import csv_text as csv_text
@@ -27,6 +24,9 @@ from .csv_files import read_rows as read_rows
 from .csv_files import unquoted_cell as unquoted_cell
 from .csv_files import write_csv as write_csv
 from .digests import file_digests as file_digests
+from .drafts import is_draft_of as is_draft_of
+from .drafts import scratch_folder as scratch_folder
+from .drafts import sole_writer as sole_writer
 from .elementary import arcsin as arcsin
 from .elementary import arctan2 as arctan2
 from .elementary import cos as cos
@@ -58,11 +58,11 @@ from .figures import UNSEEN_RGB as UNSEEN_RGB
 from .figures import figure_style as figure_style
 from .figures import font_settings as font_settings
 from .figures import save_figure as save_figure
-from .file_locks import lock_file as lock_file
 from .files import cache_folder as cache_folder
 from .files import check_regular as check_regular
 from .files import decode_text as decode_text
 from .files import file_name as file_name
+from .files import is_own as is_own
 from .files import is_there as is_there
 from .files import listed as listed
 from .files import make_folder as make_folder

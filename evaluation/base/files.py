@@ -130,6 +130,12 @@ def cache_folder() -> Path | None:
     return Path(base) / "cns-drake" if os.path.isabs(base) else None
 
 
+def is_own(path: Path) -> bool:
+    """Returns whether only this user, and root, can have filled a folder."""
+    state = path.stat()
+    return state.st_uid == os.geteuid() and not state.st_mode & stat.S_IWOTH
+
+
 def natural_key(text: str) -> tuple:
     """Returns the key by which names are sorted in natural order.
 

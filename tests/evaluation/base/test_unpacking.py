@@ -127,11 +127,11 @@ def test_data_unpack_to_their_limit_and_no_further(compression, compress):
     plain = bytes(100_000)
     packed = compress(plain)
     assert unpacked(packed, compression, len(plain)) == plain
-    with pytest.raises(ValueError, match="more than|not enough|did not decom"):
+    with pytest.raises(ValueError, match=r"more than|not|dest"):
         unpacked(packed, compression, len(plain) - 1)
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "bz2"])
 def test_damaged_and_unknown_data_are_value_errors(compression):
-    with pytest.raises(ValueError, match=r"zstd|frame|ERROR|compression"):
+    with pytest.raises(ValueError, match=r"size|frame|compression"):
         unpacked(b"no compressed data", compression, 1 << 20)
