@@ -3,6 +3,10 @@ from . import poses as poses
 from . import program as program
 from . import shared_options as shared_options
 from . import terminal as terminal
+from .caches import cache_folder as cache_folder
+from .caches import is_own as is_own
+from .caches import mark_used as mark_used
+from .caches import remove_unused as remove_unused
 from .changes import merged as merged
 from .changes import nested as nested
 from .changes import parse_changes as parse_changes
@@ -58,11 +62,9 @@ from .figures import UNSEEN_RGB as UNSEEN_RGB
 from .figures import figure_style as figure_style
 from .figures import font_settings as font_settings
 from .figures import save_figure as save_figure
-from .files import cache_folder as cache_folder
 from .files import check_regular as check_regular
 from .files import decode_text as decode_text
 from .files import file_name as file_name
-from .files import is_own as is_own
 from .files import is_there as is_there
 from .files import listed as listed
 from .files import make_folder as make_folder

@@ -20,8 +20,9 @@ import shutil
 import stat
 from typing import Any
 
+from evaluation.base.caches import own_cache
 from evaluation.base.errors import InputError
-from evaluation.base.files import cache_folder, is_own, user_errors
+from evaluation.base.files import user_errors
 
 _ENDING = ".part"
 # Number of characters of a name that its draft keeps: names end somewhere.
@@ -156,13 +157,8 @@ def _recorded(values: dict[str, Any]) -> Iterator[bool]:
 @contextlib.contextmanager
 def _locked_records() -> Iterator[Path | None]:
     """Yields the folder of records, locked; None if there is none."""
-    cache = cache_folder()
-    if cache is None:
-        yield None
-        return
-    records = cache / "drafts"
-    records.mkdir(mode=0o700, parents=True, exist_ok=True)
-    if not is_own(records):
+    records = own_cache("drafts")
+    if records is None:
         yield None
         return
     with (records / "lock").open("a") as stream:
