@@ -54,6 +54,7 @@ from .errors import no_such as no_such
 from .errors import one_line as one_line
 from .errors import validated as validated
 from .errors import value_errors as value_errors
+from .expansion import expanded_size as expanded_size
 from .families import Family as Family
 from .families import import_modules as import_modules
 from .figures import GONE_RGB as GONE_RGB
