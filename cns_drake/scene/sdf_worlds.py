@@ -352,8 +352,10 @@ class _Reader:
                 yield whole._replace(element=one, is_nested=not is_world)
             elif one.tag == "include":
                 file = self._included_file(one, whole.folder)
-                model = file and self._included_root(file).find("model")
-                if file is not None and model is not None:
+                if file is None:
+                    continue
+                model = self._included_root(file).find("model")
+                if model is not None:
                     is_nested = not (is_world or _is_merged(one))
                     yield _Expanded(model, file.parent, is_nested, True)
 
