@@ -2,8 +2,8 @@
 
 The folder can contain several drives of one format. The file `export.yaml` in
 this folder lists the exported files, and shows that an export wrote the folder.
-The subfolder of a drive is written under a name ending in `.part`, and gets its
-final name when it is complete.
+The subfolder of a drive is written under a temporary name, and gets its final
+name when it is complete.
 """
 
 from __future__ import annotations
@@ -11,9 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
 import importlib
-import os
 from pathlib import Path
-import shutil
 from typing import TYPE_CHECKING
 
 from cns_drake.export.formats import ENDING, export_formats
@@ -22,10 +20,9 @@ from cns_drake.recording import to_yaml
 from evaluation.base import (
     InputError,
     check_folder_writable,
+    draft_folder,
     make_folder,
-    part_path,
     read_yaml,
-    sole_writer,
     track,
     user_errors,
     value_errors,
@@ -115,19 +112,16 @@ def export_drive(
         )
     if layout.shared_outer_files:
         _check_shared_files(outer)
-    part = part_path(folder)
     with contextlib.ExitStack() as stack:
         stack.callback(_remove_empty, folder.parent, output)
-        stack.enter_context(sole_writer(folder))
-        stack.callback(shutil.rmtree, part, ignore_errors=True)
+        draft = stack.enter_context(draft_folder(folder))
         for note in _notes(drive, layout):
             on_note(note)
-        _write_drive(drive, layout, part, absence)
+        with user_errors(folder):
+            _write_drive(drive, layout, draft, absence)
         for path, text in outer.items():
             make_folder(path.parent)
             write_text(path, text)
-        with user_errors(folder):
-            os.replace(part, folder)
     return folder
 
 
@@ -222,28 +216,24 @@ def claim_folder(
 def _write_drive(
     drive: Drive, layout: Layout, folder: Path, absence: Absence | None
 ) -> None:
-    with user_errors(folder):
-        # An interrupted export may have left it behind.
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True)
-        files = layout.inner_files(drive)
-        if layout.has_labels:
-            files |= structure_files((absence or drive).instances)
-        for name, text in files.items():
-            (folder / name).write_text(text, encoding="utf-8")
-        if layout.scan_files is None:
-            return
-        stamps_ns = drive.stamps_ns.tolist()
-        for frame, stamp_ns in enumerate(
-            track(stamps_ns, "writing scans", len(stamps_ns), "scans")
-        ):
-            scan = deskewed_scan(drive, frame)
-            if absence is not None:
-                scan = absence.marked(scan, frame)
-            with value_errors(f"{drive.name}: scan {frame}"):
-                made = layout.scan_files(drive, frame, stamp_ns, scan)
-            for name, content in made.items():
-                path = folder / name
-                if frame == 0:
-                    path.parent.mkdir()
-                path.write_bytes(content)
+    files = layout.inner_files(drive)
+    if layout.has_labels:
+        files |= structure_files((absence or drive).instances)
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    if layout.scan_files is None:
+        return
+    stamps_ns = drive.stamps_ns.tolist()
+    for frame, stamp_ns in enumerate(
+        track(stamps_ns, "writing scans", len(stamps_ns), "scans")
+    ):
+        scan = deskewed_scan(drive, frame)
+        if absence is not None:
+            scan = absence.marked(scan, frame)
+        with value_errors(f"{drive.name}: scan {frame}"):
+            made = layout.scan_files(drive, frame, stamp_ns, scan)
+        for name, content in made.items():
+            path = folder / name
+            if frame == 0:
+                path.parent.mkdir()
+            path.write_bytes(content)

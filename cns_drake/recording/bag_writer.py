@@ -1,8 +1,8 @@
 """Writes a rosbag2 folder with one MCAP file.
 
-A recording is whole or not there. It grows in `<folder>/<name>_0.mcap.part`,
-and gets its final name when it is complete. What an exception leaves is
-removed; what a killed run leaves is replaced by the next run.
+A recording is whole or not there. It grows in a hidden file of its folder, and
+gets its final name when it is complete. What an exception leaves is removed,
+and what a killed run leaves is removed by the next run.
 
 To read one message, a reader of MCAP has to uncompress the whole chunk that
 contains the message. If chunks contained all messages in the order of time, a
@@ -20,6 +20,7 @@ import contextlib
 import json
 import os
 from pathlib import Path
+from types import TracebackType
 from typing import Any, BinaryIO
 
 from mcap.writer import CompressionType, Writer
@@ -29,11 +30,10 @@ from cns_drake.recording.rosbag2_metadata import Topic, to_yaml
 from evaluation.base import (
     InputError,
     __version__,
-    complete_part,
-    lock_file,
-    part_path,
+    completing,
+    is_draft_of,
+    sole_writer,
     user_errors,
-    write_part,
 )
 from evaluation.drives import STAMPED_RECORD, message_definition, read_stamp
 
@@ -109,7 +109,6 @@ class BagWriter:
         }
         self._custom_data = dict(custom_data or {})
         self._fingerprint = fingerprint
-        self._part = part_path(self._files.mcap)
         self._is_open = False
         self._counts = {topic.name: 0 for topic in self._topics}
         # Topic -> stamp of its last message; least and greatest stamp of all
@@ -127,20 +126,23 @@ class BagWriter:
         with user_errors(self._files.path):
             self._files.path.mkdir(parents=True, exist_ok=True)
         self._files.check(self._overwrite)
-        with contextlib.ExitStack() as stack, user_errors(self._part):
+        with contextlib.ExitStack() as stack, user_errors(self._files.mcap):
             stack.callback(self._remove_folder)
-            lock_file(self._part, stack, self._refuse_to_wait)
-            stack.callback(self._remove_drafts)
-            # A run that was killed may have left one behind.
-            self._part.unlink(missing_ok=True)
-            self._stream = open(self._part, "xb")
+            stack.enter_context(sole_writer(self._files.path, "recording"))
+            part = stack.enter_context(completing(self._files.mcap))
+            self._stream = open(part, "wb")
             stack.callback(self._close_stream)
             self._chunks, self._channel_ids = self._write_preamble()
             self._opened = stack.pop_all()
         self._is_open = True
         return self
 
-    def __exit__(self, exception_type: type | None, *_: object) -> None:
+    def __exit__(
+        self,
+        exception_type: type[BaseException] | None,
+        exception: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
         """Completes the recording; after an exception, removes it.
 
         Raises:
@@ -148,10 +150,11 @@ class BagWriter:
                 nothing is left then.
         """
         self._is_open = False
+        if exception_type is not None:
+            self._opened.__exit__(exception_type, exception, traceback)
+            return
         with self._opened:
-            if exception_type is not None:
-                return
-            with user_errors(self._part):
+            with user_errors(self._files.mcap):
                 self._write_ending()
             self._complete_files()
 
@@ -178,7 +181,7 @@ class BagWriter:
             )
         self._check_order(topic, stamp_ns)
         channel_id = self._channel_ids[topic]
-        with user_errors(self._part):
+        with user_errors(self._files.mcap):
             self._chunks.add_message(channel_id, stamp_ns, data, sequence)
         self._counts[topic] += 1
         self._latest_ns[topic] = stamp_ns
@@ -242,45 +245,35 @@ class BagWriter:
         os.fsync(self._stream.fileno())
 
     def _complete_files(self) -> None:
-        """Writes the remaining files, and gives all files their final names.
+        """Writes the remaining files, and gives them their final names.
 
-        All files are whole under their `.part` names before the first is
-        renamed. The MCAP is renamed last, and an old MCAP is removed first: no
-        file may describe another MCAP.
+        All files are whole under temporary names before the first is renamed.
+        The MCAP is renamed last, and an old MCAP is removed first: no file may
+        describe another MCAP.
         """
         own = self._files
         metadata = {"rosbag2_bagfile_information": self._bag_information()}
+        texts = {own.metadata: to_yaml(metadata)}
+        texts[own.scenario] = to_yaml(self._scenario)
+        texts |= {path: to_yaml(one) for path, one in self._beside.items()}
         if self._fingerprint:
-            write_part(own.fingerprint, self._fingerprint)
-        write_part(own.scenario, to_yaml(self._scenario))
-        write_part(own.metadata, to_yaml(metadata))
-        for path, value in self._beside.items():
-            write_part(path, to_yaml(value))
-        with user_errors(own.path):
-            own.mcap.unlink(missing_ok=True)
-            own.fingerprint.unlink(missing_ok=True)
-        for path in (*self._beside, own.scenario, own.metadata):
-            complete_part(path)
-        if self._fingerprint:
-            complete_part(own.fingerprint)
-        complete_part(own.mcap)
-
-    def _refuse_to_wait(self) -> None:
-        raise InputError(
-            f"{self._files.path}: another process is writing this recording"
-        )
+            texts[own.fingerprint] = self._fingerprint
+        with contextlib.ExitStack() as stack:
+            for path, text in texts.items():
+                part = stack.enter_context(completing(path))
+                with user_errors(path), part.open("w", encoding="utf-8") as to:
+                    to.write(text)
+                    to.flush()
+                    os.fsync(to.fileno())
+            with user_errors(own.path):
+                own.mcap.unlink(missing_ok=True)
+                own.fingerprint.unlink(missing_ok=True)
 
     def _close_stream(self) -> None:
         # All data have been flushed, or that has failed already. Closing
         # flushes again and would only repeat the error of a full disk.
         with contextlib.suppress(OSError):
             self._stream.close()
-
-    def _remove_drafts(self) -> None:
-        """Removes files that did not get their final names."""
-        with contextlib.suppress(OSError):
-            for path in (*self._files.files(), *self._beside):
-                part_path(path).unlink(missing_ok=True)
 
     def _remove_folder(self) -> None:
         """Removes the folder if nothing is in it."""
@@ -439,13 +432,11 @@ class RecordingFolder:
                     "recording (replace it by --overwrite, in Python"
                     " overwrite=True)"
                 )
-            # Completed last, so a killed run has left it.
-            part = part_path(self.mcap).name
-            names = {part, f"{part}.lock"}
-            found = sorted(entry.name for entry in self.path.iterdir())
-        if found and names.isdisjoint(found):
+            found = sorted(self.path.iterdir())
+        # The MCAP is completed last, so a killed run has left its draft.
+        if found and not any(is_draft_of(one, self.mcap) for one in found):
             raise InputError(
                 f"{self.path}: the folder already exists and holds other "
-                f"files, such as '{found[0]}' (--overwrite keeps them and "
+                f"files, such as '{found[0].name}' (--overwrite keeps them and "
                 "records beside them)"
             )

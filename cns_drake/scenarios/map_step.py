@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import os
 from pathlib import Path
-import shutil
 
 from evaluation.base import (
     Cluster,
@@ -15,7 +14,7 @@ from evaluation.base import (
     Reporter,
     Step,
     make_folder,
-    part_path,
+    remove_folder,
     run_jobs,
     user_errors,
 )
@@ -52,7 +51,7 @@ class MakeMap(Step):
     def run(self, reporter: Reporter) -> None:
         made_of = self.made_of(self.sources())
         if is_older := self.check():
-            _remove_folder(self.folder)
+            remove_folder(self.folder)
         self.make(
             lambda draft: Part(draft / _PART).write(made_of, None), reporter
         )
@@ -111,20 +110,3 @@ def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
         make_folder(output)
     jobs = [Job(f"city {one.folder.name}", one, cost=_COST) for one in steps]
     run_jobs(jobs, cluster, "cities")
-
-
-def _remove_folder(folder: Path) -> None:
-    """Renames a folder, then removes it.
-
-    If the process is killed before the folder is removed, no incomplete folder
-    is left under the original name.
-
-    Raises:
-        InputError: if the folder cannot be removed.
-    """
-    part = part_path(folder)
-    with user_errors(folder):
-        # A run that was killed may have left one behind.
-        shutil.rmtree(part, ignore_errors=True)
-        os.replace(folder, part)
-        shutil.rmtree(part)

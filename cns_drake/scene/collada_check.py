@@ -14,7 +14,13 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from evaluation.base import Element, read_bytes, read_elements, to_number
+from evaluation.base import (
+    Element,
+    expanded_size,
+    read_bytes,
+    read_elements,
+    to_number,
+)
 
 # Elements that show what their `url` names.
 _INSTANCES = (
@@ -58,8 +64,8 @@ _SHAPELESS = (
     "skeleton", "Name_array", "IDREF_array", "SIDREF_array", "bool_array",
     "int_array",
 )  # fmt: skip
-# Nodes that show each other form a circle beyond this depth.
-_DEEPEST = 100
+# Greatest number of nodes that the nodes of a file may stand for.
+_MOST_NODES = 100_000
 _CURE = "; export it with triangles and matrices, or as glTF"
 
 
@@ -155,8 +161,22 @@ def _placed_meshes(root: Element) -> Iterator[tuple[Element, np.ndarray]]:
         ValueError: a node shows itself, or has other numbers than it needs.
     """
     scene = _shown_scene(root)
-    waiting = [] if scene is None else [(scene, np.eye(4), 0)]
+    if scene is None:
+        return
     named = {one.get("id"): cast(Element, one) for one in root.iter("node")}
+
+    def inside(parent: Element) -> list[Element]:
+        urls = [one.get("url", "")[1:] for one in parent.all("instance_node")]
+        shown = [named[url] for url in urls if url in named]
+        return [*parent.all("node"), *shown]
+
+    try:
+        number = expanded_size(scene, inside)
+    except ValueError as error:
+        raise ValueError("has a node of COLLADA that shows itself") from error
+    if number > _MOST_NODES:
+        raise ValueError(f"shows {number} nodes, more than {_MOST_NODES}")
+    waiting = [(scene, np.eye(4))]
     sources = {
         f"#{one.get('id')}": inner.get("source", "")
         for one in root.iter("controller")
@@ -164,9 +184,7 @@ def _placed_meshes(root: Element) -> Iterator[tuple[Element, np.ndarray]]:
         if inner.tag in ("skin", "morph")
     }
     while waiting:
-        parent, X, depth = waiting.pop()
-        if depth > _DEEPEST:
-            raise ValueError("has a node of COLLADA that shows itself")
+        parent, X = waiting.pop()
         X = X @ _own_place(parent)
         yield from ((one, X) for one in parent.all("instance_geometry"))
         for one in parent.all("instance_controller"):
@@ -174,11 +192,7 @@ def _placed_meshes(root: Element) -> Iterator[tuple[Element, np.ndarray]]:
             for _ in sources:  # A skin may name a morph.
                 url = sources.get(url, url)
             yield Element("instance_geometry", url=url), X
-        inner = [*parent.all("node")]
-        for one in parent.all("instance_node"):
-            if (found := named.get(one.get("url", "")[1:])) is not None:
-                inner.append(found)
-        waiting += [(one, X, depth + 1) for one in reversed(inner)]
+        waiting += [(one, X) for one in reversed(inside(parent))]
 
 
 def _own_place(node: Element) -> np.ndarray:

@@ -47,7 +47,7 @@ from cns_drake.scene.model_finder import (
 )
 from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE, MOST_COPIED_TRIANGLES
-from evaluation.base import InputError
+from evaluation.base import InputError, expanded_size
 
 # Boxes (N, 2, 3) in the world [m], each its least and greatest coordinates ->
 # (N,) bool, whether anything in a box can be seen.
@@ -117,9 +117,11 @@ _GROUND = """<model name="ground_plane"><link name="link"><visual name="visual">
 </model>"""
 # Greatest depth of models within models.
 _DEEPEST = 20
-# Greatest number of elements in all included models together. A few files that
-# include each other can stand for any number.
-_MOST_INCLUDED = 250_000
+# Greatest numbers of elements, and of models within models, that a world may
+# stand for with all that it includes. Drake takes 1.4 MB and 4 ms for a model
+# within another one.
+_MOST_INCLUDED = 100_000
+_MOST_NESTED = 400
 # Greatest number of visuals on a body: Drake compares the name of each with the
 # names of all others on it.
 _MOST_ON_BODY = 250
@@ -236,6 +238,37 @@ class _Names:
         return name
 
 
+class _Expanded(NamedTuple):
+    """A world, or a model in it.
+
+    Attributes:
+        element: its element.
+        folder: folder of its file.
+        is_nested: whether it is a model within a model.
+        is_included: whether it comes from another file.
+    """
+
+    element: Element
+    folder: Path
+    is_nested: bool = False
+    is_included: bool = False
+
+    def num_included(self) -> int:
+        """Returns the number of its elements if it was included."""
+        if not self.is_included:
+            return 0
+        inner = sum(_num_elements(m) for m in self.element.iterfind("model"))
+        return _num_elements(self.element) - inner
+
+
+def _num_elements(element: Element) -> int:
+    return sum(1 for _ in element.iter())
+
+
+def _is_merged(include: Element) -> bool:
+    return include.get("merge", "").strip().lower() in ("true", "1")
+
+
 class _Reader:
     """One pass over a world and all models that it includes."""
 
@@ -257,10 +290,9 @@ class _Reader:
         self._meshes: dict[tuple[str, Path], Path | None] = {}
         # Element that is made -> the names of its children.
         self._names: dict[Element, _Names] = {}
-        # Root elements of the included files, and the number of elements of all
-        # models that were included.
+        # Root elements of the included files; URI and folder -> included file.
         self._included: dict[Path, Element] = {}
-        self._num_included = 0
+        self._files: dict[tuple[str, Path], Path | None] = {}
 
     def notes(self) -> tuple[str, ...]:
         """Returns one line for each kind of omitted element."""
@@ -283,7 +315,66 @@ class _Reader:
         self._scan_file(root)
         self._count_saved(world)
         folder = self._path.absolute().parent
+        self._check_expansion(world, folder)
         self._add_children(world, self._frames, folder, 0)
+
+    def _check_expansion(self, world: Element, folder: Path) -> None:
+        """Refuses a world that stands for too much.
+
+        Raises:
+            InputError: it does, or models include each other.
+        """
+        start = _Expanded(world, folder)
+        try:
+            num_nested = expanded_size(
+                start, self._parts, lambda one: one.is_nested
+            )
+            num_included = expanded_size(
+                start, self._parts, lambda one: one.num_included()
+            )
+        except ValueError as error:
+            raise InputError(
+                f"{self._path}: models include each other"
+            ) from error
+        if num_nested > _MOST_NESTED:
+            raise InputError(
+                f"{self._path}: stands for {num_nested} models within models,"
+                f" more than {_MOST_NESTED}; give the world models with links"
+            )
+        if num_included > _MOST_INCLUDED:
+            raise InputError(
+                f"{self._path}: its models include {num_included} elements,"
+                f" more than {_MOST_INCLUDED}"
+            )
+
+    def _parts(self, whole: _Expanded) -> Iterator[_Expanded]:
+        """Yields the models in a world or model, also those it includes."""
+        is_world = whole.element.tag == "world"
+        for one in whole.element:
+            if one.tag == "model":
+                yield whole._replace(element=one, is_nested=not is_world)
+            elif one.tag == "include":
+                file = self._included_file(one, whole.folder)
+                if file is None:
+                    continue
+                model = self._included_root(file).find("model")
+                if model is not None:
+                    is_nested = not (is_world or _is_merged(one))
+                    yield _Expanded(model, file.parent, is_nested, True)
+
+    def _included_file(self, include: Element, folder: Path) -> Path | None:
+        uri = (include.findtext("uri") or "").strip()
+        if (uri, folder) not in self._files:
+            place = self._finder.find(uri, folder)
+            self._files[uri, folder] = (
+                None if place is None else (model_file(place))
+            )
+        return self._files[uri, folder]
+
+    def _included_root(self, file: Path) -> Element:
+        if file not in self._included:
+            self._included[file] = read_model(file, self._finder)
+        return self._included[file]
 
     def leave_out_unseen(self, in_sight: InSight) -> list[UnseenMesh]:
         """Leaves out meshes that are out of sight, and returns them.
@@ -428,7 +519,9 @@ class _Reader:
     ) -> None:
         """Adds the visible parts and the frames of a world or model."""
         if depth > _DEEPEST:
-            raise InputError(f"{self._path}: models include each other")
+            raise InputError(
+                f"{self._path}: models within models, more than {_DEEPEST} deep"
+            )
         self._count_unknown(source)
         for element in source:
             if element.tag == "include":
@@ -473,8 +566,7 @@ class _Reader:
     ) -> None:
         self._count_unknown(include)
         uri = (include.findtext("uri") or "").strip()
-        place = self._finder.find(uri, folder)
-        file = None if place is None else model_file(place)
+        file = self._included_file(include, folder)
         model = None
         if file is not None:
             folder = file.parent
@@ -488,23 +580,15 @@ class _Reader:
         if model is None:
             return
         _override_model(model, include)
-        if include.get("merge", "").strip().lower() in ("true", "1"):
+        if _is_merged(include):
             self._merge(model, target, folder, depth)
         else:
             self._add_model(model, target, folder, depth)
 
     def _read_included(self, file: Path) -> Element | None:
         """Returns a file's first model, if any; counts all other content."""
-        if file not in self._included:
-            self._included[file] = read_model(file, self._finder)
         # The model is changed as its include says.
-        root = copy.deepcopy(self._included[file])
-        self._num_included += sum(1 for _ in root.iter())
-        if self._num_included > _MOST_INCLUDED:
-            raise InputError(
-                f"{self._path}: its models include more than {_MOST_INCLUDED}"
-                " elements"
-            )
+        root = copy.deepcopy(self._included_root(file))
         self._scan_file(root)
         models = root.findall("model")
         lights, actors = root.findall("light"), root.findall("actor")

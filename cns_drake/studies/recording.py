@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
 from pathlib import Path
-import shutil
 import sys
 
 from cns_drake.pictures import other_stage
@@ -29,7 +28,7 @@ from evaluation.base import (
     read_bytes,
     read_yaml,
     run_jobs,
-    user_errors,
+    scratch_folder,
 )
 
 # Expected time to load a stage [s].
@@ -179,12 +178,8 @@ class Record(Step):
         if is_new:
             yield self.folder, self.overwrite
             return
-        spare = self.output.with_name(f"{self.output.name}.page.part")
-        try:
-            yield spare, True
-        finally:
-            with user_errors(spare):
-                shutil.rmtree(spare)
+        with scratch_folder(self.output) as scratch:
+            yield scratch / self.output.name, True
 
     @property
     def _page_part(self) -> Part:

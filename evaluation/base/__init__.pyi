@@ -3,6 +3,10 @@ from . import poses as poses
 from . import program as program
 from . import shared_options as shared_options
 from . import terminal as terminal
+from .caches import cache_folder as cache_folder
+from .caches import is_own as is_own
+from .caches import mark_used as mark_used
+from .caches import remove_unused as remove_unused
 from .changes import merged as merged
 from .changes import nested as nested
 from .changes import parse_changes as parse_changes
@@ -12,12 +16,9 @@ from .compilation import compiled as compiled
 from .compilation import compiled_callback as compiled_callback
 from .complete_files import check_folder_writable as check_folder_writable
 from .complete_files import check_writable as check_writable
-from .complete_files import complete_part as complete_part
 from .complete_files import completing as completing
 from .complete_files import draft_folder as draft_folder
-from .complete_files import part_path as part_path
-from .complete_files import sole_writer as sole_writer
-from .complete_files import write_part as write_part
+from .complete_files import remove_folder as remove_folder
 from .complete_files import write_text as write_text
 from .csv_files import check_separator as check_separator
 from .csv_files import csv_text as csv_text
@@ -28,6 +29,9 @@ from .csv_files import unquoted_cell as unquoted_cell
 from .csv_files import write_csv as write_csv
 from .digests import file_digests as file_digests
 from .digests import settled_state as settled_state
+from .drafts import is_draft_of as is_draft_of
+from .drafts import scratch_folder as scratch_folder
+from .drafts import sole_writer as sole_writer
 from .elementary import arcsin as arcsin
 from .elementary import arctan2 as arctan2
 from .elementary import cos as cos
@@ -51,6 +55,7 @@ from .errors import no_such as no_such
 from .errors import one_line as one_line
 from .errors import validated as validated
 from .errors import value_errors as value_errors
+from .expansion import expanded_size as expanded_size
 from .figures import GONE_RGB as GONE_RGB
 from .figures import NEW_RGB as NEW_RGB
 from .figures import UNSEEN_RGB as UNSEEN_RGB
@@ -58,8 +63,6 @@ from .figures import figure_style as figure_style
 from .figures import font_settings as font_settings
 from .figures import save_figure as save_figure
 from .file_locks import exclusive as exclusive
-from .file_locks import lock_file as lock_file
-from .files import cache_folder as cache_folder
 from .files import check_regular as check_regular
 from .files import decode_text as decode_text
 from .files import file_name as file_name
@@ -95,7 +98,6 @@ from .json_text import fingerprint as fingerprint
 from .json_text import json_values as json_values
 from .json_text import parse_json as parse_json
 from .launch import start as start
-from .npz_archives import read_npz as read_npz
 from .number_format import is_number as is_number
 from .number_format import is_real as is_real
 from .number_format import other_separator as other_separator
@@ -129,6 +131,8 @@ from .units import NS_PER_S as NS_PER_S
 from .units import nearest_ns as nearest_ns
 from .units import shortly_before as shortly_before
 from .units import wrapped as wrapped
+from .unpacking import read_npz as read_npz
+from .unpacking import unpacked as unpacked
 from .version import __version__ as __version__
 from .version import installed_versions as installed_versions
 from .working_folder import leave_working_folder as leave_working_folder

@@ -7,17 +7,21 @@ import functools
 import hashlib
 import os
 from pathlib import Path
-import stat
 import tempfile
 from typing import TypeVar
 
 import numba
+from numba.core.caching import FunctionCache
 
-from evaluation.base.files import cache_folder
+from evaluation.base.caches import cache_folder, is_own, remove_unused
+from evaluation.base.files import user_errors
 from evaluation.base.interrupts import uninterrupted
 from evaluation.base.progress import interlude
 
 _Function = TypeVar("_Function", bound=Callable)
+_Made = TypeVar("_Made")
+# Number of digits of the hash that names a cache folder.
+_HASH_DIGITS = 16
 
 
 def compiled(function: _Function) -> _Function:
@@ -50,7 +54,7 @@ def compiled(function: _Function) -> _Function:
     lock = f"{function.__module__}.{function.__qualname__}.lock"
     dispatcher.compile = _compiling_once(
         dispatcher.compile,
-        function.__name__,
+        function,
         Path(dispatcher.stats.cache_path) / lock,
     )
     return dispatcher
@@ -72,7 +76,10 @@ def compiled_callback(function: Callable) -> int:
         _our_settings(),
     ):
         try:
-            made = numba.cfunc(signature, cache=True, **options)(function)
+            made = _despite_damage(
+                lambda: numba.cfunc(signature, cache=True, **options)(function),
+                function,
+            )
         except RuntimeError:  # See `compiled`.
             made = numba.cfunc(signature, **options)(function)
     _CALLBACKS.append(made)
@@ -137,11 +144,13 @@ class _ByContent:
         return place
 
     def ensure_cache_path(self) -> None:
+        if not self._place.exists():
+            remove_unused(self._place.parent, "[0-9a-f]" * _HASH_DIGITS)
         self._place.parent.mkdir(parents=True, exist_ok=True)
         self._place.mkdir(mode=0o700, exist_ok=True)
-        state = self._place.stat()
-        if state.st_uid != os.geteuid() or state.st_mode & stat.S_IWOTH:
+        if not is_own(self._place):
             raise PermissionError(f"{self._place}: others can write there")
+        # This also marks the folder as used.
         tempfile.TemporaryFile(dir=self._place).close()
 
     def get_cache_path(self) -> str:
@@ -155,7 +164,7 @@ class _ByContent:
 
 
 def _compiling_once(
-    compile_for: Callable[[tuple], object], name: str, file: Path
+    compile_for: Callable[[tuple], object], function: Callable, file: Path
 ) -> Callable[[tuple], object]:
     """Returns a function that compiles once for all processes.
 
@@ -166,13 +175,13 @@ def _compiling_once(
 
     Args:
         compile_for: function that compiles for types of arguments.
-        name: name of the compiled function, for messages of progress.
+        function: the function in Python.
         file: file that is locked during the compilation.
     """
 
     def compile_once(types: tuple) -> object:
         with contextlib.ExitStack() as stack:
-            stack.enter_context(interlude(f"compiling {name}"))
+            stack.enter_context(interlude(f"compiling {function.__name__}"))
             # This lock excludes other processes but not other threads: numba
             # compiles one thread at a time already, and a second lock could
             # deadlock. A forked process does not inherit it. Without locks in
@@ -183,9 +192,31 @@ def _compiling_once(
                 fcntl.lockf(stream, fcntl.LOCK_EX)
             # LLVM crashes if an interrupt ends a function that it calls.
             with _our_settings(), uninterrupted():
-                return compile_for(tuple(map(numba.types.unliteral, types)))
+                plain = tuple(map(numba.types.unliteral, types))
+                return _despite_damage(lambda: compile_for(plain), function)
 
     return compile_once
+
+
+def _despite_damage(
+    compile_it: Callable[[], _Made], function: Callable
+) -> _Made:
+    """Compiles a function again if its files in the cache are damaged.
+
+    Numba unpickles them, which can raise any error.
+
+    Raises:
+        InputError: they cannot be written again.
+    """
+    try:
+        return compile_it()
+    except RuntimeError:  # There is no cache: see `compiled`.
+        raise
+    except Exception:
+        cache = FunctionCache(function)
+        with user_errors(cache.cache_path):
+            cache.flush()
+        return compile_it()
 
 
 @functools.cache
@@ -200,4 +231,4 @@ def _content_hash(folder: Path) -> str:
     content = hashlib.sha256()
     for file in sorted(folder.glob("*.py")):
         content.update(repr((file.name, file.read_bytes())).encode())
-    return content.hexdigest()[:16]
+    return content.hexdigest()[:_HASH_DIGITS]

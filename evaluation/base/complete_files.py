@@ -4,44 +4,42 @@ from collections.abc import Iterator
 import contextlib
 import os
 from pathlib import Path
-import shutil
 import stat
 import tempfile
 
+from evaluation.base.drafts import (
+    check_draft,
+    check_links,
+    draft_file,
+    draft_identity,
+    scratch_folder,
+    sole_writer,
+)
 from evaluation.base.errors import InputError
-from evaluation.base.file_locks import exclusive, lock_file
 from evaluation.base.files import make_folder, user_errors
-
-
-def part_path(path: Path) -> Path:
-    """Returns the temporary name that a file has until it is complete."""
-    return path.with_name(f"{path.name}.part")
 
 
 @contextlib.contextmanager
 def completing(path: Path) -> Iterator[Path]:
-    """Yields a temporary path to write, which becomes the file `path`.
+    """Yields an empty, temporary file, which becomes the file `path`.
 
     When the block ends normally, the temporary file is flushed to the disk and
-    renamed to `path`. On an exception, the temporary file is removed. If
-    another process is writing the same file, the block waits until that file is
-    complete.
+    renamed to `path`; an older file of that name is replaced. On an exception,
+    the temporary file is removed. Of two processes that write the same file,
+    the last one provides it.
 
     Raises:
         InputError: if the file cannot be written, or `path` is a folder, a
             link, a device or a pipe.
     """
-    part = _new_part(path)
-    with contextlib.ExitStack() as stack, user_errors(path):
-        lock_file(part, stack, lambda: None)
-        try:
-            # A pipe or link of that name must not be written to.
-            part.unlink(missing_ok=True)
-            yield part
-            complete_part(path)
-        finally:
-            with contextlib.suppress(OSError):
-                part.unlink(missing_ok=True)
+    _check_file(path)
+    with user_errors(path), draft_file(path) as part:
+        made = draft_identity(part)
+        yield part
+        check_draft(part, made, path)
+        with part.open("rb") as stream:
+            os.fsync(stream.fileno())
+        os.replace(part, path)
 
 
 @contextlib.contextmanager
@@ -59,22 +57,36 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
     """
     # `.` has no name.
     place = Path(os.path.abspath(folder))
-    part = part_path(place)
-    draft = part / place.name
     if not replaces:
         check_new_folder(folder)
-    with sole_writer(folder):
-        try:
-            with user_errors(folder):
-                # A run that was killed may have left one behind.
-                shutil.rmtree(part, ignore_errors=True)
-                draft.mkdir(parents=True)
-                yield draft
-                if replaces and os.path.lexists(place):
-                    os.replace(place, part / "replaced")
-                os.replace(draft, place)
-        finally:
-            shutil.rmtree(part, ignore_errors=True)
+    check_links(place)
+    make_folder(place.parent)
+    with (
+        sole_writer(folder),
+        user_errors(folder),
+        scratch_folder(place) as scratch,
+    ):
+        made = draft_identity(scratch)
+        draft = scratch / place.name
+        draft.mkdir()
+        yield draft
+        check_draft(scratch, made, folder)
+        if replaces and os.path.lexists(place):
+            os.replace(place, scratch / "replaced")
+        os.replace(draft, place)
+
+
+def remove_folder(folder: Path) -> None:
+    """Renames a folder, then removes it.
+
+    If the process is killed before the folder is removed, no incomplete folder
+    is left under the original name.
+
+    Raises:
+        InputError: if the folder cannot be removed.
+    """
+    with user_errors(folder), scratch_folder(folder) as scratch:
+        os.replace(folder, scratch / "removed")
 
 
 def check_new_folder(folder: Path) -> None:
@@ -101,40 +113,6 @@ def write_text(path: Path, text: str) -> None:
         part.write_text(text, encoding="utf-8")
 
 
-def write_part(path: Path, text: str) -> None:
-    """Writes text to the temporary file of `path`, and flushes it to disk.
-
-    `complete_part` then gives the file its final name.
-
-    Raises:
-        InputError: if that fails, e.g. on a full disk.
-    """
-    part = _new_part(path)
-    # Several files must all be whole before the first gets its name.
-    with user_errors(part):
-        if not part.is_char_device():  # A full device reports its error.
-            part.unlink(missing_ok=True)
-    with user_errors(part), open(part, "w", encoding="utf-8") as stream:
-        stream.write(text)
-        stream.flush()
-        os.fsync(stream.fileno())
-
-
-def complete_part(path: Path) -> None:
-    """Renames the temporary file of `path` to `path`, once it is on the disk.
-
-    An older file of that name is replaced.
-
-    Raises:
-        InputError: the file cannot be written to the disk or renamed.
-    """
-    with user_errors(path):
-        part = part_path(path)
-        with part.open("rb") as stream:
-            os.fsync(stream.fileno())
-        os.replace(part, path)
-
-
 def check_writable(path: Path) -> None:
     """Checks before a long run that a file can be written after the run.
 
@@ -143,11 +121,10 @@ def check_writable(path: Path) -> None:
     Raises:
         InputError: if the file could not be written.
     """
-    with user_errors(path):
-        part = _new_part(path)
-        make_folder(path.parent)
-        part.touch()
-        part.unlink()
+    _check_file(path)
+    make_folder(path.parent)
+    with draft_file(path):
+        pass
 
 
 def check_folder_writable(folder: Path) -> None:
@@ -165,26 +142,14 @@ def check_folder_writable(folder: Path) -> None:
         pass
 
 
-def sole_writer(folder: Path) -> contextlib.AbstractContextManager[None]:
-    """Returns a context manager that locks a folder which is being written.
+def _check_file(path: Path) -> None:
+    """Checks that a file of this name may be written.
 
     Raises:
-        InputError: on entering the context, if another process is writing the
-            folder, or the lock cannot be written.
+        InputError: the path is a folder, link, device or pipe, or leads through
+            another user's link.
     """
-
-    def refuse() -> None:
-        raise InputError(f"{folder}: another process is writing this folder")
-
-    return exclusive(part_path(Path(os.path.abspath(folder))), refuse)
-
-
-def _new_part(path: Path) -> Path:
-    """Returns the temporary name of a file, if the file may be written.
-
-    Raises:
-        InputError: the path is a folder, link, device or pipe.
-    """
+    check_links(path)
     with user_errors(path):
         mode = path.lstat().st_mode if os.path.lexists(path) else stat.S_IFREG
         if stat.S_ISDIR(mode):
@@ -197,4 +162,3 @@ def _new_part(path: Path) -> Path:
             raise InputError(f"{path}: a link; give the name of a file")
         if not stat.S_ISREG(mode):
             raise InputError(f"{path}: not a regular file")
-    return part_path(path)

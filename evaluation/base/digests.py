@@ -15,10 +15,13 @@ import os
 from pathlib import Path
 import time
 
+from evaluation.base.caches import mark_used, own_cache, remove_unused
 from evaluation.base.complete_files import write_text
-from evaluation.base.files import cache_folder, check_regular, user_errors
+from evaluation.base.files import check_regular, user_errors
 
 _BLOCK_BYTES = 1 << 20
+# Number of digits of a digest.
+_DIGITS = 64
 # A file that was changed so recently may change again without another time:
 # some file systems count whole seconds [ns].
 _SETTLED_NS = 2_000_000_000
@@ -32,21 +35,28 @@ def file_digests(files: Sequence[Path]) -> list[str]:
     """
     paths = [os.path.realpath(file) for file in files]
     name = hashlib.sha256("\0".join(paths).encode(errors="surrogateescape"))
-    cache = cache_folder()
+    cache = own_cache("digests")
     if cache is None:
         return [_state_and_digest(path, None)[1] for path in paths]
-    kept = cache / "digests" / f"{name.hexdigest()[:32]}.json"
+    kept = cache / f"{name.hexdigest()[:32]}.json"
     known: dict[str, list] = {}
     # A cache that cannot be read or written only costs time.
     with contextlib.suppress(Exception):
-        known = dict(json.loads(kept.read_bytes()))
+        known = {
+            path: [[*state], digest]
+            for path, (state, digest) in json.loads(kept.read_bytes()).items()
+            if isinstance(digest, str) and len(digest) == _DIGITS
+        }
+    if known:
+        mark_used(kept)
+    else:
+        remove_unused(cache, "*.json")
     found = {path: _state_and_digest(path, known.get(path)) for path in paths}
     settled = {
         path: entry for path, entry in found.items() if entry[0] is not None
     }
     if settled != known:
         with contextlib.suppress(Exception):
-            kept.parent.mkdir(parents=True, exist_ok=True)
             write_text(kept, json.dumps(settled))
     return [found[path][1] for path in paths]
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 import contextlib
+import errno
 import fcntl
 import os
 from pathlib import Path
@@ -24,7 +25,7 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
     make_folder(path.parent)
     with contextlib.ExitStack() as stack:
         with user_errors(path.with_name(f"{path.name}.lock")):
-            lock_file(path, stack, on_wait)
+            _lock_file(path, stack, on_wait)
         yield
 
 
@@ -36,14 +37,14 @@ def remove_lock(path: Path) -> None:
     if path.with_name(f"{path.name}.lock").is_file():
         # A file that cannot be locked is in use, or is not one of our locks.
         with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
-            lock_file(path, stack, _refuse_to_wait)
+            _lock_file(path, stack, _refuse_to_wait)
 
 
 def _refuse_to_wait() -> None:
     raise BlockingIOError
 
 
-def lock_file(
+def _lock_file(
     path: Path, stack: contextlib.ExitStack, on_wait: Callable[[], None]
 ) -> None:
     """Locks `<path>.lock` until a stack of contexts is closed.
@@ -58,8 +59,8 @@ def lock_file(
     """
     lock = path.with_name(f"{path.name}.lock")
     while True:
-        descriptor = open_plain(lock, os.O_WRONLY)
-        stream = stack.enter_context(os.fdopen(descriptor, "w"))
+        descriptor = _open_plain(lock)
+        stream = stack.enter_context(os.fdopen(descriptor, "wb"))
         try:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -75,16 +76,16 @@ def lock_file(
                 return
 
 
-def open_plain(path: Path, flags: int) -> int:
-    """Opens a file for writing, and returns its file descriptor.
+def _open_plain(path: Path) -> int:
+    """Opens a lock for writing, and returns its file descriptor.
 
     The file is created if it does not exist. Symbolic links are not followed,
     because they may lead to another user's file. If the path is a pipe, the
-    function does not wait for a reader.
-
-    Args:
-        path: the file.
-        flags: further flags of `os.open`, such as `os.O_WRONLY`.
+    function does not wait for a reader. A file with a content is no lock.
     """
-    flags |= os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
-    return os.open(path, flags, 0o666)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
+    descriptor = os.open(path, flags, 0o666)
+    if os.fstat(descriptor).st_size > 0:
+        os.close(descriptor)
+        raise FileExistsError(errno.EEXIST, "a file that is no lock")
+    return descriptor

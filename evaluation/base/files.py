@@ -130,19 +130,6 @@ def make_folder(path: Path) -> None:
             raise InputError(f"{path}: not a folder") from None
 
 
-def cache_folder() -> Path | None:
-    """Returns cns-drake's folder in the cache of the user.
-
-    Source: the XDG base directory specification. The folder may not exist.
-    Without an absolute path, as for a user without a home, there is no cache:
-    anybody could have written files in the working directory.
-    """
-    base = os.environ.get("XDG_CACHE_HOME", "")
-    if not os.path.isabs(base):
-        base = os.path.expanduser("~/.cache")
-    return Path(base) / "cns-drake" if os.path.isabs(base) else None
-
-
 def natural_key(text: str) -> tuple:
     """Returns the key by which names are sorted in natural order.
 

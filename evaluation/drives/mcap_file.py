@@ -27,7 +27,6 @@ import struct
 from typing import Any, BinaryIO
 import zlib
 
-import lz4.frame
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
@@ -45,9 +44,14 @@ from mcap.records import (
     Statistics,
 )
 import numpy as np
-import zstandard
 
-from evaluation.base import InputError, check_regular, user_errors, value_errors
+from evaluation.base import (
+    InputError,
+    check_regular,
+    unpacked,
+    user_errors,
+    value_errors,
+)
 from evaluation.drives.bag_index import BagIndex, Entry
 from evaluation.drives.mcap_messages import read_stamp
 
@@ -110,7 +114,6 @@ _FAULTS = (
     ValueError,
     RuntimeError,
     struct.error,
-    zstandard.ZstdError,
 )
 
 
@@ -726,27 +729,11 @@ def _uncompress(chunk: Chunk) -> bytes:
     Raises:
         ValueError: if the chunk is damaged, too large or of unknown
             compression.
-        RuntimeError: if lz4 finds that the chunk is damaged.
-        zstandard.ZstdError: if zstd finds that the chunk is damaged.
     """
     size = chunk.uncompressed_size
     if size > CHUNK_LIMIT_BYTES:
         raise ValueError(f"a chunk of {size} bytes")
-    if chunk.compression == "zstd":
-        # The library reserves the size that the data claim.
-        claimed = zstandard.frame_content_size(chunk.data)
-        if claimed not in (-1, size):
-            raise ValueError(f"a chunk of {claimed} instead of {size} bytes")
-        data = zstandard.decompress(chunk.data, size)
-    elif chunk.compression == "lz4":
-        unpacker = lz4.frame.LZ4FrameDecompressor()
-        data = unpacker.decompress(chunk.data, max_length=size)
-        if not unpacker.eof:
-            raise ValueError(f"a chunk of more than {size} bytes")
-    elif chunk.compression == "":
-        data = chunk.data
-    else:
-        raise ValueError(f"unknown compression {chunk.compression!r}")
+    data = unpacked(chunk.data, chunk.compression, size)
     if len(data) != size:
         raise ValueError(f"a chunk of {len(data)} instead of {size} bytes")
     if chunk.uncompressed_crc not in (0, zlib.crc32(data)):

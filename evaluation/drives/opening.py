@@ -150,7 +150,7 @@ def open_drive(
         if poses is not None and "poses" not in arguments:
             drive = PosedDrive(drive, poses)
         return drive
-    if path.is_dir() and any(path.glob("*.mcap.part")):
+    if path.is_dir() and any(path.glob(".*.mcap.*.part")):
         raise InputError(
             f"{path}: the recording was not finished; simulate the drive again"
         )

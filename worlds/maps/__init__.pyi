@@ -10,6 +10,7 @@ from .map_folder import no_drives as no_drives
 from .map_folder import stage_name as stage_name
 from .map_reference import LocalMetres as LocalMetres
 from .map_reference import metres_on_map as metres_on_map
+from .map_reference import projected_system as projected_system
 from .shipped import recordable_drives as recordable_drives
 from .shipped import recordable_map as recordable_map
 from .shipped import recordable_maps as recordable_maps

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 import math
-from typing import Annotated
+import re
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import Field
@@ -12,9 +13,54 @@ from shapely.geometry import Polygon
 from evaluation.base import InputError, InputModel, read_yaml, validated
 from worlds.maps.map_folder import MapFolder
 
+if TYPE_CHECKING:
+    import pyproj
+
 # Semi-axes of the Earth, WGS 84 [m].
 _SEMI_MAJOR = 6378137.0
 _FLATTENING = 1.0 / 298.257223563
+# Forms of a reference system that PROJ may read: codes, URLs and URNs of EPSG
+# and other authorities, well-known text, and PROJ's own parameters if they are
+# numbers or words. In all others, and in the parts of well-known text that
+# `_WITH_FILES` names, PROJ can open a file, so also a device or a pipe.
+_LONGEST = 1 << 14
+_AUTHORITY = r"[A-Za-z]{2,9}"
+_FORMS = re.compile(
+    rf"(?:{_AUTHORITY}:)?\d+(?:\+(?:{_AUTHORITY}:)?\d+)?"
+    rf"|https?://(?:www\.)?opengis\.net/def/crs[\w./:?&=-]*"
+    rf"|urn:(?:x-)?ogc:def:crs[\w.:,-]*"
+    r"|\s*(?:PROJ|GEOG|GEOC|GEOD|COMPD_|COMPOUND|VERT_?|LOCAL_|ENG)"
+    r"(?:CRS|CS|ETICCRS|DCRS|PHICCRS|EDCRS)\s*\[.*"
+    r"|(?:\s*\+(?:proj|type|[a-z]+_[012a-z]+|zone|south|ellps|datum|a|b|rf|k|R"
+    r"|units|vunits|no_defs|towgs84|axis|pm|gamma|alpha|lonc|over)"
+    r"(?:=[A-Za-z0-9.,-]*)?)+\s*",
+    re.DOTALL | re.IGNORECASE,
+)
+_WITH_FILES = re.compile(r"EXTENSION|PARAMETERFILE", re.IGNORECASE)
+
+
+def projected_system(name: str) -> "pyproj.CRS":
+    """Returns a reference system that a file names.
+
+    Args:
+        name: an EPSG code, two of them joined by `+`, the URL or URN of a code,
+            well-known text, or parameters of PROJ that name no file.
+
+    Raises:
+        ValueError: the name has another form, or PROJ does not know the system.
+    """
+    import pyproj
+
+    if (
+        len(name) > _LONGEST
+        or not _FORMS.fullmatch(name)
+        or _WITH_FILES.search(name)
+    ):
+        raise ValueError("not a code, URL, URN or text of a reference system")
+    try:
+        return pyproj.CRS.from_user_input(name)
+    except pyproj.exceptions.ProjError as error:
+        raise ValueError("not known to PROJ") from error
 
 
 class LocalMetres:
@@ -91,12 +137,12 @@ def metres_on_map(folder: MapFolder) -> Callable[[np.ndarray], np.ndarray]:
     if len(known.origin) == 2:
         return LocalMetres(*reversed(known.origin))
     try:
-        system = pyproj.CRS.from_user_input(known.reference_system)
+        system = projected_system(known.reference_system)
         (system, *_) = system.sub_crs_list or [system]
         change = pyproj.Transformer.from_crs(
             "OGC:CRS84", system, always_xy=True
         )
-    except pyproj.exceptions.ProjError as error:
+    except (ValueError, pyproj.exceptions.ProjError) as error:
         raise InputError(
             f"{path}: reference_system: {known.reference_system[:80]!r} is none"
             " that PROJ knows"

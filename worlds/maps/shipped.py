@@ -4,16 +4,28 @@ A wheel contains them as one archive.
 """
 
 from collections.abc import Mapping
+import errno
 import functools
 import hashlib
+import json
+import os
 from pathlib import Path
-import shutil
 import tarfile
-import tempfile
 from types import MappingProxyType
 
-from evaluation.base import InputError, cache_folder, did_you_mean
+from evaluation.base import (
+    InputError,
+    cache_folder,
+    did_you_mean,
+    is_own,
+    mark_used,
+    remove_unused,
+    scratch_folder,
+)
 from worlds.maps.map_folder import MapFolder, drive_name, no_drives
+
+# File in the cache with the size of each file beside it [bytes].
+_SIZES = "sizes.json"
 
 
 @functools.cache
@@ -135,10 +147,12 @@ def unpacked(archive: Path) -> Path:
 
     Several processes may call the function at the same time: each unpacks to a
     temporary folder and then renames it, so that the folder is always whole,
-    and the first process to finish provides it.
+    and the first process to finish provides it. If files are missing or cut
+    off, the archive is unpacked again. Folders of older releases that nobody
+    has used for a month are removed.
 
     Raises:
-        InputError: if the cache cannot be written.
+        InputError: if the cache cannot be written, or others can write there.
     """
     cache = cache_folder()
     if cache is None:
@@ -147,33 +161,59 @@ def unpacked(archive: Path) -> Path:
             "unpacked; you have no home folder"
         )
     digest = hashlib.sha256(archive.read_bytes()).hexdigest()[:16]
-    folder = cache / f"{archive.name.partition('.')[0]}-{digest}"
-    if not folder.is_dir():
-        try:
+    name = archive.name.partition(".")[0]
+    folder = cache / f"{name}-{digest}"
+    try:
+        if not _is_whole(folder):
             _unpack(archive, folder)
-        except OSError as error:
-            raise InputError(
-                f"{folder}: {error.strerror or error}; the shipped worlds are "
-                "unpacked there: name another folder in XDG_CACHE_HOME"
-            ) from error
+            remove_unused(cache, f"{name}-{'[0-9a-f]' * 16}")
+    except (OSError, InputError) as error:
+        fault = error.strerror if isinstance(error, OSError) else error
+        raise InputError(
+            f"{folder}: {fault}; the shipped worlds are "
+            "unpacked there: name another folder in XDG_CACHE_HOME"
+        ) from error
+    mark_used(folder)
     return folder
+
+
+def _is_whole(folder: Path) -> bool:
+    """Returns whether a folder has all files of the archive, in their sizes.
+
+    Raises:
+        OSError: others can have filled the folder.
+    """
+    if not folder.exists():
+        return False
+    if not is_own(folder):
+        raise PermissionError(errno.EPERM, "others can write there")
+    try:
+        sizes = json.loads((folder / _SIZES).read_bytes())
+        return all(
+            os.path.getsize(folder / name) == size
+            for name, size in sizes.items()
+        )
+    except (OSError, ValueError, AttributeError, TypeError):
+        return False
 
 
 def _unpack(archive: Path, folder: Path) -> None:
     folder.parent.mkdir(parents=True, exist_ok=True)
-    part = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
-    try:
+    with scratch_folder(folder) as scratch:
+        new = scratch / folder.name
         with tarfile.open(archive) as tar:
             # Python 3.11.2, which Debian 12 has, lacks filters.
             tar.extraction_filter = getattr(
                 tarfile, "data_filter", lambda member, _: member
             )
-            tar.extractall(part)
-        part.chmod(0o755)
+            tar.extractall(new)
+            sizes = {one.name: one.size for one in tar if one.isfile()}
+        (new / _SIZES).write_text(json.dumps(sizes))
         try:
-            part.rename(folder)
+            if folder.exists() and not _is_whole(folder):
+                folder.rename(scratch / "damaged")
+            new.rename(folder)
         except OSError:
-            if not folder.is_dir():  # Otherwise another process was faster.
+            # Otherwise another process was faster.
+            if not _is_whole(folder):
                 raise
-    finally:
-        shutil.rmtree(part, ignore_errors=True)

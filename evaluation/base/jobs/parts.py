@@ -35,9 +35,16 @@ from evaluation.base.errors import InputError
 from evaluation.base.files import check_regular, make_folder, user_errors
 from evaluation.base.jobs.step import Reporter, Step
 from evaluation.base.json_text import fingerprint
+from evaluation.base.unpacking import unpacked
 
 _MAGIC = b"cns-eval part 3\n"
 _LEVEL = 1
+# What compressed data begin with.
+_ZSTD = b"\x28\xb5\x2f\xfd"
+# A result takes at most this many bytes, and as many more for each byte of its
+# file; what shrinks further is stored as it is.
+_MOST_BYTES = 1 << 25
+_MOST_RATIO = 16
 # A `LongList` keeps at most this number of its last items in memory.
 _MOST_HELD = 512
 # Number of items of a `LongList` that are written and read together.
@@ -182,7 +189,7 @@ class LongList(_Joined):
         """Returns the items of a block."""
         data = self._bytes(number)
         with _damage_named(self._where):
-            return decode(zstandard.ZstdDecompressor().decompress(data))
+            return decode(_unpacked(data))
 
     def _bytes(self, number: int) -> bytes:
         """Returns a block as it is in the file."""
@@ -236,7 +243,18 @@ class _Stretch(_Joined):
 
 def _compressed(plain: bytes) -> bytes:
     compressor = zstandard.ZstdCompressor(level=_LEVEL, write_checksum=True)
-    return compressor.compress(plain)
+    data = compressor.compress(plain)
+    return data if len(plain) <= _most_bytes(data) else plain
+
+
+def _unpacked(data: bytes) -> bytes:
+    if not data.startswith(_ZSTD):
+        return data
+    return unpacked(data, "zstd", _most_bytes(data))
+
+
+def _most_bytes(data: bytes) -> int:
+    return _MOST_BYTES + _MOST_RATIO * len(data)
 
 
 @dataclass(frozen=True)
@@ -314,8 +332,7 @@ class Part:
                     LongList._in_file(self.path, stream, start, stored)
                 )
                 start += stored["ends"][-1]
-            plain = zstandard.ZstdDecompressor().decompress(data)
-            return decode(plain, lists)
+            return decode(_unpacked(data), lists)
 
     def size(self) -> int:
         """Returns the approximate size of the value in memory [bytes].
@@ -349,7 +366,7 @@ def _damage_named(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from error
-    except (zstandard.ZstdError, ValueError, *_DECODING_ERRORS) as error:
+    except (ValueError, *_DECODING_ERRORS) as error:
         raise InputError(f"{path}: damaged ({error}); delete it") from error
 
 

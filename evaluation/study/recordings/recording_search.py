@@ -169,7 +169,7 @@ def _folders_in(folder: Path, levels: int) -> Iterator[Path]:
 
 
 def _holds_drive(path: Path) -> bool:
-    return path.suffix != ".part" and bool(find_data_sets(path))
+    return bool(find_data_sets(path))
 
 
 def _check_no_splits(spans: Mapping[Path, tuple[int, int]]) -> None:

@@ -132,12 +132,12 @@ def test_a_real_run_ends_in_one_line(tmp_path, request, disk):
         preexec_fn=preexec,
     )
     folder = output / "tiny_01"
-    part = folder / "tiny_01_0.mcap.part"
     assert result.returncode == 2
     assert result.stdout == ""
     assert "Traceback" not in result.stderr
     last = result.stderr.splitlines()[-1]
-    assert last == f"cns-drake: error: {part}: {FAULTS[disk]}"
+    mcap = folder / "tiny_01_0.mcap"
+    assert last == f"cns-drake: error: {mcap}: {FAULTS[disk]}"
     assert not folder.exists()
     if disk == "tmpfs":
         small.filler.unlink()

@@ -767,3 +767,35 @@ def test_meshes_out_of_sight_are_not_loaded(tmp_path):
     assert list(part.structures) == list(whole.structures)
     assert part.notes == whole.notes
     assert len(part.notes) == 5
+
+
+@pytest.mark.parametrize(
+    ("counts", "fault"),
+    [
+        ((2, 3), None),
+        ((401,), "stands for 401 models within models, more than 400"),
+        ((100, 100), "stands for 10100 models within models"),
+        ((10,) * 30, "stands for 1[0-9]{30} models within models"),
+    ],
+)
+def test_files_that_include_each_other_are_counted_first(
+    tmp_path, models, counts, fault
+):
+    """Each is looked at once, so a few lines cannot take memory or time."""
+    link = f"<link name='l'><visual name='v'>{BOX}</visual></link>"
+    for depth, count in enumerate((*counts, 0)):
+        inner = "".join(
+            include(f"model://m{depth + 1}", f"<name>n{k}</name>")
+            for k in range(count)
+        )
+        folder = models / f"m{depth}"
+        folder.mkdir()
+        (folder / "model.sdf").write_text(
+            f"<sdf version='1.9'><model name='m'>{inner or link}</model></sdf>"
+        )
+    path = write(tmp_path, include("model://m0"))
+    if fault is None:
+        load_world(path, model_paths=[models])
+        return
+    with pytest.raises(InputError, match=fault):
+        load_world(path, model_paths=[models])

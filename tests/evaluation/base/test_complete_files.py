@@ -1,11 +1,11 @@
 """Files and folders get their names when they are complete."""
 
-import fcntl
 import os
 from pathlib import Path
 import re
 import stat
-from threading import Thread
+import subprocess
+import sys
 
 import pytest
 
@@ -13,44 +13,132 @@ from evaluation.base import (
     InputError,
     check_folder_writable,
     check_writable,
-    complete_part,
     completing,
     draft_folder,
-    part_path,
-    write_part,
     write_text,
 )
 
 
-def test_part_lies_beside_the_file(tmp_path):
-    assert part_path(tmp_path / "a.b.html") == tmp_path / "a.b.html.part"
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
 
 
 def test_final_name_comes_with_completion_only(tmp_path):
     path = tmp_path / "page.html"
-    write_part(path, "ä\n")
-    assert not path.exists()
-    complete_part(path)
-    assert path.read_bytes() == b"\xc3\xa4\n"
-    assert not part_path(path).exists()
-
-
-def test_older_file_stays_until_completion(tmp_path):
-    path = tmp_path / "page.html"
     path.write_text("old")
-    write_part(path, "new")
-    assert path.read_text() == "old"
-    complete_part(path)
+    with completing(path) as part:
+        assert part.parent == tmp_path
+        part.write_text("new")
+        assert path.read_text() == "old"
     assert path.read_text() == "new"
+    assert names(tmp_path) == ["page.html"]
 
 
-def test_full_disk_is_one_line(tmp_path):
-    path = tmp_path / "page.html"
-    part_path(path).symlink_to("/dev/full")
-    with pytest.raises(InputError) as error:
-        write_part(path, "text")
-    assert str(error.value) == f"{path}.part: No space left on device"
-    assert not path.exists()
+def test_an_error_leaves_nothing(tmp_path):
+    for writer in (completing, draft_folder):
+        with (
+            pytest.raises(InputError, match="No space"),
+            writer(tmp_path / "town"),
+        ):
+            raise OSError(28, "No space left on device")
+    assert names(tmp_path) == []
+
+
+def test_two_drafts_of_one_file_have_names_that_nobody_knows(tmp_path):
+    found = set()
+    for _ in range(100):
+        with completing(tmp_path / "a") as part:
+            found.add(part.name)
+    assert len({name.split(".")[-2] for name in found}) == 100
+    assert all(len(name.split(".")[-2]) == 32 for name in found)
+
+
+@pytest.mark.parametrize("name", ["a" * 255, "é" * 127])
+def test_the_longest_names_can_be_written(tmp_path, name):
+    write_text(tmp_path / name, "text")
+    assert (tmp_path / name).read_text() == "text"
+
+
+def test_what_lies_beside_stays(tmp_path):
+    """Names of unfinished downloads, locks and copies are the user's."""
+    mine = {"town.part", "town.part.lock", "town.lock", ".town.part"}
+    for name in mine:
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "notes").write_text("mine")
+    with draft_folder(tmp_path / "town") as draft:
+        (draft / "a").touch()
+    with completing(tmp_path / "town.txt") as part:
+        part.touch()
+    assert {*names(tmp_path)} == mine | {"town", "town.txt"}
+    assert all((tmp_path / name / "notes").exists() for name in mine)
+
+
+def killed_draft(folder, how):
+    """Returns what a killed process left of a draft in a folder."""
+    before = {*folder.iterdir()}
+    code = (
+        "import os, signal, sys\nfrom pathlib import Path\n"
+        f"from evaluation.base import {how}\n"
+        f"with {how}(Path(sys.argv[1])) as part:\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    subprocess.run([sys.executable, "-c", code, folder / "town"], check=False)
+    (left,) = {*folder.iterdir()} - before
+    return left
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["completing", "draft_folder"])
+def test_the_next_run_removes_what_a_killed_one_left(tmp_path, how):
+    left = killed_draft(tmp_path, how)
+    assert left.name.startswith(".town.")
+    write_text(tmp_path / "other", "text")
+    assert names(tmp_path) == ["other"]
+
+
+@pytest.mark.slow
+def test_only_what_a_killed_run_made_is_removed(tmp_path):
+    """Something else may have got the name since."""
+    left = killed_draft(tmp_path, "draft_folder")
+    left.rename(tmp_path / "moved")
+    left.mkdir()
+    (left / "notes").write_text("mine")
+    write_text(tmp_path / "other", "text")
+    assert (left / "notes").read_text() == "mine"
+
+
+def test_a_draft_that_was_exchanged_becomes_no_file(tmp_path):
+    mine = tmp_path / "mine"
+    mine.write_text("mine")
+
+    def exchange():
+        with completing(tmp_path / "a") as part:
+            part.unlink()
+            part.symlink_to(mine)
+
+    with pytest.raises(InputError, match="something else took"):
+        exchange()
+    assert not (tmp_path / "a").exists()
+    assert mine.read_text() == "mine"
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root gives links away")
+def test_links_of_others_in_a_shared_folder_are_not_followed(tmp_path):
+    shared, mine = tmp_path / "shared", tmp_path / "mine"
+    shared.mkdir()
+    mine.mkdir()
+    (shared / "out").symlink_to(mine)
+    os.lchown(shared / "out", 12345, 12345)
+    write_text(shared / "out" / "a", "not shared")
+    shared.chmod(0o1777)
+    with pytest.raises(InputError, match="a link of another user"):
+        write_text(shared / "out" / "b", "text")
+    with (
+        pytest.raises(InputError, match="a link of another user"),
+        draft_folder(shared / "out" / "c"),
+    ):
+        pytest.fail("begun")
+    assert names(mine) == ["a"]
 
 
 def test_check_creates_the_folder_and_nothing_else(tmp_path):
@@ -97,23 +185,6 @@ def test_only_plain_names_are_written(tmp_path, monkeypatch):
     assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
 
 
-def test_a_part_name_that_is_a_pipe_or_a_link_is_not_written_to(tmp_path):
-    mine = tmp_path / "mine"
-    mine.write_text("mine")
-    part_path(tmp_path / "a").symlink_to(mine)
-    os.mkfifo(part_path(tmp_path / "b"))
-    for name in "ab":
-        write_text(tmp_path / name, "text")
-        assert (tmp_path / name).read_text() == "text"
-    part_path(tmp_path / "c").symlink_to(mine)
-    os.mkfifo(part_path(tmp_path / "d"))
-    for name in "cd":
-        write_part(tmp_path / name, "text")
-        complete_part(tmp_path / name)
-        assert (tmp_path / name).read_text() == "text"
-    assert mine.read_text() == "mine"
-
-
 def test_a_new_folder_takes_no_name_that_is_taken(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "full").mkdir()
@@ -149,29 +220,14 @@ def test_two_writers_of_one_folder(tmp_path):
     assert (folder / "a").exists()
 
 
-def test_two_writers_of_one_file(tmp_path):
+def test_of_two_writers_of_one_file_the_last_provides_it(tmp_path):
     path = tmp_path / "page.html"
-    order = []
-
-    def write() -> None:
-        with completing(path) as part:
-            order.append("second")
-            part.write_text("second")
-
-    with completing(path) as part:
-        part.write_text("first")
-        other = Thread(target=write)
-        other.start()
-        with (
-            open(tmp_path / "page.html.part.lock") as lock,
-            pytest.raises(BlockingIOError),
-        ):
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        order.append("first")
-    other.join()
-    assert order == ["first", "second"]
-    assert path.read_text() == "second"
-    assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
+    with completing(path) as first:
+        first.write_text("first")
+        write_text(path, "second")
+        assert path.read_text() == "second"
+    assert path.read_text() == "first"
+    assert names(tmp_path) == ["page.html"]
 
 
 def test_a_folder_is_checked_before_it_is_filled(tmp_path):

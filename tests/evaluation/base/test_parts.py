@@ -3,6 +3,7 @@ import json
 import os
 import pickle
 import struct
+import tracemalloc
 from typing import NamedTuple
 
 import numpy as np
@@ -225,3 +226,17 @@ def test_arrays_that_their_bytes_do_not_hold(part):
         _replaced(part, data=zstandard.compress(plain))
         with pytest.raises(InputError, match="damaged"):
             part.read()
+
+
+def test_a_small_file_unpacks_to_no_gigabyte(part):
+    """A compressed result has a limit; one of zeros is stored as it is."""
+    _replaced(part, data=zstandard.compress(bytes(1 << 28)))
+    tracemalloc.start()
+    with pytest.raises(InputError, match="damaged"):
+        part.read()
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 1 << 26
+    zeros = np.zeros(1 << 23)
+    part.write(INPUTS, zeros)
+    np.testing.assert_array_equal(part.read(), zeros)

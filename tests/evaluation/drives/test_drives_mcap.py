@@ -446,7 +446,7 @@ def test_folders_without_a_recording(tmp_path):
         open_drive(text)
     unfinished = tmp_path / "unfinished"
     unfinished.mkdir()
-    (unfinished / "unfinished_0.mcap.part").write_bytes(b"")
+    (unfinished / ".unfinished_0.mcap.0123.part").write_bytes(b"")
     with pytest.raises(InputError, match="was not finished"):
         open_drive(unfinished)
     path, _, _ = record(tmp_path / "two")

@@ -1241,6 +1241,7 @@ NO_FILES = {
     "evaluation.base.read_bytes": "bounded by its limit",
     "evaluation.base.read_text": "bounded by its limit",
     "evaluation.base.read_only": "an array",
+    "evaluation.base.unpacked": "bounded by its limit",
     "evaluation.base.start_python": "modules of this project",
     "worlds.city.start_city": "reads by load_road_network",
     "cns_drake.motion.load_car_masses": "a shipped model",
@@ -1261,7 +1262,7 @@ _READER = re.compile("(load|read|open|import|parse|find|decode|start)_")
 # Functions that unpack or decode a file whole -> modules that may use them.
 # Others go through these modules, which bound what is made.
 OPENERS = {
-    "zipfile.ZipFile": ("evaluation.base.npz_archives",),
+    "zipfile.ZipFile": ("evaluation.base.unpacking",),
     # The package's own archive of shipped cities.
     "tarfile.open": ("worlds.maps.shipped",),
     "gzip.open": (),
@@ -1269,7 +1270,7 @@ OPENERS = {
     "lzma.open": (),
     # Only its header is read.
     "np.load": ("evaluation.clouds.npy_files",),
-    "np.lib.format.read_array": ("evaluation.base.npz_archives",),
+    "np.lib.format.read_array": ("evaluation.base.unpacking",),
     # Films are made of the program's own pictures.
     "Image.open": (
         "evaluation.results.sections.camera_images",
@@ -1280,10 +1281,11 @@ OPENERS = {
     # After `read_yaml` of the same file.
     "yaml.compose": ("worlds.city.generation.generate",),
     "json.load": (),
-    "zstandard.decompress": ("evaluation.drives.mcap_file",),
-    "zstandard.ZstdDecompressor": ("evaluation.base.jobs.parts",),
+    "zlib.decompress": (),
+    "zstandard.decompress": ("evaluation.base.unpacking",),
+    "zstandard.ZstdDecompressor": (),
     "lz4.frame.decompress": (),
-    "lz4.frame.LZ4FrameDecompressor": ("evaluation.drives.mcap_file",),
+    "lz4.frame.LZ4FrameDecompressor": ("evaluation.base.unpacking",),
     # What another process of this program has sent.
     "pickle.load": ("cns_drake.scene.foreign_meshes",),
     "pickle.loads": (

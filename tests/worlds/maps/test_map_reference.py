@@ -1,5 +1,7 @@
 """Longitudes and latitudes on imported maps."""
 
+import os
+
 import numpy as np
 import pyproj
 import pytest
@@ -9,6 +11,7 @@ from evaluation.base import InputError
 from worlds.maps import (
     MapFolder,
     metres_on_map,
+    projected_system,
 )
 
 # Longitudes and latitudes in Delft [deg].
@@ -79,3 +82,47 @@ def test_maps_whose_place_is_unknown(tmp_path, facts, expected):
     (tmp_path / "import.yaml").unlink()
     with pytest.raises(InputError, match=r"no import\.yaml tells"):
         metres_on_map(folder)
+
+
+UTM = pyproj.CRS.from_epsg(25833)
+FORMS = [
+    "EPSG:25833", "epsg:25833", "25833", "EPSG:25833+7837",
+    "https://www.opengis.net/def/crs/EPSG/0/25833",
+    "http://www.opengis.net/def/crs/EPSG/0/25833",
+    "urn:ogc:def:crs:EPSG::25833",
+    "urn:ogc:def:crs,crs:EPSG::25833,crs:EPSG::7837",
+    *(UTM.to_wkt(one) for one in ("WKT1_GDAL", "WKT1_ESRI", "WKT2_2019")),
+    pyproj.CRS.from_user_input("EPSG:25833+7837").to_wkt("WKT1_GDAL"),
+    UTM.to_wkt(pretty=True), "+proj=utm +zone=33 +ellps=GRS80 +type=crs",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_forms_of_a_reference_system(name):
+    system = projected_system(name)
+    (horizontal, *_) = system.sub_crs_list or [system]
+    place = pyproj.Transformer.from_crs(horizontal, "EPSG:25833")
+    assert place.transform(4e5, 5.8e6) == pytest.approx((4e5, 5.8e6), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "+init=./pipe:x", "+init=/dev/stdin:x", "init=epsg:25833", "./pipe:x",
+        "+proj=utm +zone=33 +nadgrids=./pipe +type=crs",
+        "+proj=utm +zone=33 +geoidgrids=pipe +type=crs",
+        "+proj=utm +zone=33 +ellps=./pipe", "+proj=pipeline +step +init=pipe:x",
+        "http://localhost:8000/crs", "file:///dev/stdin", "/dev/stdin", "pipe",
+        "https://www.opengis.net/def/crs/../../@/dev/stdin", "{}", "", "\0",
+        UTM.to_json(), "+R=1+R" * 2000 + "!",
+        'PROJCS["x",EXTENSION["PROJ4","+proj=utm +nadgrids=./pipe"]]',
+        'BOUNDCRS[ABRIDGEDTRANSFORMATION["x",PARAMETERFILE["f","./pipe"]]]',
+        f"PROJCRS[{'[' * 20_000}", "PROJCRS[" + "[" * 9_000,
+    ],
+)  # fmt: skip
+def test_other_forms_do_not_reach_proj(name, tmp_path, monkeypatch):
+    """PROJ would wait for the pipe."""
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
+    with pytest.raises(ValueError, match=r"not a code|not known"):
+        projected_system(name)

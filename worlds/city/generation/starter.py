@@ -16,7 +16,7 @@ from shapely.geometry import box
 from shapely.ops import unary_union
 import yaml
 
-from evaluation.base import complete_part, parse_yaml, write_part
+from evaluation.base import parse_yaml, write_text
 from worlds.city.city_plan import CityPlan, load_plan
 from worlds.city.generation.city_structures import City, lay_out
 from worlds.maps import (
@@ -75,8 +75,7 @@ def start_city(
         text = yaml.safe_dump(
             values(), sort_keys=False, default_flow_style=None, width=79
         )
-        write_part(path, f"# {comment}\n\n{text}")
-        complete_part(path)
+        write_text(path, f"# {comment}\n\n{text}")
         written.append(path)
 
     plan_file = MapFolder(world).plan

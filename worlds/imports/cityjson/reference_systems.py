@@ -6,12 +6,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pyproj
-from pyproj.exceptions import CRSError, ProjError
 
 from evaluation.base import (
     InputError,
+    one_line,
     rotated,
 )
+from worlds.maps import projected_system
 
 # Direction of an axis -> its row among east, north and up, and its sign.
 _ROWS = {
@@ -99,7 +100,7 @@ def horizontal_system(name: str) -> pyproj.CRS:
     A system that is composed of codes, such as EPSG:31468+5783, has no area of
     use, but its horizontal part has one.
     """
-    system = pyproj.CRS.from_user_input(name)
+    system = projected_system(name)
     return (system.sub_crs_list or [system])[0]
 
 
@@ -119,8 +120,8 @@ def reference_system(name: str, where: str) -> ReferenceSystem:
     """Returns the axes and units of a reference system, by its name.
 
     Args:
-        name: EPSG code, or the URL or URN of an EPSG code; "" for metres east,
-            north and up.
+        name: the system, in a form that `projected_system` takes; "" for metres
+            east, north and up.
         where: place of the name in the file, for error messages.
 
     Raises:
@@ -130,10 +131,11 @@ def reference_system(name: str, where: str) -> ReferenceSystem:
     if not name:
         return ReferenceSystem()
     try:
-        system = pyproj.CRS.from_user_input(name)
-    except (CRSError, ProjError) as error:
+        system = projected_system(name)
+    except ValueError as error:
+        shown = one_line(name[:200])
         raise InputError(
-            f"{where}: {name} is not a known reference system (such as "
+            f"{where}: {shown} is not a known reference system (such as "
             "https://www.opengis.net/def/crs/EPSG/0/7415)"
         ) from error
     parts = system.sub_crs_list or [system]

@@ -207,3 +207,57 @@ def test_equal_sources_share_the_code_wherever_they_lie(tmp_path):
     assert run(tmp_path / "checkout") == "6 1\n"
     assert run(tmp_path / "installed") == "6 0\n"
     assert run(tmp_path / "changed") == "6 1\n"
+
+
+_DAMAGED = """
+import sys
+from evaluation.base.compilation import compiled, compiled_callback
+
+@compiled
+def thrice(number):
+    return 3 * number
+
+@compiled
+def nine_times(number):
+    return 3 * thrice(number)
+
+def call(address):
+    pass
+
+print(nine_times(2), compiled_callback(call) > 0)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("ending", "length"), [("nbi", 60), ("nbi", 0), ("nbc", 0), ("nbc", 300)]
+)
+def test_damaged_machine_code_is_compiled_again(tmp_path, ending, length):
+    """A cut index of a callback and of a function that another calls, too."""
+    script = tmp_path / "damaged.py"
+    script.write_text(_DAMAGED)
+
+    def run():
+        result = subprocess.run(
+            [sys.executable, script],
+            env={
+                **os.environ,
+                "PYTHONPATH": str(documents.ROOT),
+                "XDG_CACHE_HOME": str(tmp_path / "cache"),
+            },
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert (result.stdout, result.returncode) == ("18 True\n", 0), (
+            result.stderr
+        )
+
+    run()
+    files = [*(tmp_path / "cache").rglob(f"*.{ending}")]
+    assert len(files) == 3
+    for file in files:
+        os.truncate(file, length)
+    run()
+    sizes = [file.stat().st_size for file in files]
+    assert min(sizes) > length

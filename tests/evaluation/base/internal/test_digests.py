@@ -38,8 +38,13 @@ def test_digests_are_kept_until_a_file_changes(tmp_path, monkeypatch):
     os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
     check(b"pointz")
     # A damaged cache, or none, costs time only.
-    for kept in (tmp_path / "cache").rglob("*.json"):
-        kept.write_text('{"a": 1}')
+    (kept,) = (tmp_path / "cache").rglob("digests/*.json")
+    for damage in ("", '{"a": 1}', "[]", f'{{"{path}": [[1], 2]}}'):
+        kept.write_text(damage)
+        check(b"pointz")
+    # Others could have written there.
+    check(b"pointz", is_read=False)
+    kept.parent.chmod(0o777)
     check(b"pointz")
     monkeypatch.setenv("XDG_CACHE_HOME", "/proc/nowhere")
     check(b"pointz")

@@ -8,15 +8,16 @@ from evaluation.base import InputError
 from evaluation.base.file_locks import exclusive
 
 
-def test_a_lock_that_is_a_link_or_a_pipe_is_refused(tmp_path):
+def test_a_lock_that_is_a_link_a_pipe_or_a_text_is_refused(tmp_path):
     mine = tmp_path / "mine"
     mine.write_text("mine")
     (tmp_path / "a.lock").symlink_to(mine)
     os.mkfifo(tmp_path / "b.lock")
-    for name in "ab":
+    (tmp_path / "c.lock").write_text("mine")
+    for name in "abc":
         with (
             pytest.raises(InputError, match=rf"{name}\.lock: "),
             exclusive(tmp_path / name, lambda: None),
         ):
             raise AssertionError("locked")
-    assert mine.read_text() == "mine"
+    assert mine.read_text() == (tmp_path / "c.lock").read_text() == "mine"

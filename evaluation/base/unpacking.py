@@ -1,18 +1,56 @@
-"""Reading NumPy's archives from untrusted sources."""
+"""Unpacks compressed data from untrusted sources, up to a limit."""
 
 from collections.abc import Iterable
 import io
 from pathlib import Path
 import zipfile
 
+import lz4.frame
 import numpy as np
+import zstandard
 
 from evaluation.base.errors import one_line
 from evaluation.base.files import read_bytes
 
 # The compressions that `np.savez` and `np.savez_compressed` write. Of these,
 # `zipfile` unpacks no more than it is asked for.
-_COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+_ZIPPED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+
+
+def unpacked(packed: bytes, compression: str, most_bytes: int) -> bytes:
+    """Returns data without their compression.
+
+    Args:
+        packed: the compressed data.
+        compression: `zstd`, `lz4`, or "" for data that are not compressed.
+        most_bytes: greatest size of the result. No more memory is used, not
+            even if the data claim to be larger.
+
+    Raises:
+        ValueError: the data are damaged, unpack to more, or have an unknown
+            compression.
+    """
+    too_large = ValueError(f"data of more than {most_bytes} bytes")
+    try:
+        if compression == "zstd":
+            # The library reserves the size that the data claim.
+            if zstandard.frame_content_size(packed) > most_bytes:
+                raise too_large
+            data = zstandard.decompress(packed, most_bytes)
+        elif compression == "lz4":
+            unpacker = lz4.frame.LZ4FrameDecompressor()
+            data = unpacker.decompress(packed, max_length=most_bytes)
+            if not unpacker.eof:
+                raise too_large
+        elif compression == "":
+            data = packed
+        else:
+            raise ValueError(f"unknown compression {compression!r}")
+    except (zstandard.ZstdError, RuntimeError) as error:
+        raise ValueError(one_line(str(error))) from error
+    if len(data) > most_bytes:
+        raise too_large
+    return data
 
 
 def read_npz(
@@ -46,7 +84,7 @@ def read_npz(
                 left -= info.file_size
                 if left < 0:
                     raise ValueError(f"{name}: more than {most_bytes} bytes")
-                if info.compress_type not in _COMPRESSIONS:
+                if info.compress_type not in _ZIPPED:
                     raise ValueError(f"{name}: an unknown compression")
                 with archive.open(info) as member:
                     # Without a size, all that is compressed is unpacked first,

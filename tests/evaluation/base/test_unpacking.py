@@ -1,4 +1,4 @@
-"""Archives of arrays that claim more than they hold."""
+"""Archives and compressed data that claim more than they hold."""
 
 import io
 import os
@@ -6,10 +6,12 @@ import struct
 import tracemalloc
 import zipfile
 
+import lz4.frame
 import numpy as np
 import pytest
+import zstandard
 
-from evaluation.base import InputError, read_npz
+from evaluation.base import InputError, read_npz, unpacked
 
 _LIMIT = 10_000
 
@@ -110,3 +112,26 @@ def test_files_that_are_no_archives(tmp_path):
     (tmp_path / "b.npz").write_bytes(whole)
     with pytest.raises(ValueError, match="encrypted"):
         read_npz(tmp_path / "b.npz", ("a",), _LIMIT)
+
+
+@pytest.mark.parametrize(
+    ("compression", "compress"),
+    [
+        ("zstd", zstandard.compress),
+        ("zstd", zstandard.ZstdCompressor(write_content_size=False).compress),
+        ("lz4", lz4.frame.compress),
+        ("", bytes),
+    ],
+)
+def test_data_unpack_to_their_limit_and_no_further(compression, compress):
+    plain = bytes(100_000)
+    packed = compress(plain)
+    assert unpacked(packed, compression, len(plain)) == plain
+    with pytest.raises(ValueError, match=r"more than|not|dest"):
+        unpacked(packed, compression, len(plain) - 1)
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", "bz2"])
+def test_damaged_and_unknown_data_are_value_errors(compression):
+    with pytest.raises(ValueError, match=r"size|frame|compression"):
+        unpacked(b"no compressed data", compression, 1 << 20)
