@@ -588,7 +588,7 @@ def test_equal_configs_are_equal(struct, apply):
     first.ValidateOrThrow()
     for field, value in (("rate", -1), ("name", "")):
         broken = dataclasses.replace(first, **{field: value})
-        with pytest.raises(ValueError, match=f"Config .*: {field}: "):
+        with pytest.raises(ValueError, match=f"Config.*: {field}: "):
             broken.ValidateOrThrow()
 
 
