@@ -41,6 +41,7 @@ from cns_drake.scene import optional_value
 from evaluation.base import (
     nearest_ns,
     shortly_before,
+    starts_late,
 )
 from evaluation.drives import (
     BASE_FRAME,
@@ -325,6 +326,10 @@ class McapRecorder(LeafSystem):
         self._streams: list[
             tuple[Topic, Callable[[Context, int], dict[Topic, Any]]]
         ] = []
+        # Period, first time and function of the events of discrete LiDARs.
+        self._discrete_events: list[
+            tuple[float, float, Callable[[Context, int], EventStatus]]
+        ] = []
         # The tick of the last event; None before the first event.
         self._last_tick: int | None = None
         # Topic -> sequence number and stamp [ns] of its last message.
@@ -476,13 +481,13 @@ class McapRecorder(LeafSystem):
         scan = self._declare_port(f"{name}_scan", object())
         scan_time = self.DeclareVectorInputPort(f"{name}_time", 1)
 
-        def write_motion(context: Context) -> EventStatus:
-            stamp_ns = self._start_ns + nearest_ns(context.get_time(), 1)
+        def write_motion(context: Context, times: int = 1) -> EventStatus:
+            stamp_ns = self._start_ns + nearest_ns(context.get_time(), times)
             self._write_fixed_poses(stamp_ns)
             self._write_new(self._motion_messages(context, stamp_ns), stamp_ns)
             return EventStatus.Succeeded()
 
-        def write_scan(context: Context) -> EventStatus:
+        def write_scan(context: Context, times: int = 1) -> EventStatus:
             if not np.isfinite(scan_time.Eval(context)[0]):
                 return EventStatus.DidNothing()
             stamp_ns = self._start_ns + nearest_ns(scan_time.Eval(context)[0])
@@ -499,6 +504,7 @@ class McapRecorder(LeafSystem):
             self.DeclarePeriodicPublishEvent(
                 shortly_before(period), shortly_before(time), publish
             )
+            self._discrete_events.append((period, time, publish))
 
     def _add_sensor_port(self, name: str, sensor: RecordedSensor) -> None:
         self._add_port(
@@ -564,11 +570,12 @@ class McapRecorder(LeafSystem):
                 "before time zero",
                 stacklevel=2,
             )
-        # The event of this time would have come shortly before it.
-        if self._has_steps and period and time > 0.0:
-            tick = round(time / period)
-            if abs(time - tick * period) < 1e-9:
-                self._write_due_messages(context)
+        # The events of this time would have come shortly before it.
+        for own, offset, publish in self._discrete_events:
+            if starts_late(time, own, offset):
+                publish(context, 0)
+        if self._has_steps and period and starts_late(time, period, 0.0):
+            self._write_due_messages(context)
         return EventStatus.Succeeded()
 
     def _write_due_messages(self, context: Context) -> EventStatus:

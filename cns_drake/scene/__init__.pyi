@@ -12,6 +12,7 @@ from .perception_geometry import PerceptionGeometry as PerceptionGeometry
 from .perception_geometry import anchored_frames as anchored_frames
 from .perception_geometry import geometry_port as geometry_port
 from .perception_geometry import list_geometry as list_geometry
+from .perception_geometry import listed_geometry as listed_geometry
 from .perception_geometry import merge_surfaces as merge_surfaces
 from .perception_geometry import read_geometry as read_geometry
 from .perception_geometry import (

@@ -27,6 +27,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import (
     AbstractParameterIndex,
+    BusValue,
     Context,
     OutputPort,
 )
@@ -54,6 +55,8 @@ _CUBE_TRIANGLES = np.array(
 )  # fmt: skip
 # Colour of geometry without one in camera images.
 GREY = (0.5, 0.5, 0.5)
+# Name of a `GeometryList` in a BusValue.
+_LISTED = "list"
 # Number of sides of a cone; its surface is then exact to 5e-6 of its radius.
 _CONE_SIDES = 1024
 
@@ -292,11 +295,14 @@ def _appearance(
 
 
 def geometry_port(scene_graph: SceneGraph, role: Role) -> OutputPort:
-    """Returns an output port whose value is a `GeometryList` of a role.
+    """Returns an output port for the `GeometryList` of a role.
 
-    The value is a function of the Context. The value is computed anew only
-    after geometry has been added, removed, replaced, reshaped, or given another
-    role. A new pose of a frame does not count. Drake has no other way to tell:
+    The port's value is a BusValue, see `listed_geometry`, which is empty at
+    first: Drake's RgbdSensorAsync allocates Contexts of the SceneGraph on
+    threads that must not make Python objects. The value is a function of
+    the Context. It is computed anew only after geometry has been added,
+    removed, replaced, reshaped, or given another role. A new pose of a frame
+    does not count. Drake has no other way to tell:
     with 1.51 and 1.58, `ChangeShape` of perception geometry does not change
     `geometry_version` if the SceneGraph has no renderer, and to list 3,000
     geometries anew takes 20 to 50 ms, three to seven times as long as a scan.
@@ -320,16 +326,21 @@ def geometry_port(scene_graph: SceneGraph, role: Role) -> OutputPort:
             query_object.inspector(), role, latest() or _NOTHING
         )
         latest = weakref.ref(found)
-        output.set_value(found)
+        output.get_mutable_value().Set(_LISTED, Value[object](found))
 
     return scene_graph.DeclareAbstractOutputPort(
         name,
-        lambda: Value(object()),
+        lambda: Value(BusValue()),
         calc,
         # The first parameter is the geometry. The second, the configuration,
         # concerns only proximity.
         {scene_graph.abstract_parameter_ticket(AbstractParameterIndex(0))},
     )
+
+
+def listed_geometry(value: BusValue) -> GeometryList:
+    """Returns the list in a value of a port of `geometry_port`."""
+    return value.Find(_LISTED)
 
 
 def read_geometry(

@@ -91,7 +91,9 @@ def check_in_diagram(
 
     Raises:
         RuntimeError: the builder has no such system.
+        TypeError: it is no DiagramBuilder.
     """
+    check_type("builder", builder, DiagramBuilder)
     if not any(system is one for one in builder.GetSystems()):
         raise RuntimeError(
             f"{argument}: {type(system).__name__} '{system.get_name()}' is not "

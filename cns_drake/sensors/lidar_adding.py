@@ -11,7 +11,7 @@ import warnings
 
 import numpy as np
 from pydrake import geometry
-from pydrake.geometry import FrameId, Rgba, Role, SceneGraph
+from pydrake.geometry import FrameId, GeometryId, Rgba, Role, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
@@ -188,10 +188,17 @@ def add_lidar(
         _check_no_noise(measurement, range_noise, dropout)
     else:
         measurement = _noise_model(measurement, range_noise, dropout, seed)
+    for argument, places in (
+        ("body", [body]),
+        ("unseen", unseen),
+        ("anchored_frames", anchored_frames),
+        ("moving_bodies", moving_bodies),
+    ):
+        for place in places if isinstance(places, Collection) else ():
+            _check_place(argument, place, scene_graph)
     velocities: list[OutputPort] = []
     if isinstance(body, RigidBody):
         plant = body.GetParentPlant()
-        _check_registered(plant, scene_graph)
         frame_id = plant.GetBodyFrameIdOrThrow(body.index())
         if unseen is None:
             unseen = _welded_to(body)
@@ -284,6 +291,7 @@ def add_lidar_view(
         point_size: size of a point [m].
 
     Raises:
+        TypeError: an argument is of another type.
         ValueError: the LiDAR has a view already.
 
     Example:
@@ -291,6 +299,8 @@ def add_lidar_view(
 
         add_lidar_view(builder, lidar, meshcat)
     """
+    check_type("lidar", lidar, Lidar)
+    check_type("meshcat", meshcat, geometry.Meshcat)
     name = lidar.get_name()
     check_unused_names(builder, f"{name}_view")
     if period is None:
@@ -395,7 +405,27 @@ def _with_name(model: _Model, name: str) -> _Model:
     return model if model.sensor_name else replace(model, sensor_name=name)
 
 
-def _check_registered(plant: MultibodyPlant, scene_graph: SceneGraph) -> None:
+def _check_place(argument: str, place: object, scene_graph: SceneGraph) -> None:
+    """Checks that a body, frame or geometry belongs to a SceneGraph.
+
+    Raises:
+        RuntimeError: it does not.
+    """
+    if isinstance(place, RigidBody | Frame):
+        _check_registered(argument, place.GetParentPlant(), scene_graph)
+    elif isinstance(place, FrameId | GeometryId):
+        try:
+            scene_graph.model_inspector().GetName(place)
+        except RuntimeError:
+            raise RuntimeError(
+                f"{argument}: this SceneGraph has no {type(place).__name__} "
+                f"{place.get_value()}"
+            ) from None
+
+
+def _check_registered(
+    argument: str, plant: MultibodyPlant, scene_graph: SceneGraph
+) -> None:
     """Checks that a plant is registered with a SceneGraph.
 
     Raises:
@@ -405,8 +435,8 @@ def _check_registered(plant: MultibodyPlant, scene_graph: SceneGraph) -> None:
     inspector = scene_graph.model_inspector()
     if source is None or not inspector.SourceIsRegistered(source):
         raise RuntimeError(
-            "body: its plant is not registered with this SceneGraph; make "
-            "both by AddMultibodyPlantSceneGraph, or call "
+            f"{argument}: its plant is not registered with this SceneGraph; "
+            "make both by AddMultibodyPlantSceneGraph, or call "
             "plant.RegisterAsSourceForSceneGraph(scene_graph)"
         )
 

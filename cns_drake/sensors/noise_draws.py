@@ -4,14 +4,18 @@ import numbers
 
 import numpy as np
 
+from evaluation.base import check_type
 
-def check_seed(seed: object) -> None:
+
+def check_seed(seed: int) -> None:
     """Checks that a value can be the seed of a sensor's noise.
 
     Raises:
-        ValueError: it is no integer, or negative.
+        TypeError: it is no integer.
+        ValueError: it is negative.
     """
-    if not isinstance(seed, numbers.Integral) or seed < 0:
+    check_type("seed", seed, numbers.Integral)
+    if seed < 0:
         raise ValueError(f"seed: {seed!r} is not an integer from 0 on")
 
 

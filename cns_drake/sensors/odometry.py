@@ -23,10 +23,10 @@ from cns_drake.sensors.published_sensor import (
     USUAL_RATE,
     Interface,
     PublishedSensor,
-    SignalToLcm,
     carrier_frame,
     errors_of,
     find_interface,
+    make_signal,
     names_of_fields_in_errors,
     publish_measurements,
 )
@@ -253,7 +253,7 @@ def ApplyOdometryConfig(
         builder,
         interface,
         ports,
-        SignalToLcm(ports, axes, _odometry_numbers),
+        lambda time, value: make_signal(time, axes, _odometry_numbers(value)),
         period=1.0 / config.message_rate(),
     )
     return sensor

@@ -1,5 +1,6 @@
 """A LiDAR configured in YAML, in the same way as Drake's cameras."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +10,7 @@ from pydrake.multibody.parsing import GetScopedFrameByName
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 from pydrake.perception import PointCloud, PointCloudToLcm
-from pydrake.systems import framework
-from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.lcm import LcmBuses
 
 from cns_drake.sensors.lidar.beams import period_of_rate
@@ -115,36 +115,26 @@ class LidarConfig(LidarDescription, PublishedSensor):
         return section_of(self, LidarSection)
 
 
-class _ScanToLcm(framework.LeafSystem):
-    """Converts a scan to an `lcmt_point_cloud`, as Drake's `PointCloudToLcm`.
+def _make_scan_messages() -> Callable[..., AbstractValue | None]:
+    """Returns a function that returns a scan as an `lcmt_point_cloud`.
 
     The message has the time of the scan, which can be earlier than that of the
     Context.
     """
+    convert = PointCloudToLcm("world")
 
-    def __init__(self) -> None:
-        """Declares the ports."""
-        super().__init__()
-        self._convert = PointCloudToLcm("world")
-        self._cloud = self.DeclareAbstractInputPort(
-            "point_cloud_W", Value(PointCloud(0))
-        )
-        self._time = self.DeclareVectorInputPort("scan_time", 1)
-        self.DeclareAbstractOutputPort(
-            "lcmt_point_cloud",
-            self._convert.get_output_port().Allocate,
-            self._calc_message,
-        )
-
-    def _calc_message(self, context: Context, output: AbstractValue) -> None:
-        own = self._convert.CreateDefaultContext()
-        (time,) = np.nan_to_num(self._time.Eval(context))
+    def make_message(
+        _: float, cloud_W: PointCloud, scan_time: np.ndarray
+    ) -> AbstractValue | None:
+        if np.isnan(scan_time[0]):
+            return None
+        own = convert.CreateDefaultContext()
         # Drake cuts off what is below a microsecond.
-        own.SetTime((round(time * 1e6) + 0.5) / 1e6)
-        self._convert.get_input_port().FixValue(
-            own, self._cloud.EvalAbstract(context)
-        )
-        output.SetFrom(self._convert.get_output_port().EvalAbstract(own))
+        own.SetTime((round(scan_time[0] * 1e6) + 0.5) / 1e6)
+        convert.get_input_port().FixValue(own, Value(cloud_W))
+        return convert.get_output_port().EvalAbstract(own).Clone()
+
+    return make_message
 
 
 def ApplyLidarConfig(
@@ -215,9 +205,10 @@ def ApplyLidarConfig(
         builder,
         interface,
         [lidar.point_cloud_W_output_port(), lidar.scan_time_output_port()],
-        _ScanToLcm(),
+        _make_scan_messages(),
         period=lidar.samples.period if lidar.samples else period,
         offset=config.capture_offset + config.output_delay,
+        is_cloud=True,
     )
     return lidar
 

@@ -38,6 +38,7 @@ from evaluation.base import (
     Section,
     describe_validation_error,
     shortly_before,
+    starts_late,
 )
 
 # Messages per second of an IMU or odometry that names no rate.
@@ -170,8 +171,8 @@ class PublishedSensor:
 _Section = TypeVar("_Section", bound=Section)
 # An interface on which messages are published.
 Interface: TypeAlias = DrakeLcmInterface | LcmInterfaceSystem
-# Endings of the names of the systems that publish a sensor's messages.
-_PARTS = ("to_lcm", "publisher")
+# Ending of the name of the system that publishes a sensor's messages.
+_PUBLISHER = "publisher"
 
 
 @contextmanager
@@ -200,8 +201,7 @@ def find_interface(
         ValueError: the diagram already has a system with the name of one that
             publishes the sensor's messages.
     """
-    name = config.name
-    check_unused_names(builder, *(f"{name}_{part}" for part in _PARTS))
+    check_unused_names(builder, f"{config.name}_{_PUBLISHER}")
     if lcm is not None:
         return lcm
     if lcm_buses is not None:
@@ -220,12 +220,13 @@ def publish_measurements(
     builder: DiagramBuilder,
     lcm: Interface | None,
     ports: list[OutputPort],
-    to_lcm: framework.System,
+    make_message: Callable[..., AbstractValue | None],
     *,
     period: float,
     offset: float = 0.0,
+    is_cloud: bool = False,
 ) -> None:
-    """Adds systems that convert measurements to LCM messages and publish them.
+    """Adds a system that publishes measurements as LCM messages.
 
     Nothing is added for the interface of a null bus, such as in `lcm_buses:
     {default: null}`. Drake's cameras behave in the same way.
@@ -236,73 +237,91 @@ def publish_measurements(
         builder: builder of a diagram with the sensor.
         lcm: what `find_interface` returned.
         ports: output ports of the sensor.
-        to_lcm: system that converts the ports' values to a message.
+        make_message: function that returns a message, given the time [s] and
+            the values of the ports; None if there is nothing to publish.
         period: time between two messages [s].
         offset: time of the first message [s].
+        is_cloud: whether messages are `lcmt_point_cloud`, and not
+            `lcmt_drake_signal`.
     """
     if lcm is None:
         lcm = builder.AddSystem(LcmInterfaceSystem(lcm=DrakeLcm()))
     if lcm.get_lcm_url() == LcmBuses.kLcmUrlMemqNull:
         return
-    is_cloud = not isinstance(to_lcm, SignalToLcm)
     publisher = drake_lcm.LcmPublisherSystem.Make(
-        f"DRAKE_{kind}_{config.name}",
-        lcmt_point_cloud if is_cloud else lcmt_drake_signal,
-        lcm,
-        # With the state of a plant's step, and the scan, of this time.
-        publish_period=shortly_before(period),
-        publish_offset=shortly_before(offset),
+        channel=f"DRAKE_{kind}_{config.name}",
+        lcm_type=lcmt_point_cloud if is_cloud else lcmt_drake_signal,
+        lcm=lcm,
+        publish_triggers={framework.TriggerType.kForced},
         use_cpp_serializer=is_cloud,
     )
-    for part, system in zip(_PARTS, (to_lcm, publisher), strict=True):
-        builder.AddNamedSystem(f"{config.name}_{part}", system)
+    system = builder.AddNamedSystem(
+        f"{config.name}_{_PUBLISHER}",
+        _Publisher(ports, make_message, publisher, period, offset),
+    )
     for index, port in enumerate(ports):
-        builder.Connect(port, to_lcm.get_input_port(index))
-    builder.Connect(to_lcm.get_output_port(), publisher.get_input_port())
+        builder.Connect(port, system.get_input_port(index))
 
 
-class SignalToLcm(framework.LeafSystem):
-    """Converts the values of ports to an `lcmt_drake_signal`."""
+class _Publisher(framework.LeafSystem):
+    """Publishes a message in each period, also at the start of a simulation.
+
+    An LcmPublisherSystem would leave out the message of a start that is not at
+    time zero, as its event comes shortly before.
+    """
 
     def __init__(
         self,
         ports: list[OutputPort],
-        names: list[str],
-        values: Callable[..., np.ndarray],
+        make_message: Callable[..., AbstractValue | None],
+        publisher: drake_lcm.LcmPublisherSystem,
+        period: float,
+        offset: float,
     ):
-        """Declares an input for each port.
-
-        Args:
-            ports: the output ports whose values are converted.
-            names: name of each number in a message.
-            values: function that takes the values of the ports, and returns the
-                numbers of a message.
-        """
+        """Declares an input for each port, and the events."""
         super().__init__()
-        self._names = names
-        self._values = values
+        self._make_message = make_message
+        self._publisher = publisher
         for index, port in enumerate(ports):
             if port.get_data_type() == framework.PortDataType.kVectorValued:
                 self.DeclareVectorInputPort(f"u{index}", port.size())
             else:
                 self.DeclareAbstractInputPort(f"u{index}", port.Allocate())
-        self.DeclareAbstractOutputPort(
-            "lcmt_drake_signal",
-            lambda: Value(lcmt_drake_signal()),
-            self._calc_message,
+        # With the state of a plant's step, and the scan, of this time.
+        self.DeclarePeriodicPublishEvent(
+            shortly_before(period), shortly_before(offset), self._publish
         )
 
-    def _calc_message(self, context: Context, output: AbstractValue) -> None:
-        inputs = [
+        def start(context: Context) -> None:
+            if starts_late(context.get_time(), period, offset):
+                self._publish(context)
+
+        self.DeclareInitializationPublishEvent(start)
+
+    def _publish(self, context: Context) -> None:
+        values = [
             self.get_input_port(index).Eval(context)
             for index in range(self.num_input_ports())
         ]
-        message = lcmt_drake_signal()
-        message.val = self._values(*inputs).tolist()
-        message.dim = len(message.val)
-        message.coord = self._names
-        message.timestamp = round(context.get_time() * 1e6)
-        output.set_value(message)
+        message = self._make_message(context.get_time(), *values)
+        if message is None:
+            return
+        own = self._publisher.CreateDefaultContext()
+        own.SetTime(context.get_time())
+        self._publisher.get_input_port().FixValue(own, message)
+        self._publisher.ForcedPublish(own)
+
+
+def make_signal(
+    time: float, names: list[str], numbers: np.ndarray
+) -> AbstractValue:
+    """Returns an `lcmt_drake_signal`, whose time stamp is in milliseconds."""
+    message = lcmt_drake_signal()
+    message.val = numbers.tolist()
+    message.dim = len(message.val)
+    message.coord = names
+    message.timestamp = round(time * 1e3)
+    return Value(message)
 
 
 def section_of(
@@ -338,4 +357,4 @@ def carrier_frame(
 
 def _caller(config: PublishedSensor) -> str:
     """Returns the text with which errors of a configured sensor begin."""
-    return f"{type(config).__name__} {config.name}"
+    return f"{type(config).__name__} {config.name}".rstrip()

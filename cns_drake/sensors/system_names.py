@@ -4,6 +4,8 @@ from collections.abc import Collection
 
 from pydrake.systems.framework import DiagramBuilder
 
+from evaluation.base import check_type
+
 # Endings of the names of an IMU's systems.
 IMU_PARTS = ("accelerometer", "gyroscope", "noise")
 
@@ -38,8 +40,10 @@ def check_unused_names(builder: DiagramBuilder, *names: str) -> None:
     A diagram with two systems of one name ends the process when it is built.
 
     Raises:
+        TypeError: the builder is no DiagramBuilder.
         ValueError: the diagram has a system of one of these names.
     """
+    check_type("builder", builder, DiagramBuilder)
     for name in names:
         if builder.HasSubsystemNamed(name):
             raise ValueError(

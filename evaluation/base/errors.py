@@ -237,7 +237,8 @@ def check_type(argument: str, value: object, *types: type) -> None:
     """
     if not isinstance(value, types):
         names = [one.__name__ for one in types if one is not NoneType]
-        raise TypeError(f"{argument}: {value!r} is no {' or '.join(names)}")
+        given = " ".join(repr(value).split())
+        raise TypeError(f"{argument}: {given} is no {' or '.join(names)}")
 
 
 def no_such(noun: str, given: object, names: Collection[str]) -> str:

@@ -26,6 +26,23 @@ def shortly_before(time: float, times: int = 1) -> float:
     return time * (1.0 - times * 2.0**-48)
 
 
+def starts_late(
+    start: float, period: float, offset: float, times: int = 1
+) -> bool:
+    """Returns whether a simulation misses an event at the time of its start.
+
+    Args:
+        start: time of the start [s].
+        period: time between two events [s].
+        offset: time of the first event [s].
+        times: the number that was given to `shortly_before`.
+    """
+    number = max(0, math.floor((start - offset) / period + 0.5))
+    due = offset + number * period
+    is_due = nearest_ns(due) == nearest_ns(start)
+    return is_due and shortly_before(due, times) < start
+
+
 def nearest_ns(time: float, times: int = 0) -> int:
     """Returns a time [s] as the nearest whole number of nanoseconds.
 

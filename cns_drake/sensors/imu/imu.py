@@ -30,10 +30,10 @@ from cns_drake.sensors.published_sensor import (
     USUAL_RATE,
     Interface,
     PublishedSensor,
-    SignalToLcm,
     carrier_frame,
     errors_of,
     find_interface,
+    make_signal,
     names_of_fields_in_errors,
     publish_measurements,
     section_of,
@@ -309,7 +309,7 @@ def ApplyImuConfig(
         builder,
         interface,
         ports,
-        SignalToLcm(ports, axes, lambda *values: np.hstack(values)),
+        lambda time, *values: make_signal(time, axes, np.hstack(values)),
         period=1.0 / rate,
     )
     return imu

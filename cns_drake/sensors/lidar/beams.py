@@ -6,12 +6,14 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 import math
+from numbers import Real
 
 import numpy as np
 
 from evaluation.base import (
     arcsin,
     arctan2,
+    check_type,
     is_real,
 )
 
@@ -261,8 +263,10 @@ def period_of_rate(rate: float, longest: float = math.inf) -> float:
         longest: greatest time that is allowed [s].
 
     Raises:
-        ValueError: the rate is not a positive number, or is out of range.
+        TypeError: the rate is no number.
+        ValueError: the rate is not positive, or is out of range.
     """
+    check_type("rate", rate, Real)
     if not (
         is_real(rate) and 0.0 < rate <= HIGHEST_RATE and rate * longest >= 1
     ):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 import math
+from numbers import Real
 from types import NoneType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,6 +16,7 @@ from pydrake.multibody.math import SpatialVelocity
 from pydrake.perception import BaseField, Fields, PointCloud
 from pydrake.systems.framework import (
     BasicVector,
+    BusValue,
     CacheEntry,
     Context,
     InputPort,
@@ -32,7 +34,7 @@ from cns_drake.ray_casting import (
     Motion,
     RayCastingScene,
 )
-from cns_drake.scene import optional_value
+from cns_drake.scene import listed_geometry, optional_value
 from cns_drake.sensors.lidar.beams import BeamPattern, period_of_rate
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.ray_queries import (
@@ -56,6 +58,7 @@ from evaluation.base import (
     product,
     rotated,
     shortly_before,
+    starts_late,
 )
 
 if TYPE_CHECKING:
@@ -139,6 +142,7 @@ def sample_times(
         output_delay: time from a scan to its appearance on the ports [s].
 
     Raises:
+        TypeError: an argument is no number.
         ValueError: the rate is not positive or too high, the offset or delay
             is out of range, or is given without a rate.
     """
@@ -147,6 +151,7 @@ def sample_times(
         ("capture_offset", capture_offset, math.inf),
         ("output_delay", output_delay, period),
     ):
+        check_type(name, time, Real)
         if not (is_real(time) and 0.0 <= time < end):
             raise ValueError(
                 f"{name}: {time!r} is not a time from 0 to below {end:g} s"
@@ -205,8 +210,8 @@ class Lidar(LeafSystem):
     that reads it, such as that of a publisher, finds it. Its `scan_time` is
     the nominal time in whole nanoseconds. `Simulator.Initialize` takes a scan
     at once. With an `output_delay`, a second event shows the scan later, and
-    `Simulator.Initialize` takes none. `CastRays` and `EvalScene` always use
-    the present geometry.
+    `Simulator.Initialize` takes one only at the time of a periodic scan.
+    `CastRays` and `EvalScene` always use the present geometry.
 
     If the port `sweep` is connected, the poses of P come from this port and not
     from the SceneGraph: one pose for each column, at the column's firing time,
@@ -350,7 +355,7 @@ class Lidar(LeafSystem):
         """Declares the input ports, in the order of their indices."""
         declare = self.DeclareAbstractInputPort
         self._geometry_query = declare("geometry_query", Value(QueryObject()))
-        self._geometry = declare("geometry", Value(object()))
+        self._geometry = declare("geometry", Value(BusValue()))
         self._moving = declare(
             "moving_instances", Value(np.zeros(0, np.uint16))
         )
@@ -648,11 +653,11 @@ class Lidar(LeafSystem):
     def _initialize(self, context: Context, state: State) -> None:
         """Forgets the scans of an earlier simulation, and takes the first."""
         assert self.samples is not None
-        if self.samples.delay:
-            self._hold(state, _Held())
-        else:
+        period, offset, delay = self.samples
+        taken = _NO_CAPTURE
+        if not delay or starts_late(context.get_time(), period, offset, 2):
             taken = self._capture(context, 0)
-            self._hold(state, _Held(taken, taken))
+        self._hold(state, _Held(taken, _NO_CAPTURE if delay else taken))
 
     def _capture(self, context: Context, times: int) -> _Capture:
         """Returns the scan of an event that comes `times` before its time."""
@@ -688,9 +693,10 @@ class Lidar(LeafSystem):
         self, context: Context, seen: SeenGeometry, ball: Ball
     ) -> None:
         """Updates the geometry that the LiDAR sees in a ball."""
+        listed = optional_value(self._geometry, context)
         seen.update(
             self._geometry_query.Eval(context),
-            optional_value(self._geometry, context),
+            None if listed is None else listed_geometry(listed),
             self._calc_motions(context),
             self._known_poses(context),
             ball,
@@ -744,6 +750,8 @@ class Lidar(LeafSystem):
 
     def _calc_measured(self, context: Context, output: AbstractValue) -> None:
         time = context.get_time()
+        if not math.isfinite(time):
+            raise ValueError(f"time of the LiDAR's Context: {time} is no time")
         if self.samples is not None:
             time = nearest_ns(time) / NS_PER_S
         # Not `round`: of two scans a period apart, it gives half numbers one.

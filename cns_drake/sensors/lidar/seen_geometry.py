@@ -105,7 +105,8 @@ class GeometryView:
         ):
             found = getattr(self, name)
             check_type(name, found, Collection, NoneType)
-            for one in found or ():
+            # A text would be a collection of letters.
+            for one in [found] if isinstance(found, str) else found or ():
                 check_type(name, one, *kinds)
         check_type("structures", self.structures, Structures, NoneType)
         check_type("num_threads", self.num_threads, Integral)

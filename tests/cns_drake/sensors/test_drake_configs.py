@@ -281,7 +281,7 @@ def test_imu_and_odometry_publish_signals():
         [lcmt_drake_signal.decode(one) for one in received[name]]
         for name in names
     )
-    assert [m.timestamp for m in imu] == [10_000 * k for k in range(21)]
+    assert [m.timestamp for m in imu] == [10 * k for k in range(21)]
     assert len(odometry) == 5
     X_WS = X_WR @ X_RS
     # At rest an accelerometer measures what holds it up.
@@ -588,7 +588,7 @@ def test_equal_configs_are_equal(struct, apply):
     first.ValidateOrThrow()
     for field, value in (("rate", -1), ("name", "")):
         broken = dataclasses.replace(first, **{field: value})
-        with pytest.raises(ValueError, match=f"Config .*: {field}: "):
+        with pytest.raises(ValueError, match=f"Config.*: {field}: "):
             broken.ValidateOrThrow()
 
 
@@ -604,7 +604,7 @@ def test_nothing_is_published_on_a_null_bus(struct, apply):
         apply(struct(name="top"), builder, lcm_buses=buses)
         systems = builder.GetSystems()[before:]
         added[url] = [system.get_name() for system in systems]
-    published = ["top_to_lcm", "top_publisher"]
+    published = ["top_publisher"]
     assert added["memq://"] == added[None] + published
 
 

@@ -3,9 +3,10 @@
 import warnings
 
 import numpy as np
-from pydrake.geometry import Box, Role, SceneGraph
+from pydrake.geometry import Box, GeometryFrame, Role, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ConstantVectorSource
 import pytest
@@ -15,6 +16,7 @@ from cns_drake.sensors import (
     MeasurementModel,
     add_imu,
     add_lidar,
+    add_lidar_view,
     add_odometry,
     make_beam_pattern,
 )
@@ -89,7 +91,10 @@ class Site:
         ({"dropout": "a"}, ValueError, "dropout: 'a' is not a probability"),
         ({"dropout": 1.01}, ValueError, "dropout: 1.01 is not a probability"),
         ({"seed": -1}, ValueError, "seed: -1 is not an integer"),
-        ({"seed": 0.5}, ValueError, "seed: 0.5 is not an integer"),
+        ({"seed": 0.5}, TypeError, "^seed: 0.5 is no Integral"),
+        ({"seed": "7"}, TypeError, "^seed: '7' is no Integral"),
+        ({"rate": "10"}, TypeError, "^rate: '10' is no Real"),
+        ({"pose": np.eye(4)}, TypeError, r"^X_PB: array\(.* is no RigidT"),
         (
             {"range_noise": 0.1, "measurement": MeasurementModel()},
             ValueError,
@@ -111,16 +116,59 @@ class Site:
         ({"moving_bodies": 3}, TypeError, "^moving_bodies: 3 is no Map"),
         ({"causal": "no"}, TypeError, "^causal: 'no' is no bool"),
         ({"unseen": ["wall"]}, TypeError, "^unseen: 'wall' is no FrameId"),
-        ({"unseen": "wall"}, TypeError, "^unseen: '.' is no FrameId"),
+        ({"unseen": "wall"}, TypeError, "^unseen: 'wall' is no FrameId"),
         ({"role": "visual"}, TypeError, "^role: 'visual' is not a role .*"),
         ({"role": Role.kUnassigned}, TypeError, "^role: .* is not a role .*"),
     ],
 )
 def test_a_slip_is_found_at_once(options, error, fault):
     site = Site()
-    with pytest.raises(error, match=fault):
+    with pytest.raises(error, match=fault) as caught:
         site.add(**options)
+    assert "\n" not in str(caught.value)
     assert len(site.builder.GetSystems()) == 2
+
+
+def test_a_lidar_names_nothing_of_another_scene_graph():
+    site, other = Site(), Site()
+    body = other.plant.world_body()
+    (geometry_id,) = other.plant.GetVisualGeometriesForBody(body)
+    source = other.scene_graph.RegisterSource("other")
+    frame_id = other.scene_graph.RegisterFrame(source, GeometryFrame("f"))
+    fault = "its plant is not registered with this SceneGraph"
+    for place in (body, body.body_frame()):
+        with pytest.raises(RuntimeError, match=f"^unseen: {fault}"):
+            site.add(unseen=[place])
+    for options in (
+        {"body": frame_id},
+        {"unseen": [frame_id]},
+        {"unseen": [geometry_id]},
+        {"anchored_frames": [frame_id]},
+        {"moving_bodies": {frame_id: 0}},
+    ):
+        (argument,) = options
+        fault = f"^{argument}: this SceneGraph has no .*Id [0-9]+$"
+        with pytest.raises(RuntimeError, match=fault):
+            site.add(**options)
+
+
+def test_builders_and_lidars_are_checked_by_type():
+    site = Site()
+    site.builder, builder = RobotDiagramBuilder(), site.builder
+    with pytest.raises(TypeError, match=r"^builder: .* is no DiagramBuilder"):
+        site.add()
+    with pytest.raises(TypeError, match=r"^lidar: None is no Lidar"):
+        add_lidar_view(builder, None, None)
+
+
+def test_a_scan_needs_a_time():
+    site = Site()
+    lidar = site.add()
+    context = site.builder.Build().CreateDefaultContext()
+    for time in (np.nan, np.inf):
+        context.SetTime(time)
+        with pytest.raises(ValueError, match=r"^time of the LiDAR's Context: "):
+            lidar.scan_output_port().Eval(lidar.GetMyContextFromRoot(context))
 
 
 def test_a_scan_a_nanosecond_is_refused_with_a_pattern_too():

@@ -37,6 +37,7 @@ def record(
     rates=None,
     others=(),
     with_odometry=True,
+    start=0.0,
     **options,
 ):
     """Records a cart that drives towards a wall at a constant speed."""
@@ -69,10 +70,12 @@ def record(
         rates=rates,
     )
     simulator = Simulator(builder.Build())
-    own = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    context = simulator.get_mutable_context()
+    own = plant.GetMyMutableContextFromRoot(context)
     joint.set_translation_rate(own, SPEED)
+    context.SetTime(start)
     with bag:
-        simulator.AdvanceTo(seconds)
+        simulator.AdvanceTo(start + seconds)
     return McapDrive(folder) if with_odometry else None
 
 
@@ -163,3 +166,16 @@ def test_a_delayed_pose_needs_odometry(tmp_path):
             output_delay=0.02,
             with_odometry=False,
         )
+
+
+@pytest.mark.parametrize("start", [0.0, 0.3, 5.0])
+@pytest.mark.parametrize("delay", [0.0, 0.04])
+def test_a_recording_begins_with_the_scan_of_the_start(tmp_path, start, delay):
+    folder = tmp_path / "drive"
+    drive = record(folder, 0.01, 0.25, start=start, rate=10, output_delay=delay)
+    times = start + 0.1 * np.arange(3)
+    np.testing.assert_allclose(drive.stamps_ns / 1e9, times, rtol=0, atol=1e-9)
+    x = SPEED * (times - start)
+    np.testing.assert_allclose(drive.X_WS[:, 0, 3], x, rtol=0, atol=1e-9)
+    ahead = np.concatenate([drive.scan(k)["x"] for k in range(3)])
+    np.testing.assert_allclose(ahead, WALL - x, rtol=0, atol=8e-6)
