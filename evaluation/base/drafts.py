@@ -65,14 +65,15 @@ def is_draft_of(path: Path, target: Path) -> bool:
 
 
 def check_draft(draft: Path, made: list[int], target: Path) -> None:
-    """Raises an error if a draft is not what this process made.
+    """Raises an error if a draft is of another owner or kind than it was made.
 
     In a folder that everybody may change, others can put something else there.
+    What writes the draft may replace it by a file of its own.
 
     Raises:
         InputError: something else has the draft's name.
     """
-    if draft_identity(draft) != made:
+    if draft_identity(draft)[2:] != made[2:]:
         raise InputError(f"{target}: something else took the unfinished file")
 
 

@@ -1241,7 +1241,6 @@ NO_FILES = {
     "evaluation.base.read_bytes": "bounded by its limit",
     "evaluation.base.read_text": "bounded by its limit",
     "evaluation.base.read_only": "an array",
-    "evaluation.base.unpacked": "bounded by its limit",
     "evaluation.base.start_python": "modules of this project",
     "worlds.city.start_city": "reads by load_road_network",
     "cns_drake.motion.load_car_masses": "a shipped model",
