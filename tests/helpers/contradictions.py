@@ -149,7 +149,7 @@ def _said_twice(change: Callable[[Any, Any], None], topic: str):
 def _move(message, rng) -> None:
     axis = "xyz"[int(rng.integers(3))]
     position = message.pose.pose.position
-    step = float(rng.choice([1e-3, 1.0, -20.0, 1e5]))
+    step = float(rng.choice([0.1, 1.0, -20.0, 1e5]))
     setattr(position, axis, getattr(position, axis) + step)
 
 
