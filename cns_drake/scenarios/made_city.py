@@ -130,7 +130,8 @@ def make_city(scenario: Scenario, cities: Path) -> Scenario:
         doing("making the city")
         with exclusive(step.folder, lambda: doing("waiting for the city")):
             if not step.is_done():
-                step.run(Reporter())
+                with errors_at(f"{scenario.source}: city"):
+                    step.run(Reporter())
     return in_made_city(scenario, cities)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene import load_world, structures_in
-from evaluation.base import InputError, poses, read_records
+from evaluation.base import InputError, errors_at, poses, read_records
 
 # Classes of structures that can be missing; streets, ground and street
 # furniture always stay.
@@ -34,7 +34,8 @@ def lost_structures(scenario: Scenario) -> tuple[str, ...]:
     table = scenario.folder.structures
     lost = _scattered_losses(table, city.shares, city.scattered_seed, source)
     if city.missing > 0.0:
-        order = _removal_order(table, city.seed, removable)
+        with errors_at(f"{source}.missing"):
+            order = _removal_order(table, city.seed, removable)
         lost |= set(order[: round(city.missing * len(order))])
     return tuple(sorted(lost))
 

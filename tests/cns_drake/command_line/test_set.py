@@ -32,6 +32,8 @@ KINDS = {
     "list": "[]",
     "": "{}",
     "values by name": "{}",
+    "by name: number": "{}",
+    "number or by name: number": "1",
     "integer": "100",
     "integer or text": "100",
 }

@@ -163,7 +163,8 @@ def test_drives_without_a_control(tmp_path):
         on_note=notes.append,
     )
     assert notes == [
-        "town: no drive on the route of town_01 in the stage of town_02"
+        "world: all poses are in frame 'map', which drives share",
+        "town: no drive on the route of town_01 in the stage of town_02",
     ]
     assert {row.factors["both.stage"] for row in results.rows} == {"own"}
     assert "relative_auc" not in {row.metric for row in results.rows}
