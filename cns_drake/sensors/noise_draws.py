@@ -11,11 +11,11 @@ def check_seed(seed: int) -> None:
     """Checks that a value can be the seed of a sensor's noise.
 
     Raises:
-        TypeError: it is no integer.
-        ValueError: it is negative.
+        TypeError: it is no number.
+        ValueError: it is negative, or no integer.
     """
-    check_type("seed", seed, numbers.Integral)
-    if seed < 0:
+    check_type("seed", seed, numbers.Real)
+    if not isinstance(seed, numbers.Integral) or seed < 0:
         raise ValueError(f"seed: {seed!r} is not an integer from 0 on")
 
 

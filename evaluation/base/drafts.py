@@ -120,13 +120,14 @@ def _draft(target: Path, make: Callable[[Path], None]) -> Iterator[Path]:
         try:
             yield path
         finally:
-            _remove(path, made)
+            # What writes the draft may have replaced it: owner and kind stay.
+            _remove(path, made[2:])
 
 
 def _remove(path: Path, made: list[int]) -> None:
-    """Removes a draft, unless something else has its name."""
+    """Removes a draft, unless the end of its identity is not `made`."""
     with contextlib.suppress(OSError):
-        if draft_identity(path) != made:
+        if draft_identity(path)[-len(made) :] != made:
             return
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
@@ -179,7 +180,7 @@ def _living(records: Path) -> list[dict[str, Any]]:
                 living.append(values)
                 continue
             if "draft" in values:
-                _remove(Path(values["draft"]), values.get("made", []))
+                _remove(Path(values["draft"]), values.get("made", [None]))
             path.unlink()
     return living
 

@@ -91,8 +91,8 @@ class Site:
         ({"dropout": "a"}, ValueError, "dropout: 'a' is not a probability"),
         ({"dropout": 1.01}, ValueError, "dropout: 1.01 is not a probability"),
         ({"seed": -1}, ValueError, "seed: -1 is not an integer"),
-        ({"seed": 0.5}, TypeError, "^seed: 0.5 is no Integral"),
-        ({"seed": "7"}, TypeError, "^seed: '7' is no Integral"),
+        ({"seed": 0.5}, ValueError, "^seed: 0.5 is not an integer"),
+        ({"seed": "7"}, TypeError, "^seed: '7' is no Real"),
         ({"rate": "10"}, TypeError, "^rate: '10' is no Real"),
         ({"pose": np.eye(4)}, TypeError, r"^X_PB: array\(.* is no RigidT"),
         (
