@@ -37,9 +37,9 @@ from cns_drake.recording.recorded_topics import (
 )
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
-from cns_drake.scene import optional_value
-from evaluation.base import (
+from cns_drake.scene import (
     nearest_ns,
+    optional_value,
     shortly_before,
     starts_late,
 )
@@ -290,7 +290,7 @@ class McapRecorder(LeafSystem):
             start_ns: the stamp of time zero [ns].
             has_steps: whether the Diagram can have a plant with a step. The
                 events then come shortly before their times, see
-                `evaluation.base.shortly_before`.
+                `cns_drake.scene.shortly_before`.
 
         Raises:
             ValueError: period and schedule are both given, or neither is; or

@@ -3,6 +3,9 @@ from .drake_releases import find_bus as find_bus
 from .drake_releases import (
     reads_vertex_colours_as_srgb as reads_vertex_colours_as_srgb,
 )
+from .event_times import nearest_ns as nearest_ns
+from .event_times import shortly_before as shortly_before
+from .event_times import starts_late as starts_late
 from .file_references import referenced_files as referenced_files
 from .file_watch import FileWatch as FileWatch
 from .labels import number_structures as number_structures

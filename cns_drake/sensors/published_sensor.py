@@ -32,13 +32,11 @@ from pydrake.systems import lcm as drake_lcm
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
 
-from cns_drake.scene import find_bus
+from cns_drake.scene import find_bus, shortly_before, starts_late
 from cns_drake.sensors.system_names import check_unused_names
 from evaluation.base import (
     Section,
     describe_validation_error,
-    shortly_before,
-    starts_late,
 )
 
 # Messages per second of an IMU or odometry that names no rate.

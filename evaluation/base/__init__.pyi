@@ -128,9 +128,6 @@ from .round_shapes import revolved as revolved
 from .system_libraries import missing_library as missing_library
 from .terminal import note as note
 from .units import NS_PER_S as NS_PER_S
-from .units import nearest_ns as nearest_ns
-from .units import shortly_before as shortly_before
-from .units import starts_late as starts_late
 from .units import wrapped as wrapped
 from .unpacking import read_npz as read_npz
 from .unpacking import unpacked as unpacked

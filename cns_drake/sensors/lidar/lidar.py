@@ -34,7 +34,13 @@ from cns_drake.ray_casting import (
     Motion,
     RayCastingScene,
 )
-from cns_drake.scene import listed_geometry, optional_value
+from cns_drake.scene import (
+    listed_geometry,
+    nearest_ns,
+    optional_value,
+    shortly_before,
+    starts_late,
+)
 from cns_drake.sensors.lidar.beams import BeamPattern, period_of_rate
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.ray_queries import (
@@ -54,11 +60,8 @@ from evaluation.base import (
     NS_PER_S,
     check_type,
     is_real,
-    nearest_ns,
     product,
     rotated,
-    shortly_before,
-    starts_late,
 )
 
 if TYPE_CHECKING:
