@@ -6,6 +6,7 @@ from . import terminal as terminal
 from .caches import cache_folder as cache_folder
 from .caches import is_own as is_own
 from .caches import mark_used as mark_used
+from .caches import own_cache as own_cache
 from .caches import remove_unused as remove_unused
 from .changes import merged as merged
 from .changes import nested as nested

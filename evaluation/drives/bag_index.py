@@ -17,7 +17,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evaluation.base import cache_folder, completing, read_npz, settled_state
+from evaluation.base import (
+    completing,
+    mark_used,
+    own_cache,
+    read_npz,
+    remove_unused,
+    settled_state,
+)
 
 # Greatest size of the contents that are kept of a topic.
 _MOST_BYTES = 1 << 26
@@ -160,12 +167,12 @@ def _collect(
 
 def _place(files: Sequence[Path], topic: str) -> Path | None:
     """Returns the file of the cache for a topic; None without a cache."""
-    cache = cache_folder()
+    cache = own_cache("bags")
     if cache is None:
         return None
     names = [str(one.resolve()) for one in files]
     key = json.dumps([_FORM, topic, *names]).encode(errors="surrogatepass")
-    return cache / "bags" / f"{hashlib.sha256(key).hexdigest()[:32]}.npz"
+    return cache / f"{hashlib.sha256(key).hexdigest()[:32]}.npz"
 
 
 def _stamp(states: Sequence[list[int] | None], topic: str) -> np.ndarray:
@@ -197,7 +204,9 @@ def _cached(
             and len(found.ends) in (0, number)
             and (found.ends[-1:] == len(found.contents)).all()
         )
-        return found if is_whole else None
+        if is_whole:
+            mark_used(place)
+            return found
     return None
 
 
@@ -215,7 +224,7 @@ def _cache(
         return  # The bag was changed meanwhile.
     # A cache that cannot be written only costs time.
     with contextlib.suppress(Exception):
-        place.parent.mkdir(parents=True, exist_ok=True)
+        remove_unused(place.parent, "*.npz")
         stream = io.BytesIO()
         np.savez(stream, of=_stamp(states, topic), **found._asdict())
         with completing(place) as part:

@@ -278,3 +278,19 @@ def test_a_cache_that_is_cut_or_foreign_is_made_again(
         ):
             file.write_bytes(data)
             assert contents(open_drive(path)) == known
+
+
+def test_a_cache_where_others_can_write_is_not_used(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    shared = tmp_path / "cache/cns-drake/bags"
+    shared.mkdir(parents=True)
+    (tmp_path / "one").mkdir()
+    path = BAGS[min(BAGS)](tmp_path / "one")
+    for file in [path] if path.is_file() else path.iterdir():
+        os.utime(file, ns=(T0_NS, T0_NS))
+    shared.chmod(0o777)
+    known = contents(open_drive(path))
+    assert not [*shared.iterdir()]
+    shared.chmod(0o700)
+    assert contents(open_drive(path)) == known
+    assert [*shared.iterdir()]
