@@ -9,6 +9,7 @@ import multiprocessing
 import os
 import pickle
 import shutil
+import time
 
 from helpers.bags import cloud, header, pose, write_bag
 from helpers.dataset_folders import (
@@ -21,7 +22,7 @@ from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 
-from evaluation.base import InputError
+from evaluation.base import NS_PER_S, InputError
 from evaluation.drives import open_drive
 
 NUM = 12
@@ -257,18 +258,25 @@ def test_what_libraries_leave_out_is_refused_by_name(tmp_path, case):
     assert beside in str(error.value)
 
 
-@pytest.mark.parametrize("name", BAGS)
-def test_a_cache_that_is_cut_or_foreign_is_made_again(
-    tmp_path, monkeypatch, name
-):
+@pytest.fixture
+def later(tmp_path, monkeypatch):
+    """An empty cache, and a clock by which files changed a minute ago.
+
+    Files that have just changed are not in the cache.
+    """
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    now_ns = time.time_ns
+    monkeypatch.setattr(time, "time_ns", lambda: now_ns() + 60 * NS_PER_S)
     (tmp_path / "one").mkdir()
+
+
+@pytest.mark.usefixtures("later")
+@pytest.mark.parametrize("name", BAGS)
+def test_a_cache_that_is_cut_or_foreign_is_made_again(tmp_path, name):
     path = BAGS[name](tmp_path / "one")
-    # Files that have just changed are not in the cache.
-    for file in [path] if path.is_file() else path.iterdir():
-        os.utime(file, ns=(T0_NS, T0_NS))
     known = contents(open_drive(path))
     cached = [*(tmp_path / "cache").rglob("*.npz")]
+    assert cached
     for file in cached:
         for data in (
             file.read_bytes()[:-40],
@@ -280,14 +288,11 @@ def test_a_cache_that_is_cut_or_foreign_is_made_again(
             assert contents(open_drive(path)) == known
 
 
-def test_a_cache_where_others_can_write_is_not_used(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+@pytest.mark.usefixtures("later")
+def test_a_cache_where_others_can_write_is_not_used(tmp_path):
+    path = BAGS["MCAP"](tmp_path / "one")
     shared = tmp_path / "cache/cns-drake/bags"
     shared.mkdir(parents=True)
-    (tmp_path / "one").mkdir()
-    path = BAGS[min(BAGS)](tmp_path / "one")
-    for file in [path] if path.is_file() else path.iterdir():
-        os.utime(file, ns=(T0_NS, T0_NS))
     shared.chmod(0o777)
     known = contents(open_drive(path))
     assert not [*shared.iterdir()]
