@@ -65,15 +65,14 @@ def is_draft_of(path: Path, target: Path) -> bool:
 
 
 def check_draft(draft: Path, made: list[int], target: Path) -> None:
-    """Raises an error if a draft is of another owner or kind than it was made.
+    """Raises an error if a draft is not what this process made.
 
     In a folder that everybody may change, others can put something else there.
-    What writes the draft may replace it by a file of its own.
 
     Raises:
         InputError: something else has the draft's name.
     """
-    if draft_identity(draft)[2:] != made[2:]:
+    if draft_identity(draft) != made:
         raise InputError(f"{target}: something else took the unfinished file")
 
 
@@ -120,14 +119,13 @@ def _draft(target: Path, make: Callable[[Path], None]) -> Iterator[Path]:
         try:
             yield path
         finally:
-            # What writes the draft may have replaced it: owner and kind stay.
-            _remove(path, made[2:])
+            _remove(path, made)
 
 
 def _remove(path: Path, made: list[int]) -> None:
-    """Removes a draft, unless the end of its identity is not `made`."""
+    """Removes a draft, unless something else has its name."""
     with contextlib.suppress(OSError):
-        if draft_identity(path)[-len(made) :] != made:
+        if draft_identity(path) != made:
             return
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
@@ -180,7 +178,7 @@ def _living(records: Path) -> list[dict[str, Any]]:
                 living.append(values)
                 continue
             if "draft" in values:
-                _remove(Path(values["draft"]), values.get("made", [None]))
+                _remove(Path(values["draft"]), values.get("made", []))
             path.unlink()
     return living
 

@@ -6,7 +6,6 @@ are never removed or overwritten.
 """
 
 from collections.abc import Iterable
-import contextlib
 import os
 from pathlib import Path
 import re
@@ -15,9 +14,9 @@ from typing import NamedTuple
 from evaluation.base import (
     InputError,
     check_writable,
-    completing,
     errors_at,
     make_folder,
+    scratch_folder,
     user_errors,
 )
 from evaluation.results.table import QUERIES, RESULTS, QueryRows, Results
@@ -133,16 +132,19 @@ def write_tables(folder: Path, results: Results, queries: QueryRows) -> None:
     Raises:
         InputError: a file cannot be written or removed.
     """
+    tables: dict[str, Results | QueryRows] = {
+        RESULTS: results,
+        QUERIES: queries,
+    }
     # Both are whole before either gets its name.
-    with contextlib.ExitStack() as stack:
-        for path, table in (
-            (folder / RESULTS, results),
-            (folder / QUERIES, queries),
-        ):
-            part = stack.enter_context(completing(path))
-            with errors_at(path, f"{part}: "):
-                table.write_csv(part)
+    with scratch_folder(folder / RESULTS) as scratch:
+        for name, table in tables.items():
+            with errors_at(folder / name, f"{scratch / name}: "):
+                table.write_csv(scratch / name)
         remove_earlier(folder)
+        for name in tables:
+            with user_errors(folder / name):
+                os.replace(scratch / name, folder / name)
 
 
 def _found(folder: Path, group: _Group) -> list[Path]:
