@@ -1,7 +1,7 @@
 from .align import AlignmentReport as AlignmentReport
 from .opening import Opened as Opened
 from .opening import When as When
-from .opening import World as World
+from .opening import WorldVerdict as WorldVerdict
 from .opening import open_pair as open_pair
 from .opening import world_of_frames as world_of_frames
 from .registration import NUM_NEIGHBOURS as NUM_NEIGHBOURS

@@ -31,7 +31,7 @@ _APART = 200.0
 
 
 @dataclass(frozen=True)
-class World:
+class WorldVerdict:
     """The world in which drives are compared: the verdict of `open_pair`.
 
     Attributes:
@@ -73,7 +73,7 @@ class Opened:
     """
 
     drives: list[Drive | Path]
-    world: World
+    world: WorldVerdict
 
 
 def open_pair(
@@ -156,7 +156,9 @@ def open_pair(
     )
 
 
-def world_of_frames(names: Sequence[str], frames: Sequence[str]) -> World:
+def world_of_frames(
+    names: Sequence[str], frames: Sequence[str]
+) -> WorldVerdict:
     """Returns the verdict on drives whose worlds have names, see `Drive.world`.
 
     Args:
@@ -164,12 +166,16 @@ def world_of_frames(names: Sequence[str], frames: Sequence[str]) -> World:
         frames: name of the world of each.
     """
     if len(set(frames)) == 1:
-        return World(True, False, f"all poses are in {_in_words(frames[0])}")
+        return WorldVerdict(
+            True, False, f"all poses are in {_in_words(frames[0])}"
+        )
     listed = "; ".join(
         f"{name} in {_in_words(frame)}"
         for name, frame in zip(names, frames, strict=True)
     )
-    return World(False, False, f"nothing says that these are one: {listed}")
+    return WorldVerdict(
+        False, False, f"nothing says that these are one: {listed}"
+    )
 
 
 def _in_words(frame: str) -> str:
@@ -182,10 +188,10 @@ def _in_words(frame: str) -> str:
 
 def _world(
     drives: Sequence[Drive], clouds: Sequence[Path], *, aligned: bool
-) -> World:
+) -> WorldVerdict:
     """Returns the verdict on drives and clouds, before they are aligned."""
     if not drives:
-        return World(
+        return WorldVerdict(
             None,
             False,
             "maps' files name no frame; their coordinates are compared as"
@@ -200,7 +206,7 @@ def _world(
             f"{named}: names no frame; its coordinates are taken as those of"
             f" {drives[0].name}"
         )
-        return World(None, False, f"{why}; {found.why}")
+        return WorldVerdict(None, False, f"{why}; {found.why}")
     if aligned:
         return replace(
             found, aligned=True, why=f"{found.why}; aligned by their scans"

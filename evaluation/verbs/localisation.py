@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from evaluation.alignment import When, World, open_pair
+from evaluation.alignment import When, WorldVerdict, open_pair
 from evaluation.base import InputError, json_values, note
 from evaluation.drives import Drive, Reading
 from evaluation.localisation import (
@@ -237,8 +237,8 @@ def localise(
 
 
 def _with_offset(
-    world: World, rows: np.ndarray, on_note: Callable[[str], None]
-) -> World:
+    world: WorldVerdict, rows: np.ndarray, on_note: Callable[[str], None]
+) -> WorldVerdict:
     """Adds to the verdict how far poses lie from registration, if far.
 
     Args:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from evaluation.alignment import When, World, open_pair
+from evaluation.alignment import When, WorldVerdict, open_pair
 from evaluation.base import (
     InputError,
     Reporter,
@@ -122,7 +122,7 @@ _BEND = 0.05
 
 def _in_one_world(
     pair: SessionPair, align: When, on_note: Callable[[str], None]
-) -> tuple[SessionPair, World]:
+) -> tuple[SessionPair, WorldVerdict]:
     """Returns the maps in one world, and the verdict.
 
     Raises:
@@ -131,7 +131,7 @@ def _in_one_world(
     if align != "always":
         why = "the maps of a folder share a world, by its form"
         on_note(f"world: {why}")
-        return pair, World(True, False, why)
+        return pair, WorldVerdict(True, False, why)
     drives = [SessionDrive(one) for one in pair]
     opened = open_pair(drives, when=align, on_note=on_note)
     found = []

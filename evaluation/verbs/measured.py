@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from evaluation.alignment import World
+from evaluation.alignment import WorldVerdict
 from evaluation.base import Reporter, one_line
 from evaluation.drives import Drive
 from evaluation.recognition import (
@@ -34,7 +34,7 @@ class Measured:
     numbers: Mapping[str, Number]
     results: Results
     queries: QueryRows
-    world: World
+    world: WorldVerdict
 
     @property
     def metrics(self) -> dict[str, float]:
@@ -82,7 +82,7 @@ def pair_key(
 
 
 def rows_of(
-    numbers: Iterable[Number], key: Mapping[str, Any], world: World
+    numbers: Iterable[Number], key: Mapping[str, Any], world: WorldVerdict
 ) -> list[Row]:
     """Returns numbers as rows of `results.csv` with the columns of a key."""
     return [Row.of(number, world=world.state, **key) for number in numbers]

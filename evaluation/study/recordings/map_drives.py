@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 
-from evaluation.alignment import When, World, open_pair
+from evaluation.alignment import When, WorldVerdict, open_pair
 from evaluation.base import InputError, fingerprint, natural_key, read_text
 from evaluation.drives import (
     Drive,
@@ -130,7 +130,7 @@ class MapDrives:
     name: str
     stages: dict[str, RecordingInfo]
     others: tuple[RecordingInfo, ...]
-    world: World | None = None
+    world: WorldVerdict | None = None
 
     @property
     def recordings(self) -> tuple[RecordingInfo, ...]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import math
 from typing import Any, Protocol
 
-from evaluation.alignment import World
+from evaluation.alignment import WorldVerdict
 from evaluation.drives import DriveSource
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, Role
 
@@ -106,7 +106,7 @@ class Pair:
     keep: str | int = KEEP_ALL
     may_repeat: bool = False
     methods: Collection[str] | None = None
-    world: World | None = None
+    world: WorldVerdict | None = None
 
     def has_method(self, name: str) -> bool:
         """Returns whether a method of the study is measured, by its name."""

@@ -7,7 +7,7 @@ from helpers.towns import TownDrive
 import numpy as np
 import pytest
 
-from evaluation.alignment import World, open_pair, world_of_frames
+from evaluation.alignment import WorldVerdict, open_pair, world_of_frames
 from evaluation.base import InputError, from_xyz
 
 
@@ -102,9 +102,9 @@ def test_a_map_names_no_world(tmp_path):
 
 
 def test_states_of_a_verdict():
-    assert World(False, True, "").state == "aligned"
-    assert World(True, False, "").state == "shared"
-    assert World(None, False, "").state == "unknown"
+    assert WorldVerdict(False, True, "").state == "aligned"
+    assert WorldVerdict(True, False, "").state == "shared"
+    assert WorldVerdict(None, False, "").state == "unknown"
     assert world_of_frames("ab", ["map", "map"]).shared is True
     found = world_of_frames("ab", ["odom/x/a.bag", "odom/x/b.bag"])
     assert found.shared is False
