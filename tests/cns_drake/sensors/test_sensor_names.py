@@ -119,7 +119,7 @@ def test_a_diagram_with_two_sensors_can_be_built(first, second):
 
 def test_a_lidar_has_one_view():
     site = Site()
-    meshcat = Meshcat(port=7198)
+    meshcat = Meshcat()
     lidar = site.lidar("roof")
     add_lidar_view(site.builder, lidar, meshcat)
     with pytest.raises(ValueError, match="has a system 'roof_view'"):

@@ -205,7 +205,7 @@ def test_a_lidar_alone(tmp_path):
     lidar = add_lidar(
         made.builder, made.scene_graph, made.arm, X_PL, PATTERN, name="top"
     )
-    view = add_lidar_view(made.builder, lidar, meshcat := Meshcat(port=7199))
+    view = add_lidar_view(made.builder, lidar, meshcat := Meshcat())
     bag = add_mcap_recorder(
         made.builder, tmp_path / "alone", period=PERIOD, lidars=[lidar]
     )
