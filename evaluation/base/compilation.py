@@ -120,6 +120,8 @@ class _ByContent:
 
     def __init__(self, function: Callable, folder: Path, root: Path) -> None:
         self._line = function.__code__.co_firstlineno
+        # Numba names it where it warns that it cannot cache a function.
+        self._py_file = function.__code__.co_filename
         self._content = _content_hash(folder)
         self._place = root / self._content
 
