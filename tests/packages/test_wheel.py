@@ -1,4 +1,4 @@
-"""The wheel is small, and runs the main job where there is no checkout."""
+"""The wheels are small, and run the main job where there is no checkout."""
 
 import os
 from pathlib import Path
@@ -23,7 +23,8 @@ PAGE = "https://example.org/owner/project"
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
+def wheels(tmp_path_factory):
+    """The wheels of cns-drake and cns-eval."""
     folder = tmp_path_factory.mktemp("wheel")
     run(
         sys.executable,
@@ -36,10 +37,10 @@ def wheel(tmp_path_factory):
         "--wheel-dir",
         folder,
         ROOT,
+        ROOT / "evaluation",
         env=os.environ | REPOSITORY,
     )
-    (wheel,) = folder.glob("*.whl")
-    return wheel
+    return sorted(folder.glob("*.whl"))
 
 
 def run(*command, **options):
@@ -52,7 +53,8 @@ def run(*command, **options):
 
 @pytest.mark.slow
 @pytest.mark.night
-def test_it_is_small_and_has_its_notices(wheel):
+def test_it_is_small_and_has_its_notices(wheels):
+    wheel, _ = wheels
     assert wheel.stat().st_size < 10e6
     with zipfile.ZipFile(wheel) as files:
         names = {Path(name).name for name in files.namelist()}
@@ -73,7 +75,19 @@ def test_it_is_small_and_has_its_notices(wheel):
 
 @pytest.mark.slow
 @pytest.mark.night
-def test_it_runs_the_main_job_without_the_checkout(wheel, tmp_path):
+def test_the_evaluation_is_pure_and_has_its_licence(wheels):
+    _, wheel = wheels
+    assert wheel.name == f"cns_eval-{__version__}-py3-none-any.whl"
+    with zipfile.ZipFile(wheel) as files:
+        tops = {name.partition("/")[0] for name in files.namelist()}
+        (licence,) = (n for n in files.namelist() if n.endswith("/LICENSE"))
+        assert files.read(licence) == (ROOT / "LICENSE").read_bytes()
+    assert tops == {"evaluation", f"cns_eval-{__version__}.dist-info"}
+
+
+@pytest.mark.slow
+@pytest.mark.night
+def test_they_run_the_main_job_without_the_checkout(wheels, tmp_path):
     venv.create(tmp_path / "venv", symlinks=True)
     (site,) = (tmp_path / "venv").glob("lib/*/site-packages")
     # What the package needs, but not the package of the checkout.
@@ -81,7 +95,7 @@ def test_it_runs_the_main_job_without_the_checkout(wheel, tmp_path):
     (site / "needed.pth").write_text("\n".join(needed) + "\n")
     python = tmp_path / "venv/bin/python"
     pip = (sys.executable, "-m", "pip", "--python", python, "install")
-    run(*pip, "--quiet", "--no-deps", "--force-reinstall", wheel)
+    run(*pip, "--quiet", "--no-deps", "--force-reinstall", *wheels)
     options = {
         "cwd": tmp_path,
         "env": {
