@@ -703,6 +703,12 @@ class Scenario(Section):
         copy._made = made
         return copy
 
+    def in_city_of(self, other: Scenario) -> Scenario:
+        """Returns the drive through the city of another."""
+        copy = self.replaced(map=other.map, stage=other.stage, city=other.city)
+        copy._made = other._made
+        return copy
+
     @property
     def fastest_rate(self) -> int:
         """Revolutions per second of the fastest LiDAR."""

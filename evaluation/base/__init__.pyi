@@ -95,6 +95,8 @@ from .jobs.running import forecast as forecast
 from .jobs.running import run_jobs as run_jobs
 from .jobs.step import Reporter as Reporter
 from .jobs.step import Step as Step
+from .jobs.store import Key as Key
+from .jobs.store import Store as Store
 from .json_text import fingerprint as fingerprint
 from .json_text import json_values as json_values
 from .json_text import parse_json as parse_json

@@ -169,9 +169,6 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     source = "Xu, Lu, Wu, Lu, Zhu, Liang, Xiong, Wang: T-RO 2023"
     standard = True
     order = 3
-    describe_time = 0.022
-    query_time = 0.025
-    place_time = 6e-5
     Config = RingPlusPlusConfig
     skips_places = True
     divides = True

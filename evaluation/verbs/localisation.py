@@ -181,7 +181,6 @@ def localise(
             if str(method).endswith(".py")
             else str(method),
         ),
-        ("",),
         (starts,),
         spacing,
         values,
