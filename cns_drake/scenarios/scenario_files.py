@@ -1,6 +1,6 @@
 """Scenario files, and the files that a scenario names."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 import os
 from pathlib import Path
 import re
@@ -257,6 +257,14 @@ def check_files(scenario: Scenario, source: object = None) -> None:
         InputError: one of these files does not exist.
     """
     source = source or scenario.source
+    for field, fault in _file_faults(scenario):
+        raise InputError(f"{source}: {field}: {fault}", field.partition(".")[0])
+    if scenario.imu.kalibr is not None:
+        scenario.imu.sample_rate(scenario.fastest_rate)
+
+
+def _file_faults(scenario: Scenario) -> Iterator[tuple[str, str]]:
+    """Yields each field with a file that is missing, and what is wrong."""
     for field, file in (
         ("world", scenario.world),
         ("waypoints", scenario.waypoints),
@@ -264,53 +272,48 @@ def check_files(scenario: Scenario, source: object = None) -> None:
         ("traffic.fcd", scenario.traffic.fcd),
     ):
         if file is not None and not os.path.isfile(file):
-            raise InputError(f"{source}: {field}: {file}: no such file")
+            yield field, f"{file}: no such file"
     for folder_of_models in scenario.model_paths:
         if not os.path.isdir(folder_of_models):
-            raise InputError(
-                f"{source}: model_paths: {folder_of_models}: no such folder"
-            )
-    if scenario.imu.kalibr is not None:
-        scenario.imu.sample_rate(scenario.fastest_rate)
+            yield "model_paths", f"{folder_of_models}: no such folder"
     traffic, city = scenario.traffic, scenario.city
     if scenario.map is None:
         if not city.is_off:
-            raise InputError(
-                f"{source}: city: a world is no city; give a map and its stage"
-            )
+            yield "city", "a world is no city; give a map and its stage"
         if not traffic.is_off:
-            raise InputError(
-                f"{source}: traffic: a world has no roads; give a map with some"
-            )
+            yield "traffic", "a world has no roads; give a map with some"
         return
     folder = scenario.folder
     if not os.path.isdir(folder.path):
         known = ", ".join(shipped_maps())
-        raise InputError(
-            f"{source}: map: '{scenario.map}' is neither a shipped map "
-            f"({known}) nor a folder"
-            f"{did_you_mean(scenario.map, shipped_maps())}"
+        yield (
+            "map",
+            f"'{scenario.map}' is neither a shipped map ({known}) nor a"
+            f" folder{did_you_mean(scenario.map, shipped_maps())}",
         )
+    stages = ", ".join(folder.stages()) or "none"
     if not os.path.isfile(scenario.world_file):
-        stages = ", ".join(folder.stages()) or "none"
-        raise InputError(
-            f"{source}: stage: map '{scenario.map}' has no stage "
-            f"'{scenario.stage}'; it has: {stages}"
+        yield (
+            "stage",
+            f"map '{scenario.map}' has no stage '{scenario.stage}'; it has:"
+            f" {stages}",
         )
     if city.towards is not None and city.towards not in folder.stages():
-        raise InputError(
-            f"{source}: city.towards: map '{scenario.map}' has no stage "
-            f"'{city.towards}'; it has: {', '.join(folder.stages())}"
+        yield (
+            "city.towards",
+            f"map '{scenario.map}' has no stage '{city.towards}'; it has:"
+            f" {stages}",
         )
     if traffic.queues and not folder.roads.is_file():
-        raise InputError(
-            f"{source}: traffic: queues: no {folder.roads.name} in "
-            f"{folder.path}: {SUMO_INSTEAD}"
+        yield (
+            "traffic",
+            f"queues: no {folder.roads.name} in {folder.path}: {SUMO_INSTEAD}",
         )
     if traffic.is_recorded and not folder.traffic.is_file():
-        raise InputError(
-            f"{source}: traffic: no recorded traffic, {folder.traffic.name}, "
-            f"in {folder.path}: {SUMO_INSTEAD}"
+        yield (
+            "traffic",
+            f"no recorded traffic, {folder.traffic.name}, in {folder.path}:"
+            f" {SUMO_INSTEAD}",
         )
 
 

@@ -30,7 +30,8 @@ from evaluation.results import (
 )
 from evaluation.study.pair import Pair, StudyDrive
 from evaluation.study.recordings.map_drives import MapDrives
-from evaluation.study.study import DriveAsked, Study
+from evaluation.study.run import DriveAsked
+from evaluation.study.study import Study
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.place import PlaceTask
 
@@ -122,7 +123,7 @@ class RecordedCity:
 
     def page_drives(self, study: Study) -> MakePart:
         """Returns the step that makes name -> `PageDrive` of the drives."""
-        drives = dict.fromkeys(drive for drive, _ in self.shown())
+        drives = {drive.digest: drive for drive, _ in self.shown()}
         part = Part(
             study.store.folder / "pages" / f"{file_name(self.city.name)}.data"
         )
@@ -132,7 +133,7 @@ class RecordedCity:
                 _part(study, one, self._picture(one)),
                 one.source,
             )
-            for one in drives
+            for one in drives.values()
         )
         return MakePart(part, make_page_drives, (arguments,))
 

@@ -1,11 +1,5 @@
-"""A study: an experiment, its pairs of drives, and their tables.
+"""A study: an experiment, its methods and tasks, and its tables and page."""
 
-First all drives that several pairs need are read, each once; then each pair is
-measured, in a process of its own; at the end, the tables are made of what the
-store holds.
-"""
-
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import os
@@ -14,23 +8,15 @@ from typing import Any
 
 from evaluation.base import (
     InputError,
-    Job,
-    Key,
-    Reporter,
     Space,
-    Step,
     Store,
     doing,
     errors_at,
-    forecast,
     no_such,
-    run_jobs,
 )
 from evaluation.methods import SETTINGS, known_methods, optional_methods
 from evaluation.recognition import (
     STANDARD,
-    Asked,
-    DriveData,
     MethodChoice,
     RetrievalProtocol,
     choose_methods,
@@ -63,14 +49,12 @@ from evaluation.study.experiments.experiment import (
 from evaluation.study.experiments.experiment_run import ExperimentRun
 from evaluation.study.experiments.factors import FLEET, SESSIONS
 from evaluation.study.experiments.method_variants import method_variants
-from evaluation.study.pair import Pair, StudyDrive
+from evaluation.study.pair import Pair
+from evaluation.study.run import DriveAsked, measure_pairs
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.map import MapTask
 from evaluation.study.tasks.place import CostTask, PlaceTask
 from evaluation.study.tasks.task import Task
-
-# A drive, and what is asked of it.
-DriveAsked = tuple[StudyDrive, Asked]
 
 
 @dataclass
@@ -256,23 +240,9 @@ class Study(ExperimentRun):
         make_output(self.output, ["page"])
         doing("looking at what is measured already")
         measured = self._measured(pairs)
-        groups = _alike(measured, self.store)
-        left = [one for one in groups if not one.is_done()]
-        drives = _drives_of(left, shown, self.store)
-        groups = [one.reading(drives) for one in left]
-        readings = _jobs(
-            (one.words, ReadDrive(data))
-            for one, data in drives.values()
-            if data.store is not None
+        measure_pairs(
+            measured, shown, self.store, self.cluster, self.on_note, space
         )
-        jobs = _jobs((one.pairs[0].title, one) for one in groups)
-        told = forecast([*readings, *jobs], self.cluster, space)
-        if told is not None:
-            self.on_note(
-                f"{told}; after an interruption, run the same command again"
-            )
-        run_jobs(readings, self.cluster, "drives")
-        run_jobs(jobs, self.cluster, "pairs")
         doing("writing the tables")
         tables = self.tables(measured)
         if not tables[0].rows:
@@ -416,17 +386,6 @@ class Study(ExperimentRun):
         }
 
 
-def _jobs(steps: Iterable[tuple[str, Step]]) -> list[Job]:
-    """Returns jobs with the given names, numbered where two are equal."""
-    known: Counter[str] = Counter()
-    jobs = []
-    for name, step in steps:
-        known[name] += 1
-        number = known[name]
-        jobs.append(Job(f"{name} ({number})" if number > 1 else name, step))
-    return jobs
-
-
 def _worlds(pairs: Iterable[Pair]) -> list[str]:
     """Returns what the page says of the worlds of recordings."""
     found = (
@@ -435,139 +394,6 @@ def _worlds(pairs: Iterable[Pair]) -> list[str]:
         if one.world is not None
     )
     return list(dict.fromkeys(found))
-
-
-def _alike(
-    measured: Mapping[Pair, Sequence[Task]], store: Store
-) -> "list[MeasurePair]":
-    """Returns a step for all pairs that differ only in the radius of a match.
-
-    Queries are scored once for all radii.
-    """
-    groups: dict[str, tuple[dict[Pair, None], dict[Task, None]]] = {}
-    for one, tasks in measured.items():
-        asked = f"{one.asked(with_radius=False)} {one.methods}"
-        pairs, known = groups.setdefault(asked, ({}, {}))
-        if tasks:
-            pairs[one] = None
-            known |= dict.fromkeys(tasks)
-    return [
-        MeasurePair(tuple(pairs), tuple(tasks), store)
-        for pairs, tasks in groups.values()
-        if tasks
-    ]
-
-
-def _drives_of(
-    groups: "Iterable[MeasurePair]", shown: Iterable[DriveAsked], store: Store
-) -> dict[str, tuple[StudyDrive, DriveData]]:
-    """Returns the drives to read, by digest, with what is asked of them.
-
-    What several pairs need, or what may not fit into memory, is in the store.
-    """
-    asked: dict[str, tuple[StudyDrive, dict[Asked, None]]] = {}
-    stored: set[str] = set()
-
-    def ask(drive: StudyDrive, one: Asked) -> None:
-        asked.setdefault(drive.digest, (drive, {}))[1][one] = None
-
-    for group in groups:
-        before = {*asked}
-        for drive, one in group.asks():
-            if drive.digest in before:
-                stored.add(drive.digest)
-            ask(drive, one)
-        pair = group.pairs[0]
-        stored |= {one.digest for one in pair.distractors}
-        if pair.is_composed:
-            stored |= {one.digest for one in pair.database}
-    for drive, one in shown:
-        stored.add(drive.digest)
-        ask(drive, one)
-    found = {}
-    for digest, (drive, some) in asked.items():
-        data = DriveData(drive.source, tuple(some), digest, store)
-        if digest not in stored and data.missing():
-            data = replace(data, store=None)
-        found[digest] = drive, data
-    return found
-
-
-@dataclass(frozen=True, eq=False)
-class ReadDrive(Step):
-    """A job step that reads a drive for several pairs.
-
-    Attributes:
-        data: what is asked of the drive, and the store.
-    """
-
-    data: DriveData
-
-    @property
-    def output(self) -> Path:
-        store, asked = self.data.store, self.data.asked
-        assert store is not None
-        return store.part(self.data.key(asked[0])).path
-
-    def is_done(self) -> bool:
-        return not self.data.missing()
-
-    def run(self, reporter: Reporter) -> None:
-        self.data.fill()
-
-
-@dataclass(frozen=True, eq=False)
-class MeasurePair(Step):
-    """A job step that measures a pair of drives by all tasks.
-
-    Attributes:
-        pairs: the pair; several if they differ only in the radius of a match.
-        tasks: the tasks.
-        store: gets the results.
-        drives: digest of a drive -> what is asked of it.
-    """
-
-    pairs: tuple[Pair, ...]
-    tasks: tuple[Task, ...]
-    store: Store
-    drives: Mapping[str, DriveData] = field(default_factory=dict)
-
-    @property
-    def output(self) -> Path:
-        return self.store.part(next(iter(self._keys()))).path
-
-    def is_done(self) -> bool:
-        return all(map(self.store.has, self._keys()))
-
-    def run(self, reporter: Reporter) -> None:
-        for task in self.tasks:
-            keys = (key for pair in self.pairs for key in task.keys(pair))
-            if not all(map(self.store.has, keys)):
-                task.measure(
-                    self.pairs,
-                    lambda drive: self.drives[drive.digest],
-                    self.store,
-                    reporter,
-                )
-
-    def asks(self) -> Iterable[DriveAsked]:
-        """Yields what the tasks that are left ask of drives."""
-        for task in self.tasks:
-            for pair in self.pairs:
-                yield from task.asks(pair, self.store)
-
-    def reading(
-        self, drives: Mapping[str, tuple[StudyDrive, DriveData]]
-    ) -> "MeasurePair":
-        """Returns the step with what has been asked of its drives."""
-        own = dict.fromkeys(drive.digest for drive, _ in self.asks())
-        found = {digest: drives[digest][1] for digest in own}
-        return replace(self, drives=found)
-
-    def _keys(self) -> Iterable[Key]:
-        for task in self.tasks:
-            for pair in self.pairs:
-                yield from task.keys(pair)
 
 
 def _condition(one: Pair, factors: Mapping[str, Any]) -> tuple[object, ...]:

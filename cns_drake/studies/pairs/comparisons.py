@@ -108,7 +108,7 @@ class PairMaker:
             return self._build(condition, seed)
         except InputError as error:
             raise InputError(
-                _as_written(str(error), self.source, condition)
+                _as_written(error, self.source, condition)
             ) from error
 
     def _build(self, condition: Condition, seed: int) -> Pair:
@@ -261,7 +261,7 @@ class PairMaker:
 
     def _find_stage(self, place: str, side: str, wanted: Any) -> str:
         """Returns the stage that a drive's field `stage` = `wanted` means."""
-        with errors_at(f"{self.source}: {place}.stage"):
+        with errors_at(f"{self.source}: {place}.stage", field="stage"):
             return find_stage(wanted, self._unchanged[side], self._last_stage)
 
     def _check_traffic(self, traffic: Any) -> None:
@@ -384,17 +384,18 @@ _OF_DATABASE = ("keep", "maintain")
 _FRAME_FIELDS = ("map", "world")
 
 
-def _as_written(fault: str, source: str, condition: Condition) -> str:
+def _as_written(error: InputError, source: str, condition: Condition) -> str:
     """Returns a fault of a drive's field, with the section that sets the field.
 
     That can be `both` or a case, of which the drive's section knows nothing.
     """
-    found = re.match(
-        rf"{re.escape(source)}: (database|query)[.:] ?(\w+)", fault
-    )
-    if found is None:
+    fault, field = str(error), error.field
+    for side in ("database", "query"):
+        start = f"{source}: {side}"
+        if field and fault.startswith(start):
+            break
+    else:
         return fault
-    side, field = found.groups()
     sections = {n: condition.changes.get(n, {}) for n in (side, "both")}
     case = f"cases.{condition.factors.get(CAUSE)}"
     for cause in condition.causes:
@@ -406,8 +407,7 @@ def _as_written(fault: str, source: str, condition: Condition) -> str:
             }
     for section, fields in sections.items():
         if field in fields:
-            start, end = found.span(1)
-            return fault[:start] + section + fault[end:]
+            return f"{source}: {section}{fault.removeprefix(start)}"
     return fault
 
 

@@ -21,6 +21,7 @@ from evaluation.recognition import (
 from evaluation.study import (
     find_recordings,
     recorded_city,
+    run,
     study,
     study_recordings,
 )
@@ -59,7 +60,7 @@ def jobs_here(patch):
 
     runs = []
     run_here(patch, map_step, recording)
-    for module in (study, recorded_city):
+    for module in (run, recorded_city):
         patch.setattr(
             module,
             "run_jobs",
@@ -101,7 +102,7 @@ def report(recordings, output, methods=None, protocols=None, **more):
     """Measures a folder of recordings; returns the path of the page."""
     chosen = choose_methods() if methods is None else tuple(methods)
     with pytest.MonkeyPatch.context() as patch:
-        run_here(patch, study, recorded_city)
+        run_here(patch, run, recorded_city)
         return study_recordings(
             find_recordings(recordings),
             output,
