@@ -316,8 +316,8 @@ for _name, _change in SCENARIOS.items():
 
     @way(
         f"scenario: {_name}", "x.yaml" if _name != "far waypoints" else "t.csv",
-        "cns_drake.scenarios.load_scenario", "worlds.roads.read_waypoints",
-        "worlds.roads.load_waypoint_path",
+        "cns_drake.scenarios.load_scenario", "worlds.shapes.read_waypoints",
+        "worlds.shapes.load_waypoint_path",
         use=plan,
     )  # fmt: skip
     def _(folder, change=_change):

@@ -19,10 +19,7 @@ import yaml
 from evaluation.base import parse_yaml, write_text
 from worlds.city.city_plan import CityPlan, load_plan
 from worlds.city.generation.city_structures import City, lay_out
-from worlds.maps import (
-    STAGES_NAME,
-    MapFolder,
-)
+from worlds.maps import STAGES_NAME, MapFolder
 from worlds.roads import Areas, RoadNetwork, draw_route, load_road_network
 from worlds.shapes import (
     polygons_of,

@@ -21,11 +21,7 @@ from worlds.imports.drives.free_space import (
 from worlds.imports.faults import (
     ImportFaults,
 )
-from worlds.roads import (
-    POINT_SPACING,
-    TIGHTEST_RADIUS,
-    make_waypoint_path,
-)
+from worlds.shapes import POINT_SPACING, TIGHTEST_RADIUS, make_waypoint_path
 
 # Paths of vehicles are quintic splines (`cns_drake.motion`). The points of a
 # path are their control points.

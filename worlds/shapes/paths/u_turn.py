@@ -15,15 +15,15 @@ from evaluation.base import (
     dot,
     sin,
 )
-from worlds.roads.car_outline import (
+from worlds.shapes.paths.car_outline import (
     swept_area,
 )
-from worlds.roads.centreline import (
+from worlds.shapes.paths.centreline import (
     Centreline,
     sample_stations,
 )
 
-# From the car in worlds/vehicle.sdf: its wheelbase [m].
+# From the simulator's car, `vehicle.sdf`: its wheelbase [m].
 _WHEELBASE = 2.8
 # Distance from the car's middle to a front wheel [m].
 _HALF_TRACK = 0.79
