@@ -14,9 +14,9 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from cns_drake.scene.expansion import expanded_size
 from evaluation.base import (
     Element,
-    expanded_size,
     read_bytes,
     read_elements,
     to_number,

@@ -1,6 +1,5 @@
 from .carriageway import Areas as Areas
 from .carriageway import union_without_slits as union_without_slits
-from .network import Connection as Connection
 from .network import RoadNetwork as RoadNetwork
 from .network import load_road_network as load_road_network
 from .queue_lanes import lanes_between_stop_lines as lanes_between_stop_lines

@@ -28,16 +28,10 @@ from .models import part_mesh as part_mesh
 from .models import roll_pitch_yaw as roll_pitch_yaw
 from .models import triple as triple
 from .object_models import OBJECT_MESHES as OBJECT_MESHES
-from .object_models import ROOT_DEPTH as ROOT_DEPTH
-from .object_models import Builder as Builder
 from .object_models import assemble as assemble
 from .object_models import bar as bar
 from .object_models import block as block
 from .object_models import ground_footprint as ground_footprint
-from .object_models import in_a_row as in_a_row
-from .object_models import mesh_part as mesh_part
-from .object_models import object_mesh as object_mesh
-from .object_models import pillar as pillar
 from .object_models import post as post
 from .objects.catalogue import OBJECTS as OBJECTS
 from .objects.catalogue import pick_key as pick_key
