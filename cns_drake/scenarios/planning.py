@@ -27,12 +27,7 @@ from cns_drake.recording import frames_within
 from cns_drake.scenarios.missing_structures import lost_structures
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files
-from cns_drake.scene import (
-    InSight,
-    World,
-    load_world,
-    read_perception_geometry,
-)
+from cns_drake.scene import InSight, World, load_world, read_perception_geometry
 from evaluation.base import InputError, errors_at_option
 from worlds.shapes import (
     FINE_SPACING,

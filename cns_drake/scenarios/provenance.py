@@ -10,9 +10,7 @@ from cns_drake.motion import suspension_file, vehicle_file
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene import FileWatch, referenced_files
 from cns_drake.sensors import KALIBR_FILE
-from evaluation.base import (
-    __version__ as __version__,
-)
+from evaluation.base import __version__ as __version__
 from evaluation.base import (
     check_regular,
     fingerprint,

@@ -9,9 +9,7 @@ import yaml
 
 from cns_drake.scenarios.scenario import SUMO_INSTEAD, Scenario
 from cns_drake.sensors import KALIBR_FILE
-from evaluation.base import (
-    InputError as InputError,
-)
+from evaluation.base import InputError as InputError
 from evaluation.base import (
     check_writable,
     did_you_mean,

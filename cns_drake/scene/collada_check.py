@@ -15,12 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cns_drake.scene.expansion import expanded_size
-from evaluation.base import (
-    Element,
-    read_bytes,
-    read_elements,
-    to_number,
-)
+from evaluation.base import Element, read_bytes, read_elements, to_number
 
 # Elements that show what their `url` names.
 _INSTANCES = (

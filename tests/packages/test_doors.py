@@ -136,7 +136,7 @@ def late():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("package", DOORS)
+@pytest.mark.parametrize("package", [*ROOTS, *DOORS])
 def test_a_door_loads_nothing_before_a_name_is_used(package):
     code = f"import {package}, sys; print(*sys.modules)"
     loaded = subprocess.check_output(

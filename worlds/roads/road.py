@@ -9,12 +9,7 @@ from numpy.typing import ArrayLike
 
 from evaluation.base import cos, sin
 from worlds.roads.roads_file import RoadEntry
-from worlds.shapes import (
-    DIRECTIONS,
-    Centreline,
-    Direction,
-    sample_stations,
-)
+from worlds.shapes import DIRECTIONS, Centreline, Direction, sample_stations
 
 End = Literal["start", "end"]
 ENDS: tuple[End, End] = ("start", "end")

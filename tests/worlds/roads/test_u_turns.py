@@ -7,10 +7,7 @@ from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
 from cns_drake.motion import Speeds, Trajectory, VehicleMotion, vehicle_file
-from cns_drake.scenarios import (
-    load_scenario,
-    plan_drive,
-)
+from cns_drake.scenarios import load_scenario, plan_drive
 from evaluation.base import InputError
 from worlds.shapes import (
     POINT_SPACING,

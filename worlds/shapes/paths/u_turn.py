@@ -10,18 +10,9 @@ import shapely
 from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
-from evaluation.base import (
-    cos,
-    dot,
-    sin,
-)
-from worlds.shapes.paths.car_outline import (
-    swept_area,
-)
-from worlds.shapes.paths.centreline import (
-    Centreline,
-    sample_stations,
-)
+from evaluation.base import cos, dot, sin
+from worlds.shapes.paths.car_outline import swept_area
+from worlds.shapes.paths.centreline import Centreline, sample_stations
 
 # From the simulator's car, `vehicle.sdf`: its wheelbase [m].
 _WHEELBASE = 2.8
