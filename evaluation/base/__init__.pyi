@@ -56,7 +56,6 @@ from .errors import no_such as no_such
 from .errors import one_line as one_line
 from .errors import validated as validated
 from .errors import value_errors as value_errors
-from .expansion import expanded_size as expanded_size
 from .figures import GONE_RGB as GONE_RGB
 from .figures import NEW_RGB as NEW_RGB
 from .figures import UNSEEN_RGB as UNSEEN_RGB

@@ -29,7 +29,8 @@ from evaluation.base import (
 from evaluation.map_update import MAINTAINERS, NOT_MAINTAINED
 from evaluation.results import OWN
 from evaluation.study import FLEET, SESSIONS, Changes
-from worlds.roads import RoadNetwork, Route, draw_route, load_road_network
+from worlds.roads import RoadNetwork, draw_route, load_road_network
+from worlds.shapes import Route
 
 # Fields of the database that no drive has.
 DATABASE_FIELDS = (FLEET, "distractors", SESSIONS, "keep", "maintain")
