@@ -16,13 +16,7 @@ from cns_drake.studies.pairs.changed_pairs import (
     changed_pairs,
     simulated_drives,
 )
-from evaluation.base import (
-    Cluster,
-    InputError,
-    check_writable,
-    note,
-    write_csv,
-)
+from evaluation.base import Cluster, InputError, check_writable, note, write_csv
 from evaluation.results import CAUSE
 from evaluation.study import ExperimentRun, Pair, load_experiment
 from worlds.maps import recordable_drives

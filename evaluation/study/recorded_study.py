@@ -40,11 +40,7 @@ from evaluation.results import (
 from evaluation.study.experiments.experiment import Experiment
 from evaluation.study.experiments.experiment_files import load_experiment
 from evaluation.study.pair import Pair
-from evaluation.study.recorded_city import (
-    RecordedCity,
-    ShownCity,
-    draw_cities,
-)
+from evaluation.study.recorded_city import RecordedCity, ShownCity, draw_cities
 from evaluation.study.recordings.map_drives import (
     RecordingInfo,
     drives_by_map,

@@ -6,14 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from evaluation.base import (
-    InputError,
-    Space,
-    Store,
-    doing,
-    errors_at,
-    no_such,
-)
+from evaluation.base import InputError, Space, Store, doing, errors_at, no_such
 from evaluation.methods import SETTINGS, known_methods, optional_methods
 from evaluation.recognition import (
     STANDARD,

@@ -3,12 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
-from evaluation.base import (
-    InputError,
-    natural_key,
-    no_such,
-    repeated,
-)
+from evaluation.base import InputError, natural_key, no_such, repeated
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
 from evaluation.results import CAUSE, LAST, OWN, STAGE
 from evaluation.study.experiments.experiment import Condition

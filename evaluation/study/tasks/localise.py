@@ -18,12 +18,7 @@ from evaluation.localisation import (
 )
 from evaluation.recognition import Number, numbers_of
 from evaluation.study.pair import Pair
-from evaluation.study.tasks.task import (
-    Answered,
-    DataOf,
-    Task,
-    check_positive,
-)
+from evaluation.study.tasks.task import Answered, DataOf, Task, check_positive
 
 # The methods that need no optional package.
 SHIPPED = tuple(name for name in METHODS if name != KISS_MATCHER)

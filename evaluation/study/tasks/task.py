@@ -7,14 +7,7 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from evaluation.base import (
-    InputError,
-    Key,
-    Reporter,
-    Store,
-    no_such,
-    repeated,
-)
+from evaluation.base import InputError, Key, Reporter, Store, no_such, repeated
 from evaluation.recognition import (
     Asked,
     DriveData,

@@ -21,11 +21,7 @@ from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition import PROTOCOLS, RetrievalProtocol, choose_methods
 from evaluation.results import QueryRows, Results
-from evaluation.study import (
-    drives_by_map,
-    find_recordings,
-    study_recordings,
-)
+from evaluation.study import drives_by_map, find_recordings, study_recordings
 
 pytestmark = pytest.mark.slow
 
