@@ -5,7 +5,6 @@ from .chosen_methods import choose_methods as choose_methods
 from .chosen_methods import expanded_names as expanded_names
 from .chosen_methods import method_settings as method_settings
 from .describing import DescribingCost as DescribingCost
-from .describing import Role as Role
 from .describing import describe_drive as describe_drive
 from .descriptors import DescribedScans as DescribedScans
 from .descriptors import DriveDescriptors as DriveDescriptors
@@ -14,8 +13,6 @@ from .drive_data import Asked as Asked
 from .drive_data import DescribingTime as DescribingTime
 from .drive_data import Descriptors as Descriptors
 from .drive_data import DriveData as DriveData
-from .drive_data import DriveMapping as DriveMapping
-from .drive_data import DrivePicture as DrivePicture
 from .drive_data import Map as Map
 from .drive_data import Picture as Picture
 from .drive_data import asked_key as asked_key
