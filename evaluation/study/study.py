@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+import functools
+from functools import partial
 import os
 from pathlib import Path
 from typing import Any
@@ -338,15 +340,16 @@ class Study(ExperimentRun):
                     if key not in baselines and task in measured[base]:
                         baselines[key] = task.found(base, store)
                     before = baselines.get(key)
+                columns = functools.cache(partial(self._columns, one, task))
+                world = one.world.state if one.world else ""
                 for number in task.numbers(found, before, compared):
-                    columns = self._columns(
-                        one, task, number.method, number.verified
+                    own = columns(number.method, number.verified)
+                    rows.append(
+                        Row.of(number, baseline=baseline, world=world, **own)
                     )
-                    columns["world"] = one.world.state if one.world else ""
-                    rows.append(Row.of(number, baseline=baseline, **columns))
                 for method, verified, given in task.answers(found):
-                    columns = self._columns(one, task, method, verified)
-                    answers.append(Answers(**columns, columns=given))
+                    own = columns(method, verified)
+                    answers.append(Answers(**own, columns=given))
         return Results.of(rows), QueryRows.of(answers)
 
     def _columns(
