@@ -23,13 +23,14 @@ from cns_drake.scene import geometry_port
 from cns_drake.sensors.carriers import (
     body_and_pose,
     check_in_diagram,
+    check_new_sensor,
+    check_unused_names,
     find_motion,
 )
 from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.seen_geometry import Place, Structures
-from cns_drake.sensors.system_names import check_new_sensor, check_unused_names
 from evaluation.base import check_type
 
 if TYPE_CHECKING:
@@ -167,7 +168,7 @@ def add_lidar(
     unit = pattern if isinstance(pattern, str | Path) else None
     if unit is not None:
         # Imported here: patterns of the caller's own need no data sheets.
-        from cns_drake.sensors.sheet_patterns import (
+        from cns_drake.sensors.lidar_config import (
             make_beam_pattern,
             revolution_at_rate,
         )
@@ -180,7 +181,7 @@ def add_lidar(
         )
     model = _returns_model(returns, unit, seed, name)
     if model is not None and unit is not None:
-        from cns_drake.sensors.sheet_patterns import aimed
+        from cns_drake.sensors.lidar_config import aimed
 
         pattern = aimed(pattern, model.sheet)
     check_type("measurement", measurement, MeasurementModel, NoneType)
@@ -369,13 +370,16 @@ def _noise_model(
     Raises:
         ValueError: the noise is given twice.
     """
-    if not (range_noise or dropout or seed):
+    noise = MeasurementModel(
+        range_noise=range_noise, dropout=dropout, seed=seed
+    )
+    if noise == IDEAL:
         return measurement
     if measurement is not None:
         raise ValueError(
             "measurement: give either it or range_noise, dropout and seed"
         )
-    return MeasurementModel(range_noise=range_noise, dropout=dropout, seed=seed)
+    return noise
 
 
 def _check_no_noise(

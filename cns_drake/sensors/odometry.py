@@ -17,7 +17,11 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.lcm import LcmBuses
 
-from cns_drake.sensors.carriers import body_and_pose, find_motion
+from cns_drake.sensors.carriers import (
+    body_and_pose,
+    check_new_sensor,
+    find_motion,
+)
 from cns_drake.sensors.lidar.beams import period_of_rate
 from cns_drake.sensors.published_sensor import (
     USUAL_RATE,
@@ -30,7 +34,6 @@ from cns_drake.sensors.published_sensor import (
     names_of_fields_in_errors,
     publish_measurements,
 )
-from cns_drake.sensors.system_names import check_new_sensor
 
 
 @dataclass(frozen=True)

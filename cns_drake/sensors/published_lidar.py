@@ -20,6 +20,7 @@ from cns_drake.sensors.lidar_config import (
     LidarDescription,
     LidarSection,
     make_lidar_model,
+    revolution_at_rate,
 )
 from cns_drake.sensors.noise_draws import check_seed
 from cns_drake.sensors.published_sensor import (
@@ -32,7 +33,6 @@ from cns_drake.sensors.published_sensor import (
     publish_measurements,
     section_of,
 )
-from cns_drake.sensors.sheet_patterns import revolution_at_rate
 from evaluation.base import one_line
 from evaluation.lidar_sheets import DEFAULT_PRESET, LONGEST_PERIOD
 

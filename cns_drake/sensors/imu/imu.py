@@ -19,13 +19,15 @@ from pydrake.systems.framework import (
 from pydrake.systems.lcm import LcmBuses
 from pydrake.systems.sensors import Accelerometer, Gyroscope
 
-from cns_drake.sensors import carriers, system_names
+from cns_drake.sensors import carriers
 from cns_drake.sensors.imu.config import ImuDescription, ImuSection
-from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
-from cns_drake.sensors.imu.sampling import MEASUREMENTS, last_sample
-from cns_drake.sensors.noise_draws import (
-    check_seed,
+from cns_drake.sensors.imu.noise import (
+    MEASUREMENTS,
+    ImuErrors,
+    ImuNoise,
+    last_sample,
 )
+from cns_drake.sensors.noise_draws import check_seed
 from cns_drake.sensors.published_sensor import (
     USUAL_RATE,
     Interface,
@@ -180,8 +182,8 @@ def add_imu(
         raise ValueError("noise: it needs a rate; give rate as well")
     if noise is not None and noise.sensor_name == ImuNoise.sensor_name:
         noise = replace(noise, sensor_name=name)
-    parts = system_names.IMU_PARTS
-    system_names.check_new_sensor(builder, name, parts)
+    parts = carriers.IMU_PARTS
+    carriers.check_new_sensor(builder, name, parts)
     systems = [f"{name}_{part}" for part in parts]
     body, X_BI = carriers.body_and_pose(body, X_PB)
     poses, velocities, accelerations = carriers.find_motion(

@@ -15,6 +15,7 @@ from evaluation.base import (
     arctan2,
     check_type,
     is_real,
+    of_type,
 )
 
 # Height of the elevation bands in which beams of irregular patterns are cast.
@@ -142,8 +143,11 @@ class BeamPattern(ABC):
         """Checks that the range limits and the period are possible.
 
         Raises:
+            TypeError: one of them is no number.
             ValueError: one of them is impossible.
         """
+        for name in ("min_range", "max_range", "period"):
+            of_type(getattr(self, name), float, name)
         if not 0.0 <= self.min_range < self.max_range:
             raise ValueError(
                 f"min_range {self.min_range:g}, max_range {self.max_range:g}: "

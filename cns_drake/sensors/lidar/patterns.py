@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from cns_drake.sensors.lidar.beams import BeamPattern, Beams, make_beams
 from evaluation.base import (
+    check_fields,
     cos,
     sin,
     sinc,
@@ -39,6 +40,7 @@ class SpinningPattern(BeamPattern):
         azimuths_rad: first and last azimuth [rad]; None for all azimuths.
 
     Raises:
+        TypeError: a value is of another type.
         ValueError: a value is impossible, or elevations ascend.
 
     Example:
@@ -56,17 +58,12 @@ class SpinningPattern(BeamPattern):
     azimuths_rad: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self)
         self.check()
-        if not (self.num_columns >= 1 and self.num_columns % 1 == 0):
+        if self.num_columns < 1:
             raise ValueError(f"num_columns: {self.num_columns} is no number")
-        object.__setattr__(self, "num_columns", int(self.num_columns))
-        elevations = np.asarray(self.elevations_rad, float)
-        azimuths = np.zeros(2)
-        if self.azimuths_rad is not None:
-            azimuths = np.asarray(self.azimuths_rad, float)
-            object.__setattr__(self, "azimuths_rad", tuple(azimuths.tolist()))
-        # Equal patterns are found by their hash, which an array has not.
-        object.__setattr__(self, "elevations_rad", tuple(elevations.tolist()))
+        elevations = np.asarray(self.elevations_rad)
+        azimuths = self.azimuths_rad or (0.0, 0.0)
         if not (
             elevations.size
             and (np.abs(elevations) <= math.pi / 2.0).all()
@@ -76,7 +73,7 @@ class SpinningPattern(BeamPattern):
                 "elevations_rad: they must descend, from pi/2 at most to "
                 "-pi/2 at least, and there must be one"
             )
-        if azimuths.shape != (2,) or not np.ptp(azimuths) <= 2 * math.pi + 1e-9:
+        if not np.ptp(azimuths) <= 2 * math.pi + 1e-9:
             raise ValueError(
                 f"azimuths_rad: {self.azimuths_rad} is no range within 360 deg"
             )
@@ -305,8 +302,10 @@ class _TimedPattern(BeamPattern):
         """Checks the values.
 
         Raises:
+            TypeError: one of them is of another type.
             ValueError: one of them is impossible.
         """
+        check_fields(self)
         self.check()
         if not 0.0 < self.points_per_second < math.inf:
             raise ValueError(

@@ -28,7 +28,9 @@ from cns_drake import (
     ImuConfig,
     ImuNoise,
     LidarConfig,
+    MeasurementModel,
     OdometryConfig,
+    Weather,
     add_imu,
     add_lidar,
     load_scenario,
@@ -404,8 +406,8 @@ def test_faults_name_config_and_field(change, fault):
         (LidarConfig, "{causal: maybe}", r"\.causal: 'maybe' is not true or"),
         (LidarConfig, "{motion_distortion: 1}", r"\.motion_distortion: 1 is"),
         (LidarConfig, "{name: 3}", r"\.name: 3 is not a text"),
-        (LidarConfig, "{X_PB: 3}", r"\.X_PB: 3 is not a pose"),
-        (LidarConfig, "{unseen: robot}", r"\.unseen: 'robot' is not a list"),
+        (LidarConfig, "{X_PB: 3}", r"\.X_PB: 3 is no Transform"),
+        (LidarConfig, "{unseen: robot}", r"\.unseen: 'robot' is no list"),
         (LidarConfig, "{num_threads: two}", r"\.num_threads: 'two' is not a"),
         (ImuConfig, "{rate: fast}", r"\.rate: 'fast' is not a number"),
         (OdometryConfig, "{rate: 2.5}", r"\.rate: 2\.5 is not a whole number"),
@@ -413,21 +415,51 @@ def test_faults_name_config_and_field(change, fault):
 )
 def test_wrong_types_name_the_field_in_one_line(struct, text, fault):
     fault = rf"^{struct.__name__}{fault}.*\Z"
-    with pytest.raises(ValueError, match=fault):
-        yaml_load_typed(schema=struct, data=text)
     (field, value), *_ = yaml_load(data=text).items()
-    with pytest.raises(ValueError, match=fault):
-        struct(**{field: value})
-    with pytest.raises(ValueError, match=fault):
-        setattr(struct(), field, value)
+    for make in (
+        lambda: yaml_load_typed(schema=struct, data=text),
+        lambda: struct(**{field: value}),
+        lambda: dataclasses.replace(struct(), **{field: value}),
+        lambda: setattr(struct(), field, value),
+    ):
+        with pytest.raises((TypeError, ValueError), match=fault):
+            make()
 
 
 @pytest.mark.parametrize("text", ["{rate: 10}", "{rate: 1e1}", "{rate: '10'}"])
 def test_numbers_are_read_as_drake_reads_them(text):
+    """As texts they are numbers in YAML alone."""
     config = yaml_load_typed(schema=LidarConfig, data=text)
     assert (config.rate, type(config.rate)) == (10.0, float)
     assert yaml_dump_typed(config, defaults=LidarConfig()) == "rate: 10.0\n"
     assert LidarConfig(rate=np.float32(10), rings=np.int64(4)).rings == 4
+
+
+@pytest.mark.parametrize(
+    "struct",
+    [
+        LidarConfig,
+        ImuConfig,
+        OdometryConfig,
+        MeasurementModel,
+        ImuNoise,
+        Weather,
+    ],
+)
+def test_fields_from_python_have_their_types(struct):
+    """Texts that spell a number, bools and NaN are none, in any field."""
+    refused = (TypeError, ValueError)
+    usable = {float: (True, "1", 1j), int: (True, "1", 1.5), bool: (1, "true")}
+    for field, kind in typing.get_type_hints(struct).items():
+        kind, *others = typing.get_args(kind) or (kind,)
+        wrong = (*usable.get(kind, (3,)), [1j], b"1", np.ones(2))
+        for value in wrong if others else (*wrong, None):
+            with pytest.raises(refused, match=f"{field}: ") as found:
+                struct(**{field: value})
+            assert "\n" not in str(found.value)
+        if kind is float:
+            with pytest.raises(ValueError, match=f"{field}: .*"):
+                getattr(struct(**{field: np.nan}), "ValidateOrThrow", list)()
 
 
 def ahead_of(**fields):
