@@ -136,11 +136,12 @@ def check_unused_names(builder: DiagramBuilder, *names: str) -> None:
     A diagram with two systems of one name ends the process when it is built.
 
     Raises:
-        TypeError: the builder is no DiagramBuilder.
+        TypeError: the builder is no DiagramBuilder, or a name no text.
         ValueError: the diagram has a system of one of these names.
     """
     check_type("builder", builder, DiagramBuilder)
     for name in names:
+        of_type(name, str, "name")
         if builder.HasSubsystemNamed(name):
             raise ValueError(
                 f"name: the diagram has a system '{name}'; give each a name "

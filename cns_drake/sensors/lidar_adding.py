@@ -31,7 +31,7 @@ from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.seen_geometry import Place, Structures
-from evaluation.base import check_type
+from evaluation.base import check_type, of_type
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.
@@ -306,6 +306,8 @@ def add_lidar_view(
     check_unused_names(builder, f"{name}_view")
     if period is None:
         period = (lidar.samples or lidar.pattern).period
+    of_type(period, float, "period")
+    of_type(point_size, float, "point_size")
     view = builder.AddNamedSystem(
         f"{name}_view",
         geometry.MeshcatPointCloudVisualizer(meshcat, name, period),

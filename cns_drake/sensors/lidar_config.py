@@ -34,7 +34,7 @@ from cns_drake.sensors.lidar.patterns import (
     SpinningPattern,
 )
 from cns_drake.sensors.sensor_config import Mount, Triple, field_off_by_default
-from evaluation.base import InputError, Section, validated
+from evaluation.base import InputError, Section, of_type, validated
 from evaluation.drives import LayoutName
 from evaluation.lidar_sheets import (
     DEFAULT_PRESET,
@@ -342,6 +342,7 @@ def make_beam_pattern(
         patterns = [make_beam_pattern(name, 0.1) for name in LIDAR_PRESETS]
     """
     sheet = find_sheet(unit)
+    of_type(period, float | None, "period")
     if period is not None and not 0.0 < period <= LONGEST_PERIOD:
         raise ValueError(
             f"period: {period:g} s is not above 0 and up to {LONGEST_PERIOD:g}"

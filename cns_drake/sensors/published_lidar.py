@@ -33,7 +33,7 @@ from cns_drake.sensors.published_sensor import (
     publish_measurements,
     section_of,
 )
-from evaluation.base import one_line
+from evaluation.base import check_type, one_line
 from evaluation.lidar_sheets import DEFAULT_PRESET, LONGEST_PERIOD
 
 _ROLES = {
@@ -175,6 +175,7 @@ def ApplyLidarConfig(
 
         ApplyLidarConfig(LidarConfig(name="roof", rate=10), builder)
     """
+    check_type("config", config, LidarConfig)
     config.ValidateOrThrow()
     section = config._section()
     period = revolution_at_rate(section.sheet, config.rate, section.columns)

@@ -42,7 +42,7 @@ from cns_drake.sensors.published_sensor import (
 )
 from evaluation.base import (
     check_type,
-    is_real,
+    of_type,
 )
 
 
@@ -174,10 +174,9 @@ def add_imu(
         builder.ExportOutput(imu.ports()["specific_force"], "specific_force")
     """
     check_type("noise", noise, ImuNoise, NoneType)
-    if rate is not None and not (is_real(rate) and rate > 0.0):
-        raise ValueError(
-            f"rate: {rate!r} is not a positive number of samples a second"
-        )
+    rate = of_type(rate, float | None, "rate")
+    if rate is not None:
+        _check_sample_rate(rate)
     if noise is not None and rate is None:
         raise ValueError("noise: it needs a rate; give rate as well")
     if noise is not None and noise.sensor_name == ImuNoise.sensor_name:
@@ -215,6 +214,13 @@ def add_imu(
     return replace(imu, noisy=noisy)
 
 
+def _check_sample_rate(rate: float) -> None:
+    if not 0.0 < rate < math.inf:
+        raise ValueError(
+            f"rate: {rate!r} is not a positive number of samples a second"
+        )
+
+
 @names_of_fields_in_errors
 @dataclass(eq=False)
 class ImuConfig(ImuDescription, PublishedSensor):
@@ -240,11 +246,7 @@ class ImuConfig(ImuDescription, PublishedSensor):
 
     def _validate(self) -> None:
         check_seed(self.seed)
-        if not self.sample_rate() > 0.0 or math.isinf(self.sample_rate()):
-            raise ValueError(
-                f"rate: {self.rate!r} is not a positive number of samples a "
-                "second"
-            )
+        _check_sample_rate(self.sample_rate())
 
     def _section(self) -> ImuSection:
         """Returns the section of a scenario with the same fields."""
@@ -291,6 +293,7 @@ def ApplyImuConfig(
 
         ApplyImuConfig(ImuConfig(rate=200), builder)
     """
+    check_type("config", config, ImuConfig)
     config.ValidateOrThrow()
     section, rate = config._section(), config.sample_rate()
     interface = find_interface(config, builder, lcm_buses, lcm)

@@ -210,7 +210,8 @@ class LimitedPattern(BeamPattern):
             ("azimuths_deg", azimuths_deg, 180.0),
             ("elevations_deg", elevations_deg, 90.0),
         ):
-            if np.shape(limits) != (2,) or not np.all(np.abs(limits) <= most):
+            limits = of_type(limits, tuple[float, float], name)
+            if not np.all(np.abs(limits) <= most):
                 raise ValueError(
                     f"{name}: {limits} is not two numbers from {-most:g} to "
                     f"{most:g}"

@@ -329,6 +329,9 @@ class Lidar(LeafSystem):
             anchored_frames=anchored_frames,
             num_threads=num_threads,
         )
+        check_type("parent_frame_id", parent_frame_id, FrameId)
+        check_type("X_PB", X_PB, RigidTransform)
+        check_type("pattern", pattern, BeamPattern)
         check_type("measurement", measurement, MeasurementModel)
         check_type("causal", causal, bool)
         check_type("moving_bodies", moving_bodies, Mapping, NoneType)

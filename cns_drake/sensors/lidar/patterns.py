@@ -14,6 +14,7 @@ from cns_drake.sensors.lidar.beams import BeamPattern, Beams, make_beams
 from evaluation.base import (
     check_fields,
     cos,
+    of_type,
     sin,
     sinc,
 )
@@ -233,6 +234,7 @@ def make_flash_pattern(
         period: time between two flashes [s].
 
     Raises:
+        TypeError: a value is of another type.
         ValueError: a value is impossible.
 
     Example:
@@ -242,7 +244,8 @@ def make_flash_pattern(
             160, 120, (60.0, 45.0), min_range=0.2, max_range=30.0, period=0.05
         )
     """
-    across, up = np.deg2rad(fov_deg)
+    width, height = of_type(width, int, "width"), of_type(height, int, "height")
+    across, up = np.deg2rad(of_type(fov_deg, tuple[float, float], "fov_deg"))
     if not (0.0 < across <= 2.0 * math.pi and 0.0 < up <= math.pi):
         raise ValueError(
             f"fov_deg: {fov_deg} is not above 0, up to 360 and 180 deg"
