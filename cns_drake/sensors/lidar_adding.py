@@ -185,10 +185,12 @@ def add_lidar(
 
         pattern = aimed(pattern, model.sheet)
     check_type("measurement", measurement, MeasurementModel, NoneType)
-    if model is not None:
-        _check_no_noise(measurement, range_noise, dropout)
-    else:
-        measurement = _noise_model(measurement, range_noise, dropout, seed)
+    noise = MeasurementModel(
+        range_noise=range_noise, dropout=dropout, seed=seed
+    )
+    measurement = _noise_model(
+        measurement, noise, is_calibrated=model is not None
+    )
     for argument, places in (
         ("body", [body]),
         ("unseen", unseen),
@@ -219,7 +221,7 @@ def add_lidar(
         frame_id,
         X_PB,
         pattern,
-        measurement=_with_name(measurement or IDEAL, name),
+        measurement=_with_name(measurement, name),
         returns=model,
         causal=causal,
         rate=rate,
@@ -360,47 +362,34 @@ def _returns_model(
 
 
 def _noise_model(
-    measurement: MeasurementModel | None,
-    range_noise: float,
-    dropout: float,
-    seed: int,
-) -> MeasurementModel | None:
-    """Returns the model of noise of ideal returns, if there is any noise.
+    given: MeasurementModel | None,
+    noise: MeasurementModel,
+    *,
+    is_calibrated: bool,
+) -> MeasurementModel:
+    """Returns the model of noise, losses and rounding beside the returns.
 
-    The arguments are the same as for `add_lidar`.
+    Args:
+        given: argument `measurement` of `add_lidar`.
+        noise: model with the arguments `range_noise`, `dropout` and `seed`.
+        is_calibrated: whether the returns have noise of their own.
 
     Raises:
         ValueError: the noise is given twice.
     """
-    noise = MeasurementModel(
-        range_noise=range_noise, dropout=dropout, seed=seed
-    )
-    if noise == IDEAL:
-        return measurement
-    if measurement is not None:
+    if is_calibrated:
+        if noise.is_random or (given is not None and given.is_random):
+            raise ValueError(
+                "range_noise, dropout, measurement: calibrated returns have "
+                "noise of their own; leave these out"
+            )
+    elif noise != IDEAL:
+        if given is None:
+            return noise
         raise ValueError(
             "measurement: give either it or range_noise, dropout and seed"
         )
-    return noise
-
-
-def _check_no_noise(
-    measurement: MeasurementModel | None, range_noise: float, dropout: float
-) -> None:
-    """Checks that a LiDAR with calibrated returns gets no other noise.
-
-    Raises:
-        ValueError: one of the arguments adds noise.
-    """
-    if (
-        range_noise
-        or dropout
-        or (measurement is not None and measurement.is_random)
-    ):
-        raise ValueError(
-            "range_noise, dropout, measurement: calibrated returns have "
-            "noise of their own; leave these out"
-        )
+    return given or IDEAL
 
 
 _Model = TypeVar("_Model", MeasurementModel, "CalibratedReturns")

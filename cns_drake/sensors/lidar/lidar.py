@@ -299,14 +299,10 @@ class Lidar(LeafSystem):
             measurement: the model of noise, losses and rounding.
             returns: the model of a real unit; None for ideal returns. With a
                 model, only the resolution is taken from `measurement`.
-            causal: whether a scan is the revolution that ends at the time of
-                the output; by default the revolution starts at that time.
-            rate: scans per second of a discrete LiDAR, at most 1000 and at most
-                one scan per revolution. By default the LiDAR is continuous: it
-                has a scan for each time at which its ports are evaluated.
-            capture_offset: time of a discrete LiDAR's first periodic scan [s].
-            output_delay: time from a scan of a discrete LiDAR to its appearance
-                on the ports [s], less than 1 / `rate`.
+            causal: see `add_lidar`, as for the following arguments.
+            rate: scans per second, at most 1000 and one per revolution.
+            capture_offset: time of the first periodic scan [s].
+            output_delay: time until a scan is on the ports [s].
             moving_bodies: frame -> index of its body in the port
                 `body_spatial_velocities`. The LiDAR has this port only if this
                 argument is given.

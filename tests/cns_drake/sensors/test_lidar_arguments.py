@@ -101,7 +101,6 @@ class Site:
         ({"seed": -1}, ValueError, "seed: -1 is not an integer"),
         ({"seed": 0.5}, ValueError, "^seed: 0.5 is not a whole number"),
         ({"seed": "7"}, TypeError, "^seed: '7' is not a whole number"),
-        ({"rate": "10"}, TypeError, "^rate: '10' is no Real"),
         ({"pose": np.eye(4)}, TypeError, r"^X_PB: array\(.* is no RigidT"),
         (
             {"range_noise": 0.1, "measurement": MeasurementModel()},
