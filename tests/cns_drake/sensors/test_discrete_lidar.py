@@ -454,31 +454,6 @@ def test_advancing_in_pieces_changes_nothing(casts):
     np.testing.assert_array_equal(*found)
 
 
-def test_a_lidar_config_with_a_rate_is_discrete(casts):
-    for rate, expected in ((10.0, 11), (None, 101)):
-        casts[0] = 0
-        builder = DiagramBuilder()
-        plant, _ = AddMultibodyPlantSceneGraph(builder, 0.01)
-        plant.RegisterVisualGeometry(
-            plant.world_body(), RigidTransform(), Box(9, 9, 9), "b", np.ones(4)
-        )
-        # It moves, so that every step needs a scan of its own.
-        plant.AddRigidBody(
-            "ball", SpatialInertia.SolidBoxWithMass(1.0, 1.0, 1.0, 1.0)
-        )
-        plant.Finalize()
-        lidar = ApplyLidarConfig(
-            LidarConfig(preset="hokuyo-ust-20lx", rate=rate, columns=8),
-            builder,
-            lcm=DrakeLcm("memq://"),
-        )
-        port = lidar.GetOutputPort("scan")
-        reader = builder.AddSystem(Reader([port], lambda scan: None))
-        builder.Connect(port, reader.get_input_port())
-        Simulator(builder.Build()).AdvanceTo(1.0)
-        assert casts[0] == expected
-
-
 @pytest.mark.parametrize(
     ("options", "fault"),
     [

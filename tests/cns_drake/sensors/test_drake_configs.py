@@ -161,6 +161,7 @@ def test_a_preset_is_that_of_add_lidar(preset):
         ),
     ]
     assert lidars[0].pattern == lidars[1].pattern
+    assert lidars[0].samples is lidars[1].samples is None
     context = builder.Build().CreateDefaultContext()
     first, second = (
         one.GetOutputPort("scan").Eval(one.GetMyContextFromRoot(context))
@@ -180,6 +181,7 @@ def test_any_rate(rate):
     lidar = ApplyLidarConfig(config, builder, lcm=lcm)
     period = min(0.1, 1.0 / rate)
     assert lidar.pattern.period == period
+    assert lidar.samples == (1.0 / rate, 0.0, 0.0)
     assert lidar.pattern.num_beams == round(100_000 * period)
     channel = "DRAKE_POINT_CLOUD_lidar"
     _, received = advance(builder, lcm, 2.5 / rate, channel)
