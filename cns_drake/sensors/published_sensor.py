@@ -34,6 +34,7 @@ from evaluation.base import (
     Section,
     describe_validation_error,
     is_number,
+    no_such,
     of_type,
     types_of_fields,
 )
@@ -88,16 +89,19 @@ class PublishedSensor:
         takes `1e-3` for a text.
 
         Raises:
+            AttributeError: there is no such field.
             TypeError: the value is of another type.
         """
-        kind = types_of_fields(type(self)).get(name)
-        if kind is not None:
-            if name in vars(self) and isinstance(value, str):
-                if kind is bool:
-                    value = {"true": True, "false": False}.get(value, value)
-                elif kind in _NUMBERS and is_number(value):
-                    value = float(value)
-            value = of_type(value, kind, f"{type(self).__name__}.{name}")
+        kinds, struct = types_of_fields(type(self)), type(self).__name__
+        if name not in kinds:
+            raise AttributeError(f"{struct}: {no_such('field', name, kinds)}")
+        kind = kinds[name]
+        if name in vars(self) and isinstance(value, str):
+            if kind is bool:
+                value = {"true": True, "false": False}.get(value, value)
+            elif kind in _NUMBERS and is_number(value):
+                value = float(value)
+        value = of_type(value, kind, f"{struct}.{name}")
         object.__setattr__(self, name, value)
 
     def __eq__(self, other: object) -> bool:

@@ -109,6 +109,8 @@ def test_yaml_and_back():
     assert "preset: vlp-16" in text
     with pytest.raises(RuntimeError, match="furrows"):
         yaml_load_typed(schema=LidarConfig, data="{furrows: 3}")
+    with pytest.raises(AttributeError, match=r"no field 'rate_hz'.*rate"):
+        config.rate_hz = 3
 
 
 @pytest.mark.parametrize(
