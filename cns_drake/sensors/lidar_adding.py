@@ -1,4 +1,4 @@
-"""Adding a LiDAR to a diagram."""
+"""Adding a LiDAR to a diagram, without pydantic for one's own patterns."""
 
 from __future__ import annotations
 

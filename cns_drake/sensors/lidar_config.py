@@ -1,4 +1,7 @@
-"""Descriptions of a LiDAR and the weather, and the models that follow."""
+"""Descriptions of a LiDAR and the weather, and the models that follow.
+
+Scenarios are read with this module, and thus without Drake.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

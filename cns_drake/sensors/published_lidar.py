@@ -1,4 +1,8 @@
-"""A LiDAR configured in YAML, in the same way as Drake's cameras."""
+"""A LiDAR configured in YAML, in the same way as Drake's cameras.
+
+It needs both Drake, which `lidar_config` does without, and pydantic, which
+`lidar_adding` does without.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
