@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
+import math
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, TypeVar
@@ -295,7 +296,7 @@ def add_lidar_view(
 
     Raises:
         TypeError: an argument is of another type.
-        ValueError: the LiDAR has a view already.
+        ValueError: the LiDAR has a view already, or the period is negative.
 
     Example:
         from cns_drake import add_lidar_view
@@ -308,7 +309,9 @@ def add_lidar_view(
     check_unused_names(builder, f"{name}_view")
     if period is None:
         period = (lidar.samples or lidar.pattern).period
-    of_type(period, float, "period")
+    if not 0.0 <= of_type(period, float, "period") < math.inf:
+        # Drake would end the process.
+        raise ValueError(f"period: {period!r} is not a time from 0 s on")
     of_type(point_size, float, "point_size")
     view = builder.AddNamedSystem(
         f"{name}_view",

@@ -1,5 +1,7 @@
 """Names of sensors: what Drake takes, and what a recording takes."""
 
+import math
+
 import numpy as np
 from pydrake.geometry import Box, Meshcat
 from pydrake.lcm import DrakeLcm
@@ -121,7 +123,10 @@ def test_a_lidar_has_one_view():
     site = Site()
     meshcat = Meshcat()
     lidar = site.lidar("roof")
-    add_lidar_view(site.builder, lidar, meshcat)
+    for period in (-0.1, math.nan, math.inf):
+        with pytest.raises(ValueError, match=f"^period: {period} is not"):
+            add_lidar_view(site.builder, lidar, meshcat, period=period)
+    add_lidar_view(site.builder, lidar, meshcat, period=0.0)
     with pytest.raises(ValueError, match="has a system 'roof_view'"):
         add_lidar_view(site.builder, lidar, meshcat)
     site.builder.Build()
