@@ -1,7 +1,6 @@
 """An IMU: Drake's accelerometer and gyroscope, with optional errors."""
 
 from dataclasses import dataclass, replace
-import math
 from types import NoneType
 
 import numpy as np
@@ -44,6 +43,9 @@ from evaluation.base import (
     check_type,
     of_type,
 )
+
+# Beyond, events hardly advance the time of a long simulation [1/s].
+_HIGHEST_SAMPLE_RATE = 1e6
 
 
 class NoisyImu(LeafSystem):
@@ -164,8 +166,8 @@ def add_imu(
     Raises:
         RuntimeError: the plant is not finalized.
         TypeError: an argument is of another type.
-        ValueError: there is noise without a rate, the rate is not positive, the
-            pose is not finite, or the name is taken or empty.
+        ValueError: there is noise without a rate, the rate is not positive or
+            above 1e6, the pose is not finite, or the name is taken or empty.
 
     Example:
         from cns_drake import add_imu
@@ -215,9 +217,10 @@ def add_imu(
 
 
 def _check_sample_rate(rate: float) -> None:
-    if not 0.0 < rate < math.inf:
+    if not 0.0 < rate <= _HIGHEST_SAMPLE_RATE:
         raise ValueError(
-            f"rate: {rate!r} is not a positive number of samples a second"
+            f"rate: {rate!r} is not a positive number of samples a second, up "
+            f"to {_HIGHEST_SAMPLE_RATE:g}"
         )
 
 

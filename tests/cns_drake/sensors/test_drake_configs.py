@@ -536,7 +536,7 @@ APPLIED = (
     ("struct", "apply", "good", "bad"),
     [
         (OdometryConfig, ApplyOdometryConfig, (1, 1000), (1001, 10**9)),
-        (ImuConfig, ApplyImuConfig, (0.5, 62.5, 1600), (np.inf, np.nan)),
+        (ImuConfig, ApplyImuConfig, (0.5, 62.5, 1e6), (1.1e6, np.nan)),
     ],
 )
 def test_rates_out_of_range(struct, apply, good, bad):
