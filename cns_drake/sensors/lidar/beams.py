@@ -6,17 +6,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 import math
-from numbers import Real
 
 import numpy as np
 
-from evaluation.base import (
-    arcsin,
-    arctan2,
-    check_type,
-    is_real,
-    of_type,
-)
+from evaluation.base import arcsin, arctan2, of_type
 
 # Height of the elevation bands in which beams of irregular patterns are cast.
 _BAND_RAD = 0.03
@@ -271,10 +264,8 @@ def period_of_rate(rate: float, longest: float = math.inf) -> float:
         TypeError: the rate is no number.
         ValueError: the rate is not positive, or is out of range.
     """
-    check_type("rate", rate, Real)
-    if not (
-        is_real(rate) and 0.0 < rate <= HIGHEST_RATE and rate * longest >= 1
-    ):
+    of_type(rate, float, "rate")
+    if not (0.0 < rate <= HIGHEST_RATE and rate * longest >= 1):
         least = f"at least {1.0 / longest:g} and " if longest < math.inf else ""
         raise ValueError(
             f"rate: {rate!r} is not a positive number per second, {least}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 import math
-from numbers import Real
 from types import NoneType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -59,7 +58,7 @@ from cns_drake.sensors.lidar.seen_geometry import (
 from evaluation.base import (
     NS_PER_S,
     check_type,
-    is_real,
+    of_type,
     product,
     rotated,
 )
@@ -154,8 +153,7 @@ def sample_times(
         ("capture_offset", capture_offset, math.inf),
         ("output_delay", output_delay, period),
     ):
-        check_type(name, time, Real)
-        if not (is_real(time) and 0.0 <= time < end):
+        if not 0.0 <= of_type(time, float, name) < end:
             raise ValueError(
                 f"{name}: {time!r} is not a time from 0 to below {end:g} s"
             )

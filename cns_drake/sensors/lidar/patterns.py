@@ -11,13 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cns_drake.sensors.lidar.beams import BeamPattern, Beams, make_beams
-from evaluation.base import (
-    check_fields,
-    cos,
-    of_type,
-    sin,
-    sinc,
-)
+from evaluation.base import check_fields, cos, of_type, sin, sinc
 
 
 @dataclass(frozen=True)
