@@ -7,8 +7,10 @@ import os
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
+from evaluation.base.errors import check_type
+
 # Type of a field -> the types of a value that becomes it, and what they are.
-_TAKEN = {
+_TAKEN: dict[type, tuple[Any, str]] = {
     bool: (bool, "not true or false"),
     float: (numbers.Real, "not a number"),
     int: (numbers.Real, "not a whole number"),
@@ -49,6 +51,7 @@ def of_type(value: Any, kind: Any, name: str) -> Any:
         TypeError: the value is of another type.
         ValueError: a number is not whole, or a tuple has another length.
     """
+    shown = " ".join(repr(value).split())
     if get_origin(kind) in (UnionType, Union):
         kinds = get_args(kind)
         if value is None and NoneType in kinds:
@@ -59,19 +62,20 @@ def of_type(value: Any, kind: Any, name: str) -> Any:
         one, *rest = get_args(kind)
         count = 1 + len(rest)
         if isinstance(value, str | bytes) or not isinstance(value, Iterable):
-            raise TypeError(f"{name}: {value!r} is no {sequence.__name__}")
+            raise TypeError(f"{name}: {shown} is no {sequence.__name__}")
         taken = sequence(of_type(item, one, name) for item in value)
         if rest not in ([], [...]) and len(taken) != count:
-            raise ValueError(f"{name}: {value!r} is not of length {count}")
+            raise ValueError(f"{name}: {shown} is not of length {count}")
         return taken
-    types, what = _TAKEN.get(kind, (kind, f"no {kind.__name__}"))
-    fault = f"{name}: {value!r} is {what}"
+    if kind not in _TAKEN:
+        check_type(name, value, kind)
+        return value
+    types, what = _TAKEN[kind]
+    fault = f"{name}: {shown} is {what}"
     if not isinstance(value, types) or (
         isinstance(value, bool) and kind is not bool
     ):
         raise TypeError(fault)
     if kind is int and value % 1 != 0:
         raise ValueError(fault)
-    if kind is str:
-        return os.fspath(value)
-    return kind(value) if kind in _TAKEN else value
+    return os.fspath(value) if kind is str else kind(value)
