@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import dataclass, field
 from functools import lru_cache
 import math
 
@@ -276,7 +276,7 @@ _TURNS_HZ = 100.0
 _NODS_HZ = 5.0 * (np.sqrt(5.0) - 1.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _TimedPattern(BeamPattern):
     """A pattern of `num_lines` beams that fire together at a constant rate.
 
@@ -284,7 +284,6 @@ class _TimedPattern(BeamPattern):
     frame in s.
     """
 
-    _: KW_ONLY
     points_per_second: float
     min_range: float
     max_range: float
