@@ -56,6 +56,9 @@ from .errors import no_such as no_such
 from .errors import one_line as one_line
 from .errors import validated as validated
 from .errors import value_errors as value_errors
+from .field_types import check_fields as check_fields
+from .field_types import of_type as of_type
+from .field_types import types_of_fields as types_of_fields
 from .figures import GONE_RGB as GONE_RGB
 from .figures import NEW_RGB as NEW_RGB
 from .figures import UNSEEN_RGB as UNSEEN_RGB
