@@ -169,6 +169,9 @@ class LidarSection(LidarDescription, Mount):
             the data sheet, instead of a preset.
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
+        hidden_deg: first and last azimuth, counterclockwise, of a sector that
+            something beside the LiDAR hides, from -180 to 180 [deg]; by
+            default nothing is hidden.
         resolution: step to which recorded coordinates are rounded [m]; the
             default is 2^-10 m, about 1 mm. 0 records exact values.
         rate: revolutions per second [Hz]. The rate of the fastest LiDAR of the
@@ -179,6 +182,7 @@ class LidarSection(LidarDescription, Mount):
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)
+    hidden_deg: tuple[float, float] | None = field_off_by_default(None)
     # The content of the file, so that a recording states all of it.
     unit: Annotated[
         LidarSheet | None,
@@ -260,7 +264,7 @@ class LidarSection(LidarDescription, Mount):
             raise ValueError(
                 f"min_range {nearest:g} is not below max_range {farthest:g}"
             )
-        make_pattern(self)
+        _without_hidden(make_pattern(self), self.hidden_deg)
         if self.returns == "calibrated":
             sheet.returns.check_range(farthest)
         return self
@@ -512,9 +516,27 @@ class LidarModel(NamedTuple):
         returns: the model of calibrated returns; None for ideal returns.
     """
 
-    pattern: UnitPattern
+    pattern: BeamPattern
     measurement: MeasurementModel
     returns: "CalibratedReturns | None"
+
+
+def _without_hidden(
+    pattern: BeamPattern, hidden_deg: tuple[float, float] | None
+) -> BeamPattern:
+    """Returns a pattern without the beams of a hidden sector."""
+    if hidden_deg is None:
+        return pattern
+    first, last = hidden_deg
+    if first == last:
+        raise ValueError(f"hidden_deg: {list(hidden_deg)} is no sector")
+    try:
+        return pattern.within(azimuths_deg=(last, first))
+    except ValueError:
+        raise ValueError(
+            f"hidden_deg: {list(hidden_deg)} is not two azimuths from -180 to"
+            " 180, or hides every beam"
+        ) from None
 
 
 def make_lidar_model(
@@ -536,7 +558,7 @@ def make_lidar_model(
     Raises:
         ValueError: see `make_pattern`.
     """
-    pattern = make_pattern(config, period)
+    pattern = _without_hidden(make_pattern(config, period), config.hidden_deg)
     measurement = MeasurementModel(
         resolution=config.resolution,
         range_noise=config.range_noise,
