@@ -142,11 +142,7 @@ def _remove_empty(folder: Path, output: Path) -> None:
 
 
 def _check_shared_files(texts: Mapping[Path, str]) -> None:
-    """Checks that existing files of all drives have the given texts.
-
-    Raises:
-        InputError: a file differs.
-    """
+    """Checks that existing files of all drives have the given texts."""
     for path, text in texts.items():
         with user_errors(path):
             is_other = path.is_file() and path.read_bytes() != text.encode()

@@ -1,7 +1,5 @@
 """Systems that move a vehicle along a trajectory."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import functools
 from typing import NamedTuple

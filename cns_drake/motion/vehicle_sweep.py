@@ -1,7 +1,5 @@
 """The poses of a vehicle just after the current time, for its LiDARs."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

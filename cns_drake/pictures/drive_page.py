@@ -1,7 +1,5 @@
 """Makes a web page of a drive through a city; the page needs no server."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterator, Mapping, Sequence
 import contextlib

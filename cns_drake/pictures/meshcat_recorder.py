@@ -1,7 +1,5 @@
 """Records a drive while it is simulated, for its web page."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """Renders images of a stage by casting rays, without a GPU or a display."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from pathlib import Path
 

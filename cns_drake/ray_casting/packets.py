@@ -8,8 +8,6 @@ does not depend on the instructions that Embree uses on a processor. If a ray
 passes all the shapes, it is cast again, from there on.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ around each shape, and what a ray meets follows in double precision from the
 shape itself (see `packets`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 import math

@@ -41,11 +41,7 @@ def lost_structures(scenario: Scenario) -> tuple[str, ...]:
 
 
 def _lacking_in(scenario: Scenario, other: str, source: str) -> frozenset[str]:
-    """Returns the structures of a drive's stage that another stage lacks.
-
-    Raises:
-        InputError: the other stage does not exist, or lacks nothing.
-    """
+    """Returns the structures of a drive's stage that another stage lacks."""
     here, there = (
         structures_in(load_world(world))
         for world in (scenario.world_file, scenario.folder.stage(other))
@@ -70,10 +66,6 @@ def _removal_order(
         seed: seed of the random place.
         removable: the structures that can be missing; None for all buildings
             and plants except those that wait on a lot for a building.
-
-    Raises:
-        InputError: no structure can be missing, or a place in the table is not
-            a number.
     """
     rows = [
         row
@@ -118,9 +110,6 @@ def _scattered_losses(
         shares: class -> share of its structures, from 0 to 1.
         seed: seed of the random choice.
         source: file and section of the losses, for error messages.
-
-    Raises:
-        InputError: the table has no structure of a class.
     """
     records = [row for _, row in read_records(table, ("name", "class"))]
     rows = [row for row in records if not _is_on_a_lot(row)]

@@ -241,9 +241,6 @@ def _obstacles_beside(scenario: Scenario, points: np.ndarray) -> np.ndarray:
     Args:
         scenario: the scenario, whose world is loaded.
         points: (N, 3) points of the path, which must be close together [m].
-
-    Raises:
-        InputError: the world cannot be loaded.
     """
     scene = _scene_of(scenario)
     p_WR = (points + _HEIGHTS[:, None]).reshape(-1, 3)
@@ -314,10 +311,6 @@ def _ground_heights(scenario: Scenario, xy: np.ndarray) -> np.ndarray:
     Args:
         scenario: the scenario.
         xy: (N, 2) places along the path, 2 m apart.
-
-    Raises:
-        InputError: the world cannot be loaded, or it is open which of several
-            surfaces is the ground.
     """
     levels = _usable_levels(_scene_of(scenario), xy)
     heights = np.full(len(xy), np.nan)
@@ -415,11 +408,7 @@ def load_scenario_world(
 
 
 def _scene_of(scenario: Scenario) -> RayCastingScene:
-    """Returns the geometry of a scenario's world, for rays.
-
-    Raises:
-        InputError: the world cannot be loaded.
-    """
+    """Returns the geometry of a scenario's world, for rays."""
     world = load_scenario_world(scenario)
     context = world.plant.CreateDefaultContext()
     inspector = world.scene_graph.model_inspector()

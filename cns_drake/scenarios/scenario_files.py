@@ -165,10 +165,6 @@ def _check_own_map(values: dict, file: Path) -> None:
     Args:
         values: the fields, in which a map of the folder's name becomes `.`.
         file: the file that contains the fields.
-
-    Raises:
-        InputError: the drive goes through a shipped map, and its folder has
-            another name and stages of its own.
     """
     name = values.get("map")
     if not isinstance(name, str):

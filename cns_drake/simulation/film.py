@@ -178,9 +178,6 @@ def _shot_times(
 
     If `start` is None, the shot shows that part of the drive, of the shot's
     length, whose two ends lie farthest apart.
-
-    Raises:
-        InputError: the start is not within the drive.
     """
     end = trajectory.duration
     moments = np.arange(number) / RATE

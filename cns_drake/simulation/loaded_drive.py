@@ -63,9 +63,6 @@ def _plan_recording(scenario: Scenario) -> _RecordingPlan:
     own, continue until the last scan is complete. If scans have motion
     distortion, the poses on `/tf` also continue until then, so that scans can
     be corrected up to their last point.
-
-    Raises:
-        InputError: Kalibr's file cannot be used.
     """
     fastest = scenario.fastest_rate
     layouts = {name: lidar.layout for name, lidar in scenario.lidars.items()}

@@ -307,9 +307,6 @@ def _with_distractors(
     the map is shipped, drives along its streets between other buildings; the
     drives of other maps through their other stages; and drives along the
     streets of other maps, between other buildings.
-
-    Raises:
-        InputError: a shipped map cannot be used.
     """
     pairs = list(pairs)
     most = max(one.num_distractors for one in pairs)

@@ -1,7 +1,5 @@
 """Vehicles that stand in queues in all lanes between junctions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

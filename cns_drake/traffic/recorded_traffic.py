@@ -6,8 +6,6 @@ that planned traffic by rules of its own: for each map 600 s of 60 vehicles and
 ego car drove. The 60 pedestrians who got about most were kept.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

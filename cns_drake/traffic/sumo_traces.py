@@ -303,11 +303,7 @@ def _other_elements(steps: list[Element]) -> dict[str, set[str]]:
 
 
 def _sampling_times(path: Path, times: np.ndarray) -> tuple[float, float]:
-    """Returns the first of evenly spaced times, and their distance [s].
-
-    Raises:
-        InputError: they are not evenly spaced.
-    """
+    """Returns the first of evenly spaced times, and their distance [s]."""
     if len(times) < 2:
         raise InputError(
             f"{path}: {len(times)} timesteps are too few; at least two are "
@@ -365,11 +361,7 @@ def _traced_objects(steps: list[Element], tag: str) -> tuple[TracedObject, ...]:
 
 
 def _check_unit(path: Path, objects: Sequence[TracedObject], dt: float) -> None:
-    """Compares the places of a trace with its speeds, `dt` [s] apart.
-
-    Raises:
-        InputError: the places are not in metres.
-    """
+    """Compares the places of a trace with its speeds, `dt` [s] apart."""
     by_places, by_speeds = _ways(objects, dt)
     if by_speeds < _COMPARED:
         return
@@ -548,9 +540,6 @@ def _check_place(trace: FcdTrace, path: Path, levels: Levels) -> None:
 
     If any vehicle is on a road, half of their places must be. Otherwise half of
     all places must be on the ground.
-
-    Raises:
-        InputError: the trace belongs to another map.
     """
     traced = trace.vehicles or trace.persons
     places = np.concatenate([road_user.xy for road_user in traced])

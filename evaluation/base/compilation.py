@@ -206,9 +206,6 @@ def _despite_damage(
     """Compiles a function again if its files in the cache are damaged.
 
     Numba unpickles them, which can raise any error.
-
-    Raises:
-        InputError: they cannot be written again.
     """
     try:
         return compile_it()

@@ -143,12 +143,7 @@ def check_folder_writable(folder: Path) -> None:
 
 
 def _check_file(path: Path) -> None:
-    """Checks that a file of this name may be written.
-
-    Raises:
-        InputError: the path is a folder, link, device or pipe, or leads through
-            another user's link.
-    """
+    """Checks that a file of this name may be written."""
     check_links(path)
     with user_errors(path):
         mode = path.lstat().st_mode if os.path.lexists(path) else stat.S_IFREG

@@ -167,11 +167,7 @@ def _by_own(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
-    """Registers a scan by a function of the user; see `Estimator`.
-
-    Raises:
-        InputError: the function does not return a pose and a score.
-    """
+    """Registers a scan by a function of the user; see `Estimator`."""
     nearby = surroundings.around(start[:3, 3], HALF_EXTENT)
     answer = function(nearby, measured.copy(), start.copy())
     try:
@@ -232,9 +228,6 @@ def _function_of_file(path: Path) -> Callable:
     """Returns the estimator that a user's Python file defines.
 
     It is the function `localise`, or the only public function of the file.
-
-    Raises:
-        InputError: the file cannot be run, or has no such function.
     """
     module = run_module(path)
     own = {

@@ -71,11 +71,7 @@ class Settings:
 
 
 def _parse(name: str, kind: Callable, text: Any) -> Any:
-    """Returns the value of a setting.
-
-    Raises:
-        InputError: the value is no number in the range of the setting.
-    """
+    """Returns the value of a setting."""
     try:
         value = kind(text)
     except (TypeError, ValueError):

@@ -292,11 +292,7 @@ def _slopes(p_S: np.ndarray) -> np.ndarray:
 
 
 def _check_scans(session: Session) -> None:
-    """Checks that a session has scans with poses.
-
-    Raises:
-        InputError: it has none.
-    """
+    """Checks that a session has scans with poses."""
     if len(session.X_WS) == 0:
         raise InputError(
             f"{session.folder}: no poses.txt and Scans; this baseline needs "

@@ -1,7 +1,5 @@
 """Distances between the points of two maps."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -393,9 +393,6 @@ def _choose_labels(
         truth: the exact labels of these maps.
         given: files with the labels for `GIVEN`, of the older and of the newer
             map.
-
-    Raises:
-        InputError: a file cannot be read, or the detector cannot run.
     """
     if method == TRUTH:
         return truth

@@ -272,11 +272,7 @@ def write_labels(path: Path, labels: np.ndarray) -> None:
 
 
 def _read_any_labels(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
-    """Returns labels of any shape and type, and their points, if known.
-
-    Raises:
-        InputError: the file cannot be read, or is a cloud without labels.
-    """
+    """Returns labels of any shape and type, and their points, if known."""
     if path.suffix == ".ply":
         points = np.concatenate(list(read_blocks(path)))
         if "prediction" not in (points.dtype.names or ()):
@@ -292,9 +288,6 @@ def _session_of(folder: Path, points: np.ndarray, X_WS: np.ndarray) -> Session:
         folder: folder of the session's files.
         points: structured array (N,) of the map's points.
         X_WS: (K, 4, 4) poses of the scans.
-
-    Raises:
-        InputError: a label or an instance is no number of 16 bits.
     """
     columns = {}
     for name in ("label", "instance"):
@@ -313,9 +306,6 @@ def _as_uint16(path: Path, points: np.ndarray, name: str) -> np.ndarray:
         path: file of the map, for error messages.
         points: structured array (N,) of the map's points.
         name: name of the column.
-
-    Raises:
-        InputError: a value is no whole number from 0 to 65535.
     """
     with np.errstate(invalid="ignore"):
         numbers = points[name].astype(np.uint16)
@@ -448,11 +438,7 @@ def read_truth(pair: SessionPair) -> PairLabels:
 
 
 def _truth_of(session: Session) -> Path:
-    """Returns the file with the ground truth of a session.
-
-    Raises:
-        InputError: there is none.
-    """
+    """Returns the file with the ground truth of a session."""
     path = session.folder / "truth.npy"
     if not is_there(path):
         raise InputError(

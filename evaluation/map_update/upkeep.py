@@ -7,8 +7,6 @@ the points of B are added. `evaluation.map_update.upkept_drive` shows the
 updated map in the scans of the drives.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -6,8 +6,6 @@ new points that are not occluded. The maps for localisation and the places for
 recognition therefore come from one map.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from evaluation.base import poses, xyz

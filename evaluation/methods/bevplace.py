@@ -451,12 +451,7 @@ class BevPlace(Method[np.ndarray, np.ndarray]):
 
 
 def _read_weights(path: Path) -> dict[str, np.ndarray]:
-    """Returns the weights (float32) in an .npz file, by name.
-
-    Raises:
-        InputError: the file cannot be read, or an array is missing, of another
-            shape or not finite.
-    """
+    """Returns the weights (float32) in an .npz file, by name."""
     try:
         found = read_npz(path, SHAPES, _MOST_BYTES)
     except ValueError as error:

@@ -7,8 +7,6 @@ Cells with many layers set (walls, trunks, posts) are the keypoints, unless they
 are part of a line of such cells.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math

@@ -1,7 +1,5 @@
 """What is read of a drive, once: descriptors, scans, a map and a picture."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial

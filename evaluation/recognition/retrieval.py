@@ -4,8 +4,6 @@ The distance of a query from a place is the distance between the positions of
 the sensor in three dimensions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 

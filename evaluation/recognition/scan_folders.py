@@ -154,10 +154,6 @@ class _CloudReader:
         Returns:
             (N, 3) float64 points [m], N > 0; for a method with further fields,
             a structured array (N,). The array is read-only.
-
-        Raises:
-            InputError: the cloud cannot be read, lacks a field that the method
-                needs, or has no point within range.
         """
         scan = read_cloud(path, columns, self._on_note)
         is_finite = np.isfinite(xyz(scan)).all(axis=1)
@@ -175,12 +171,7 @@ class _CloudReader:
 
 
 def _scan_files(folder: Path) -> list[Path]:
-    """Returns the files of the clouds in a folder, sorted by name.
-
-    Raises:
-        InputError: there is no folder or no cloud, or two clouds have the same
-            name.
-    """
+    """Returns the files of the clouds in a folder, sorted by name."""
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
     files = [path for path in listed(folder) if is_cloud(path)]

@@ -5,8 +5,6 @@ Therefore whole blocks of street are the units, and not queries. All tests and
 all confidence intervals of results come from the function `sign_flip_test`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache

@@ -4,8 +4,6 @@
 read again is the same value.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 import json

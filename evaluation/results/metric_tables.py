@@ -111,11 +111,7 @@ def _by_method_and_condition(keys: Iterable[Any]) -> dict[_Measured, Any]:
 def _check_answers(
     queries: Path, answers: Iterable[Answers], path: Path, results: Results
 ) -> None:
-    """Checks that a table's results follow from the answers to queries.
-
-    Raises:
-        InputError: a result or the number of queries differs.
-    """
+    """Checks that a table's results follow from the answers to queries."""
     known = {
         (*row.identity, row.metric): row
         for row in results.where(task="place").rows

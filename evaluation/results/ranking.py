@@ -1,7 +1,5 @@
 """Ranks methods by their means over conditions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 import math
 from typing import NamedTuple

@@ -447,11 +447,7 @@ class _AnswerColumn:
     _known: dict[str, Any] = field(default_factory=dict)
 
     def values(self, lines: Sequence[TableLine]) -> list[Any]:
-        """Returns the values of the column's cells in lines.
-
-        Raises:
-            InputError: a cell contains no value of this kind.
-        """
+        """Returns the values of the column's cells in lines."""
         known, place = self._known, self.place
         cells = [line.cells[place] for line in lines]
         if not known.keys() >= set(cells):
@@ -701,12 +697,7 @@ class TableLines:
 
 
 def _csv_lines(file: Path) -> list[tuple[int, list[str]]]:
-    """Returns the lines of a CSV file: number and cells, the header first.
-
-    Raises:
-        InputError: the file cannot be read, is no CSV file, or a cell has a
-            control character.
-    """
+    """Returns the lines of a CSV file: number and cells, the header first."""
     try:
         text = read_bytes(file).decode("utf-8-sig")
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)
@@ -743,12 +734,7 @@ def _csv_lines(file: Path) -> list[tuple[int, list[str]]]:
 def _check_columns(
     file: Path, names: Sequence[str], needed: Iterable[str]
 ) -> None:
-    """Checks the names of a table's columns.
-
-    Raises:
-        InputError: the table lacks a column, has a column twice or a column
-            without a name.
-    """
+    """Checks the names of a table's columns."""
     missing = [name for name in needed if name not in names]
     if missing:
         raise InputError(f"{file}: no column '{missing[0]}'")

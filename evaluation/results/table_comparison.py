@@ -109,12 +109,7 @@ class _Agreement(NamedTuple):
 
 
 def _rank_agreement(first: MetricTable, second: MetricTable) -> _Agreement:
-    """Compares the rankings of two tables, each over its own conditions.
-
-    Raises:
-        InputError: fewer than two methods have results in all conditions of
-            both tables.
-    """
+    """Compares the rankings of two tables, each over its own conditions."""
     whole = [
         {
             method
@@ -464,11 +459,7 @@ def rows_beside_shipped(results: Results, metric: str) -> tuple[list[Row], str]:
 
 
 def _only_metric(path: Path) -> Metric:
-    """Returns the metric that a user's file registers.
-
-    Raises:
-        InputError: the file cannot be used, or registers several metrics.
-    """
+    """Returns the metric that a user's file registers."""
     found = load_metrics(path)
     if len(found) > 1:
         names = ", ".join(one.name for one in found)
@@ -692,12 +683,7 @@ def _differences(
 
 
 def _check_same_queries(first: Answers, second: Answers) -> None:
-    """Raises an error unless two methods answered the same queries.
-
-    Raises:
-        InputError: the two methods answered different queries, or the queries
-            are in other blocks of street.
-    """
+    """Raises an error unless two methods answered the same queries."""
     frames, others = (a.columns["query_frame"] for a in (first, second))
     two = (
         f"{first.experiment}: {first.database}, {first.query}:"
@@ -718,9 +704,6 @@ def _common_conditions(
 
     If the shipped table has none of the conditions that the tables of the user
     have in common, only the user's tables count.
-
-    Raises:
-        InputError: the tables have no condition in common.
     """
     if not own:
         return shipped.conditions, []

@@ -1,7 +1,5 @@
 """What the page of a study shows of recorded cities, and how it is drawn."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The experiment `stages` on recordings, which need not exist yet."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -138,10 +138,6 @@ class Study(ExperimentRun):
 
         If a database has several drives, a study of place recognition also
         measures the cost of the methods.
-
-        Raises:
-            InputError: a task compares exactly two drives, but the database has
-                several.
         """
         wanted = self.experiment.tasks
         if not any(map(_has_several, self.experiment.conditions)):
@@ -165,9 +161,6 @@ class Study(ExperimentRun):
 
         `load_experiment` has checked all other factors. A setting of a method
         that this run leaves out is known, too.
-
-        Raises:
-            InputError: there is no such metric, or no such factor.
         """
         chosen = {choice.name for choice, _ in self.methods.values()}
         settings = (n for _, columns in self.methods.values() for n in columns)
@@ -413,11 +406,7 @@ def _has_several(condition: Condition) -> bool:
 def _chosen_methods(
     experiment: Experiment,
 ) -> dict[str, tuple[MethodChoice, Mapping[str, Any]]]:
-    """Returns the chosen methods by key, each with columns of its settings.
-
-    Raises:
-        InputError: a method is unknown, or a setting is wrong.
-    """
+    """Returns the chosen methods by key, each with columns of its settings."""
     files = [
         Path(one) for one in experiment.methods or () if one.endswith(".py")
     ]

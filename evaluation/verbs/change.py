@@ -1,7 +1,5 @@
 """The verb `tcr`: how much changed between two drives or maps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The verb `localise`: how well scans are localised in a map."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
@@ -265,11 +263,7 @@ def _with_offset(
 def _check(
     query_spacing: float | None, odometry_drift: float | None, *, track: bool
 ) -> None:
-    """Checks which options are given together, and their ranges.
-
-    Raises:
-        InputError: an option cannot be used.
-    """
+    """Checks which options are given together, and their ranges."""
     if track and query_spacing is not None:
         raise InputError("--query-spacing: not together with --track")
     if not track and odometry_drift is not None:

@@ -1,7 +1,5 @@
 """The verb `map-update`: how well changes between two maps are labelled."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -123,11 +121,7 @@ _BEND = 0.05
 def _in_one_world(
     pair: SessionPair, align: When, on_note: Callable[[str], None]
 ) -> tuple[SessionPair, WorldVerdict]:
-    """Returns the maps in one world, and the verdict.
-
-    Raises:
-        InputError: the maps cannot be aligned, or only by bending one.
-    """
+    """Returns the maps in one world, and the verdict."""
     if align != "always":
         why = "the maps of a folder share a world, by its form"
         on_note(f"world: {why}")

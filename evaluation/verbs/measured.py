@@ -1,7 +1,5 @@
 """What a verb measures: its metrics, and its rows in the two tables."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The verb `pr`: how well a method recognises the places of a drive."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
@@ -317,11 +315,7 @@ def _choice(
 
 
 def _scans_of(opened: Drive | Path) -> CountedDrive:
-    """Returns a drive that counts what is ignored of it.
-
-    Raises:
-        InputError: it is a point cloud.
-    """
+    """Returns a drive that counts what is ignored of it."""
     if isinstance(opened, Path):
         raise InputError(f"{opened}: a point cloud, not a recorded drive")
     return CountedDrive(opened)
@@ -340,11 +334,7 @@ def _named(given: Drive | Path | str) -> str:
 def _check_returns(
     places: Drive, queries: Drive, protocol: RetrievalProtocol
 ) -> None:
-    """Refuses a drive that never returns, before its scans are described.
-
-    Raises:
-        InputError: the drive never returns.
-    """
+    """Refuses a drive that never returns, before its scans are described."""
     recent_s = protocol.exclude_recent
     if recent_s is None or protocol.overlap is not None:
         return

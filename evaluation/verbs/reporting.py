@@ -1,7 +1,5 @@
 """The verb `report`: all recordings in a folder."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 

@@ -10,8 +10,6 @@ as the LiDAR does. Times are the processor's, on one thread, medians of 15 scans
 or more.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 import time
 

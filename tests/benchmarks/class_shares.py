@@ -10,8 +10,6 @@ shares in SemanticKITTI's training sequences, from the field `content` of its
 file config/semantic-kitti.yaml.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections import Counter
 import csv

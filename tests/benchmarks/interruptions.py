@@ -10,8 +10,6 @@ end, a table has the longest time of each command. Recordings are made in FOLDER
 first, unless they are there.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import os

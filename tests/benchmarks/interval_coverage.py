@@ -10,8 +10,6 @@ often a test finds one nevertheless. Redirect it to `docs/notes/coverage.csv`.
 On one core, this takes five minutes.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Sequence
 import csv

@@ -24,8 +24,6 @@ and `rosbags`. Prints one JSON object for each program:
     end             error at the end [m]
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 import json

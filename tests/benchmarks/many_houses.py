@@ -9,8 +9,6 @@ processes, and the peak of resident memory of the largest of them.
 Linux only.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from pathlib import Path

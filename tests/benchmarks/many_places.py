@@ -20,8 +20,6 @@ many queries as places. Exponents are slopes of straight lines through
 logarithms.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from pathlib import Path

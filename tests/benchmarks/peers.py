@@ -17,8 +17,6 @@ and as that is another ray, errors of centimetres are in the nature of it.
 Casters that are not installed, or that do not run here, are named.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

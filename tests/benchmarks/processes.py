@@ -1,7 +1,5 @@
 """Processes that benchmarks measure in; imports nothing that costs memory."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 import multiprocessing
 import os

@@ -10,8 +10,6 @@ Aims: 0.85 of the limit and 2.5 times Open3D on one thread, 1.8 times as much
 on two threads, at most 15 % more time with 20 moving cars.
 """
 
-from __future__ import annotations
-
 import argparse
 import ctypes
 from pathlib import Path

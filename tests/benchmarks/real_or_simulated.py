@@ -12,8 +12,6 @@ Boosted trees then tell the patches of both sets apart, cross-validated by place
 All values are means over random draws of patches. Needs scikit-learn.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from pathlib import Path

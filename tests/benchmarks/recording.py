@@ -12,8 +12,6 @@ share of each step, by the CPU time of the thread that does it.
 Aims: at most 1.0 times Open3D's time with two cores, 1.5 times with one.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections import defaultdict
 from collections.abc import Iterator

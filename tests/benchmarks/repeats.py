@@ -11,8 +11,6 @@ under the name of its session. Only planned motions are compared; no scan is
 simulated.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 import csv

@@ -10,8 +10,6 @@ the face's corners from that plane, and what part of the difference lies across
 the face; the latter is less than the former where the face is not plane.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

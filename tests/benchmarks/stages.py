@@ -1,7 +1,5 @@
 """What the benchmarks of ray casting share: stages, poses, timing."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import time

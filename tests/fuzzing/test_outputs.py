@@ -6,8 +6,6 @@ that names it, and must change nothing. Inputs are as small as possible, or not
 there at all: what is in the way is found before a drive is opened.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Writes bags as public programs do, with the writers of rosbags."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 import dataclasses
 from pathlib import Path

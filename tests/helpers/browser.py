@@ -5,8 +5,6 @@ end with a zero byte, and needs no library. Unlike with a window's size, pages
 may be narrower than 500 pixels.
 """
 
-from __future__ import annotations
-
 import base64
 from contextlib import contextmanager
 import fcntl

@@ -4,8 +4,6 @@ A town of five roads, with two stages and two short drives, replaces Metropolis
 and Riverside. All differences from the documents are written here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A folder in which the documents are followed, recipe after recipe."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import contextlib
 import os

@@ -1,7 +1,5 @@
 """The parts of the documents that a reader may run or copy."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 import re

@@ -4,8 +4,6 @@ The recordings follow the contract of the project. They are written here with
 the libraries alone, so that readers are tested against an independent writer.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

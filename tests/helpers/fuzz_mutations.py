@@ -1,7 +1,5 @@
 """Mutations of files: of their bytes, and of the elements of their formats."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 import re

@@ -1,7 +1,5 @@
 """Readers of files, each with valid files to start from."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 import shutil

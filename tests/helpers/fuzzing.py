@@ -4,8 +4,6 @@ If a reader crashes, hangs or takes all memory, the failure is reported with its
 input, like any other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import contextlib
 from dataclasses import dataclass

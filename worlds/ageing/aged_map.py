@@ -346,9 +346,6 @@ class _StageWriter:
         in the order in which they are built, and structures of the past come
         last. If later years are added, today's structures and those of the
         earlier `new` years keep their instance ids.
-
-        Raises:
-            InputError: there are more structures than instance ids.
         """
         world = self._world
         rows: list[Mapping[str, str]] = [

@@ -282,12 +282,7 @@ def _not_one_model(path: Path) -> str:
 
 
 def _number_within(text: str, largest: float, where: object) -> float:
-    """Returns the number in a cell, from -`largest` to `largest`.
-
-    Raises:
-        InputError: the text is not a number, or its absolute value exceeds
-            `largest`. The message begins with `where`.
-    """
+    """Returns the number in a cell, from -`largest` to `largest`."""
     value = to_number(text)
     if not abs(value) <= largest:
         raise InputError(

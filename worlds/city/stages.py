@@ -174,9 +174,6 @@ class _Names:
         Names are in the order of the patterns and, for one pattern, in the
         order of the city's structures. A pattern can be a name. `field` is the
         field of `stages.yaml` with the patterns, for error messages.
-
-        Raises:
-            InputError: a pattern matches nothing.
         """
         found: list[str] = []
         for pattern in patterns:

@@ -271,12 +271,7 @@ def load_road_network(path: Path | str) -> RoadNetwork:
 def _make_curve(
     path: Path, file: RoadsFile, name: str, entry: RoadEntry
 ) -> Centreline:
-    """Returns the centreline of a road, from junction to junction.
-
-    Raises:
-        InputError: a junction of the road does not exist, the road has no lane,
-            or a corner does not fit.
-    """
+    """Returns the centreline of a road, from junction to junction."""
     for field in ENDS:
         junction = getattr(entry, field)
         if junction not in file.junctions:
@@ -298,11 +293,7 @@ def _make_curve(
 def _make_junction(
     path: Path, file: RoadsFile, name: str, curves: Mapping[str, Centreline]
 ) -> Junction:
-    """Returns a junction with its arms.
-
-    Raises:
-        InputError: too few roads end at the junction.
-    """
+    """Returns a junction with its arms."""
     entry = file.junctions[name]
     ends: list[_RoadEnd] = []
     for road_name, road in file.roads.items():
@@ -357,11 +348,7 @@ def _derived_setback(
 
 
 def _check_crossings(path: Path, network: RoadNetwork) -> None:
-    """Checks that roads cross in junctions only.
-
-    Raises:
-        InputError: two roads overlap outside a junction.
-    """
+    """Checks that roads cross in junctions only."""
     names = list(network.roads)
     strips = []
     for name in names:

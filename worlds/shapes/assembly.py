@@ -1,7 +1,5 @@
 """The assembly of one building from its parts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 

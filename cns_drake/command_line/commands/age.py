@@ -1,7 +1,5 @@
 """The command `age`, which simulates years of change in a city."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
@@ -69,9 +67,6 @@ def _maps_and_years(
 
     Returns:
         The names of the maps, and all years.
-
-    Raises:
-        InputError: a word begins like an option.
     """
     maps = []
     years = list(first)

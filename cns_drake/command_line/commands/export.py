@@ -1,7 +1,5 @@
 """The command `export`, which converts recordings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated
@@ -146,9 +144,6 @@ def _check_options(names: Iterable[str], layout: str) -> None:
     Args:
         names: names of the parameters that the user gave.
         layout: the format.
-
-    Raises:
-        InputError: an option belongs to other formats.
     """
     for name in names:
         formats = _ONLY_WITH.get(name, (layout,))

@@ -1,7 +1,5 @@
 """The command `film`, which shows a drive in every stage of its city."""
 
-from __future__ import annotations
-
 from pathlib import Path
 import re
 from typing import Annotated

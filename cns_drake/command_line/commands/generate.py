@@ -1,7 +1,5 @@
 """The command `generate`, which records many drives."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 import typer

@@ -1,7 +1,5 @@
 """The command `reproduce`, which measures the drives of whole maps."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

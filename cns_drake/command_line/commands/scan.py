@@ -104,9 +104,6 @@ def _check_fields_of_scan(scenario: Scenario, plain: Scenario) -> None:
     Args:
         scenario: the changed scenario of the scan.
         plain: the scenario without changes.
-
-    Raises:
-        InputError: another field is changed.
     """
     changed_fields = [
         name

@@ -1,7 +1,5 @@
 """The command `simulate`, which records one drive."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

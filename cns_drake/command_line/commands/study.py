@@ -1,7 +1,5 @@
 """The command `study`, which runs an experiment."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """The command `truth`: exact ground truth about two drives."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from enum import Enum
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The IMU of a vehicle whose trajectory is known."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """The directions that the beams of a LiDAR cover."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from evaluation.base import arcsin, arctan2

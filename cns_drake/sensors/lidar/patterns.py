@@ -1,7 +1,5 @@
 """Beam patterns that repeat: spinning, flash, and any other directions."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from dataclasses import dataclass, field
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Rays of any origin and direction, cast on the geometry that a LiDAR sees."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

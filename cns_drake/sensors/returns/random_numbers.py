@@ -6,8 +6,6 @@ on the cell of a grid in which the place lies. Neither depends on the order of
 computation.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from evaluation.base import compiled

@@ -1,7 +1,5 @@
 """The texture of surfaces: how albedo and height vary from place to place."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cns_drake.ray_casting import SurfaceFrames

@@ -1,7 +1,5 @@
 """Tables: named tuples of arrays that have one row for each entry."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, TypeVar
 

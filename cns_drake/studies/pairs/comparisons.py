@@ -428,10 +428,6 @@ def _session_fields(
     Returns:
         The fields of each drive, by the path of the drive in the file, such as
         `database.sessions.2`.
-
-    Raises:
-        InputError: the drives are not a list of mappings, or a drive has a
-            field that it cannot have.
     """
     shared = dict(database)
     for name in _OF_DATABASE:

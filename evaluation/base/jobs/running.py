@@ -5,8 +5,6 @@ that of a Dask client on a cluster. A worker of Dask runs each job in a process
 of its own, too.
 """
 
-from __future__ import annotations
-
 import asyncio
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -340,11 +338,7 @@ def _note_repeated(name: str, why: str) -> None:
 
 @contextlib.contextmanager
 def _dask_workers(address: str, hear: _Hear) -> Iterator[_Connected]:
-    """Yields the executor of the Dask scheduler at an address.
-
-    Raises:
-        InputError: if Dask is not installed, or the scheduler does not answer.
-    """
+    """Yields the executor of the Dask scheduler at an address."""
     # Slow to import, and not needed to print help.
     try:
         from distributed import Client

@@ -1,7 +1,5 @@
 """A store of results: each has a file named by what the result was made of."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

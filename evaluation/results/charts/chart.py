@@ -198,9 +198,6 @@ def _parse_width(text: str) -> float:
 
     Args:
         text: a number and `in`, `cm`, `mm` or `pt`, the point of TeX.
-
-    Raises:
-        InputError: the text is no such length.
     """
     found = re.fullmatch(r"(\d+\.?\d*|\.\d+) ?(in|cm|mm|pt)", text.strip())
     if found is None:

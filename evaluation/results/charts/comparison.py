@@ -1,7 +1,5 @@
 """The figure of a comparison: a row for each method, the best on top."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 import math
 import textwrap

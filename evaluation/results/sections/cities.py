@@ -1,7 +1,5 @@
 """The section of a page that says which shipped city was measured."""
 
-from __future__ import annotations
-
 from evaluation.results.charts.chart import NARROW, WIDE
 from evaluation.results.charts.comparison import draw_comparison
 from evaluation.results.figure_files import figure_svg

@@ -266,9 +266,6 @@ def _check_charts(experiment: Experiment, known: _Measured, path: Path) -> None:
 
     Settings of methods, and metrics of the user, are known once their files
     have run: `run_study` checks them.
-
-    Raises:
-        InputError: a chart names something else, or cannot be used.
     """
     if not experiment.charts:
         return

@@ -135,10 +135,6 @@ def _chosen_recordings(
             stage.
         names: names of the recordings.
         where: file and field of the names, for errors.
-
-    Raises:
-        InputError: a recording is unknown, is named twice, is the query, or
-            is later than the query.
     """
     known = {one.name: one for one in city.recordings}
     for name in repeated(names):

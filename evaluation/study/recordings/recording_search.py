@@ -1,7 +1,5 @@
 """Finds the recordings in a folder, and the map and stage of each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 import itertools
 import os
@@ -94,9 +92,6 @@ def _find_drives(folder: Path, on_note: Callable[[str], None]) -> list[Path]:
     Args:
         folder: the folder, searched three levels down.
         on_note: is called with each note.
-
-    Raises:
-        InputError: no drive is left.
     """
     children = listed(folder)
     drives = [path for path in children if _holds_drive(path)]
@@ -127,9 +122,6 @@ def _with_scenario(
     Args:
         drives: paths of all drives, at least one.
         on_note: is called with a note if drives are left out.
-
-    Raises:
-        InputError: no drive is left.
     """
     unplaced = [
         path
@@ -172,11 +164,7 @@ def _holds_drive(path: Path) -> bool:
 
 
 def _check_no_splits(spans: Mapping[Path, tuple[int, int]]) -> None:
-    """Refuses files of one recording, which would count as drives.
-
-    Raises:
-        InputError: a file continues another in its folder.
-    """
+    """Refuses files of one recording, which would count as drives."""
     ordered = sorted(spans, key=lambda one: spans[one])
     for before, after in itertools.pairwise(ordered):
         gap_ns = spans[after][0] - spans[before][1]

@@ -178,11 +178,7 @@ class Task(abc.ABC):
 
 
 def _method_names(value: Any, where: str) -> list[str]:
-    """Returns one or several names of methods as a list.
-
-    Raises:
-        InputError: there is no name, or two results would have the same name.
-    """
+    """Returns one or several names of methods as a list."""
     found = [value] if isinstance(value, str) else value
     if not (found and isinstance(found, list)):
         raise InputError(f"{where}: {value!r} is no list of names")

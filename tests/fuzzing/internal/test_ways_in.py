@@ -9,8 +9,6 @@ A reader that a package's door offers, a data set, a source of maps or a format
 of clouds or meshes without a row makes `test_every_reader_has_a_way` fail.
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Callable
 import contextlib

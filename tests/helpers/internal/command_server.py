@@ -10,8 +10,6 @@ The program is that of the checkout. If `INSTALLED_VARIABLE` names the Python of
 another environment, it is the one that is installed there.
 """
 
-from __future__ import annotations
-
 import gc
 import importlib
 import json

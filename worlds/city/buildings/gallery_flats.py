@@ -1,7 +1,5 @@
 """The slab block with galleries along the doors of the flats."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from worlds.city.facades import (

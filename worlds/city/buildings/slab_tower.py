@@ -1,7 +1,5 @@
 """The slab tower: a concrete slab block with loggias."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from worlds.city.facades import (

@@ -5,8 +5,6 @@ right, as seen from outside, z up, and depth inwards. What has a negative depth
 protrudes.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple, TypeVar
 
 

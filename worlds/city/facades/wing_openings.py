@@ -1,7 +1,5 @@
 """Windows, doors and shops of a house's wings, as groups of openings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 from worlds.city.facades import bays, boards, canopies

@@ -1,7 +1,5 @@
 """Roofs of a house's wings, with their gables and dormers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import math
 

@@ -4,8 +4,6 @@
 windows in each storey.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 from worlds.city.facades import bays, solids

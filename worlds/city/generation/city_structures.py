@@ -188,11 +188,7 @@ def build_along(streets: CityStreets, plan: CityPlan, source: str) -> City:
 
 
 def _check_names(plan: CityPlan, source: str) -> None:
-    """Checks that all names in a plan are known.
-
-    Raises:
-        InputError: if an archetype, object or car is unknown.
-    """
+    """Checks that all names in a plan are known."""
 
     def require(field: str, names: Iterable[str]) -> None:
         registry = ARCHETYPES if field.endswith(".rows") else OBJECTS

@@ -78,11 +78,7 @@ def generate_city(
 def _rendered_files(
     world: Path, progress: Callable[[str], None], repair_stages: bool
 ) -> dict[str, str]:
-    """Returns the text of every file to write, by relative path.
-
-    Raises:
-        InputError: see `generate_city`.
-    """
+    """Returns the text of every file to write, by relative path."""
     doing("laying out the city")
     city = make_city(world)
     text = _stages_text(world, city, repair_stages, progress)
@@ -102,11 +98,7 @@ def _rendered_files(
 def _stages_text(
     world: Path, city: City, repair: bool, progress: Callable[[str], None]
 ) -> str | None:
-    """Returns the new text of `stages.yaml`, or None if it stays the same.
-
-    Raises:
-        InputError: see `generate_city`.
-    """
+    """Returns the new text of `stages.yaml`, or None if it stays the same."""
     stages, table = world / STAGES_NAME, world / STRUCTURES_NAME
     if not table.exists() and not repair:
         return None
@@ -237,9 +229,6 @@ def _find_renaming(
         table: the file `structures.csv` of the earlier city, for which `stages`
             was written.
         structures: the structures of the current city.
-
-    Raises:
-        InputError: a file cannot be read.
     """
     before = {row.name: row for row in _read_rows(table)}
     today = [
@@ -270,9 +259,6 @@ def _renamed_text(stages: Path, renamed: Mapping[str, str]) -> str:
     """Returns the text of `stages.yaml` with structures renamed.
 
     Comments and order stay unchanged. `renamed` maps old names to new names.
-
-    Raises:
-        InputError: the file cannot be read.
     """
     text = _read_text(stages)
     nodes = _name_nodes(stages)

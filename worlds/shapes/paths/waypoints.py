@@ -220,9 +220,6 @@ def _free_lengths(
         turns: (N - 2,) turns at the inner waypoints [rad].
         is_loop: (N - 2,) whether the car turns round there in a loop.
         names: names of the N waypoints, for error messages.
-
-    Raises:
-        InputError: a segment is too short for its loops.
     """
     taken = np.where(is_loop, _loop_approach(turns), 0.0)
     taken = np.concatenate([[0.0], taken, [0.0]])
@@ -387,9 +384,6 @@ def _columns(cells: list[str], where: str) -> dict[str, int]:
 
     `cells` is the first line of the file. If the line has no names, the columns
     are x, y and z. `where` begins the error messages.
-
-    Raises:
-        InputError: the first line has neither such names nor such numbers.
     """
     names = [cell.lower() for cell in cells]
     if {"x", "y"} <= set(names):
