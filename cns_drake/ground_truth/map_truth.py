@@ -181,7 +181,6 @@ def _write_page(
         path: path of the page.
         pair: the maps of A and B, which the page shows from above.
         truth: labels of the points of each map.
-        table: the changed structures.
         names: names of the two drives.
     """
     low, step, shape = _picture_frame(pair)

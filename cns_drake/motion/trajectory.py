@@ -237,7 +237,6 @@ def _find_speed_profile(
     The drive starts and ends at rest. The acceleration is piecewise constant.
 
     Args:
-        path: the path.
         speed_limits: (N,) speed limit at each control point of the path [m/s].
         speeds: limits of the speed, and of the longitudinal and the lateral
             acceleration.

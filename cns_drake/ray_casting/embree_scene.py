@@ -229,7 +229,6 @@ class EmbreeScene:
         """Returns the scene of a group; groups of the same shapes share it.
 
         Args:
-            group: the group.
             before: content of a group -> its scene in an earlier hierarchy,
                 which is reused.
         """

@@ -302,7 +302,6 @@ def _cast_on_plane(
 
     Args:
         X_OLs: (K, 3, 4) poses of L; ray i takes pose i mod K.
-        rays: the N rays.
         row: row of the group.
         limits: (N,) greatest ranges; set to the range of each hit [m].
         met: (N,) row of the group that each ray hit; set to `row` for each hit.

@@ -398,7 +398,6 @@ class McapRecorder(LeafSystem):
         """Declares a port whose values are recorded.
 
         Args:
-            name: name of the port.
             topic: the topic that is due when messages are made.
             make: function that returns topic -> message, given the value of the
                 port and the time [ns].
@@ -471,7 +470,6 @@ class McapRecorder(LeafSystem):
         """Declares the ports and the events of a discrete LiDAR.
 
         Args:
-            name: name of the LiDAR.
             make: function that returns topic -> message, given a scan and its
                 stamp [ns].
             period: time between two scans [s].

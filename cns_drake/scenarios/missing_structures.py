@@ -63,7 +63,6 @@ def _removal_order(
 
     Args:
         table: the map's table of structures.
-        seed: seed of the random place.
         removable: the structures that can be missing; None for all buildings
             and plants except those that wait on a lot for a building.
     """
@@ -108,7 +107,6 @@ def _scattered_losses(
     Args:
         table: the map's table of structures.
         shares: class -> share of its structures, from 0 to 1.
-        seed: seed of the random choice.
         source: file and section of the losses, for error messages.
     """
     records = [row for _, row in read_records(table, ("name", "class"))]

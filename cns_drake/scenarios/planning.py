@@ -309,7 +309,6 @@ def _ground_heights(scenario: Scenario, xy: np.ndarray) -> np.ndarray:
     heights beside are interpolated; without any, they are 0.
 
     Args:
-        scenario: the scenario.
         xy: (N, 2) places along the path, 2 m apart.
     """
     levels = _usable_levels(_scene_of(scenario), xy)

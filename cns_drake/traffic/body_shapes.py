@@ -79,7 +79,6 @@ def _round_shape(
     """Returns a capsule, or a cylinder, around the axis from start to end.
 
     Args:
-        name: name of the shape.
         radius: radius [m].
         start, end: ends of the axis in the limb's frame [m].
         rgb: colour.

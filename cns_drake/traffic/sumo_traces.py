@@ -650,7 +650,6 @@ def _vehicle_rows(
 
     Args:
         vehicle: the vehicle, with its place at M steps.
-        kind: its kind.
         levels: heights of the ground.
     """
     ahead = np.column_stack([cos(vehicle.yaw), sin(vehicle.yaw)])
@@ -683,7 +682,6 @@ def _make_tracks(
     """Returns tracks of objects, each of which exists at some times only.
 
     Args:
-        trace: the trace.
         traced: the objects, with the numbers of their M steps.
         rows: coordinates (M, 5) of each object.
     """

@@ -235,8 +235,6 @@ def _scan_city(
     """Simulates the drives through a city, without recording them.
 
     Args:
-        reporter: reports progress.
-        drawn: the random city.
         folder: folder to which the map of the city is written; the folder is
             removed at the end.
 

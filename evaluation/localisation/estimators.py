@@ -277,7 +277,6 @@ def _align_robustly(
     previous alignment.
 
     Args:
-        surface: the map.
         scan: (N, 3) in S [m].
         start: initial pose X_WS (4, 4).
         settings: the widths of the first and of the last alignment, and the
@@ -357,7 +356,6 @@ def _gauss_newton_step(
     It is 0 with too few pairs.
 
     Args:
-        surface: the map.
         scan: (N, 3) in S [m].
         X_WS: (4, 4) pose before the step.
         width: greatest distance between paired points [m].

@@ -187,9 +187,7 @@ def _record_of_start(
     """Returns a record of `QUERY` in which only the initial pose is known.
 
     Args:
-        frame: number of the scan.
         stamp_ns: time of the scan [ns].
-        initial: the initial pose.
     """
     row = np.zeros((), QUERY)
     for name in MEASURED:
@@ -213,7 +211,6 @@ def _record_errors(
     """Enters the errors of an estimated pose into its record of `QUERY`.
 
     Args:
-        row: the record.
         found: (4, 4) estimated pose of S in W.
         covariance: (6, 6) covariance of the estimate, see `_Fit`.
         X_WS: (4, 4) ground-truth pose.

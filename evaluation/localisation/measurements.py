@@ -160,11 +160,9 @@ def _localised_in_jobs(
     the points of the maps are passed on in files.
 
     Args:
-        drive: the drive.
         frames: frames of the scans.
         maps: the maps, in the order in which `_localisers` asks for them.
         how: the last arguments of `localise_queries`.
-        processes: number of processes.
     """
     number = min(processes, len(frames))
     with tempfile.TemporaryDirectory() as name:

@@ -193,7 +193,6 @@ def _label_by_scans(
     Args:
         points: (N, 3) points of a map in W [m].
         side: side of this map, `A` or `B`.
-        theirs: the other drive.
     """
     unobserved, kept, changed = SIDES[side]
     cells = np.floor(points / _CELL).astype(np.int64)

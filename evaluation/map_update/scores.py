@@ -389,7 +389,6 @@ def _choose_labels(
 
     Args:
         method: name of a change detector, `TRUTH` or `GIVEN`.
-        pair: the two maps.
         truth: the exact labels of these maps.
         given: files with the labels for `GIVEN`, of the older and of the newer
             map.

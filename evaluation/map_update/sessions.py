@@ -305,7 +305,6 @@ def _as_uint16(path: Path, points: np.ndarray, name: str) -> np.ndarray:
     Args:
         path: file of the map, for error messages.
         points: structured array (N,) of the map's points.
-        name: name of the column.
     """
     with np.errstate(invalid="ignore"):
         numbers = points[name].astype(np.uint16)

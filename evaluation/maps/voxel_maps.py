@@ -408,7 +408,6 @@ def _add_points(
         divisions: number of cells along a voxel's side; 0 to keep no samples.
         table: (S,) slots of type `_SLOT`; changed here. S is a power of two.
             The table needs room for all voxels.
-        size: number of voxels that the table already contains.
         sampled: (S, B) uint8, for each slot one bit per cell: whether the cell
             has a sample; changed here.
         samples: (K, 3) the samples [m]; changed here. The array needs room for

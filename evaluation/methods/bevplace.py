@@ -331,7 +331,6 @@ def _embedded(weights: Weights, name: str, grid: np.ndarray) -> np.ndarray:
     """Returns the output of a network of small convolutions at each point.
 
     Args:
-        weights: the weights.
         name: prefix of the names of the network's layers.
         grid: (5, 5, N, 32) features over scales and turns.
 
@@ -357,7 +356,6 @@ def _convolved_over_turns(
     """Returns a convolution over the first two axes, with zeros around.
 
     Args:
-        weights: the weights.
         name: name of the layer, whose kernel is 1 x 1 or 3 x 3.
         x: (H, W, N, channels).
     """

@@ -536,7 +536,6 @@ class Btc(Method[BtcDescription, BtcDatabase]):
 
         Args:
             query: descriptor of the query.
-            database: the places.
             max_candidates: number of candidates: the places with the most
                 matches; None for all.
         """

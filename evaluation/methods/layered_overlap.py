@@ -627,7 +627,6 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         """Returns the best pose of two scans, found by hill climbing.
 
         Args:
-            query, place: the two scans.
             start: (3,) heading and shifts at which the search starts.
         """
         heading, rows, columns, *common = climb(
@@ -675,10 +674,6 @@ def _search(
     each place at its best heading.
 
     Args:
-        query: the query's scan.
-        database: the places.
-        number: number of pairs that the second search compares.
-        refined: number of pairs that the third search compares.
         exhaustive: whether each place is kept.
 
     Returns:

@@ -305,7 +305,6 @@ def _load_checked(
     """Returns the weights in a file; see `load_weights`.
 
     Args:
-        path: the file.
         mtime_ns: time of its last change [ns]; a file that has changed is read
             again.
         size: its size [bytes].

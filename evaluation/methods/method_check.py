@@ -304,8 +304,6 @@ def _cloud(method: Method, seed: int, number: int | None = None) -> np.ndarray:
     """Returns a cloud, as a method gets it.
 
     Args:
-        method: the method.
-        seed: seed of the cloud.
         number: how many of its points are returned; by default all.
     """
     rng = np.random.default_rng([seed, 17])

@@ -294,13 +294,9 @@ def _method_outcomes(
     """Returns a method's outcomes; none if the method would take too long.
 
     Args:
-        choice: the method.
         search: the method's search in the database.
         database: the places that are searched.
-        query: the described queries.
-        compared: the comparison.
         shown: how much of each query its best match shows.
-        reporter: reports notes.
     """
     searched, drives, _, num_here = database
     protocol, radii = compared.protocol, compared.radii

@@ -146,7 +146,6 @@ class RetrievalProtocol:
         """Refuses a value that is out of range.
 
         Args:
-            name: name of the field.
             is_valid: whether its value is in range.
             fault: what the value is otherwise, for the message.
         """

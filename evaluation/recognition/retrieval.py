@@ -312,8 +312,6 @@ def _errors_at_best(
     Args:
         scores: (Q, D) scores; NaN for a place that is no candidate.
         poses: for each query, place -> estimated pose X_PQ (4, 4), or None.
-        places: the D places.
-        queries: the Q queries.
     """
     errors = PoseErrors.unknown(len(scores))
     for row, found in enumerate(scores):

@@ -138,7 +138,6 @@ class _CloudReader:
 
         Args:
             method: the method that will describe the clouds.
-            on_note: is called with notes on how files were read.
         """
         self.num_ignored = 0
         self._method = method
@@ -148,7 +147,6 @@ class _CloudReader:
         """Returns the cloud in a file, cropped to the protocol's range.
 
         Args:
-            path: the file.
             columns: number of columns if it is a `.bin` file.
 
         Returns:

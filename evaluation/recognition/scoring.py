@@ -72,7 +72,6 @@ def _reranked(
     """Returns the scores (D,) after the second stage of a method.
 
     Args:
-        method: the method.
         scores: (D,) scores of the first stage; NaN for a place that is no
             candidate.
         query: cloud of the query.

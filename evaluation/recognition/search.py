@@ -228,7 +228,6 @@ class Search:
 
         Args:
             query: drive with described queries.
-            row: number of the query.
             is_known: (D,) bool, which places may be candidates.
             group: the places of the group, which is in memory.
             num_entries: number of entries of the group that the search

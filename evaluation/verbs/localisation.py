@@ -239,7 +239,6 @@ def _with_offset(
     """Adds to the verdict how far poses lie from registration, if far.
 
     Args:
-        world: the verdict.
         rows: the results, see `Localisation`.
         on_note: is called with what is added.
     """

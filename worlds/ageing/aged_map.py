@@ -272,7 +272,6 @@ class _StageWriter:
         """Writes the world of a stage: the aged city in a given year.
 
         Args:
-            stage: name of the stage.
             year: years since the original city; negative for years before.
             standing: name of each structure that stands in this year -> the
                 structure, or None if it is the same as in the original city.

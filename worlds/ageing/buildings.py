@@ -145,9 +145,7 @@ class Buildings:
         """Opens a building site on a lot, if a new building fits there.
 
         Args:
-            lot: the lot.
             height: approximate height of the new building [m].
-            rng: random generator for the building and the site.
             replaced: name of the building that stood there; the new building
                 has another archetype.
         """
@@ -265,7 +263,6 @@ class Buildings:
         Args:
             plot: plot of the building.
             height: height of the building [m].
-            name: name of the building.
             scaffolds: list to which the name of the scaffold is added.
         """
         rng = self._draws.generator("scaffold", name)
@@ -381,9 +378,7 @@ class Buildings:
 
         Args:
             lot: lot of the building.
-            name: name of the building.
             triangles: (M, 3, 3) triangles of the building in W [m].
-            rng: random generator for the balconies.
         """
         one = alterations.balconies_on(
             lot.plot,

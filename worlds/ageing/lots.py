@@ -128,7 +128,6 @@ def _free_lots(
     Trees and furniture may stand on these lots.
 
     Args:
-        world: the city.
         kept_free: area in W [m] on which nothing is built.
         built_on: the lots of buildings.
     """

@@ -121,9 +121,7 @@ class StreetRenewal:
         """Returns how a piece of furniture moves to its new place.
 
         Args:
-            name: name of the piece.
             footprint: footprint of the piece in W [m].
-            rng: random generator for the place.
 
         Returns:
             (2,) offset in W [m], rise of the ground [m] and turn [rad]. All are

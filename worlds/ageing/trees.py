@@ -150,7 +150,6 @@ def _about_its_foot(whole: Structure, seen: StructureGeometry) -> Structure:
     """Returns a tree with the origin of its frame near its foot.
 
     Args:
-        whole: the tree.
         seen: the geometry of the same tree in W.
     """
     *xy, z = whole.xyz

@@ -86,7 +86,6 @@ def _next_lanes(
 
     Args:
         after: lane -> connections that begin at its exit.
-        lane: the lane.
         wanted: the lanes that end a way.
     """
     found: set[LaneRef] = set()

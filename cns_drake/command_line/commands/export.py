@@ -143,7 +143,6 @@ def _check_options(names: Iterable[str], layout: str) -> None:
 
     Args:
         names: names of the parameters that the user gave.
-        layout: the format.
     """
     for name in names:
         formats = _ONLY_WITH.get(name, (layout,))

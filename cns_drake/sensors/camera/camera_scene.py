@@ -148,7 +148,6 @@ class CameraScene(LeafSystem):
             kind: kind of the copy, a key of `scene_graphs`.
             frame: the moving frame in the original that carries the geometry;
                 None for geometry that never moves.
-            made: the geometry.
         """
         scene_graph, source = self.scene_graphs[kind], self._sources[kind]
         if frame is None:

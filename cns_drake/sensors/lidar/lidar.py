@@ -860,7 +860,6 @@ class Lidar(LeafSystem):
         """Sets the points of a scan as a cloud.
 
         Args:
-            cloud: the cloud.
             scan: (N,) points of `POINT_DTYPE`.
             poses: poses of S if the cloud is in the world; None for S.
         """

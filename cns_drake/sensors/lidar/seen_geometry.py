@@ -276,7 +276,6 @@ class SeenGeometry:
 
         Args:
             records: the records of the geometry.
-            world: the world's frame.
             calc_X_WF: returns the pose of a frame.
             p_WS: the position of the sensor in the world, (3,) [m].
         """

@@ -121,7 +121,6 @@ def _make_unit_beams(
     """Returns the beams of a revolution, with the errors of their lasers.
 
     Args:
-        beams: the nominal beams.
         sheet: data sheet of the unit.
         key: key of the random numbers of the individual unit, from
             `cns_drake.sensors.returns.random_numbers.frame_key`.

@@ -224,7 +224,6 @@ def _advance_to_hits(
     """Advances each ray to its hit.
 
     Args:
-        ways: the rays.
         met: hits of the rays.
         materials: materials of all geometries.
         scale: `scale` of the `LinkBudget`.
@@ -366,7 +365,6 @@ def _behind_hits(
     """Returns points (M, 3) a little behind the hits of rays [m].
 
     Args:
-        ways: the rays.
         met: hits of the rays.
         before: (M,) rows of the rays.
         d_Wset: (M, 3) unit directions behind the hits.

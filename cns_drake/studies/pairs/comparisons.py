@@ -317,8 +317,6 @@ class PairMaker:
             sessions: maps the path of each database drive in the experiment's
                 file to the fields of the drive.
             query: fields of the query drive.
-            condition: the condition.
-            seed: seed of the random choices.
         """
         stages = list(self.query.folder.stages())
         stage = self._find_stage("query", "query", query.get("stage", OWN))
@@ -421,7 +419,6 @@ def _session_fields(
 
     Args:
         database: fields of the database.
-        query_years: number of years by which the query's city has aged.
         seed: seed of a fleet that has no own seed.
         source: file of the experiment, for errors.
 
@@ -550,7 +547,6 @@ class _UniqueNames:
         Args:
             drive: the changed drive, with the name of the unchanged drive.
             factors: name of each factor that concerns the drive -> its value.
-            seed: seed of the changes.
         """
         content = fingerprint(drive.replaced(name="").model_dump(mode="json"))
         if content not in self._known:

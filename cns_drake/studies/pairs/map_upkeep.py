@@ -137,8 +137,6 @@ def _exact_labels(
     """Returns the exact labels of the map so far and of the next drive's map.
 
     Args:
-        pair: the two maps.
-        drive: the next drive.
         frames: (K,) numbers of the frames whose scans make the drive's map.
     """
     gone = label_points(pair.A, drive, frames)

@@ -550,7 +550,6 @@ def _compared_values(
     condition.
 
     Args:
-        experiment: the experiment.
         named: the values that the field `baseline` names.
         centre: the values of all factors of fields in the first condition.
 

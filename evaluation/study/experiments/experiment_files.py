@@ -156,7 +156,6 @@ def _checked(
         values: the fields of the experiment, in long form.
         written: the fields of the file without those of `quick`, whose factors
             charts may name, too.
-        path: the file.
         overrides: see `load_experiment`.
         chosen: names of tasks and methods that replace those of the experiment.
     """

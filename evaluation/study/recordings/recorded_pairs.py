@@ -133,7 +133,6 @@ def _chosen_recordings(
     Args:
         city: all recordings of the map; the query is the recording of the last
             stage.
-        names: names of the recordings.
         where: file and field of the names, for errors.
     """
     known = {one.name: one for one in city.recordings}

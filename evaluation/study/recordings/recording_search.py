@@ -91,7 +91,6 @@ def _find_drives(folder: Path, on_note: Callable[[str], None]) -> list[Path]:
 
     Args:
         folder: the folder, searched three levels down.
-        on_note: is called with each note.
     """
     children = listed(folder)
     drives = [path for path in children if _holds_drive(path)]
@@ -121,7 +120,6 @@ def _with_scenario(
 
     Args:
         drives: paths of all drives, at least one.
-        on_note: is called with a note if drives are left out.
     """
     unplaced = [
         path

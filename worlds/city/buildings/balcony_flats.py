@@ -134,12 +134,9 @@ def _add_upper_storeys(
     """Adds storeys that only one section has; returns their top [m].
 
     Args:
-        flats: the building.
-        number: number of the section.
         section: outline (4, 2) of the section [m].
         z0: height of the storeys' floor [m].
         storey: height of a storey [m].
-        count: number of storeys.
     """
     windows = [_window(flats, storey)]
     rows = bays.rhythm(flats.pitch, windows, margin=_END_M)

@@ -142,8 +142,6 @@ def _lean_to(
     """Returns the lean-to against the long side of the barn.
 
     Args:
-        barn: the barn.
-        main: its main box.
         left: least x of the barn and the lean-to [m].
         right: greatest x of the barn and the lean-to [m].
         back: greatest y of the barn and the lean-to [m].

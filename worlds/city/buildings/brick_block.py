@@ -229,7 +229,6 @@ def _add_fire_stairs(
     """Adds one flight of fire stairs to each storey except the lowest.
 
     Args:
-        block: the building.
         wall: the wall with the stairs.
         bottom: height of the lowest flight [m].
         storey: height of a storey [m].

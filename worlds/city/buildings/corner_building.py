@@ -126,7 +126,6 @@ def _add_shops(
     other walls have shops, with awnings in front.
 
     Args:
-        building: the building.
         plan: (N, 2) corners of the walls [m].
         blind: numbers of the walls against a neighbour.
     """

@@ -165,10 +165,8 @@ def _add_oriels(
     """Adds bay windows to the street front, from the first floor upwards.
 
     Args:
-        block: the building.
         plan: (N, 2) corners of the walls [m].
         z0: height of the feet of the bay windows [m].
-        count: number of storeys of a bay window.
         storey: height of a storey [m].
     """
     half, reach = _ORIEL_HALF_M, block.oriel_reach

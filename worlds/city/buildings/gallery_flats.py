@@ -171,7 +171,6 @@ def _storey_walls(
     the opposite side. The ends have windows in the middle.
 
     Args:
-        flats: the building.
         storey: height of the storey [m].
         gallery_edge: the side of the gallery: 0 for the front, 2 for the back.
     """
@@ -214,9 +213,7 @@ def _add_galleries(
     """Adds a gallery to each storey, with continuous posts, and screens.
 
     Args:
-        flats: the building.
         slab: (4, 2) outline of the flats [m].
-        edge: number of the slab's edge with the galleries.
         storeys: the storeys above the ground floor.
     """
     wall = WallFrame(slab, edge)
@@ -275,7 +272,6 @@ def _screens(
     """Returns screens at random places on the outer edge of the galleries.
 
     Args:
-        flats: the building.
         wall: the wall with the galleries.
         cells: start and end of each flat along the wall [m].
         reach: how far the galleries reach out of the wall [m].

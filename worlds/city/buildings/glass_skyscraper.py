@@ -117,7 +117,6 @@ class GlassSkyscraper(Building):
         Args:
             start: height of the tier's foot, as a share of the tower's height,
                 before a random shift.
-            edges: number of the site's edges.
         """
         share: float | np.ndarray
         if edges == 4:
@@ -224,7 +223,6 @@ def _add_crown(tower: GlassSkyscraper, plan: np.ndarray, z0: float) -> None:
     """Adds the crown: a wedge, a smaller storey on a terrace, or a screen.
 
     Args:
-        tower: the skyscraper.
         plan: (N, 2) outline of the topmost tier [m].
         z0: height of the crown's foot [m].
     """
@@ -282,7 +280,6 @@ def _add_louvred_storey(
     """Adds the topmost walls, with louvres, and the equipped roof.
 
     Args:
-        tower: the skyscraper.
         plan: (N, 2) outline of the walls [m].
         z0: height of the foot of the walls [m].
         height: height of the walls [m].

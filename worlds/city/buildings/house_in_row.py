@@ -242,9 +242,6 @@ def _add_bay(
     Without room for a bay window, nothing is added.
 
     Args:
-        house: the building.
-        wing: the house.
-        openings: its openings.
         storeys: its number of storeys.
         step: height of a storey [m].
         door: middle of the door along the front [m].

@@ -96,7 +96,6 @@ def _add_round(
     """Adds a polygonal deck, posts or glazed walls, and a roof.
 
     Args:
-        pavilion: the building.
         center: middle of the deck [m].
         reach: greatest distance of deck and steps from the middle [m].
     """

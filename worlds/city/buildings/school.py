@@ -251,7 +251,6 @@ def _add_gym(
     """Adds the gymnasium with high windows, and its link to the school.
 
     Args:
-        school: the building.
         xs: least and greatest x of gymnasium and link [m].
         ys: y of the front of the school, and greatest y of the gymnasium [m].
         bar: (4, 2) outline of the classroom wing [m].

@@ -165,8 +165,6 @@ def _add_entrances(
     """Adds the doors under one or two roofs, and bays on the ground floor.
 
     Args:
-        houses: the building.
-        main: the main wing.
         openings: openings of the main wing.
         y0: least y of the site [m].
     """

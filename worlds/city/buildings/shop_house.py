@@ -150,10 +150,7 @@ def _add_oriels(
     """Adds bay windows above the shops, in place of the windows there.
 
     Args:
-        house: the building.
-        wing: its wing.
         openings: openings of the wing.
-        upper: number of storeys above the shops.
         step: height of such a storey [m].
     """
     if upper < 1 or step < 2.5 or house.oriels == 0:

@@ -327,10 +327,8 @@ def _nets(
     """Returns nets over random parts of a scaffold's bays.
 
     Args:
-        tower: the building.
         wall: the edge with the scaffold.
         xs: places of the uprights along the edge [m].
-        lifts: number of storeys of the scaffold.
     """
     nets = []
     for start, end in itertools.pairwise(xs):

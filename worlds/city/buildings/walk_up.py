@@ -122,7 +122,6 @@ def _storey_walls(
     """Returns the walls of a storey; walls of a stair have a landing's window.
 
     Args:
-        flats: the building.
         storey: height of the storey [m].
         stairs: numbers of the walls with a stair behind them.
         blind: numbers of the walls against a neighbour.
@@ -187,7 +186,6 @@ def _add_ground(
     It has entrances with steps in front, and windows of the cellar at its foot.
 
     Args:
-        flats: the building.
         plan: (N, 2) corners of the walls [m].
         stairs: numbers of the walls with a stair behind them.
         blind: numbers of the walls against a neighbour.
@@ -277,7 +275,6 @@ def _add_flat_roof(
     """Adds a flat roof behind a parapet with a cornice.
 
     Args:
-        flats: the building.
         body: (4, 2) corners of the walls without the bays in front [m].
         plan: (N, 2) corners of the walls [m].
         z0: height of the parapet's foot [m].

@@ -134,7 +134,6 @@ def _dock(
     """Returns a loading platform under a canopy, with steps at both ends.
 
     Args:
-        hall: the building.
         x0: least x of the site [m].
         x1: greatest x of the site [m].
         y0: least y of the site [m].
@@ -219,7 +218,6 @@ def _monitor(
     """Returns a monitor along the ridge with evenly spaced ventilators.
 
     Args:
-        hall: the building.
         x0: least x of the roof [m].
         x1: greatest x of the roof [m].
         y: y of the ridge [m].

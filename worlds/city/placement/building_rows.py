@@ -92,10 +92,7 @@ def _add_house(
 
     Args:
         draft: the city so far.
-        district: name of the district.
         stem: first part of the house's name; None for the archetype.
-        house: the house.
-        rng: random generator for its parameters.
         fault_at: entry of the plan, named in error messages.
     """
     name = draft.names.next_name(stem or house.archetype)

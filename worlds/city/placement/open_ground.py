@@ -176,12 +176,10 @@ def _place_if_free(
 
     Args:
         draft: the city so far.
-        district: the district.
         object_kind: kind of object, a key of `OBJECTS`.
         stem: first part of the structure's name; None for the usual one.
         xy: position of the object in W [m].
         yaw: heading of the object in W [rad].
-        rng: random generator for the object.
     """
     draft.place(
         object_kind,

@@ -150,8 +150,6 @@ def _crane_sections(storeys: int, bays: int, yaw: float) -> Iterator[Part]:
     """Yields the sections of a crane's mast and jib.
 
     Args:
-        storeys: number of sections of the mast.
-        bays: number of sections of the jib in front of the mast.
         yaw: heading of the jib [rad].
     """
     crane = COLOURS["crane"]
