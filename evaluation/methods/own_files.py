@@ -1,16 +1,15 @@
 """A wall: Python files of users, which share the process with the program.
 
 A user's file defines a method of place recognition, or an estimator of poses.
-All code of such a file runs in one context, `users_code`. What the file changes
-in the process (the search path of modules, the modules beside it, the working
-directory) is there while its code runs, and for its code alone. What it prints
-goes to stderr, because stdout contains the program's results. A fault is
-reported in one line.
+The file runs once. Afterwards the search path of modules and the working
+directory are as before, and the modules beside the file belong to it alone. Its
+functions run in the context `users_code`: what they print goes to stderr,
+because stdout contains the program's results, and a fault is reported in one
+line.
 """
 
 from collections.abc import Callable, Iterator
 import contextlib
-from dataclasses import dataclass, field
 import functools
 import hashlib
 import importlib.util
@@ -95,27 +94,7 @@ def _registered_method(module: ModuleType, path: Path) -> type[Method]:
     return found[0]
 
 
-@dataclass
-class _Share:
-    """What a user's file has changed in the process, for its own code alone.
-
-    Attributes:
-        folders: folders that the file has put on the search path of modules.
-        modules: name -> module that the file has imported from its folder or
-            from `folders`.
-        directory: working directory that the file has chosen, if any.
-        depth: how many calls of the file's code are running, one in another.
-    """
-
-    folders: list[str] = field(default_factory=list)
-    modules: dict[str, ModuleType] = field(default_factory=dict)
-    directory: str | None = None
-    depth: int = 0
-
-
-_shares: dict[str, _Share] = {}
-# The process has one stdout and one working directory, so the code of one file
-# runs at a time.
+# The process has one stdout, so the code of one file runs at a time.
 _turn = threading.RLock()
 
 
@@ -137,8 +116,7 @@ def run_module(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     # Dataclasses look up their module there.
     sys.modules[name] = module
-    _shares[place] = _Share()
-    with users_code(path), errors_at(path, f"{place}: "):
+    with users_code(path), errors_at(path, f"{place}: "), _kept_apart(place):
         spec.loader.exec_module(module)
     return module
 
@@ -159,11 +137,7 @@ def as_users_code(function: Callable, path: Path) -> Callable:
 
 @contextlib.contextmanager
 def users_code(path: Path, place: str | None = None) -> Iterator[None]:
-    """Runs code of a user's file, without effects on the rest of the program.
-
-    Inside, stdout is stderr, and the modules, the search path and the working
-    directory are those that the file has chosen so far. Afterwards they are
-    what they were before.
+    """Runs code of a user's file; inside, stdout is stderr.
 
     Args:
         path: the file, as errors name it.
@@ -174,17 +148,8 @@ def users_code(path: Path, place: str | None = None) -> Iterator[None]:
             one line, with the file and the number of the line that failed.
     """
     place = place or os.path.abspath(path)
-    share = _shares.setdefault(place, _Share())
-    with _turn, _named_faults(path, place):
-        share.depth += 1
-        try:
-            if share.depth > 1:  # One function of the file calls another.
-                yield
-                return
-            with _stdout_on_stderr(), _own_share(share, place):
-                yield
-        finally:
-            share.depth -= 1
+    with _turn, _named_faults(path, place), _stdout_on_stderr():
+        yield
 
 
 @contextlib.contextmanager
@@ -209,34 +174,21 @@ def _stdout_on_stderr() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _own_share(share: _Share, place: str) -> Iterator[None]:
-    """Puts a file's share of the process in place, and takes it out again."""
+def _kept_apart(place: str) -> Iterator[None]:
+    """Takes back what a file changes for others while it is run.
+
+    Modules in its folders are forgotten: other files have some of these names.
+    """
     directory, folders = os.getcwd(), list(sys.path)
-    modules = dict(sys.modules)
-    sys.path[:0] = share.folders
-    sys.modules.update(share.modules)
-    if share.directory is not None:
-        os.chdir(share.directory)
+    modules = set(sys.modules)
     try:
         yield
     finally:
-        share.directory = os.getcwd()
-        if share.directory == directory:
-            share.directory = None
         os.chdir(directory)
-        share.folders = [one for one in sys.path if one not in folders]
+        added = [one for one in sys.path if one not in folders]
         sys.path[:] = folders
-        own = (os.path.dirname(place), *share.folders)
-        for name, module in list(sys.modules.items()):
-            if module is modules.get(name):
-                continue
-            if module is not share.modules.get(name):
-                if not _lies_in(module, own):
-                    continue
-                share.modules[name] = module
-            if name in modules:
-                sys.modules[name] = modules[name]
-            else:
+        for name in set(sys.modules) - modules:
+            if _lies_in(sys.modules[name], (os.path.dirname(place), *added)):
                 del sys.modules[name]
 
 
