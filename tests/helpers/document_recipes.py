@@ -844,8 +844,25 @@ RECIPES = {
     ),
 }
 
-# Pieces that cannot run here: first words -> reason.
-NOT_RUN = {
+_LISTED = "film city import list simulate generate scan export pairs truth"
+# Pieces that cannot run here: first words, of one or several -> reason.
+NOT_RUN: dict[str | tuple[str, ...], str] = {
+    ("pip install", ".venv/bin/pip install"): "installs from the network; "
+    "test_plugins and `.ci/run` install what others do not",
+    "pip uninstall": "takes away what the tests test, or test_plugins does it",
+    ".venv/bin/python -m pytest": "tests in a test; `.ci/run` runs all of them",
+    tuple(f"cns-drake {word}" for word in _LISTED.split()): (
+        "a list of commands; recipes run them on a small city"
+    ),
+    "cns-drake reproduce metropolis": "in that list; the recipe reproduce",
+    ("cns-drake study", ".venv/bin/cns-drake study docs/examples"): (
+        "takes from minutes to hours in shipped cities"
+    ),
+    "cns-drake train": "needs an extra, and minutes; test_training trains",
+    "cns-eval ": "a list of commands; recipes run them on small drives",
+    ".venv/bin/cns-eval pr --method": "needs PyTorch, or weights that do not "
+    "ship; test_own_methods and test_bevplace have some of their own",
+    ".venv/bin/cns-eval pr data/": "needs scans that cannot be shipped",
     ".venv/bin/python docs/reference_pages.py": "writes into this project; "
     "test_fields compares the pages with what is there",
     ".venv/bin/python docs/fill_numbers.py": "writes into this project; "
@@ -868,11 +885,6 @@ NOT_RUN = {
         "simulates a shipped city for minutes; the workflow `site.yml` runs it"
     ),
     "[build-system]\nrequires": "test_plugins installs it",
-    "pip install ./evaluation": "installs from the network",
-    "pip uninstall cns-drake": "takes away what the tests test",
-    "pip install ./mine": "test_plugins installs it",
-    "cns-eval pr --method mean-heights": "test_plugins finds the method",
-    "pip uninstall mine": "test_plugins uninstalls it",
     "import numpy as np\n\nfrom evaluation import DataSet": (
         "test_plugins installs it"
     ),
@@ -882,95 +894,40 @@ NOT_RUN = {
     ".venv/bin/mypy && .venv/bin/lint-imports": (
         "these read this project, not an example; `.ci/run` runs them"
     ),
-    ".venv/bin/pip install -e ./evaluation -e": "installs from the network",
-    ".venv/bin/pip install pre-commit": "installs from the network and changes"
-    " the repository's hooks",
-    ".venv/bin/pip install nbconvert": "installs from the network and changes"
-    " the notebooks",
-    ".venv/bin/python -m pytest tests/": "tests in a test; `.ci/run` runs all"
-    " of them",
-    ".venv/bin/python -m pytest --night": "takes as long; the workflow runs "
-    "all of them",
-    ".venv/bin/python -m pytest --affected": "whatever a change concerns",
-    ".venv/bin/python -m pytest -m unit": "the quick tests in one of "
-    "them; `.ci/run` runs all",
     "\\includegraphics": "a line for LaTeX",
     "mcap recover": "a program of others",
     "ros2 bag": "needs ROS 2; test_mcap_recorder and others read "
     "recordings with rosbags' reader of rosbag2 folders",
     ".venv/bin/cns-drake study ladder suburbia --quick --output": "measures "
     "20 causes, for many minutes; the recipe ladder has fewer",
-    "cns-drake study ladder suburbia": "the same command",
     ".venv/bin/cns-drake study map-pairs": "ages and surveys a whole city, for "
     "minutes; the recipe map truth has a small one",
     ".venv/bin/cns-drake study trend --set": "measures 58 versions of a "
     "shipped city; the recipe trend has two of a small one",
     ".venv/bin/cns-drake study fresh": "draws shipped cities and drives "
     "through them, for many minutes; test_fresh_cities draws a small one",
-    "cns-drake study levels": "takes hours",
     "netconvert --osm-files": "SUMO, and a file that is not shipped",
     ".venv/bin/cns-drake simulate neukolln": "needs the trace; "
     "test_scenario_traffic has one in degrees",
     ".venv/bin/cns-drake study stages --method heights.py": "drives through "
     "shipped cities, for an hour",
-    ".venv/bin/cns-eval pr --method network.py": "needs PyTorch; "
-    "test_own_methods has a network",
-    "cns-eval pr --method map-closures": "needs an extra",
-    ".venv/bin/cns-eval pr --method bevplace": "needs weights that do not "
-    "ship; test_bevplace has some of its own",
     ".venv/bin/cns-drake study stages --task place --method bevplace": "needs "
     "weights, too",
     ".venv/bin/cns-drake study ladder suburbia --quick --task": "needs "
     "weights, too",
     "import numpy as np, torch": "needs PyTorch and these weights, too",
-    "cns-drake train": "needs an extra, and minutes; test_training trains",
     ".venv/bin/cns-drake train": "needs that extra, too",
-    "pip install '.[train]'": "installs it",
     "import pickle": "needs a trainer's class; test_pair_export has it",
-    "pip install './evaluation[map-closures]'": "installs that extra",
-    "pip install './evaluation[kiss-matcher]'": "installs another extra",
-    "pip install './evaluation[map-update]'": "installs another extra",
-    "pip install pandas": "installs from the network",
     "python -m pydrake.visualization.meldis": "a server, which does not end; "
     "test_example_diagrams runs the scenario",
     ".venv/bin/python diagrams/hardware_scenario.py": "runs in real time; "
     "test_example_diagrams runs it, too",
-    "cns-drake film": "the recipe films runs it",
-    "cns-drake city town --new\n": "the recipe start a city runs it",
-    "cns-drake import delft": "the recipe imports runs it",
-    "cns-drake list": "the recipe own city runs it",
-    "cns-drake simulate metropolis_01 --output drives": "the recipe first "
-    "drive runs it",
-    "cns-drake generate metropolis_01 metropolis_04": "the recipe recording "
-    "varied drives runs it",
-    "cns-drake scan worlds/metropolis/stage_01.sdf": "the recipe scans runs it",
-    "cns-drake export drives/metropolis_01": "the recipe exports runs it",
-    "cns-drake reproduce metropolis": "the recipe reproduce runs it",
-    "cns-eval tcr drives/metropolis_01": "the recipe evaluation runs it",
-    "cns-eval pr drives/metropolis_01": "the recipe evaluation runs it",
-    "cns-eval localise drives/metropolis_01": "the recipe localisation runs it",
-    "cns-eval scores kitti": "the recipe scores runs it",
-    "cns-eval report drives": "the recipe own scans, report runs it",
-    "cns-eval compare mine/results.csv": "the recipe compare runs it",
-    "cns-eval map-update maps": "the recipe map update runs it",
-    "cns-drake pairs": "the recipe pairs runs it",
-    "cns-drake truth": "the recipe map truth runs it",
     ".venv/bin/cns-drake truth suburbia_01": "drives through a shipped city, "
     "for minutes",
-    ".venv/bin/cns-drake study docs/examples/anchor": "ages a shipped city and "
-    "drives through it, for minutes",
-    ".venv/bin/cns-drake study docs/examples/new_plans": "needs maps that "
-    "do not ship",
-    ".venv/bin/cns-drake study docs/examples/what_changes": "makes four cities "
-    "and drives through them, for half an hour",
-    ".venv/bin/cns-drake study docs/examples/robust": "localises in a shipped "
-    "city, for half an hour",
     ".venv/bin/cns-eval report data/CNS": "needs the authors' drives; "
     "test_recorded_study has some in their layout",
     ".venv/bin/cns-eval tcr data/MulRan": "needs data sets that cannot be "
     "shipped",
-    ".venv/bin/cns-eval pr data/nclt": "needs them, too",
-    ".venv/bin/cns-eval pr data/sequences": "needs KITTI's scans",
     ".venv/bin/python tests/benchmarks/real_or_simulated.py": "likewise",
     "evo_rpe tum": "a program of its own",
     "lidars: typing.Mapping": "lines of an example of Drake's",
