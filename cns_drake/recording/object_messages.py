@@ -180,9 +180,7 @@ def marked_boxes(
     message are placeholders. The boxes are in the map frame W.
 
     Args:
-        identities: instance id and class of each object.
-        numbers: (N, 10) position [m], orientation (x, y, z, w) and size [m] of
-            each box.
+        identities, numbers: see `marked_detections`.
     """
     stamp = messages.make_header(MAP_FRAME, _STAMP_MARK_NS).stamp
     entities = []

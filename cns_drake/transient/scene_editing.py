@@ -107,12 +107,10 @@ class SceneEditing:
         """Moves a structure and renames it.
 
         Args:
-            structure: the structure.
+            structure, cause: see `remove`.
             X_new: rigid transform in W that is applied to the structure's
                 points.
             name: new name of the structure, unique in the world.
-            cause: field of the scenario's section `transient` that asks for the
-                change.
         """
         for part in structure.parts:
             self._register(
@@ -177,10 +175,8 @@ class SceneEditing:
         """Scales a structure down about the middle of its foot.
 
         Args:
-            structure: the structure.
+            structure, cause: see `remove`.
             share: scale factor of all lengths, from 0 to 1.
-            cause: field of the scenario's section `transient` that asks for the
-                change.
         """
         p_WPs = structure.p_WPs
         feet = p_WPs[p_WPs[:, 2] <= structure.bottom + _FOOT]
@@ -208,14 +204,12 @@ class SceneEditing:
         colour and its material.
 
         Args:
-            structure: the structure.
+            structure, cause: see `remove`.
             before: model of the unchanged structure, with the parts in the
                 order of the structure's parts.
             after: the changed model. A part replaces the part of the same name
                 in `before`; a part with a new name is added.
             X_WS: pose of the frame S of both models in W.
-            cause: field of the scenario's section `transient` that asks for the
-                change.
         """
         loaded = dict(zip(before.parts, structure.parts, strict=True))
         old = {part.name: one for part, one in loaded.items()}
@@ -291,13 +285,10 @@ class SceneEditing:
         """Adds a structure made of triangles to the world.
 
         Args:
-            name: name of the structure, unique in the world.
-            semantic_class: class of the structure.
+            name, semantic_class, cause: see `add`.
             p_WVs: (N, 3) vertices in W [m].
             triangles: (M, 3) indices of vertices.
             look: colour, reflectivity and material of the structure.
-            cause: field of the scenario's section `transient` that asks for the
-                change.
         """
         # Vertices have seven significant digits, which are too few far from
         # the origin of the mesh.

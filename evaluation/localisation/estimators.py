@@ -356,11 +356,9 @@ def _gauss_newton_step(
     It is 0 with too few pairs.
 
     Args:
-        scan: (N, 3) in S [m].
+        scan, covariances: see `_align_robustly`.
         X_WS: (4, 4) pose before the step.
         width: greatest distance between paired points [m].
-        covariances: (N, 3, 3) covariances of the scan's points in S, for GICP;
-            None for point-to-plane ICP.
     """
     arms = scan @ X_WS[:3, :3].T
     found, squares = surface.tree.batch_nearest_neighbor_search(

@@ -185,9 +185,7 @@ class Search:
         place.
 
         Args:
-            query: drive with described queries.
-            rows: R queries.
-            is_known: (R, D) bool, which places may be candidates.
+            query, rows, is_known: see `scores`.
         """
         method = self.method
         most = method.num_shortlisted

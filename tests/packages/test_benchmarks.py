@@ -11,10 +11,6 @@ import pytest
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 # Program -> arguments, and a word of what it prints.
 RUNS = {
-    "class_shares.py": (
-        ("--drive", "{drive}", "--roadsides", 0, 1, "--scans", 1),
-        "semantic-kitti",
-    ),
     "many_houses.py": (("--houses", 16), "16 houses: "),
     "many_places.py": (
         ("--methods", "solid", "--places", 5, 10, "--queries", 2),

@@ -95,11 +95,9 @@ def bar(
     """Returns a cylinder between two points, as a part of a structure.
 
     Args:
-        name: name of the part.
+        name, radius, rgb: see `post`.
         start: (3,) centre of one end in the structure's frame [m].
         end: (3,) centre of the other end in the structure's frame [m].
-        radius: radius of the cylinder [m].
-        rgb: colour; by default the colour of the structure's semantic class.
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     along = end - start
@@ -158,13 +156,11 @@ def pillar(
     It begins slightly below the ground.
 
     Args:
-        name: name of the part.
+        name, height, rgb: see `post`.
         x: length along the box's own x [m].
         y: length along the box's own y [m].
-        height: height of its top above the ground [m].
         xy: position of its middle in the structure's frame [m].
         yaw: heading of the box in the structure's frame [rad].
-        rgb: colour; by default the colour of the structure's semantic class.
     """
     center = (*xy, (height - ROOT_DEPTH) / 2)
     return block(name, (x, y, height + ROOT_DEPTH), center, yaw, rgb)
@@ -182,14 +178,11 @@ def mesh_part(
     """Returns an upright mesh of the folder `object_meshes` as a part.
 
     Args:
-        name: name of the part.
+        name, rgb, material: see `block`.
         mesh: name of its file without `.obj`.
         at: (3,) position of the mesh's origin in the structure's frame [m].
         yaw: heading of the mesh in the structure's frame [rad].
-        rgb: colour; by default the colour of the structure's semantic class.
         scale: factors along the mesh's own x, y and z.
-        material: name of the material; by default the usual material of the
-            structure's semantic class.
     """
     rpy = (0.0, 0.0, float(yaw))
     return Part(name, MeshShape(mesh, scale), triple(at), rpy, rgb, material)

@@ -219,10 +219,7 @@ def u_shape(
     """Returns the outline (8, 2) of a U, whose court is open to the back [m].
 
     Args:
-        x0: left end [m].
-        y0: front [m].
-        x1: right end [m].
-        y1: back [m].
+        x0, y0, x1, y1: see `stadium`.
         wing: width of the two wings, left and right of the court [m].
         back: depth of the part that joins the wings, in front of the court [m].
     """
@@ -237,10 +234,7 @@ def l_shape(
     """Returns the outline (6, 2) of an L: a front part and a left wing [m].
 
     Args:
-        x0: left end [m].
-        y0: front [m].
-        x1: right end [m].
-        y1: back [m].
+        x0, y0, x1, y1: see `stadium`.
         wing: width of the wing behind the front part [m].
         back: depth of the front part [m].
     """

@@ -314,9 +314,7 @@ class PairMaker:
         """Returns the drives of a database, from older to newer.
 
         Args:
-            sessions: maps the path of each database drive in the experiment's
-                file to the fields of the drive.
-            query: fields of the query drive.
+            sessions, query: see `_check_rates`.
         """
         stages = list(self.query.folder.stages())
         stage = self._find_stage("query", "query", query.get("stage", OWN))

@@ -45,7 +45,6 @@ def test_stages_are_drawn_side_by_side(small_map, tmp_path):
             "street.fov_y: ",
         ),
         ("street: {position: [0, 0, .inf], target: [1, 0, 1]}", "position.2"),
-        ("street: [", "not readable as YAML"),
         ("- 1", "views.yaml: "),
     ],
 )

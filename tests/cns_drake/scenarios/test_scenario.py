@@ -165,23 +165,6 @@ def test_bad_fields_are_named(small_map, tmp_path, change, fault):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("text", "fault"),
-    [
-        ("a: [1, 2", "not readable as YAML"),
-        ("- 1\n- 2\n", "not a mapping"),
-        ("", "not a mapping"),
-        ("\x00\x01", "not readable as YAML"),
-    ],
-)
-def test_files_that_are_no_scenario(tmp_path, text, fault):
-    path = tmp_path / "broken.yaml"
-    path.write_text(text)
-    with pytest.raises(InputError, match=rf"broken.yaml: {fault}") as caught:
-        load_scenario(path)
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize("number", [-1, 2.5])
 def test_traffic_that_cannot_be(small_map, number):
     scenario = make_scenario(scenario_values(small_map), "drive.yaml")

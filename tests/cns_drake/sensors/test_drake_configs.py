@@ -378,8 +378,6 @@ def test_buses_by_name():
     [
         ({"preset": "vlp16"}, "roof: preset: no preset 'vlp16'"),
         ({"rate": 0}, "roof: rate: 0.0 is not .*, at least 0.25 and"),
-        ({"rate": 0.001}, "roof: rate: 0.001 is not .*, at least 0.25 and"),
-        ({"rate": -7}, "roof: rate: "),
         ({"rate": 1000.1}, "roof: rate: "),
         ({"rate": np.nan}, "roof: rate: "),
         ({"X_PB": Transform(RigidTransform([np.nan, 0, 0]))}, "roof: X_PB: "),
@@ -405,17 +403,11 @@ def test_faults_name_config_and_field(change, fault):
     ("struct", "text", "fault"),
     [
         (LidarConfig, "{rate: fast}", r"\.rate: 'fast' is not a number"),
-        (LidarConfig, "{rate: true}", r"\.rate: True is not a number"),
         (LidarConfig, "{rings: 3.5}", r"\.rings: 3\.5 is not a whole number"),
-        (LidarConfig, "{columns: many}", r"\.columns: 'many' is not a whole"),
-        (LidarConfig, "{dropout: some}", r"\.dropout: 'some' is not a number"),
         (LidarConfig, "{causal: maybe}", r"\.causal: 'maybe' is not true or"),
-        (LidarConfig, "{motion_distortion: 1}", r"\.motion_distortion: 1 is"),
         (LidarConfig, "{name: 3}", r"\.name: 3 is not a text"),
         (LidarConfig, "{X_PB: 3}", r"\.X_PB: 3 is no Transform"),
         (LidarConfig, "{unseen: robot}", r"\.unseen: 'robot' is no list"),
-        (LidarConfig, "{num_threads: two}", r"\.num_threads: 'two' is not a"),
-        (ImuConfig, "{rate: fast}", r"\.rate: 'fast' is not a number"),
         (OdometryConfig, "{rate: 2.5}", r"\.rate: 2\.5 is not a whole number"),
     ],
 )

@@ -96,7 +96,6 @@ def test_there_is_no_stage_03(tmp_path):
         ("all of it", "all\n    absent: {x: [car_001]}", "the last stage"),
         ('"01"', '"05"', "rising order"),
         ("stages:", "lots: {pool: []}\nstages:", "lots.pool"),
-        ("stages:", "stages: [", "not readable as YAML"),
         (GOOD, "stages: {}", "at least one stage"),
         (GOOD, "", "(top level)"),
     ],
@@ -109,8 +108,3 @@ def test_faults_are_named_in_one_line(tmp_path, old, new, fault):
     assert fault in message
     assert message.startswith(str(tmp_path / "stages.yaml"))
     assert "\n" not in message
-
-
-def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(InputError, match=r"stages\.yaml: No such file"):
-        load_stages(tmp_path / "stages.yaml", NAMES)

@@ -53,7 +53,6 @@ class ArtDecoTower(Building):
     """The art-deco tower: symmetric setbacks, tall piers, a stepped crown."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         starts = self.pick(_TIER_STARTS)
         # Two tiers step back less than one tier.
@@ -89,10 +88,6 @@ class ArtDecoTower(Building):
         return _Setback(start + self.uniform(-0.04, 0.04), across, along)
 
     def build(self) -> None:
-        """Adds all parts of the art-deco tower.
-
-        The building's site must be a rectangle.
-        """
         base = self.site.outline
         plan = self._with_notches(base)
         top = _add_ground(self, plan)

@@ -49,7 +49,6 @@ class BalconyFlats(Building):
     """The white slab block: stacks of balconies, staggered sections."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         room = site.depth - _AROUND_M
         # Distance by which every other section stands back.
@@ -82,10 +81,7 @@ class BalconyFlats(Building):
         )
 
     def build(self) -> None:
-        """Adds all parts of the slab block, which lies along the front.
-
-        The building's site must be a rectangle.
-        """
+        """Adds all parts of the slab block, which lies along the front."""
         sections = _sections(self)
         plan, fronts = _outline(sections)
         body = self.height - _TOP_M

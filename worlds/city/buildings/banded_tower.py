@@ -42,7 +42,6 @@ class BandedTower(Building):
     """The banded office tower: round corners, ribbon windows, garden floors."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         side = min(site.width, site.depth)
         self.radius = round(self.uniform(0.18, 0.42) * side, 2)
@@ -66,10 +65,6 @@ class BandedTower(Building):
         )
 
     def build(self) -> None:
-        """Adds all parts of the banded office tower.
-
-        The building's site must be a rectangle.
-        """
         outer = self._outline()
         inner = outlines.inset(
             outer, min(self.taper, 0.5 * outlines.inset_limit(outer))

@@ -46,7 +46,6 @@ class Barn(Building):
     """The barn or boat house: timber boards, wide doors, a lean-to."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         width = min(site.width, site.depth)
         aisle = round(self.uniform(0.2, 0.28) * width, 2)
@@ -69,10 +68,6 @@ class Barn(Building):
         self.ventilators = self.whole(0, 3)
 
     def build(self) -> None:
-        """Adds all parts of the barn, which lies along the site's longer sides.
-
-        The building's site must be a rectangle.
-        """
         x0, y0, x1, y1 = self.site.bounds
         along_y = y1 - y0 >= x1 - x0
         left, right = x0 + _MARGIN_M, x1 - _MARGIN_M

@@ -43,7 +43,6 @@ class BrickBlock(Building):
     """The old brick block: punched windows, fire stairs, a water tower."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         self.storey_height = self.uniform(3.1, 3.7)
         free = [

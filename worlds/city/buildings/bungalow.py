@@ -51,7 +51,6 @@ class Bungalow(FamilyHouse):
     """The bungalow: one long low storey, a carport or a garage."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         # `long`, `ell` (a wing to the front) or `court` (two of them).
         self.plan = self.pick(("long", "ell", "ell", "court"))
         # `garage` in the front wing, `carport` beside the house or `none`.
@@ -73,10 +72,7 @@ class Bungalow(FamilyHouse):
         self.chimney_at = self.uniform(0.25, 0.75)
 
     def build(self) -> None:
-        """Adds all parts of the bungalow, which lies along the front.
-
-        The building's site must be a rectangle.
-        """
+        """Adds all parts of the bungalow, which lies along the front."""
         self._lay_out()
         main, *fronts = self.boxes
         openings = window_rows(self, main, 1)

@@ -74,7 +74,6 @@ class Chapel(Building):
     """The chapel: a nave with a steep roof, a tower or bell cote, a porch."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         wide = min(site.width, site.depth, _MOST_WIDTH_M)
         # `front` (a tower in the middle of the front), `side` (a tower beside

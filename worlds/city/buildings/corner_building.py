@@ -58,7 +58,6 @@ class CornerBuilding(Building):
     """
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         side = min(site.width, site.depth, _MOST_SIDE_M)
         self.corner = self.pick(site.free_corners or [FRONT_LEFT, FRONT_RIGHT])
@@ -77,10 +76,6 @@ class CornerBuilding(Building):
         self.cornice_reach = self.uniform(0.5, 0.9, digits=2)
 
     def build(self) -> None:
-        """Adds all parts of the corner house.
-
-        The building's site must be a rectangle.
-        """
         site = self.site
         if self.corner not in site.free_corners:
             site = site.detached(self.kind.overhang)

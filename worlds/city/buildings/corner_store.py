@@ -51,7 +51,6 @@ class CornerStore(Building):
     """The corner store: a door across the corner, flats above the shop."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         # Rise of the parapet above the corner.
         self.raised = self.uniform(0.3, 0.9, digits=2)
@@ -75,10 +74,6 @@ class CornerStore(Building):
         )
 
     def build(self) -> None:
-        """Adds all parts of the corner store.
-
-        The building's site must be a rectangle.
-        """
         walls = _walls(self)
         top = _add_shop(self, walls)
         room = self.height - (self.raised + _RIM_M) - top

@@ -48,7 +48,6 @@ class CourtBlock(Building):
     """The court block: wings around a court, a mansard roof with dormers."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         range_depth = self.uniform(10.0, 12.5)
         # Approximate length of all walls.
@@ -72,10 +71,6 @@ class CourtBlock(Building):
         self.gate_height = self.uniform(3.2, 3.6, digits=2)
 
     def build(self) -> None:
-        """Adds all parts of the court block, whose court is open to the back.
-
-        The building's site must be a rectangle.
-        """
         form = outlines.u_shape if self.shape == "U" else outlines.l_shape
         plan = form(*self.site.bounds, self.wing, self.back)
         if self.mirrored:

@@ -70,7 +70,6 @@ class DetachedHouse(FamilyHouse):
     """
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         self.plan = self.pick(("box", "ell", "tee", "cross", "ell"))
         self.mirrored = self.chance(0.5)
         self.roof = self.pick(("gable", "gable", "hip", "gambrel"))
@@ -93,10 +92,7 @@ class DetachedHouse(FamilyHouse):
         self.bay_window = self.chance(0.4)
 
     def build(self) -> None:
-        """Adds all parts of the detached house, with the porch in front.
-
-        The building's site must be a rectangle.
-        """
+        """Adds all parts of the detached house, with the porch in front."""
         self._lay_out()
         _add_main(self)
         for wing in self.wings:

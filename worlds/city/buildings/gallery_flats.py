@@ -48,7 +48,6 @@ class GalleryFlats(Building):
     """The gallery block: walkways along the doors, loggias at the back."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         self.gallery = self.uniform(1.4, 1.8, digits=2)
         room = site.depth - self.gallery
@@ -72,10 +71,6 @@ class GalleryFlats(Building):
         )
 
     def build(self) -> None:
-        """Adds all parts of the gallery block, whose longer sides lie along x.
-
-        The building's site must be a rectangle.
-        """
         slab = _slab_outline(self)
         gallery_edge = _FRONT if self.gallery_front else _BACK
         room = self.height - _STAIR_RISE_M - self.ground
@@ -272,9 +267,7 @@ def _screens(
     """Returns screens at random places on the outer edge of the galleries.
 
     Args:
-        wall: the wall with the galleries.
-        cells: start and end of each flat along the wall [m].
-        reach: how far the galleries reach out of the wall [m].
+        wall, cells, reach: see `_gallery_posts`.
         storeys: the storeys above the ground floor.
     """
     screens = []

@@ -52,7 +52,6 @@ class GardenFlats(Building):
     """Flats in a garden: staggered houses under gables, stacks of verandas."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         self.roof = self.pick(("gable", "gable", "hip"))
         # Wanted pitch of the roofs.
@@ -72,10 +71,7 @@ class GardenFlats(Building):
             self.casing = self.pick(("frame", "sill"))
 
     def build(self) -> None:
-        """Adds all parts of the houses, side by side along the front.
-
-        The building's site must be a rectangle.
-        """
+        """Adds all parts of the houses, side by side along the front."""
         x0, y0, x1, y1 = self.site.bounds
         left, right = x0 + _MARGIN_M, x1 - _MARGIN_M
         count = max(1, round((right - left) / self.section))

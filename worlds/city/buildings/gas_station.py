@@ -50,7 +50,6 @@ class GasStation(Building):
     """The gas station: pumps under a canopy, shop, car wash and price sign."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         self.canopy_top = round(min(self.height, self.uniform(5.0, 5.8)), 2)
         # Height of the canopy's edge.
@@ -74,10 +73,6 @@ class GasStation(Building):
         )
 
     def build(self) -> None:
-        """Adds all parts of the gas station: a shop behind a canopy with pumps.
-
-        The building's site must be a rectangle.
-        """
         x0, y0, x1, y1 = self.site.bounds
         shop_front = y1 - self.shop_depth - _BACK_M
         room = shop_front - _SHOP_GAP_M - (y0 + _FORECOURT_M)

@@ -68,7 +68,6 @@ class GlassSkyscraper(Building):
     """The glass skyscraper: curtain walls with fins, setbacks, a crown."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         edges = len(site.outline)
         starts = self.pick(_TIER_STARTS)

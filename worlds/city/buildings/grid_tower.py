@@ -44,7 +44,6 @@ class GridTower(Building):
         return self.recess + 0.15
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         # `box`, `offset` (two slabs that slide past each other) or `notched`.
         self.plan = self.pick(("box", "offset", "notched"))
@@ -75,10 +74,6 @@ class GridTower(Building):
         )
 
     def build(self) -> None:
-        """Adds all parts of the gridded office tower.
-
-        The building's site must be a rectangle.
-        """
         plan = np.round(_outline(self), 2)
         top = _add_lobby(self, plan)
         if self.waist > 0:

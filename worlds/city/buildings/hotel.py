@@ -53,7 +53,6 @@ class Hotel(Building):
     """The hotel: balconies along rounded walls, a forecourt, a roof-top bar."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         depth = site.depth - _FORECOURT_M
         self.pitch = max(self.uniform(3.6, 4.6), site.width / _MOST_ROOMS)
@@ -71,10 +70,7 @@ class Hotel(Building):
         self.sign_left = self.chance(0.5)
 
     def build(self) -> None:
-        """Adds all parts of the hotel, which stands behind a forecourt.
-
-        The building's site must be a rectangle.
-        """
+        """Adds all parts of the hotel, which stands behind a forecourt."""
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + _FORECOURT_M
         if self.round_ends:

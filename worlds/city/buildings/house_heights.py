@@ -40,9 +40,7 @@ def wall_top_for(
     low; in this case, the walls are lower than the storeys need.
 
     Args:
-        height: height of the ridge [m].
-        floor: height of the ground floor [m].
-        span: width of the roof across the ridge [m].
+        height, floor, span: see `storeys_for`.
         storeys: number of storeys, as from `storeys_for`.
     """
     wanted = floor + storeys * STOREY_M + 0.15

@@ -54,7 +54,6 @@ class KioskRow(Building):
     """The row of kiosks: small stalls with counters behind a common arcade."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         reach = self.uniform(1.6, 2.4, digits=2)
         # Wanted width of a stall.
@@ -71,10 +70,7 @@ class KioskRow(Building):
         self.tower = self.height > _LANTERN_ROW_M and self.chance(0.6)
 
     def build(self) -> None:
-        """Adds all parts of the kiosks, side by side along the front.
-
-        The building's site must be a rectangle.
-        """
+        """Adds all parts of the kiosks, side by side along the front."""
         x0, y0, x1, y1 = self.site.bounds
         left, right = x0 + _MARGIN_M, x1 - _MARGIN_M
         front = y0 + _FORECOURT_M

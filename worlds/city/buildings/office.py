@@ -41,7 +41,6 @@ class Office(Building):
     """
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         self.ground_height = self.uniform(4.4, 5.4, digits=2)
         self.storey_height = self.uniform(3.4, 3.9)

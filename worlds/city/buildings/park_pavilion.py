@@ -58,7 +58,6 @@ class ParkPavilion(Building):
     """The park pavilion: a bandstand, a shelter with tables, or a tea house."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         long = not 0.67 < site.width / site.depth < 1.5
         self.floor = self.uniform(0.3, 0.9, digits=2)
@@ -77,10 +76,6 @@ class ParkPavilion(Building):
         self.bell = self.chance(0.5)
 
     def build(self) -> None:
-        """Adds all parts of the pavilion.
-
-        The building's site must be a rectangle.
-        """
         x0, y0, x1, y1 = self.site.bounds
         if self.form == "shelter":
             _add_shelter(self, (x0, y0, x1, y1))

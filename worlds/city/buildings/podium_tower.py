@@ -59,7 +59,6 @@ class PodiumTower(Building):
     """The podium tower: a block of shops with a tower set back on its roof."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         podium, tower = (
             self.kind.choices[part] for part in ("podium", "tower")
@@ -87,10 +86,6 @@ class PodiumTower(Building):
         self.awnings = self.uniform(0.3, 0.9)
 
     def build(self) -> None:
-        """Adds all parts of the podium and of the tower on it.
-
-        The building's site must be a rectangle.
-        """
         base = self.site.outline
         top = _add_shops(self)
         top = tiers.add_storeys(

@@ -26,7 +26,6 @@ class RowHouse(HouseInRow):
     """The row house: one narrow house between its neighbours, with a stoop."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         width = self.site.width
         self.draw_house(width, _NARROW_ROOFS if width < _NARROW_M else _ROOFS)
         self.stoop = _STOOP_M
@@ -38,10 +37,6 @@ class RowHouse(HouseInRow):
         self.annex_left = self.chance(0.5)
 
     def build(self) -> None:
-        """Adds all parts of the row house.
-
-        The building's site must be a rectangle.
-        """
         _, y0, _, y1 = self.site.bounds
         left, right, blind = front_of_site(self)
         front, back = y0 + self.stoop, y1 - _BACK_M

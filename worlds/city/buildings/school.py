@@ -67,7 +67,6 @@ class School(Building):
     """The school: classroom wings, a glazed entrance, a gymnasium."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         deep = min(self.uniform(9.0, 12.0), site.depth - 4.5)
         self.rise = round(self.uniform(0.26, 0.36) * deep, 2)
@@ -101,10 +100,7 @@ class School(Building):
         )
 
     def build(self) -> None:
-        """Adds all parts of the school, with the entrance in front.
-
-        The building's site must be a rectangle.
-        """
+        """Adds all parts of the school, with the entrance in front."""
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + _FORECOURT_M
         left, right, back = x0 + _MARGIN_M, x1 - _MARGIN_M, y1 - _MARGIN_M

@@ -51,7 +51,6 @@ class SemiDetached(FamilyHouse):
     """The pair of semi-detached houses: mirrored halves under one roof."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         self.roof = self.pick(("gable", "hip"))
         # Wanted pitch of the roof.
         self.pitch_deg = self.uniform(30.0, 45.0)
@@ -72,10 +71,6 @@ class SemiDetached(FamilyHouse):
         self.chimneys = self.pick(("middle", "ends"))
 
     def build(self) -> None:
-        """Adds all parts of the two semi-detached houses.
-
-        The building's site must be a rectangle.
-        """
         x0, y0, x1, y1 = self.site.bounds
         left, right, back = x0 + MARGIN_M, x1 - MARGIN_M, y1 - MARGIN_M
         front = y0 + min(2.4, 0.25 * (y1 - y0))

@@ -53,7 +53,6 @@ class ShopHouse(HouseInRow):
     """The shop house: shops on the ground floor, flats above them."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         width, depth = self.site.width, self.site.depth
         roofs = _NARROW_ROOFS if width < min(_NARROW_M, depth) else _ROOFS
         self.draw_house(
@@ -78,10 +77,6 @@ class ShopHouse(HouseInRow):
         )
 
     def build(self) -> None:
-        """Adds all parts of the shop house.
-
-        The building's site must be a rectangle.
-        """
         _, y0, _, y1 = self.site.bounds
         left, right, blind = front_of_site(self)
         area = (left, y0 + self.stoop, right, y1 - _BACK_M)

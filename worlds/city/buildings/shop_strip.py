@@ -38,7 +38,6 @@ class ShopStrip(Building):
     """The strip of shops: low flat-roofed units side by side, all different."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         # Height of the shops without their parapets.
         self.ground = round(min(self.uniform(3.6, 4.2), self.height - 0.5), 2)
         self.unit_width = self.uniform(5.5, 9.0)
@@ -54,10 +53,7 @@ class ShopStrip(Building):
         )
 
     def build(self) -> None:
-        """Adds all parts of the shops, side by side along the front.
-
-        The building's site must be a rectangle.
-        """
+        """Adds all parts of the shops, side by side along the front."""
         site = self.site
         x0, y0, x1, y1 = site.bounds
         count = max(1, round((x1 - x0) / self.unit_width))

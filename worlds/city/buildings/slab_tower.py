@@ -53,7 +53,6 @@ class SlabTower(Building):
     """The concrete slab block: loggias, a stair tower, pillars, a pavilion."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         self.ground_height = self.uniform(4.2, 5.2, digits=2)
         self.storey_height = self.uniform(2.9, 3.2)
@@ -68,10 +67,7 @@ class SlabTower(Building):
         self.pavilion_height = self.uniform(4.0, 5.5, digits=1)
 
     def build(self) -> None:
-        """Adds all parts of the slab block, whose longer sides lie along x.
-
-        The building's site must be a rectangle.
-        """
+        """Adds all parts of the slab block, whose longer sides lie along x."""
         x0, y0, x1, y1 = self.site.bounds
         front = y1 - self.depth if self.at_back else y0
         back = front + self.depth

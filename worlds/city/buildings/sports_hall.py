@@ -47,7 +47,6 @@ class SportsHall(Building):
     """The sports hall: a wide roof on frames, a low front, high windows."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         # A `butterfly` is two sheds that fall to the middle.
         self.roof = self.pick(("barrel", "gable", "shed", "butterfly"))
@@ -72,10 +71,7 @@ class SportsHall(Building):
         )
 
     def build(self) -> None:
-        """Adds all parts of the sports hall, with the entrance in front.
-
-        The building's site must be a rectangle.
-        """
+        """Adds all parts of the sports hall, with the entrance in front."""
         x0, y0, x1, y1 = self.site.bounds
         ahead = self.annex + _FORECOURT_M if self.annex else _PORCH_M
         front = y0 + ahead

@@ -48,7 +48,6 @@ class Supermarket(Building):
     """The supermarket: a low hall, a glazed front under a canopy, a dock."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         # Width of the entrance.
         self.entrance_width = round(
@@ -78,10 +77,7 @@ class Supermarket(Building):
         )
 
     def build(self) -> None:
-        """Adds all parts of the supermarket, with the entrance in front.
-
-        The building's site must be a rectangle.
-        """
+        """Adds all parts of the supermarket, with the entrance in front."""
         x0, y0, x1, y1 = self.site.bounds
         left, right = x0 + _MARGIN_M, x1 - _MARGIN_M
         if self.dock_left:

@@ -26,7 +26,6 @@ class Terrace(HouseInRow):
     """The terrace: a row of narrow houses, similar but not the same."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         # Wanted width of a house.
         self.unit_width = self.uniform(5.0, 6.6)
         self.draw_house(
@@ -54,10 +53,7 @@ class Terrace(HouseInRow):
         self.bays = self.uniform(0.2, 0.9)
 
     def build(self) -> None:
-        """Adds all parts of the houses, side by side along the front.
-
-        The building's site must be a rectangle.
-        """
+        """Adds all parts of the houses, side by side along the front."""
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + self.stoop
         back = min(y1 - _BACK_M, front + _MOST_DEPTH_M)

@@ -73,7 +73,6 @@ class UnfinishedTower(Building):
     """The tower under construction: core, frame, scaffolds, cladding."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         rise = self.height - self.uniform(3.5, 5.5)
         wanted = max(3, round(rise / self.uniform(3.4, 4.0)))
         # Number of storeys that together are one part.
@@ -101,10 +100,6 @@ class UnfinishedTower(Building):
         self.hoist = self.chance(0.6)
 
     def build(self) -> None:
-        """Adds all parts of the tower under construction.
-
-        The building's site must be a rectangle.
-        """
         site = outlines.rectangle(*self.site.bounds)
         plan = np.round(outlines.inset(site, _SCAFFOLD_M + 0.2), 2)
         _add_frame(self, plan)

@@ -56,7 +56,6 @@ class WalkUp(Building):
     """The walk-up: brick flats around a stair, behind a raised entrance."""
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         depth = site.depth - _FRONT_M - _BACK_M
         is_free = not {1, 3} & site.blind_edges
@@ -88,10 +87,6 @@ class WalkUp(Building):
         )
 
     def build(self) -> None:
-        """Adds all parts of the walk-up flats.
-
-        The building's site must be a rectangle.
-        """
         site = self.site
         x0, y0, x1, y1 = site.bounds
         left = x0 if 3 in site.blind_edges else x0 + _SIDE_M

@@ -52,7 +52,6 @@ class WaterfrontHall(Building):
     """
 
     def draw(self) -> None:
-        """Samples sizes and style."""
         site = self.site
         self.roof = self.pick(("gable", "barrel", "sawtooth"))
         self.dock_depth = self.uniform(2.5, 4.0, digits=1)
@@ -70,10 +69,7 @@ class WaterfrontHall(Building):
         self.ventilators = self.whole(3, 7)
 
     def build(self) -> None:
-        """Adds all parts of the waterfront hall, with its dock in front.
-
-        The building's site must be a rectangle.
-        """
+        """Adds all parts of the waterfront hall, with its dock in front."""
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + self.dock_depth
         plan = outlines.rectangle(x0, front, x1, y1)

@@ -83,9 +83,7 @@ def ribbon(sill: float, head: float, depth: float, post: float) -> Bay:
     Two such bays side by side have a whole post between them.
 
     Args:
-        sill: height of the bottom of the glass [m].
-        head: height of the top of the glass [m].
-        depth: distance of the glass behind the wall [m].
+        sill, head, depth: see `window`.
         post: width of a whole post [m].
     """
     return window(1e3, sill, head, depth, pier=post / 2)
@@ -190,11 +188,9 @@ def house_door(width: float, z0: float, z1: float, depth: float) -> Bay:
     The door has two leaves, a fanlight and a flat surround.
 
     Args:
-        width: width of the doorway [m]; the doorway is narrower in a bay that
-            is too narrow.
+        width, depth: see `entrance`.
         z0: height of the threshold [m].
         z1: height of the top of the doorway [m].
-        depth: distance of the door behind the wall [m].
     """
 
     def bay(x0: float, x1: float) -> list[Relief]:

@@ -111,13 +111,10 @@ def corner_piers(
     """Returns angled piers around the convex corners of an outline.
 
     Args:
-        outline: (N, 2) corners of the walls in the building's frame,
-            counter-clockwise [m].
+        outline, z0, z1: see `wall_piers`.
         width: length of the pier along each of the two walls [m].
         reach: how far the piers reach out of the walls [m].
         depth: how far the piers reach into the walls, past recessed glass [m].
-        z0: height of the feet of the piers [m].
-        z1: height of the tops of the piers [m].
         skip: edges whose corners get no piers.
     """
     outline = np.asarray(outline, dtype=float)

@@ -103,10 +103,7 @@ def add_steps(
     """Adds steps of the material `base` that lead down and away from a wall.
 
     Args:
-        out: the building under assembly, which gets the parts.
-        wall: the wall.
-        x0: left end along the wall [m].
-        x1: right end along the wall [m].
+        out, wall, x0, x1: see `add_porch`.
         start: distance of the top step from the wall [m].
         rise: height of the top step [m].
         room: greatest length of the steps away from the wall [m].

@@ -44,10 +44,7 @@ def gambrel_line(
     The slopes are steep up to a knee, and flatter above.
 
     Args:
-        a: where the line begins across the roof [m].
-        b: where the line ends across the roof [m].
-        z: height of both ends [m].
-        top: height of the ridge [m].
+        a, b, z, top: see `gable_line`.
     """
     half = (b - a) / 2
     run = 0.24 * half
@@ -61,9 +58,7 @@ def barrel_line(
     """Returns the roof line of a barrel roof as (across, height) points [m].
 
     Args:
-        a: where the line begins across the roof [m].
-        b: where the line ends across the roof [m].
-        z: height of both ends [m].
+        a, b, z: see `gable_line`.
         top: height of the crown [m].
     """
     half = (b - a) / 2

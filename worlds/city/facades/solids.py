@@ -263,10 +263,8 @@ def standing(x: Range, y: Range, z1: float, *, bottom: bool = False) -> Mesh:
     The box reaches down to `FOUNDATION_M` below the ground.
 
     Args:
-        x: least and greatest x [m].
-        y: least and greatest y [m].
+        x, y, bottom: see `box`.
         z1: height of the top [m].
-        bottom: whether the box has a lower side.
     """
     return box(x, y, (-FOUNDATION_M, z1), bottom=bottom)
 

@@ -97,9 +97,7 @@ def add_storeys(
     glass.
 
     Args:
-        out: the building under assembly, which gets the parts.
-        outline: (N, 2) corners of the walls in the building's frame,
-            counter-clockwise [m].
+        out, outline: see `add_ground`.
         facade: the walls of one storey.
         z0: height of the lowest floor [m].
         groups: number of parts, one above another.
@@ -270,9 +268,7 @@ def add_crown(
     """Adds the top walls and the roof; returns the height of the roof [m].
 
     Args:
-        out: the building under assembly, which gets the parts.
-        outline: (N, 2) corners of the walls in the building's frame,
-            counter-clockwise [m].
+        out, outline: see `add_ground`.
         facade: the topmost walls.
         z0: height of the foot of these walls [m].
         parapet: height of the walls above the roof [m].

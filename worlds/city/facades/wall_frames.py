@@ -72,10 +72,8 @@ class WallFrame:
         The box reaches below the ground.
 
         Args:
-            x: where the box begins and ends along the wall [m].
-            y: distances of the box's back and front out of the wall [m].
+            x, y, bottom: see `box`.
             z1: height of the top [m].
-            bottom: whether the box has a lower side.
         """
         return self.place(solids.standing(x, y, z1, bottom=bottom))
 

@@ -93,9 +93,7 @@ def add_garage_door(openings: Openings, x: float, width: float) -> None:
     """Adds a garage door with ribs to the front, in the material `trim`.
 
     Args:
-        openings: the openings of the wing.
-        x: middle of the door along the front [m].
-        width: width of the door [m].
+        openings, x, width: see `add_door`.
     """
     height = 2.15
     a, b = round(x - width / 2, 2), round(x + width / 2, 2)

@@ -204,11 +204,9 @@ def make_ground(
     """Returns the ground of a city: level if all roads and pads are level.
 
     Args:
-        surface: heights of the roads.
+        surface, streets, bounds: see `SlopingGround`.
         kerb_height: height of sidewalks above the roads [m]: one number, or a
             function that returns the heights (N,) at places (N, 2).
-        streets: area of carriageways, sidewalks and medians in W [m].
-        bounds: x0, y0, x1, y1 of the city in W [m].
         pads: level areas outside the streets. Where two pads meet, the first
             pad takes precedence.
     """

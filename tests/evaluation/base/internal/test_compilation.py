@@ -115,6 +115,23 @@ def test_no_machine_code_where_others_can_write(tmp_path, place):
     assert not [*tmp_path.rglob("*.nb?")]
 
 
+def output_of(script, folder):
+    """Returns what a script prints; its machine code is kept in a folder."""
+    result = subprocess.run(
+        [sys.executable, script],
+        env={
+            **os.environ,
+            "PYTHONPATH": str(documents.ROOT),
+            "XDG_CACHE_HOME": str(folder / "cache"),
+        },
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
 _TWICE = """
 import fcntl
 import os
@@ -155,18 +172,7 @@ def test_nothing_is_compiled_twice(tmp_path):
     """Neither by two processes, nor for numbers that are written out."""
     script = tmp_path / "twice.py"
     script.write_text(_TWICE)
-    result = subprocess.run(
-        [sys.executable, script],
-        env={
-            **os.environ,
-            "PYTHONPATH": str(documents.ROOT),
-            "XDG_CACHE_HOME": str(tmp_path / "cache"),
-        },
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert result.stdout == "4 1 Counter()\n7 [(int64, int64)]\n"
+    assert output_of(script, tmp_path) == "4 1 Counter()\n7 [(int64, int64)]\n"
 
 
 _THRICE = """
@@ -184,29 +190,14 @@ print(thrice(2), thrice.stats.cache_misses.total())
 @pytest.mark.night
 def test_equal_sources_share_the_code_wherever_they_lie(tmp_path):
     """Age and place of the source do not count; content of a sibling does."""
-
-    def run(folder):
-        result = subprocess.run(
-            [sys.executable, folder / "thrice.py"],
-            env={
-                **os.environ,
-                "PYTHONPATH": str(documents.ROOT),
-                "XDG_CACHE_HOME": str(tmp_path / "cache"),
-            },
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        return result.stdout
-
     for name in ("checkout", "installed", "changed"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "thrice.py").write_text(_THRICE)
     os.utime(tmp_path / "installed/thrice.py", (1e9, 1e9))
     (tmp_path / "changed/sibling.py").write_text("# Another folder.\n")
-    assert run(tmp_path / "checkout") == "6 1\n"
-    assert run(tmp_path / "installed") == "6 0\n"
-    assert run(tmp_path / "changed") == "6 1\n"
+    assert output_of(tmp_path / "checkout/thrice.py", tmp_path) == "6 1\n"
+    assert output_of(tmp_path / "installed/thrice.py", tmp_path) == "6 0\n"
+    assert output_of(tmp_path / "changed/thrice.py", tmp_path) == "6 1\n"
 
 
 _DAMAGED = """
@@ -236,28 +227,11 @@ def test_damaged_machine_code_is_compiled_again(tmp_path, ending, length):
     """A cut index of a callback and of a function that another calls, too."""
     script = tmp_path / "damaged.py"
     script.write_text(_DAMAGED)
-
-    def run():
-        result = subprocess.run(
-            [sys.executable, script],
-            env={
-                **os.environ,
-                "PYTHONPATH": str(documents.ROOT),
-                "XDG_CACHE_HOME": str(tmp_path / "cache"),
-            },
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert (result.stdout, result.returncode) == ("18 True\n", 0), (
-            result.stderr
-        )
-
-    run()
+    assert output_of(script, tmp_path) == "18 True\n"
     files = [*(tmp_path / "cache").rglob(f"*.{ending}")]
     assert len(files) == 3
     for file in files:
         os.truncate(file, length)
-    run()
+    assert output_of(script, tmp_path) == "18 True\n"
     sizes = [file.stat().st_size for file in files]
     assert min(sizes) > length

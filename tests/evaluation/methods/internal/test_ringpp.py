@@ -5,7 +5,7 @@ import pytest
 
 from evaluation.base import InputError
 from evaluation.methods import make_method
-from evaluation.methods.ringpp import RingPlusPlus, _normalise, radon
+from evaluation.methods.ringpp import RingPlusPlus, radon
 
 CELL = 140.0 / 120.0
 # Least possible distance of a pair, see `test_no_pair_is_nearer`.
@@ -160,17 +160,6 @@ class TestScore:
         query, place = (method.describe(scan) for scan in scans)
         database = method.build_database([place])
         assert method.score(query, database) == pytest.approx(max(expected))
-
-    @pytest.mark.parametrize("cells", [31, 32])
-    def test_half_spectra_normalise_as_whole_ones(self, cells):
-        rng = np.random.default_rng([cells])
-        signals = rng.uniform(size=(3, 7, cells))
-        whole = np.abs(np.fft.fft(signals, axis=2)).transpose(0, 2, 1)
-        mean = whole.mean(axis=(1, 2), keepdims=True)
-        deviation = np.sqrt(whole.var(axis=(1, 2), keepdims=True) + 1e-5)
-        expected = ((whole - mean) / deviation)[:, : cells // 2 + 1]
-        half = np.abs(np.fft.rfft(signals, axis=2)).transpose(0, 2, 1)
-        np.testing.assert_allclose(_normalise(half, cells), expected)
 
     def test_no_pair_is_nearer(self):
         # By the Cauchy-Schwarz inequality; a constant close to it appears

@@ -130,9 +130,6 @@ def test_own_cases_beside_those_of_causes(tmp_path):
 
 FAULTS = [
     ("- 1", "not a mapping of an experiment's fields"),
-    ("", "not a mapping"),
-    ("a: b: c", "not readable as YAML"),
-    ("seeds: [1]\nseeds: [2]", "not readable.* line 2: 'seeds' is .*twice"),
     ("metods: [solid]", "metods: Extra inputs .* mean methods"),
     ("name: ../x", "name: "),
     ("maps: []", "maps: at least 1 needed"),
