@@ -46,6 +46,7 @@ from .elementary import rotated as rotated
 from .elementary import sin as sin
 from .elementary import sinc as sinc
 from .elementary import tan as tan
+from .errors import FailedJobsError as FailedJobsError
 from .errors import InputError as InputError
 from .errors import check_type as check_type
 from .errors import describe_validation_error as describe_validation_error
