@@ -67,6 +67,8 @@ _BASES = {"Bridge": Base.DECK, "Tunnel": Base.UNDERGROUND}
 _LEAST_ROOM = 2.0
 # The corners of a level face differ in height by at most this [m].
 _LEVEL = 0.05
+# Type of a group of objects, which has no shape of its own.
+_GROUP = "CityObjectGroup"
 # Names are cut to this length.
 _LONGEST_NAME = 80
 
@@ -123,9 +125,11 @@ def import_objects(
         surfaces = _triangles_by_part(chosen, root, city.faults, origin)
         if not any(map(len, surfaces.values())):
             kind = "object without a surface"
+            ruins = city.objects[root].object_type != _GROUP
             if not chosen and any(member.geometries for member in members):
                 kind = f"object without level of detail {lod:g}"
-            city.faults.add(f"{kind}, left out", root)
+                ruins = False
+            city.faults.add(f"{kind}, left out", root, ruins=ruins)
             continue
         object_type = city.objects[root].object_type
         semantic_class, finish = _class_of(object_type)
@@ -240,7 +244,7 @@ def _families(city: CityFile) -> dict[str, list[CityObject]]:
                 for parent in city.objects[root].parents
                 if parent in city.objects
                 # A group is not one structure: it may contain half a city.
-                and city.objects[parent].object_type != "CityObjectGroup"
+                and city.objects[parent].object_type != _GROUP
             ]
             if not parents or parents[0] in seen:
                 break

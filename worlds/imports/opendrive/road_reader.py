@@ -24,11 +24,13 @@ from evaluation.base import (
     read_elements,
     value_errors,
 )
-from worlds.imports.faults import ImportFaults
+from worlds.imports.faults import WHOLE_FILE, ImportFaults
 from worlds.imports.opendrive import curves, road_model
 from worlds.imports.opendrive.things import read_things
 from worlds.imports.part_tables import PartTable
 
+# Versions up to 1.8 are read.
+_LAST_MINOR = 8
 # Greatest length of a road [m].
 _LONGEST_ROAD = 100_000.0
 # A gap between two pieces of a road's course is counted if it is wider than
@@ -84,6 +86,7 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
             The message names the file, the road, the line and the fault.
     """
     top = read_elements(path, "OpenDRIVE")
+    _check_version(top, path)
     roads: list[road_model.ImportedRoad] = []
     names: set[str] = set()
     for kind in ("road", "junction"):
@@ -99,7 +102,8 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
     if not roads:
         raise InputError(f"{path}: the file has no roads")
     _count_dangling_links(top, faults)
-    _count_unread(top, faults, "the file")
+    faults.check_ruins(path, (road.name for road in roads))
+    _count_unread(top, faults, WHOLE_FILE)
     x, y = _origin_of(path, roads)
     reference = top.first("header", "geoReference")
     system = "" if reference is None else reference.text or ""
@@ -110,6 +114,21 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
         " ".join(system.split()),
         (x + east, y + north, up),
     )
+
+
+def _check_version(top: Element, path: Path) -> None:
+    """Raises an InputError if the file has a version that is not read."""
+    header = top.first("header")
+    with value_errors(path):
+        version = [
+            1 if header is None else int(header.number(part, 1.0))
+            for part in ("revMajor", "revMinor")
+        ]
+    if version[0] != 1 or version[1] > _LAST_MINOR:
+        raise InputError(
+            f"{path}: OpenDRIVE {version[0]}.{version[1]}; versions up to"
+            f" 1.{_LAST_MINOR} are read"
+        )
 
 
 def _offset_of(top: Element) -> tuple[float, float, float]:
@@ -213,7 +232,7 @@ def _read_road(
     """
     pieces = _read_course(element.all("planView", "geometry"), name, faults)
     if not pieces:
-        faults.add("road without a course, left out", name)
+        faults.add("road without a course, left out", name, ruins=True)
         return None
     stated = element.number("length")
     length = pieces[-1].s + pieces[-1].length
@@ -224,7 +243,7 @@ def _read_road(
         raise ValueError(f"{length:g} m are more than {_LONGEST_ROAD:g} m")
     sections = read_sections(element, length, name, faults)
     if not sections:
-        faults.add("road without lanes, left out", name)
+        faults.add("road without lanes, left out", name, ruins=True)
         return None
     if max(pieces[0].s, sections[0].start) > _WIDEST_JOINT:
         faults.add("road whose course or lanes begin after its start", name)

@@ -690,6 +690,7 @@ def _report_of(
 ) -> ImportReport:
     roads = town.roads.roads
     of_file = ("roads", "roads in junctions", "signals", "objects")
+    num_elements = len(roads) + sum(len(road.things) for road in roads)
     return ImportReport(
         kinds=town.kinds,
         triangles=sum(
@@ -701,8 +702,9 @@ def _report_of(
         drives=tuple(drive.length for drive in town.drives),
         faults=town.faults.rows(),
         parts=town.faults.parts(),
-        num_elements=len(roads) + sum(len(road.things) for road in roads),
+        num_elements=num_elements,
         num_built=sum(town.kinds.get(kind, 0) for kind in of_file),
+        shares=town.faults.shares({}, num_elements),
     )
 
 

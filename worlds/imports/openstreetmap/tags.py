@@ -129,7 +129,7 @@ def tag_value(
     if where is not None:
         name, faults = where
         kind = f"{key} unreadable or implausible, the usual one taken"
-        faults.add(kind, name)
+        faults.add(kind, name, ruins=True)
     return None
 
 
