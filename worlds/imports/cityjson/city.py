@@ -9,6 +9,7 @@ from pathlib import Path
 import re
 
 import numpy as np
+from scipy.spatial import cKDTree
 import shapely
 from shapely.geometry.base import BaseGeometry
 
@@ -62,9 +63,11 @@ _CLASSES: dict[str, tuple[str, Finish | None]] = {
 }
 # Beginning of a type -> where its objects are.
 _BASES = {"Bridge": Base.DECK, "Tunnel": Base.UNDERGROUND}
-# An object stands above the terrain if its lowest corner is this far above it,
-# as a canopy is [m].
+# An object stands above the ground if its lowest corner is this far above it,
+# as a canopy is; structures with a room are higher [m].
 _LEAST_ROOM = 2.0
+# Number of neighbours with which a flat structure is compared.
+_NEIGHBOURS = 8
 # The corners of a level face differ in height by at most this [m].
 _LEVEL = 0.05
 # Type of a group of objects, which has no shape of its own.
@@ -162,8 +165,8 @@ def _base_of(
     """Returns where an object stands, by its type and its semantic surfaces.
 
     A structure whose lowest face is level and known to be no ground, such as
-    an OuterCeilingSurface, is open below. Without semantics it stands on the
-    ground.
+    an OuterCeilingSurface, is open below. Without semantics, the ground around
+    it decides.
     """
     for beginning, base in _BASES.items():
         if object_type.startswith(beginning):
@@ -182,7 +185,11 @@ def _base_of(
 
 
 def _on_terrain(objects: Sequence[ImportedObject]) -> Iterator[ImportedObject]:
-    """Yields objects, with the base that the file's terrain shows."""
+    """Yields objects, with the base that the ground around them shows.
+
+    The ground is the file's terrain. Without terrain, a structure too flat to
+    contain a room is compared with the feet of its neighbours.
+    """
     is_terrain = [one.object_type == "TINRelief" for one in objects]
     terrain = UpperSides(
         turned_up(
@@ -193,17 +200,34 @@ def _on_terrain(objects: Sequence[ImportedObject]) -> Iterator[ImportedObject]:
             )
         )
     )
+    feet = [
+        one.foot
+        for one in objects
+        if one.base is Base.GROUND and not _is_flat(one)
+    ]
+    tree = cKDTree(np.reshape(feet, (-1, 3))[:, :2])
     for one, is_it in zip(objects, is_terrain, strict=True):
         if one.base is Base.GROUND and not is_it:
             corners = one.triangles.reshape(-1, 3)
             above = corners[:, 2] - terrain.heights(corners[:, :2])
             # Where there is no terrain, nothing is known.
             above = above[np.isfinite(above)]
+            if not any(is_terrain) and feet and _is_flat(one):
+                count = min(_NEIGHBOURS, len(feet))
+                _, near = tree.query(one.foot[:2], range(1, count + 1))
+                low = np.median([feet[k][2] for k in near])
+                above = one.foot[2:] - low
             if len(above) and above.min() > _LEAST_ROOM:
                 one = replace(one, base=Base.RAISED)
             elif len(above) and above.max() < -_LEAST_ROOM:
                 one = replace(one, base=Base.UNDERGROUND)
         yield one
+
+
+def _is_flat(one: ImportedObject) -> bool:
+    """Returns whether a structure is too flat to contain a room."""
+    is_ground = one.structure.semantic_class in GROUND_CLASSES
+    return not is_ground and np.ptp(one.triangles[..., 2]) < _LEAST_ROOM
 
 
 def _first_year(

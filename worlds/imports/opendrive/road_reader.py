@@ -113,6 +113,7 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
         tuple(_moved(road, x, y) for road in roads),
         " ".join(system.split()),
         (x + east, y + north, up),
+        len(list(top.all("road"))),
     )
 
 
@@ -271,9 +272,10 @@ def _read_road(
         limits=step_function(_speed_limits(element, name, faults)),
         things=tuple(read_things(element, name, faults)),
         spans=tuple(
-            span.tag
+            road_model.Span(tag, s, s + span.number("length"))
             for tag in ("bridge", "tunnel")
             for span in element.all("objects", tag)
+            for s in (span.number("s"),)
         ),
     )
 
