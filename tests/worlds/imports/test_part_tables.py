@@ -26,7 +26,7 @@ from worlds.imports import ImportOptions, import_city
 KEYS = {
     "source": "survey", "name": "A", "surface": "asphalt", "access": "private",
     "height": "7", "width": "3", "min_height": "1", "oneway": "yes",
-    "width": "7.3", "maxspeed": "30", "service": "alley", "layer": "1",
+    "lanes": "3", "maxspeed": "30", "service": "alley", "layer": "1",
     "bridge": "yes", "tunnel": "yes", "roof:shape": "pyramidal",
     "operator": "B", "start_date": "1900", "end_date": "2100", "foot": "yes",
     "bicycle": "no", "lit": "yes", "sidewalk": "both", "tracktype": "grade2",
@@ -357,6 +357,7 @@ def shapes(city):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dressed", [False, True])
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_tags_that_change_no_shape_change_none(tmp_path, element, dressed):
