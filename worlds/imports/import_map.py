@@ -29,7 +29,7 @@ from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity
 from worlds.imports.ground import ground_of, ground_structures
 from worlds.imports.grown_city import grow
-from worlds.imports.imported_objects import ImportedObject
+from worlds.imports.imported_objects import FARTHEST, ImportedObject
 from worlds.imports.map_source import MapSource, source_of
 from worlds.imports.options import DriveOn, ImportOptions
 from worlds.imports.report import ImportReport
@@ -255,7 +255,8 @@ def _volumes(objects: Sequence[ImportedObject]) -> dict[str, float]:
     """
     volumes: defaultdict[str, float] = defaultdict(float)
     for one in objects:
-        if one.is_building:
+        size = np.ptp(one.triangles, axis=(0, 1))
+        if one.is_building and (size < FARTHEST).all():
             a, b, c = np.moveaxis(one.triangles, 1, 0)
             twice_area = np.cross(b - a, c - a)[:, 2]
             height = (a + b + c)[:, 2] / 3.0 - one.triangles[:, :, 2].min()

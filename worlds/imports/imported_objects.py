@@ -18,6 +18,9 @@ from worlds.shapes import (
     hull_of,
 )
 
+# Greatest distance of a structure from the middle of a city along x, y and z
+# [m]. Some files have -9999 in place of an unknown height.
+FARTHEST = np.array([10_000.0, 10_000.0, 3_000.0])
 # Classes of the ground on which cars may drive.
 _GROUND_OF_CARS = GROUND_CLASSES - {"sidewalk"}
 

@@ -371,6 +371,7 @@ def test_far_structures_are_left_out(tmp_path):
     city.box("far", 3e6, -2e6, (20.0, 20.0, 6.0))
     # A lake over half a continent, and a wall into space.
     city.box("high", 10.0, 50.0, (20.0, 20.0, 1e6))
+    city.box("unknown", 10.0, 90.0, (20.0, 20.0, 6.0), z=-9999.0)
     lake = {
         "type": "MultiSurface",
         "lod": "1",
@@ -380,7 +381,10 @@ def test_far_structures_are_left_out(tmp_path):
     source = city.write(tmp_path / "city.json")
     report = import_city(source, tmp_path / "town", ImportOptions())
     assert report.stages == {"01": 4}
-    assert ("object more than 10 km away, left out", 3, "far") in report.faults
+    kind = "object more than 10 km away or 3 km higher or lower, left out"
+    assert (kind, 4, "far") in report.faults
+    facts = yaml.safe_load((tmp_path / "town/import.yaml").read_text())
+    assert facts["origin"] == [85070.0, 446035.0, 3.0]
 
 
 @pytest.mark.night
