@@ -230,27 +230,6 @@ def test_parts_of_another_year_are_buildings(tmp_path, date, buildings):
     assert ("date in start_date that is not understood" in kinds) == is_unclear
 
 
-@pytest.mark.parametrize(
-    ("attribute", "value", "is_counted"),
-    [
-        ("measuredHeight", 12.5, True),
-        ("roofType", "1000", True),
-        ("identificatie", "a", False),
-        ("yearOfConstruction", 1950, False),
-        ("b3_h_max", 5.0, False),
-    ],
-)
-def test_attributes_of_cityjson_are_accounted_for(
-    tmp_path, attribute, value, is_counted
-):
-    path = tmp_path / "a.json"
-    path.write_text(json.dumps(house({attribute: value})))
-    city = read_city(path)
-    kinds = [fault.kind for fault in city.faults.rows()]
-    assert (f"{attribute} of attributes, not read" in kinds) == is_counted
-    assert is_counted or attribute in " ".join(city.faults.parts()).split()
-
-
 def test_a_demolished_house_of_cityjson_has_an_end(tmp_path):
     path = tmp_path / "a.json"
     dates = {"yearOfConstruction": 1900, "yearOfDemolition": "1950-05-01"}

@@ -161,28 +161,23 @@ def tunnel_shells(
                 continue
             a, b = right[run], left[run]
             out = _WALL * (b - a) / width[run, None]
-            triangles = np.concatenate(
-                [
-                    swept_surface(
-                        np.stack([p + low, p + top, q + top, q + low], axis=1)
-                    )
-                    for p, q, low, top in (
-                        (a - out, a, 0.0 * up, _TUNNEL_HEIGHT * up),
-                        (b, b + out, 0.0 * up, _TUNNEL_HEIGHT * up),
-                        (
-                            a - out,
-                            b + out,
-                            _TUNNEL_HEIGHT * up,
-                            (_TUNNEL_HEIGHT + _WALL) * up,
-                        ),
-                    )
-                ]
+            foot, top = 0.0 * up, _TUNNEL_HEIGHT * up
+            boxes = (
+                (a - out, a, foot, top),
+                (b, b + out, foot, top),
+                (a - out, b + out, top, top + _WALL * up),
             )
+            surfaces = [
+                swept_surface(
+                    np.stack([p + low, p + high, q + high, q + low], axis=1)
+                )
+                for p, q, low, high in boxes
+            ]
             structure = make_object(
                 f"tunnel_{road}_{section}_{number}",
                 "other-structure",
                 "Tunnel",
-                {"shell": _without_slivers(triangles)},
+                {"shell": _without_slivers(np.concatenate(surfaces))},
                 {},
             ).structure
             outline = np.concatenate([a - out, (b + out)[::-1]])[:, :2]
