@@ -313,6 +313,8 @@ THINGS = {
         # A canopy without semantics is too flat to be a house.
         ([("more", "Building", 36, 20, 25.5, (20, 9, 0.5), None)],
          [((43, 25), 25.5, 26.0)]),
+        # A square on a roof.
+        ([("more", "Square", 4, 4, 6.0, (20, 20, 0.1), None)], []),
     ],
     ".xodr": [
         (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+import itertools
 from pathlib import Path
 import re
 
@@ -66,7 +67,9 @@ _BASES = {"Bridge": Base.DECK, "Tunnel": Base.UNDERGROUND}
 # An object stands above the ground if its lowest corner is this far above it,
 # as a canopy is; structures with a room are higher [m].
 _LEAST_ROOM = 2.0
-# Number of neighbours with which a flat structure is compared.
+# A surface that is at most this far above or below a roof lies on it [m].
+_ON_ROOF = 0.3
+# Number of neighbours with which what may be raised is compared.
 _NEIGHBOURS = 8
 # The corners of a level face differ in height by at most this [m].
 _LEVEL = 0.05
@@ -187,32 +190,33 @@ def _base_of(
 def _on_terrain(objects: Sequence[ImportedObject]) -> Iterator[ImportedObject]:
     """Yields objects, with the base that the ground around them shows.
 
-    The ground is the file's terrain. Without terrain, a structure too flat to
-    contain a room is compared with the feet of its neighbours.
+    The ground is the file's terrain. Without terrain, what may be a canopy or
+    a roof terrace is compared with the feet of its neighbours.
     """
     is_terrain = [one.object_type == "TINRelief" for one in objects]
-    terrain = UpperSides(
-        turned_up(
-            joined_triangles(
-                one.triangles
-                for one, is_it in zip(objects, is_terrain, strict=True)
-                if is_it
-            )
-        )
-    )
+    terrain = _upper_sides(itertools.compress(objects, is_terrain))
+    may_be_raised = [False] * len(objects)
+    if not any(is_terrain):
+        rooms = [
+            one for one in objects if not _is_flat(one) and not _is_surface(one)
+        ]
+        roofs = _upper_sides(rooms)
+        may_be_raised = [_is_flat(one) or _is_on(roofs, one) for one in objects]
     feet = [
         one.foot
-        for one in objects
-        if one.base is Base.GROUND and not _is_flat(one)
+        for one, may_be in zip(objects, may_be_raised, strict=True)
+        if one.base is Base.GROUND and not may_be
     ]
     tree = cKDTree(np.reshape(feet, (-1, 3))[:, :2])
-    for one, is_it in zip(objects, is_terrain, strict=True):
+    for one, is_it, may_be in zip(
+        objects, is_terrain, may_be_raised, strict=True
+    ):
         if one.base is Base.GROUND and not is_it:
             corners = one.triangles.reshape(-1, 3)
             above = corners[:, 2] - terrain.heights(corners[:, :2])
             # Where there is no terrain, nothing is known.
             above = above[np.isfinite(above)]
-            if not any(is_terrain) and feet and _is_flat(one):
+            if may_be and feet:
                 count = min(_NEIGHBOURS, len(feet))
                 _, near = tree.query(one.foot[:2], range(1, count + 1))
                 low = np.median([feet[k][2] for k in near])
@@ -224,10 +228,28 @@ def _on_terrain(objects: Sequence[ImportedObject]) -> Iterator[ImportedObject]:
         yield one
 
 
+def _upper_sides(objects: Iterable[ImportedObject]) -> UpperSides:
+    """Returns the upper sides of objects."""
+    triangles = joined_triangles(one.triangles for one in objects)
+    return UpperSides(turned_up(triangles))
+
+
+def _is_surface(one: ImportedObject) -> bool:
+    """Returns whether an object is a surface, such as a road."""
+    return one.structure.semantic_class in GROUND_CLASSES
+
+
 def _is_flat(one: ImportedObject) -> bool:
     """Returns whether a structure is too flat to contain a room."""
-    is_ground = one.structure.semantic_class in GROUND_CLASSES
-    return not is_ground and np.ptp(one.triangles[..., 2]) < _LEAST_ROOM
+    height = np.ptp(one.triangles[..., 2])
+    return not _is_surface(one) and bool(height < _LEAST_ROOM)
+
+
+def _is_on(roofs: UpperSides, one: ImportedObject) -> bool:
+    """Returns whether an object is a surface that lies on roofs."""
+    middles = one.triangles.mean(axis=1)
+    away = np.abs(roofs.heights(middles[:, :2]) - middles[:, 2])
+    return _is_surface(one) and bool((away < _ON_ROOF).all())
 
 
 def _first_year(
