@@ -67,3 +67,26 @@ def test_the_factor_that_is_named_cures_the_city(tmp_path, scale):
         assert float(factor) == pytest.approx(1 / scale)
         scale *= float(factor)
     try_out("cured", scale)
+
+
+@pytest.mark.parametrize(
+    ("tag", "is_refused"),
+    [
+        ("height", True),
+        ("building__levels", True),
+        ("roof__direction", False),
+        ("start_date", False),
+    ],
+)
+def test_only_sizes_that_most_things_lack_ruin_a_city(
+    tmp_path, tag, is_refused
+):
+    osm = OsmWriter()
+    for k in range(5):
+        osm.box(30 * k, 0, 9, 9, building="yes", **{tag: "some"})
+    path = osm.write(tmp_path / "a.osm")
+    if not is_refused:
+        import_city(path, tmp_path / "map", PLAIN)
+        return
+    with pytest.raises(InputError, match=rf"read: {tag.replace('__', ':')} "):
+        import_city(path, tmp_path / "map", PLAIN)

@@ -217,7 +217,7 @@ def _way_of(
         for is_absent, number in others.items():
             gap = "that is not in the file" if is_absent else "off the globe"
             kind = f"place of a way {gap}, left out"
-            faults.add(kind, name, number, ruins=True)
+            faults.add(kind, name, number, ruins=len(nodes) < 2)
     if len(nodes) < 2:
         return None
     line = np.array([(node.lon, node.lat) for node in nodes])
