@@ -173,17 +173,15 @@ def tunnel_shells(
                 )
                 for p, q, low, high in boxes
             ]
-            structure = make_object(
+            outline = np.concatenate([a - out, (b + out)[::-1]])[:, :2]
+            yield make_object(
                 f"tunnel_{road}_{section}_{number}",
                 "other-structure",
                 "Tunnel",
                 {"shell": _without_slivers(np.concatenate(surfaces))},
                 {},
+                footprint=shapely.make_valid(shapely.Polygon(outline)),
             ).structure
-            outline = np.concatenate([a - out, (b + out)[::-1]])[:, :2]
-            area = shapely.make_valid(shapely.Polygon(outline))
-            model = replace(structure.model, footprint=area)
-            yield replace(structure, model=model)
 
 
 def _without_slivers(triangles: np.ndarray) -> np.ndarray:

@@ -588,9 +588,9 @@ def _object_structure(
         {"body": triangles},
         {},
         kind=thing.kind,
+        footprint=footprint,
     ).structure
-    model = replace(structure.model, footprint=footprint)
-    return replace(structure, model=model, tags=("object",))
+    return replace(structure, tags=("object",))
 
 
 def _generator_of(name: str) -> np.random.Generator:
