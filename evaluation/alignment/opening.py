@@ -105,11 +105,13 @@ def open_pair(
         The drives and paths of clouds, and the verdict.
 
     Raises:
-        InputError: something cannot be read; a drive cannot be aligned, is of
-            another map or, with `never`, of another world; or a cloud should be
-            aligned. The error says how recordings of this format get a common
-            world.
+        InputError: nothing is given, or it cannot be read; a drive cannot be
+            aligned, is of another map or, with `never`, of another world; or a
+            cloud should be aligned. The error says how recordings of this
+            format get a common world.
     """
+    if not given:
+        raise InputError("no drive and no cloud is given")
     readings = readings or Reading.each(len(given))
     found = [
         one if isinstance(one, Drive) else reading.open_source(Path(one))

@@ -78,7 +78,7 @@ _LAYOUTS = {
 
 def to_layout(
     points: np.ndarray,
-    layout: str,
+    layout: LayoutName,
     num_rings: int | None = None,
     is_calibrated: bool = False,
     echoes: str = "strongest",
@@ -87,8 +87,7 @@ def to_layout(
 
     Args:
         points: (N,) with the fields x y z intensity ring t.
-        layout: a `LayoutName`; `cns` is the layout that the points
-            have.
+        layout: the layout; `cns` is that of the points.
         num_rings: number of rings of the LiDAR. If given, the layout `velodyne`
             counts rings from the lowest ring, as Velodyne's driver does.
         is_calibrated: whether the intensities are calibrated. Calibrated

@@ -12,11 +12,12 @@ from evaluation.base import MAX_INSTANCE, InputError
 from worlds.imports.building_years import stands_today
 from worlds.imports.foreign_city import ForeignCity
 from worlds.imports.former_buildings import with_former_buildings
-from worlds.imports.imported_objects import ImportedObject, boxes_of
+from worlds.imports.imported_objects import (
+    FARTHEST,
+    ImportedObject,
+    boxes_of,
+)
 from worlds.imports.options import ImportOptions
-
-# Greatest distance of a structure from the middle of a city [m].
-_FARTHEST = 10_000.0
 
 
 @dataclass(frozen=True)
@@ -176,7 +177,7 @@ def stage_names(years: Sequence[int]) -> list[str]:
 
 
 def _without_outliers(city: ForeignCity) -> list[ImportedObject]:
-    """Returns a city's objects within 10 km of its middle.
+    """Returns a city's objects within 10 km of its middle, and 3 km in height.
 
     All other objects are counted in the city's faults.
     """
@@ -186,13 +187,16 @@ def _without_outliers(city: ForeignCity) -> list[ImportedObject]:
     middle = np.median(boxes.mean(axis=1), axis=0)
     kept = []
     for imported, reach in zip(
-        city.objects, np.abs(boxes - middle).max(axis=(1, 2)), strict=True
+        city.objects,
+        (np.abs(boxes - middle) / FARTHEST).max(axis=(1, 2)),
+        strict=True,
     ):
-        if reach <= _FARTHEST:
+        if reach <= 1.0:
             kept.append(imported)
         else:
-            kind = f"object more than {_FARTHEST / 1000:g} km away, left out"
-            city.faults.add(kind, imported.structure.name)
+            x, _, z = FARTHEST / 1000
+            kind = f"object more than {x:g} km away or {z:g} km higher or lower"
+            city.faults.add(f"{kind}, left out", imported.structure.name)
     return kept
 
 

@@ -36,7 +36,7 @@ from worlds.imports.cityjson.reference_systems import (
     check_lengths,
     reference_system,
 )
-from worlds.imports.faults import ImportFaults
+from worlds.imports.faults import WHOLE_FILE, ImportFaults
 from worlds.imports.part_tables import PartTable
 
 # Every city is wider than 1 m, and narrower than 1 deg (about 100 km).
@@ -63,6 +63,8 @@ _NESTING = {
     "MultiSolid": 2,
     "CompositeSolid": 2,
 }
+# Versions that are read, with a patch of the format.
+_VERSION = re.compile(r"(1\.[01]|2\.0)(\.\d+)?")
 # No place on Earth is farther than this from the origin of a survey grid [m].
 _FARTHEST = 1e8
 # Greatest number of faces in all places of templates together. A short file can
@@ -143,7 +145,7 @@ def _read_documents(path: Path) -> CityFile:
 
 def _check_version(document: dict, where: str) -> None:
     version = str(document.get("version", ""))
-    if not re.match(r"[12]\.", version):
+    if not _VERSION.fullmatch(version):
         raise InputError(
             f"{where}: CityJSON of version {version!r}, not 1.0 to 2.0"
         )
@@ -316,7 +318,7 @@ def _read_geometry(
             boundaries = [face for group in boundaries for face in group]
         kinds = _surface_kinds(geometry, name, faults)
     except (LookupError, TypeError, ValueError, AttributeError):
-        faults.add("geometry that is not an object, left out", name)
+        faults.add("geometry that is not an object, left out", name, ruins=True)
         return None
     if is_instance:
         source.templates.place(len(boundaries))
@@ -324,7 +326,7 @@ def _read_geometry(
     for boundary, kind_of_face in zip(boundaries, kinds, strict=True):
         face = _face_of_boundary(boundary, vertices)
         if face is None:
-            faults.add("face with unknown vertices, left out", name)
+            faults.add("face with unknown vertices, left out", name, ruins=True)
         else:
             faces.append(face)
             kinds_of_faces.append(kind_of_face)
@@ -464,13 +466,13 @@ def _count_assumptions(city: CityFile) -> None:
     system = city.system
     if not system.name:
         city.faults.add(
-            "no reference system; metres east, north and up assumed", "the file"
+            "no reference system; metres east, north and up assumed", WHOLE_FILE
         )
     elif system.heights_assumed and not system.is_plain:
         city.faults.add(
             "reference system without heights; its horizontal unit taken for "
             "them",
-            system.name,
+            WHOLE_FILE,
         )
 
 
@@ -540,7 +542,7 @@ def _settle_axes(city: CityFile, vertices: np.ndarray) -> None:
         city.order_is_open = False
         _exchange_axes(city)
     elif not is_there:
-        city.faults.add(_BEYOND, defined.name)
+        city.faults.add(_BEYOND, WHOLE_FILE)
 
 
 def _exchange_axes(city: CityFile) -> None:
@@ -554,7 +556,7 @@ def _exchange_axes(city: CityFile) -> None:
     city.faults.add(
         f"reference system with {order[0]} first, but coordinates with"
         f" {order[1]} first; read as {order[1]} first",
-        defined.name,
+        WHOLE_FILE,
     )
 
 
@@ -573,7 +575,7 @@ def _exchange_mirrored_axes(city: CityFile) -> None:
     if not outwards:
         if city.system.is_north_first:
             kind = "order of axes that no face shows, taken as defined"
-            city.faults.add(kind, city.system.name)
+            city.faults.add(kind, WHOLE_FILE)
     elif sum(outwards) < _MIRRORED_SHARE * len(outwards):
         if city.order_is_open:
             _exchange_axes(city)
@@ -582,7 +584,7 @@ def _exchange_mirrored_axes(city: CityFile) -> None:
         elif len(outwards) > 1:
             city.faults.add(
                 "all inside out: the city may be mirrored (north first?)",
-                "the file",
+                WHOLE_FILE,
             )
 
 

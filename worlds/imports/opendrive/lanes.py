@@ -316,7 +316,8 @@ def stations(
         if bend > 0.0:
             # A chord of this length is at most `SAG` from an arc.
             step = min(step, math.sqrt(8.0 * SAG / bend))
-        number = math.ceil((b - a) / step) + 1
+        # Rounded: a length is a few last bits more or less.
+        number = math.ceil(round((b - a) / step, 6)) + 1
         total += number
         if total > _MOST_STATIONS:
             raise ValueError(f"road {road.name}: too many bends")

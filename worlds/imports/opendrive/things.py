@@ -537,11 +537,11 @@ def _swept_object(
     below = np.concatenate([before[:, [0, 3]], after[:, [3, 0]]], axis=1)
     area = shapely.make_valid(shapely.polygons(below[..., :2]))
     return _object_structure(
-        thing, _swept_surface(sections), shapely.union_all(area)
+        thing, swept_surface(sections), shapely.union_all(area)
     )
 
 
-def _swept_surface(sections: np.ndarray) -> np.ndarray:
+def swept_surface(sections: np.ndarray) -> np.ndarray:
     """Returns the surface through cross-sections, as triangles (M, 3, 3) [m].
 
     `sections` (N, 4, 3) are the corners of each cross-section [m], counted
@@ -588,9 +588,9 @@ def _object_structure(
         {"body": triangles},
         {},
         kind=thing.kind,
+        footprint=footprint,
     ).structure
-    model = replace(structure.model, footprint=footprint)
-    return replace(structure, model=model, tags=("object",))
+    return replace(structure, tags=("object",))
 
 
 def _generator_of(name: str) -> np.random.Generator:

@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from evaluation.base import InputError, check_regular, user_errors
 from worlds.imports.faces import is_tangled
-from worlds.imports.faults import ImportFaults
+from worlds.imports.faults import WHOLE_FILE, ImportFaults
 from worlds.imports.openstreetmap.element_kinds import (
     element_kind,
     is_building,
@@ -188,7 +188,8 @@ def _count_without_area(
             fault = (
                 _WITHOUT_AREA if name in flat else _why_no_area(ways.get(name))
             )
-            features.faults.add(f"building {fault}, left out", name)
+            kind = f"building {fault}, left out"
+            features.faults.add(kind, name, ruins=True)
 
 
 def _area_of(area: Any, tags: Tags) -> OsmArea:
@@ -215,14 +216,15 @@ def _way_of(
         )
         for is_absent, number in others.items():
             gap = "that is not in the file" if is_absent else "off the globe"
-            faults.add(f"place of a way {gap}, left out", name, number)
+            kind = f"place of a way {gap}, left out"
+            faults.add(kind, name, number, ruins=len(nodes) < 2)
     if len(nodes) < 2:
         return None
     line = np.array([(node.lon, node.lat) for node in nodes])
     if len(line) > _MANY_NODES and (
         is_tangled(line) or is_tangled(line, reach=_NEAR)
     ):
-        faults.add("way with a tangle of nodes, left out", name)
+        faults.add("way with a tangle of nodes, left out", name, ruins=True)
         return None
     return OsmWay(name, tags, line, tuple(node.ref for node in nodes))
 
@@ -491,7 +493,7 @@ def _report_remark(path: Path, faults: ImportFaults) -> None:
     parser.CharacterDataHandler = text
     if _is_parsed(path, parser, b"<remark") and remark:
         words = " ".join("".join(remark).split())
-        faults.add(f"the file may be cut off: {words}", "its remark")
+        faults.add(f"the file may be cut off: {words}", WHOLE_FILE)
 
 
 def _is_parsed(path: Path, parser: expat.XMLParserType, word: bytes) -> bool:
