@@ -399,6 +399,7 @@ class McapDrive(Drive):
                     self._file.library.startswith("cns-drake ")
                     and self.lidar_section.get("returns") != "calibrated"
                 ),
+                stamp_ns,
             )
 
     def _labels(self, index: int, cloud: Any) -> np.ndarray | None:
