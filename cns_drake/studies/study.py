@@ -88,6 +88,7 @@ def run_study(
     printed: PrintStyle | None = None,
     on_note: Callable[[str], None] = lambda text: None,
     align: When = "auto",
+    pose_gap: float | None = None,
 ) -> Path:
     """Measures all conditions of an experiment; writes tables and a page.
 
@@ -106,6 +107,7 @@ def run_study(
             study takes.
         align: when recordings are aligned, see `open_pair` of
             `evaluation.alignment`.
+        pose_gap: of recordings, see `open_drive`.
 
     Returns:
         The path of the page.
@@ -121,7 +123,7 @@ def run_study(
         cluster,
         on_note,
     )
-    cities = plan_study(study, maps, align)
+    cities = plan_study(study, maps, align, pose_gap)
     results, queries = study.measure()
     own = [one.name for one, _ in study.methods.values() if one.file]
     notes = [one.to_text() for one in study.protocols]
@@ -172,14 +174,17 @@ def _unlike_shipped(study: Study, maps: Sequence[str]) -> str:
 
 
 def plan_study(
-    study: Study, maps: Sequence[str] = (), align: When = "auto"
+    study: Study,
+    maps: Sequence[str] = (),
+    align: When = "auto",
+    pose_gap: float | None = None,
 ) -> list[ShownCity]:
     """Plans how all pairs of drives in all conditions are measured.
 
     Args:
         study: the study.
         maps: names or folders of maps that replace the experiment's maps.
-        align: see `run_study`.
+        align, pose_gap: see `run_study`.
 
     Returns:
         What the page shows of recorded cities.
@@ -201,7 +206,9 @@ def plan_study(
             study,
             maps,
             lambda folder: drives_by_map(
-                find_recordings(folder, study.on_note), study.on_note, align
+                find_recordings(folder, study.on_note, pose_gap=pose_gap),
+                study.on_note,
+                align,
             ),
         )
     )

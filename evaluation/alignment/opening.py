@@ -12,6 +12,8 @@ import numpy as np
 from evaluation.alignment.align import AlignmentReport, align
 from evaluation.base import NS_PER_S, InputError, doing
 from evaluation.drives import (
+    FASTEST,
+    JUMP,
     SHARED_FRAMES,
     Drive,
     Reading,
@@ -220,14 +222,14 @@ def _misfits(drives: Sequence[Drive]) -> list[str]:
     notes = []
     for drive in dict.fromkeys(drives):
         steps = np.diff(drive.stamps_ns) / NS_PER_S
-        p_WS = drive.X_WS[:, :3, 3]
-        worst = int(steps.argmax()) if len(steps) else 0
-        if len(steps) and steps[worst] > _PAUSE:
-            away = np.linalg.norm(p_WS[worst + 1] - p_WS[worst])
+        moves = np.linalg.norm(np.diff(drive.X_WS[:, :3, 3], axis=0), axis=1)
+        is_jump = moves > JUMP + FASTEST * steps
+        if is_jump.any() or (steps > _PAUSE).any():
+            worst = int((moves if is_jump.any() else steps).argmax())
             notes.append(
-                f"{drive.name}: a pause of {steps[worst]:.0f} s after scan"
-                f" {worst}, over which the poses move by {away:.1f} m; give"
-                " sessions whose poses begin anew as drives of their own"
+                f"{drive.name}: a pause of {steps[worst]:.2g} s after scan"
+                f" {worst}, over which the poses move by {moves[worst]:.1f} m;"
+                " give sessions whose poses begin anew as drives of their own"
             )
     heights = [
         float(drive.X_BS[2, 3]) for drive in drives if drive.X_BS is not None

@@ -60,6 +60,7 @@ class BoreasDrive(FileDrive):
         path: Path,
         columns: int | None = None,
         poses: Path | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a drive.
 
@@ -67,6 +68,7 @@ class BoreasDrive(FileDrive):
             path: its folder.
             columns: is ignored, because the layout is fixed.
             poses: file with poses of the LiDAR, which is read instead.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
@@ -77,9 +79,9 @@ class BoreasDrive(FileDrive):
         super().__init__(
             name=as_given(path).name,
             scans=(
-                posed_by(poses, files, stamps_ns)
+                posed_by(poses, files, stamps_ns, pose_gap)
                 if poses
-                else _posed(path / _POSES, files, stamps_ns)
+                else _posed(path / _POSES, files, stamps_ns, pose_gap)
             ),
             read=_read_scan,
             tables=[path / SCENARIO],
@@ -88,7 +90,12 @@ class BoreasDrive(FileDrive):
         )
 
 
-def _posed(path: Path, files: list[Path], stamps_ns: np.ndarray) -> PosedFiles:
+def _posed(
+    path: Path,
+    files: list[Path],
+    stamps_ns: np.ndarray,
+    pose_gap: float | None,
+) -> PosedFiles:
     """Gives scan files the poses of the drive, which are at `path`."""
     trajectory = read_angles(path, num_velocities=3)
     X_WS = trajectory.X_WB
@@ -96,8 +103,10 @@ def _posed(path: Path, files: list[Path], stamps_ns: np.ndarray) -> PosedFiles:
     local = is_local(X_WS)
     if not local:
         X_WS[:, :3, 3] -= _ORIGIN
-    return posed(files, stamps_ns, trajectory)._replace(
-        world_frame=f"boreas/{'enu' if local else 'utm-17n'}", tables=(path,)
+    return posed(files, stamps_ns, trajectory, pose_gap)._replace(
+        world_frame=f"boreas/{'enu' if local else 'utm-17n'}",
+        tables=(path,),
+        has_own_world=False,
     )
 
 

@@ -84,6 +84,7 @@ class CnsFolderDrive(FileDrive):
         path: Path,
         columns: int | None = None,
         poses: Path | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a drive.
 
@@ -91,6 +92,7 @@ class CnsFolderDrive(FileDrive):
             path: its folder.
             columns: has no effect, because PCD files name their columns.
             poses: file with poses of the LiDAR, which is read instead.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
@@ -121,10 +123,11 @@ class CnsFolderDrive(FileDrive):
                 f" taken as {_LIDAR_HEIGHT:g} m above the vehicle's origin"
             )
         if poses:
-            scans = posed_by(poses, files, stamps_ns)
+            scans = posed_by(poses, files, stamps_ns, pose_gap)
         else:
             table = path / _POSES
-            scans = posed(files, stamps_ns, read_quaternions(table, ","))
+            trajectory = read_quaternions(table, ",")
+            scans = posed(files, stamps_ns, trajectory, pose_gap)
             scans = scans._replace(
                 X_WS=scans.X_WS @ _read_mount(mount),
                 world_frame="map",

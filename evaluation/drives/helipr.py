@@ -95,6 +95,7 @@ class HeliprDrive(FileDrive):
         path: Path,
         lidar: str | None = None,
         poses: Path | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a drive.
 
@@ -103,6 +104,7 @@ class HeliprDrive(FileDrive):
             lidar: name of the LiDAR, if `path` does not contain it. By default
                 the Ouster or, in a folder without the Ouster, the only LiDAR.
             poses: file with poses of the LiDAR, which is read instead.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
@@ -121,9 +123,9 @@ class HeliprDrive(FileDrive):
             name=as_given(drive).name,
             lidar=lidar,
             scans=(
-                posed_by(poses, files, stamps_ns)
+                posed_by(poses, files, stamps_ns, pose_gap)
                 if poses
-                else _posed(drive, lidar, files, stamps_ns)
+                else _posed(drive, lidar, files, stamps_ns, pose_gap)
             ),
             read=partial(_read_scan, lidar),
             tables=[drive / SCENARIO],
@@ -134,13 +136,18 @@ class HeliprDrive(FileDrive):
 
 
 def _posed(
-    drive: Path, lidar: str, files: list[Path], stamps_ns: np.ndarray
+    drive: Path,
+    lidar: str,
+    files: list[Path],
+    stamps_ns: np.ndarray,
+    pose_gap: float | None,
 ) -> PosedFiles:
     """Gives scan files the poses of the drive."""
     in_utm = (drive / _POSES / f"global_{lidar}_gt.txt").is_file()
     poses_name = f"global_{lidar}_gt.txt" if in_utm else f"{lidar}_gt.txt"
     poses_path = drive / _POSES / poses_name
-    found = posed(files, stamps_ns, read_quaternions(poses_path, None))
+    trajectory = read_quaternions(poses_path, None)
+    found = posed(files, stamps_ns, trajectory, pose_gap)
     return found._replace(
         X_WS=to_world(found.X_WS, poses_path) if in_utm else found.X_WS,
         world_frame=f"helipr{f'/{DATUM}' if in_utm else drive.resolve()}",

@@ -103,6 +103,7 @@ class KittiDrive(BinDrive):
         path: Path,
         columns: int | None = None,
         poses: Path | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a drive.
 
@@ -111,6 +112,7 @@ class KittiDrive(BinDrive):
                 as `poses.txt` beside the scans.
             columns: number of columns of a scan, see `BinDrive`.
             poses: file with poses of the LiDAR, which is read instead.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: there is no such drive, its files do not fit together,
@@ -154,7 +156,7 @@ class KittiDrive(BinDrive):
                 f" {times_path}"
             )
         scans = (
-            posed_by(poses, files, stamps_ns, numbers)
+            posed_by(poses, files, stamps_ns, pose_gap, numbers)
             if poses
             else PosedFiles(
                 files,

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 import contextlib
-from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 import re
@@ -31,7 +30,6 @@ from evaluation.drives.drive import (
     Drive,
     as_given,
     index_instances,
-    is_shared,
     poses_frame,
 )
 from evaluation.drives.drive_scenario import SCENARIO, read_scenario
@@ -57,7 +55,8 @@ from evaluation.drives.point_cloud2 import (
 from evaluation.drives.point_layouts import from_layout
 from evaluation.drives.rosbag_file import RosbagFile, check_finished
 from evaluation.drives.stamped_poses import (
-    LONGEST_GAP,
+    FASTEST,
+    JUMP,
     PosedScans,
     StampedPoses,
 )
@@ -70,11 +69,6 @@ _KALIBR = "imu.yaml"
 _METADATA = "metadata.yaml"
 # rosbag2 compresses each file or message if its metadata say so.
 _PACKED = r"^\s*compression_mode: *[\"']?(file|message)"
-_GAP_ADVICE = " (--pose-gap SECONDS allows more)"
-# Files are not joined where the poses jump by more than this [m] ...
-_JUMP = 2.0
-# ... and this speed of a vehicle allow [m/s].
-_FASTEST = 50.0
 # A function that returns the poses of the LiDAR, given the scans' stamps [ns].
 _Poses = Callable[[np.ndarray], StampedPoses]
 # `image_transport` adds this to the names of topics of depth images.
@@ -177,8 +171,7 @@ class McapDrive(Drive):
             odometry: topic of the poses.
             poses: function that returns poses of the LiDAR, which are used
                 instead of those of a topic.
-            pose_gap: greatest time between two poses that are interpolated [s];
-                by default a second.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: if there is no complete recording at `path`, or no such
@@ -193,7 +186,8 @@ class McapDrive(Drive):
             self.name = str((self.scenario or {}).get("name", self.name))
         self._lidar_topic = self._topics.choose(_CLOUDS, lidar)
         self._given = poses
-        self._longest_gap = LONGEST_GAP if pose_gap is None else pose_gap
+        self.has_own_world = None if poses is None else False
+        self._pose_gap = pose_gap
         self._pose_topic = None
         if poses is None:
             self._pose_topic = self._topics.choose(_POSES, odometry)
@@ -277,19 +271,6 @@ class McapDrive(Drive):
     def world_frame(self) -> str:  # type: ignore[override]  # Read late.
         if self._pose_topic is None:
             return poses_frame(Path(str(self._posed_by.source)))
-        frame = self._pose_frame
-        return f"{frame}{self._path.resolve()}" if self.has_own_world else frame
-
-    @property
-    def has_own_world(self) -> bool:  # type: ignore[override]  # Read late.
-        return self._pose_topic is not None and not is_shared(
-            self._pose_frame, self.scenario
-        )
-
-    @property
-    def _pose_frame(self) -> str:
-        """Name of the frame of the poses of a topic, as recorded."""
-        assert self._pose_topic is not None
         return frame_name(self._topics.first(self._pose_topic).header.frame_id)
 
     @property
@@ -471,17 +452,13 @@ class McapDrive(Drive):
     @cached_property
     def _posed(self) -> PosedScans:
         """The poses of the scans."""
-        return self._posed_by.at_scans(self._all_scans[0])
+        return self._posed_by.at_scans(self._all_scans[0], self._pose_gap)
 
     @cached_property
     def _posed_by(self) -> StampedPoses:
         """The poses of the vehicle, or those of the LiDAR from a file."""
         if self._given is not None:
-            return replace(
-                self._given(self._all_scans[0]),
-                longest_gap=self._longest_gap,
-                advice=_GAP_ADVICE,
-            )
+            return self._given(self._all_scans[0])
         return self._trajectory()
 
     def _trajectory(self, *later: np.ndarray) -> StampedPoses:
@@ -501,8 +478,6 @@ class McapDrive(Drive):
             rows["stamp_ns"],
             X_WB,
             num_unknown=num_unknown,
-            longest_gap=self._longest_gap,
-            advice=_GAP_ADVICE,
         )
         self._check_joints(source, found.stamps_ns, found.X_WB[:, :3, 3])
         return found
@@ -517,17 +492,20 @@ class McapDrive(Drive):
             stamps_ns: (N,) stamps of the poses [ns].
             p_WB: (N, 3) positions of the vehicle [m].
         """
+        steps_s = np.diff(stamps_ns) / NS_PER_S
+        moves = np.linalg.norm(np.diff(p_WB, axis=0), axis=1)
+        is_jump = moves > JUMP + FASTEST * steps_s
         for joint_ns in self._file.joints_ns:
-            after = int(np.searchsorted(stamps_ns, joint_ns, side="right"))
-            if not 0 < after < len(stamps_ns):
-                continue
-            step_s = (stamps_ns[after] - stamps_ns[after - 1]) / NS_PER_S
-            jump = np.linalg.norm(p_WB[after] - p_WB[after - 1])
-            if jump > _JUMP + _FASTEST * step_s:
+            # Stamps are up to a second before or after the log's times.
+            first, last = np.searchsorted(
+                stamps_ns, [joint_ns - NS_PER_S, joint_ns + NS_PER_S]
+            )
+            near = slice(max(first - 1, 0), last)
+            if is_jump[near].any():
                 raise InputError(
                     f"{source}: several recordings: the poses jump by"
-                    f" {jump:.1f} m where a file ends and the next begins; give"
-                    f" one of {' '.join(one.name for one in self._file.files)}"
+                    f" {moves[near].max():.1f} m where a file ends and the next"
+                    f" begins; give one of {' '.join(self._file.names)}"
                 )
 
     @property
@@ -554,7 +532,7 @@ class McapDrive(Drive):
         """Whether points are in the frame of the poses, as of FAST-LIO's."""
         if self._pose_topic is None:
             return self._lidar_frame in _WORLD_FRAMES
-        return self._lidar_frame == self._pose_frame
+        return self._lidar_frame == self.world_frame
 
     @cached_property
     def _mounted(self) -> tuple[np.ndarray, list[str]]:
@@ -922,20 +900,27 @@ class _McapImages:
 def holds_mcap(path: Path) -> bool:
     """Returns whether `path` is a bag of ROS or a folder with one."""
     if not path.is_dir():
-        return path.suffix in _ENDINGS
-    return (path / _METADATA).is_file() or any(
-        listed(path, f"*{ending}") for ending in _ENDINGS
-    )
+        return path.suffix.lower() in _ENDINGS
+    return (path / _METADATA).is_file() or any(_bags(path).values())
+
+
+def _bags(folder: Path) -> dict[str, list[Path]]:
+    """Returns ending -> the files of bags in a folder, in natural order."""
+    files = listed(folder)
+    return {
+        ending: [one for one in files if one.suffix.lower() == ending]
+        for ending in _ENDINGS
+    }
 
 
 def _open_bag(path: Path) -> McapFile | RosbagFile:
     """Opens the bag at a path, or in a folder."""
     if not path.is_dir():
-        if path.suffix in (".bag", ".db3"):
+        if path.suffix.lower() in (".bag", ".db3"):
             return RosbagFile([path])
         return McapFile(path)
-    files = {ending: listed(path, f"*{ending}") for ending in _ENDINGS}
-    mcap, sqlite, ros1 = (files[ending] for ending in _ENDINGS)
+    files = _bags(path)
+    mcap, sqlite, ros1 = files.values()
     for file in listed(path, "*.bag.active"):
         check_finished([file.with_suffix("")])
     if sum(map(bool, files.values())) > 1:

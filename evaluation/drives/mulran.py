@@ -71,6 +71,7 @@ class MulranDrive(BinDrive):
         path: Path,
         columns: int | None = None,
         poses: Path | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a drive.
 
@@ -78,6 +79,7 @@ class MulranDrive(BinDrive):
             path: its folder, with or without a `sensor_data`.
             columns: number of columns of a scan, see `BinDrive`.
             poses: file with poses of the LiDAR, which is read instead.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
@@ -94,9 +96,9 @@ class MulranDrive(BinDrive):
             columns,
             name=as_given(path).name,
             scans=(
-                posed_by(poses, files, stamps_ns)
+                posed_by(poses, files, stamps_ns, pose_gap)
                 if poses
-                else _posed(path, files, stamps_ns)
+                else _posed(path, files, stamps_ns, pose_gap)
             ),
             tables=[path / SCENARIO],
             notes=tuple(chosen),
@@ -136,11 +138,17 @@ DATA_SET = DataSet(
 )
 
 
-def _posed(path: Path, files: list[Path], stamps_ns: np.ndarray) -> PosedFiles:
+def _posed(
+    path: Path,
+    files: list[Path],
+    stamps_ns: np.ndarray,
+    pose_gap: float | None,
+) -> PosedFiles:
     """Gives scan files the poses of the drive."""
     poses_path = path / _POSES
     trajectory = read_matrices(poses_path)
-    found = posed(files, stamps_ns, trajectory)._replace(tables=(poses_path,))
+    found = posed(files, stamps_ns, trajectory, pose_gap)
+    found = found._replace(tables=(poses_path,))
     if is_local(trajectory.X_WB):
         note = (
             f"{poses_path}: no UTM coordinates; taken for those of a frame of"
@@ -156,6 +164,7 @@ def _posed(path: Path, files: list[Path], stamps_ns: np.ndarray) -> PosedFiles:
         X_WS=to_world(found.X_WS, poses_path) @ X_BS,
         world_frame=f"mulran/{DATUM}",
         datum=DATUM,
+        has_own_world=False,
     )
 
 

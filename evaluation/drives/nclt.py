@@ -75,6 +75,7 @@ class NcltDrive(FileDrive):
         path: Path,
         columns: int | None = None,
         poses: Path | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a session.
 
@@ -82,6 +83,7 @@ class NcltDrive(FileDrive):
             path: its folder.
             columns: is ignored, because the layout is fixed.
             poses: file with poses of the LiDAR, which is read instead.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: there is no such session, or its poses cannot be used.
@@ -97,13 +99,16 @@ class NcltDrive(FileDrive):
         name = as_given(path).name
         chosen: list[str] = []
         if poses:
-            scans = posed_by(poses, files, stamps_ns)
+            scans = posed_by(poses, files, stamps_ns, pose_gap)
         else:
             table = _poses_path(path, chosen)
-            scans = posed(files, stamps_ns, read_angles(table))
+            scans = posed(files, stamps_ns, read_angles(table), pose_gap)
             X_WS = _X_WN @ scans.X_WS @ _X_BS
             scans = scans._replace(
-                X_WS=X_WS, world_frame="nclt", tables=(table,)
+                X_WS=X_WS,
+                world_frame="nclt",
+                tables=(table,),
+                has_own_world=False,
             )
         super().__init__(
             name=name,

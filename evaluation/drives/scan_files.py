@@ -47,11 +47,11 @@ class PosedFiles(NamedTuple):
     files: list[Path]
     stamps_ns: np.ndarray
     X_WS: np.ndarray
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
     world_frame: str = ""
     tables: tuple[Path, ...] = ()
     datum: str | None = None
-    has_own_world: bool = False
+    has_own_world: bool | None = None
 
 
 class FileDrive(Drive):
@@ -226,7 +226,10 @@ def _are_alike(first: Path, second: Path) -> bool:
 
 
 def posed(
-    files: list[Path], stamps_ns: np.ndarray, trajectory: StampedPoses
+    files: list[Path],
+    stamps_ns: np.ndarray,
+    trajectory: StampedPoses,
+    pose_gap: float | None,
 ) -> PosedFiles:
     """Gives scan files their poses.
 
@@ -234,6 +237,7 @@ def posed(
         files: files of N scans.
         stamps_ns: (N,) their stamps [ns].
         trajectory: the poses of the drive.
+        pose_gap: see `StampedPoses.at_scans`.
 
     Returns:
         The files between the first and the last pose, and notes, see
@@ -242,7 +246,7 @@ def posed(
     Raises:
         InputError: a scan has no pose.
     """
-    kept, X_WB, notes = trajectory.at_scans(stamps_ns)
+    kept, X_WB, notes = trajectory.at_scans(stamps_ns, pose_gap)
     return PosedFiles(files[kept], stamps_ns[kept], X_WB, notes)
 
 
@@ -250,6 +254,7 @@ def posed_by(
     poses: Path,
     files: list[Path],
     stamps_ns: np.ndarray,
+    pose_gap: float | None,
     numbers: Sequence[int] | None = None,
 ) -> PosedFiles:
     """Gives scan files the poses of the LiDAR that the user's file has.
@@ -258,14 +263,15 @@ def posed_by(
         poses: the file, see `read_trajectory`.
         files: files of all N scans, even those without ground truth.
         stamps_ns: (N,) their stamps [ns].
+        pose_gap: see `StampedPoses.at_scans`.
         numbers: see `read_trajectory`.
 
     Raises:
         InputError: the file cannot be read, or has no pose for a scan.
     """
     trajectory = read_trajectory(poses, stamps_ns, numbers)
-    return posed(files, stamps_ns, trajectory)._replace(
-        world_frame=poses_frame(poses), tables=(poses,)
+    return posed(files, stamps_ns, trajectory, pose_gap)._replace(
+        world_frame=poses_frame(poses), tables=(poses,), has_own_world=False
     )
 
 

@@ -11,6 +11,10 @@ from evaluation.base import NS_PER_S, InputError, poses
 
 # Greatest time between two poses that are interpolated, by default [s].
 LONGEST_GAP = 1.0
+# Poses begin anew where they jump by more than this [m] ...
+JUMP = 2.0
+# ... and this speed of a vehicle allow [m/s].
+FASTEST = 50.0
 # Poses with one stamp are one pose if they are within this distance [m] ...
 _SAME_PLACE = 0.05
 # ... and this angle [rad].
@@ -45,18 +49,14 @@ class StampedPoses:
         X_WB: (N, 4, 4) float64 poses.
         num_unknown: number of rows or messages that were left out, because they
             have NaN or no rotation in the place of a pose.
-        longest_gap: greatest time between two poses that are interpolated [s].
         notes: notes for the user on poses that were left out or moved.
-        advice: what else may be done about a longer gap, for errors.
     """
 
     source: object
     stamps_ns: np.ndarray
     X_WB: np.ndarray
     num_unknown: int = 0
-    longest_gap: float = LONGEST_GAP
     notes: tuple[str, ...] = ()
-    advice: str = ""
 
     @classmethod
     def of(
@@ -132,7 +132,9 @@ class StampedPoses:
             stamps, X = stamps[kept], X[kept]
         return cls(source, stamps, X, notes=tuple(notes), **fields)
 
-    def at_scans(self, stamps_ns: np.ndarray) -> PosedScans:
+    def at_scans(
+        self, stamps_ns: np.ndarray, pose_gap: float | None = None
+    ) -> PosedScans:
         """Returns the poses at the stamps of scans.
 
         Rotations are interpolated by SLERP, positions linearly. A pose within a
@@ -140,10 +142,12 @@ class StampedPoses:
 
         Args:
             stamps_ns: (M,) int64 stamps, increasing [ns].
+            pose_gap: greatest time between two poses that are interpolated [s];
+                by default a second.
 
         Raises:
             InputError: no scan has a pose, or a scan lies in a gap of more than
-                `longest_gap`.
+                `pose_gap`.
         """
         own = self.stamps_ns
         spanned = np.flatnonzero(
@@ -168,12 +172,13 @@ class StampedPoses:
         off = np.flatnonzero(away > _SAME_NS)
         X_WB = self.X_WB[nearest]
         gaps = (from_before + to_after)[off]
-        if (gaps > self.longest_gap * NS_PER_S).any():
+        longest_gap = LONGEST_GAP if pose_gap is None else pose_gap
+        if (gaps > longest_gap * NS_PER_S).any():
             worst = off[gaps.argmax()]
             raise InputError(
                 f"{self.source}: no pose for the scan at {wanted[worst]} ns:"
                 f" the poses there are {gaps.max() * 1e-9:.4g} s apart, more"
-                f" than {self.longest_gap:g} s{self.advice}"
+                f" than {longest_gap:g} s (--pose-gap SECONDS allows more)"
             )
         notes = [*self.notes]
         if self.num_unknown:

@@ -155,8 +155,7 @@ def recognise(
         odometry: topic of the poses, for recordings with several.
         poses: file with the poses of the LiDAR, see `open_drive`.
         columns: number of columns of `.bin` files.
-        pose_gap: greatest time between two poses of a bag that are interpolated
-            [s], see `open_drive`.
+        pose_gap: see `open_drive`.
         exact_overlaps: file with exact overlaps; by default overlaps are
             estimated from the scans. It needs the field `overlap`.
         on_note: is called with notes for the user.

@@ -18,6 +18,7 @@ import pytest
 
 from evaluation.base import InputError, poses, xyz
 from evaluation.drives import open_drive
+from evaluation.study import find_recordings
 
 POINTS = "sensor_msgs/msg/PointCloud2"
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -439,6 +440,24 @@ def test_poses_of_a_receiver_at_1_hz_need_an_option(tmp_path, gap):
         _ = open_drive(path, pose_gap=gap).X_WS
 
 
+def test_recordings_are_opened_as_they_were_found(tmp_path):
+    """With the options of the command, in the processes of jobs, too."""
+    rows = [*odometry("/odom", "map", "os", X_BS)]
+    far = rows[:1] + rows[-1:]
+    other = [("/gnss", *one[1:]) for one in far]
+    write_bag(tmp_path / "town_1", [*clouds("/points", "os"), *rows, *other])
+    with pytest.raises(InputError, match="--odometry TOPIC"):
+        find_recordings(tmp_path)
+    with pytest.raises(InputError, match="--pose-gap SECONDS allows more"):
+        find_recordings(tmp_path, odometry="/gnss")
+    of_gaps = [
+        find_recordings(tmp_path, odometry="/gnss", pose_gap=gap)[0].source
+        for gap in (2.0, 3.0)
+    ]
+    assert len(of_gaps[0]()) == NUM_SCANS
+    assert of_gaps[0].identity() != of_gaps[1].identity()
+
+
 @pytest.mark.parametrize("gap", [0.0, -1.0, np.inf, np.nan])
 def test_a_gap_that_is_none_is_refused(tmp_path, gap):
     path = session(tmp_path / "a.bag", 0.0)
@@ -454,8 +473,16 @@ def test_a_bag_of_ros_1_that_is_cut_off_names_its_cure(tmp_path):
         open_drive(path)
 
 
-def session(path, later_s, away=0.0, topic="/points", frame="odom"):
-    """Writes a bag of ROS 1 that begins later, and elsewhere."""
+def session(
+    path,
+    later_s,
+    away=0.0,
+    topic="/points",
+    frame="odom",
+    logged_later_ns=0,
+    **options,
+):
+    """Writes a bag that begins later, and elsewhere."""
     later = int(later_s * 10**9)
     entries = [
         (name, kind, stamp + later, moved_to(fields, stamp + later, away))
@@ -464,7 +491,9 @@ def session(path, later_s, away=0.0, topic="/points", frame="odom"):
             *odometry("/odometry", frame, "os", X_BS),
         ]
     ]
-    return write_bag(path, sorted(entries, key=lambda one: one[2]))
+    entries.sort(key=lambda one: one[2])
+    log_times = [one[2] + logged_later_ns for one in entries]
+    return write_bag(path, entries, log_times=log_times, **options)
 
 
 def moved_to(fields, stamp_ns, away):
@@ -513,6 +542,25 @@ def test_files_of_several_sessions_are_no_drive(tmp_path, options, why):
         _ = open_drive(tmp_path).X_WS
     assert "give one of a.bag b.bag" in str(e.value)
     assert len(open_drive(tmp_path / "b.bag")) == NUM_SCANS
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3", "sqlite3-file"])
+@pytest.mark.parametrize("away", [3.75, -200.0])
+@pytest.mark.parametrize("logged_later_ns", [0, 400_000_000])
+def test_files_of_rosbag2_are_joined_unless_the_poses_jump(
+    tmp_path, storage, away, logged_later_ns
+):
+    """As after `ros2 bag reindex` of the files of two sessions."""
+    paths = [tmp_path / "ride_0", tmp_path / "ride_1"]
+    session(paths[0], 0.0, storage=storage, logged_later_ns=logged_later_ns)
+    session(paths[1], 1.25, away, storage=storage)
+    join_bags(*paths)
+    if away > 0.0:
+        assert len(open_drive(paths[0])) == 2 * NUM_SCANS
+        return
+    said = r"the poses jump by 20\d\.\d m .*; give one of ride_0\..* ride_1\."
+    with pytest.raises(InputError, match=said):
+        _ = open_drive(paths[0]).X_WS
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])

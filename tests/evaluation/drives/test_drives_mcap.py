@@ -488,7 +488,7 @@ def test_a_local_frame_is_of_one_recording(tmp_path, frame):
     for name in "abc":
         record(tmp_path / name, world_frame=frame)
     first, second = drive("a"), drive("b")
-    assert first.has_own_world
+    assert first.is_local
     assert first.world == drive("a").world != second.world
     for one in (second, RecentScans(second, 1)):
         with pytest.raises(InputError, match=rf"{frame}/.* in '{frame}/"):
