@@ -227,9 +227,10 @@ def _misfits(drives: Sequence[Drive]) -> list[str]:
         if is_jump.any() or (steps > _PAUSE).any():
             worst = int((moves if is_jump.any() else steps).argmax())
             notes.append(
-                f"{drive.name}: a pause of {steps[worst]:.2g} s after scan"
-                f" {worst}, over which the poses move by {moves[worst]:.1f} m;"
-                " give sessions whose poses begin anew as drives of their own"
+                f"{drive.name}: after scan {worst}, {steps[worst]:.2g} s"
+                " without a scan, in which the poses move by"
+                f" {moves[worst]:.1f} m; give sessions whose poses begin anew"
+                " as drives of their own"
             )
     heights = [
         float(drive.X_BS[2, 3]) for drive in drives if drive.X_BS is not None

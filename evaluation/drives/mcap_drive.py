@@ -23,6 +23,7 @@ from evaluation.base import (
     value_errors,
     xyz,
 )
+from evaluation.clouds import coarse_note
 from evaluation.drives import mcap_messages, ros_messages
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.drive import (
@@ -54,6 +55,7 @@ from evaluation.drives.point_cloud2 import (
 )
 from evaluation.drives.point_layouts import from_layout
 from evaluation.drives.rosbag_file import RosbagFile, check_finished
+from evaluation.drives.scan_files import are_returns
 from evaluation.drives.stamped_poses import (
     FASTEST,
     JUMP,
@@ -69,6 +71,8 @@ _KALIBR = "imu.yaml"
 _METADATA = "metadata.yaml"
 # rosbag2 compresses each file or message if its metadata say so.
 _PACKED = r"^\s*compression_mode: *[\"']?(file|message)"
+# The second scan of a simulator's clock is earlier than this [ns].
+_SIMULATED_NS = 10 * NS_PER_S
 # A function that returns the poses of the LiDAR, given the scans' stamps [ns].
 _Poses = Callable[[np.ndarray], StampedPoses]
 # `image_transport` adds this to the names of topics of depth images.
@@ -283,12 +287,15 @@ class McapDrive(Drive):
                 f" {missing} scans; they are left out"
             )
         first = self._topics.first(self._lidar_topic)
-        if not self._is_livox and has_wrong_rows(first):
-            notes.append(
-                f"{self._path}: {self._lidar_topic}: row_step is not width x"
-                " point_step; the points are read one after the other, which"
-                " the length of the data shows"
-            )
+        if not self._is_livox:
+            if has_wrong_rows(first):
+                notes.append(
+                    f"{self._path}: {self._lidar_topic}: row_step is not width"
+                    " x point_step; the points are read one after the other,"
+                    " which the length of the data shows"
+                )
+            if coarse := coarse_note(to_points(first)):
+                notes.append(f"{self._path}: {self._lidar_topic}: {coarse}")
         return (*notes, *filter(None, [self.distortion_note]))
 
     @property
@@ -365,6 +372,7 @@ class McapDrive(Drive):
             points = (
                 livox_points(message) if self._is_livox else to_points(message)
             )
+            is_return = are_returns(points)
             if self._is_in_world:
                 points = points.copy()
                 X_SW = poses.inverse(self.X_WS[index])
@@ -372,7 +380,7 @@ class McapDrive(Drive):
                 for axis, values in zip("xyz", moved.T, strict=True):
                     points[axis] = values
             check_range(points, FARTHEST_RETURN)
-            return from_layout(
+            found = from_layout(
                 points,
                 self._labels(index, message),
                 # Other programs have other units.
@@ -382,6 +390,7 @@ class McapDrive(Drive):
                 ),
                 stamp_ns,
             )
+            return found if is_return.all() else found[is_return]
 
     def _labels(self, index: int, cloud: Any) -> np.ndarray | None:
         """Returns the labels of a scan from their own topic, if any."""
@@ -551,8 +560,19 @@ class McapDrive(Drive):
                 f"{where}: the points are in the frame {frame!r} of the poses;"
                 f" they are moved into the frame {base or 'of the vehicle'!r}"
             ]
-        if base is not None and frame and _TF_STATIC_TOPIC in self._topics:
-            return self._transforms.pose(base, frame), []
+        if base is not None and frame:
+            if self._transforms.has(base, frame):
+                return self._transforms.pose(base, frame), []
+            if self._has_tf:
+                # The package tf, before tf2, repeats fixed transforms there.
+                self._transforms.add_fixed(self._edges(_TF_TOPIC))
+            if self._transforms.has(base, frame):
+                return self._transforms.pose(base, frame), [
+                    f"{where}: the LiDAR is mounted as {_TF_TOPIC} says, where"
+                    f" {frame!r} does not move in {base!r}"
+                ]
+            if _TF_STATIC_TOPIC in self._topics:
+                self._transforms.pose(base, frame)  # It raises the error.
         why = (
             f"{topic} names no frame of the vehicle"
             if base is None
@@ -566,9 +586,15 @@ class McapDrive(Drive):
     @cached_property
     def _transforms(self) -> StaticTransforms:
         topic = _TF_STATIC_TOPIC
-        places = self._file.locate(topic)
-        messages = (self._topics.message(topic, place) for place in places)
-        return StaticTransforms(messages, f"{self._path}: {topic}")
+        edges = self._edges(topic) if topic in self._topics else ()
+        return StaticTransforms(edges, f"{self._path}: {topic}")
+
+    def _edges(self, topic: str) -> Iterator[Any]:
+        """Yields the transforms of a topic."""
+        for _, data in self._topics.visit(topic):
+            with self._topics.faults(topic):
+                message = mcap_messages.decode(data, ros_messages.TF)
+            yield from message.transforms
 
     @cached_property
     def _lidar_frame(self) -> str:
@@ -817,9 +843,11 @@ class _Topics:
         found = self.file.index.of(topic)
         stamps_ns, digests = found.stamps_ns, found.checksums
         with self.faults(topic):
-            if (stamps_ns == 0).any() and len(places) > 1:
-                raise ValueError("a message has no stamp")
             order = np.argsort(stamps_ns, kind="stable")
+            # A simulator's clock may begin at 0.
+            first, *second = stamps_ns[order[:2]].tolist()
+            if first == 0 and second and not 0 < second[0] < _SIMULATED_NS:
+                raise ValueError("a message has no stamp")
             twice = np.diff(stamps_ns[order], prepend=-1) == 0
             for k in np.flatnonzero(twice).tolist():
                 if digests[int(order[k])] != digests[int(order[k - 1])]:
@@ -932,10 +960,10 @@ def _open_bag(path: Path) -> McapFile | RosbagFile:
         _check_listed(metadata, [*mcap, *sqlite])
     if len(mcap) == 1 and not re.search(_PACKED, told, re.I | re.M):
         return McapFile(mcap[0])
+    if len(sqlite) == 1 and not re.search(_PACKED, told, re.I | re.M):
+        return RosbagFile(sqlite)
     if told:
         return RosbagFile([path])
-    if len(sqlite) == 1:
-        return RosbagFile(sqlite)
     if ros1:
         return RosbagFile(ros1)
     number, ending = (len(mcap), ".mcap") if mcap else (len(sqlite), ".db3")

@@ -16,6 +16,9 @@ from evaluation.drives.data_set import DataSet, check_interface
 from evaluation.drives.drive import Drive
 from evaluation.drives.posed_drive import PosedDrive
 
+# Endings of packed files, of which none is a drive.
+_PACKED = (".gz", ".bz2", ".xz", ".zst", ".zstd", ".lz4", ".zip", ".7z", ".tar")
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -155,12 +158,9 @@ def open_drive(
         raise InputError(
             f"{path}: the recording was not finished; simulate the drive again"
         )
-    one = [path] if ".mcap.zst" in path.name else []
-    for file in listed(path, "*.mcap.zst*") if path.is_dir() else one:
-        raise InputError(
-            f"{file}: the whole recording is compressed (rosbag2's mode"
-            " `file`); uncompress it first"
-        )
+    for file in listed(path) if path.is_dir() else [path]:
+        if file.suffix.lower().endswith(_PACKED):
+            raise InputError(f"{file}: a packed file; unpack it first")
     titles = [one.title for one in data_sets().values() if one.title != "MCAP"]
     raise InputError(
         f"{path}: not a recorded drive (a folder with an .mcap file, or"

@@ -87,15 +87,15 @@ class RosbagFile:
                 behind that is not read, or the files are not one recording.
         """
         self.path = paths[0] if len(paths) == 1 else paths[0].parent
-        self.files = (
-            tuple(listed(self.path)) if self.path.is_dir() else tuple(paths)
-        )
-        check_finished(self.files)
-        self.names = [
-            one.name
-            for one in self.files
+        files = listed(self.path) if self.path.is_dir() else [*paths]
+        check_finished(files)
+        bags = [
+            one
+            for one in files
             if {"bag", "db3", "mcap"} & {*one.name.lower().split(".")}
         ]
+        self.names = [one.name for one in bags]
+        self.files = (*bags, *(one for one in files if one not in bags))
         self._paths = list(paths)
         self._local = threading.local()
         self._opened: list[_Opened] = []
@@ -282,7 +282,7 @@ class RosbagFile:
             # rosbags, SQLite and the compression raise errors of any class.
             raise InputError(
                 f"{self.path}: the bag cannot be read"
-                f" ({type(error).__name__}: {error}){self._advice()}"
+                f" ({type(error).__name__}: {_told(error)}){self._advice()}"
             ) from error
 
     def _advice(self) -> str:
@@ -375,6 +375,11 @@ class _Opened:
             return 0
         _, sec, nanosec = _HEADER_1.unpack_from(data)
         return int(sec * NS_PER_S + nanosec)
+
+
+def _told(error: Exception) -> str:
+    """Returns what an error of the package says, except what is to be done."""
+    return str(error).partition("; please report")[0]
 
 
 def _linked(folder: Path, path: Path) -> Path:

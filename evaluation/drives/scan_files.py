@@ -148,9 +148,9 @@ class FileDrive(Drive):
             raise IndexError(f"scan {index} of {len(self)}")
         path = self._files[index]
         with user_errors(path), value_errors(path):
-            return _without_no_returns(
-                self._read(path, int(self._stamps_ns[index]))
-            )
+            points = self._read(path, int(self._stamps_ns[index]))
+            check_range(points, FARTHEST_RETURN)
+            return points[are_returns(points)]
 
 
 class BinDrive(FileDrive):
@@ -309,14 +309,12 @@ def check_below(points: np.ndarray, name: str, limit: int) -> None:
         )
 
 
-def _without_no_returns(points: np.ndarray) -> np.ndarray:
-    """Returns the points except points at the origin (beams without return).
+def are_returns(points: np.ndarray) -> np.ndarray:
+    """Returns which points (N,) are not at the origin, as beams without return.
 
-    Raises:
-        ValueError: if a coordinate is too large for a point.
+    Ouster and Livox, for example, write points for all beams.
     """
-    check_range(points, FARTHEST_RETURN)
     is_return = np.zeros(len(points), dtype=bool)
     for name in "xyz":
         is_return |= points[name] != 0.0
-    return points[is_return]
+    return is_return

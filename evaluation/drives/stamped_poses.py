@@ -24,6 +24,16 @@ _SAME_TURN = np.radians(1.0)
 _SAME_NS = 1000
 
 
+def _differences(
+    X_WA: np.ndarray, X_WB: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns distances [m] and small angles [rad] of poses (N, 4, 4)."""
+    away = np.linalg.norm((X_WB - X_WA)[:, :3, 3], axis=1)
+    # The chord of a small angle is as long as its arc.
+    chords = (X_WB - X_WA)[:, :3, :3]
+    return away, np.linalg.norm(chords, axis=(1, 2)) / np.sqrt(2.0)
+
+
 class PosedScans(NamedTuple):
     """The scans of a drive that have poses.
 
@@ -110,10 +120,7 @@ class StampedPoses:
         twice = np.flatnonzero(np.diff(stamps) == 0) + 1
         if len(twice):
             first = np.searchsorted(stamps, stamps[twice])
-            away = np.linalg.norm((X[twice] - X[first])[:, :3, 3], axis=1)
-            # The chord of a small angle is as long as its arc.
-            chords = (X[twice] - X[first])[:, :3, :3]
-            turn = np.linalg.norm(chords, axis=(1, 2)) / np.sqrt(2.0)
+            away, turn = _differences(X[first], X[twice])
             is_far = (away > _SAME_PLACE) | (turn > _SAME_TURN)
             if is_far.any():
                 k = int(is_far.argmax())
@@ -173,14 +180,26 @@ class StampedPoses:
         X_WB = self.X_WB[nearest]
         gaps = (from_before + to_after)[off]
         longest_gap = LONGEST_GAP if pose_gap is None else pose_gap
-        if (gaps > longest_gap * NS_PER_S).any():
-            worst = off[gaps.argmax()]
+        is_long = gaps > longest_gap * NS_PER_S
+        moves, turns = _differences(
+            self.X_WB[before[off]], self.X_WB[after[off]]
+        )
+        # Programs such as amcl send poses only while the robot moves.
+        is_still = (moves <= _SAME_PLACE) & (turns <= _SAME_TURN)
+        if (is_long & ~is_still).any():
+            worst = int(np.where(is_still, 0, gaps).argmax())
             raise InputError(
-                f"{self.source}: no pose for the scan at {wanted[worst]} ns:"
-                f" the poses there are {gaps.max() * 1e-9:.4g} s apart, more"
-                f" than {longest_gap:g} s (--pose-gap SECONDS allows more)"
+                f"{self.source}: no pose for the scan at {wanted[off[worst]]}"
+                f" ns: the poses there are {gaps[worst] * 1e-9:.4g} s apart,"
+                f" more than {longest_gap:g} s (--pose-gap SECONDS allows more)"
             )
         notes = [*self.notes]
+        if is_long.any():
+            notes.append(
+                f"{self.source}: no pose for up to {gaps.max() * 1e-9:.4g} s at"
+                f" {np.count_nonzero(is_long)} scans, but the same before and"
+                " after; the vehicle is taken to stand there"
+            )
         if self.num_unknown:
             notes.append(
                 f"{self.source}: {self.num_unknown} poses without numbers or"

@@ -11,7 +11,7 @@ from helpers.bags import (
     transform,
     write_bag,
 )
-from helpers.drive_files import T0_NS, yaw_pose
+from helpers.drive_files import T0_NS, write_recording, yaw_pose
 from mcap.writer import Writer
 import numpy as np
 import pytest
@@ -26,7 +26,8 @@ STATIC = "tf2_msgs/msg/TFMessage"
 NUM_SCANS = 12
 ID = np.eye(4)
 X_BS = yaw_pose(0.4, -0.1, 1.7, 0.3)
-p_WP = np.random.default_rng(4).uniform(-30.0, 30.0, (60, 3))
+NUM_POINTS = 60
+p_WP = np.random.default_rng(4).uniform(-30.0, 30.0, (NUM_POINTS, 3))
 
 
 def X_WB(stamp_ns):
@@ -429,8 +430,8 @@ def test_poses_of_a_receiver_at_1_hz_need_an_option(tmp_path, gap):
     """Its clock jitters about a second, which is the limit."""
     times = [T0_NS, T0_NS + 1_200_000_000]
     rows = list(odometry("/odom", "map", "os", X_BS))
-    few = [(*rows[0][:2], t, {**rows[0][3], "header": header(t, "map")})
-           for t in times]  # fmt: skip
+    few = [(*row[:2], t, {**row[3], "header": header(t, "map")})
+           for row, t in zip(rows[::len(rows) - 1], times, strict=True)]  # fmt: skip
     path = write_bag(tmp_path / "a", [*clouds("/points", "os"), *few])
     if gap == 1.25:
         assert len(open_drive(path, pose_gap=gap)) == NUM_SCANS
@@ -456,6 +457,108 @@ def test_recordings_are_opened_as_they_were_found(tmp_path):
     ]
     assert len(of_gaps[0]()) == NUM_SCANS
     assert of_gaps[0].identity() != of_gaps[1].identity()
+
+
+@pytest.mark.parametrize(("moved", "is_read"), [(0.04, True), (0.06, False)])
+def test_a_gap_in_which_the_robot_stands_is_none(tmp_path, moved, is_read):
+    """As of amcl, which sends no pose while the robot stands."""
+    rows = [
+        (name, kind, stamp, moved_to(fields, stamp, k * moved))
+        for k, stamp in enumerate((T0_NS, T0_NS + 2 * 10**9))
+        for name, kind, _, fields in [*odometry("/odom", "map", "os")][:1]
+    ]
+    drive = open_drive(write_bag(tmp_path / "a", [*clouds("/p", "os"), *rows]))
+    if not is_read:
+        with pytest.raises(InputError, match="2 s apart, more than 1 s"):
+            _ = drive.X_WS
+        return
+    assert np.ptp(drive.X_WS[:, 0, 3]) < moved
+    assert "the vehicle is taken to stand" in drive.notes[0]
+
+
+@pytest.mark.parametrize("is_moving", [False, True])
+def test_a_mount_on_tf_is_read_if_it_never_moves(tmp_path, is_moving):
+    """The package tf, before tf2, repeats fixed transforms on /tf."""
+    rows = [*odometry("/odom", "map", "base"), *clouds("/points", "os")]
+    for k, stamp in enumerate(STAMPS):
+        X = X_BS @ yaw_pose(0.0, 0.0, 0.0, 0.01 * k * is_moving)
+        edges = [
+            transform("map", "base", X_WB(stamp), stamp),
+            transform("base", "os", X, stamp),
+        ]
+        rows.append(("/tf", STATIC, stamp, {"transforms": edges}))
+    drive = open_drive(write_bag(tmp_path / "ride.bag", rows))
+    np.testing.assert_allclose(drive.X_BS, ID if is_moving else X_BS, atol=1e-9)
+    said = "no /tf_static says" if is_moving else "mounted as /tf says"
+    assert said in "; ".join(drive.notes)
+
+
+def test_beams_without_a_return_are_left_out(tmp_path):
+    """Ouster and Livox write points at the origin for them."""
+    rows = [*odometry("/odom", "map", "os", X_BS)]
+    for name, every in (
+        ("/ouster", clouds("/ouster", "os", "x y z intensity t")),
+        ("/livox", livox("/livox", "os")),
+    ):
+        for _, kind, stamp, fields in every:
+            if name == "/ouster":
+                data = fields["data"].reshape(-1, fields["point_step"]).copy()
+                data[::2] = 0
+                fields = {**fields, "data": data.ravel()}
+            else:
+                points = [dict(one) for one in fields["points"]]
+                for one in points[::2]:
+                    one |= {"x": 0.0, "y": 0.0, "z": 0.0}
+                fields = {**fields, "points": points}
+            rows.append((name, kind, stamp, fields))
+    path = write_bag(tmp_path / "a", rows)
+    for name in ("/ouster", "/livox"):
+        drive = open_drive(path, name)
+        seen = poses.transform(drive.X_WS[3], xyz(drive.scan(3)))
+        np.testing.assert_allclose(seen, p_WP[1::2], atol=1e-4)
+
+
+@pytest.mark.parametrize("second_ns", [10**8, 9 * 10**9, 11 * 10**9])
+def test_a_clock_may_begin_at_zero(tmp_path, second_ns):
+    """As Gazebo's; a zero among times since 1970 is no time."""
+    scan, stamps = points_of(ID), [0, second_ns, second_ns + 1]
+    X = [yaw_pose(1.0 * k, 0.0, 0.0, 0.0) for k in range(3)]
+    write_recording(tmp_path / "a", [scan] * 3, X, stamps_ns=stamps)
+    if second_ns < 10**10:
+        assert open_drive(tmp_path / "a").stamps_ns.tolist() == stamps
+        return
+    with pytest.raises(InputError, match="a message has no stamp"):
+        _ = open_drive(tmp_path / "a").stamps_ns
+
+
+def test_registered_clouds_far_from_the_origin_are_coarse(tmp_path):
+    """As clouds of float32 in UTM coordinates."""
+    path = write_bag(tmp_path / "a", [
+        *clouds("/points", "map", in_world=True),
+        *odometry("/odom", "map", "os", X_BS)])  # fmt: skip
+    assert not any("steps of" in one for one in open_drive(path).notes)
+    rows = []
+    for name, kind, stamp, fields in clouds("/points", "map", in_world=True):
+        data = fields["data"].view("<f4").reshape(NUM_POINTS, -1) + 4e6
+        rows.append(
+            (name, kind, stamp, {**fields, "data": data.view("u1").ravel()})
+        )
+    path = write_bag(tmp_path / "b", [
+        *rows, *odometry("/odom", "map", "os", X_BS, away=4e6)])  # fmt: skip
+    assert any(
+        "float32 has steps of 0.25 m" in x for x in open_drive(path).notes
+    )
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_single_file_is_read_whatever_version_its_list_has(tmp_path, storage):
+    entries = [*clouds("/points", "os"), *odometry("/odom", "map", "os", X_BS)]
+    path = write_bag(tmp_path / "ride", entries, storage)
+    text = (path / "metadata.yaml").read_text()
+    assert "version: 8" in text
+    text = text.replace("version: 8", "version: 10", 1)
+    (path / "metadata.yaml").write_text(text)
+    assert len(open_drive(path)) == NUM_SCANS
 
 
 @pytest.mark.parametrize("gap", [0.0, -1.0, np.inf, np.nan])

@@ -158,7 +158,7 @@ def test_a_compressed_file_is_read_when_uncompressed(tmp_path, ending):
     packed.write_bytes(zstandard.compress(path.read_bytes()))
     path.unlink()
     for one in (packed, packed.parent):
-        said = f"{packed.name}: the whole rec.*; uncompress it first"
+        said = f"{packed.name}: a packed file; unpack it first"
         with pytest.raises(InputError, match=said):
             open_drive(one)
     path.write_bytes(zstandard.decompress(packed.read_bytes()))
