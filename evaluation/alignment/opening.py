@@ -25,6 +25,8 @@ When = Literal["auto", "always", "never"]
 
 # A pause between two scans is told if it is longer than this [s].
 _PAUSE = 10.0
+# If more of the steps are jumps, the unit of the poses may be wrong.
+_MOSTLY = 0.5
 # The mounts of two LiDARs are told if their heights differ by more [m].
 _MOUNT = 0.2
 # Drives that are nowhere closer than this have no place in common, and the
@@ -55,6 +57,13 @@ class WorldVerdict:
         if self.aligned:
             return "aligned"
         return "shared" if self.shared else "unknown"
+
+    @property
+    def doubt(self) -> str:
+        """What to do if nothing is found where its world says; or ""."""
+        if self.state != "shared":
+            return ""
+        return "; if the poses are not in one world, --align always moves them"
 
     def to_json(self) -> dict[str, Any]:
         """Returns the verdict, ready for JSON."""
@@ -226,11 +235,16 @@ def _misfits(drives: Sequence[Drive]) -> list[str]:
         is_jump = moves > JUMP + FASTEST * steps
         if is_jump.any() or (steps > _PAUSE).any():
             worst = int((moves if is_jump.any() else steps).argmax())
+            advice = (
+                "are they in metres?"
+                if is_jump.mean() > _MOSTLY
+                else "give sessions whose poses begin anew as drives of their"
+                " own"
+            )
             notes.append(
                 f"{drive.name}: after scan {worst}, {steps[worst]:.2g} s"
                 " without a scan, in which the poses move by"
-                f" {moves[worst]:.1f} m; give sessions whose poses begin anew"
-                " as drives of their own"
+                f" {moves[worst]:.1f} m; {advice}"
             )
     heights = [
         float(drive.X_BS[2, 3]) for drive in drives if drive.X_BS is not None

@@ -478,10 +478,8 @@ class McapDrive(Drive):
         known = np.isfinite(rows["position"]).all(axis=1) & (length > 0.0)
         num_unknown = len(rows) - int(known.sum())
         rows = rows[known] if known.any() else rows
-        X_WB = checked_poses(
-            rows["position"], rows["quat_xyzw"], str(self._path)
-        )
         source = f"{self._path}: {self._pose_topic}"
+        X_WB = checked_poses(rows["position"], rows["quat_xyzw"], source)
         found = StampedPoses.of(
             source,
             rows["stamp_ns"],

@@ -246,6 +246,8 @@ def _with_offset(
         on_note: is called with what is added.
     """
     right = is_right(rows)
+    if not right.any() and world.doubt:
+        on_note(f"no scan is localised{world.doubt}")
     if right.mean() < _MOSTLY:
         return world
     off, turn_deg = (

@@ -223,6 +223,8 @@ def recognise(
     check_has_match(outcome)
     for text in (*_notes(made, drives), *_easy(outcome, drives, protocol)):
         on_note(text)
+    if not outcome.outcomes.is_right.any() and (doubt := opened.world.doubt):
+        on_note(f"{outcome.query}: no answer is right{doubt}")
     if protocol.exclude_recent is None and _is_itself(database, query):
         on_note(
             f"{_named(query)}: every scan finds itself (--exclude-recent leaves"

@@ -87,6 +87,9 @@ def test_poses_that_begin_anew_are_told(away, is_told):
     notes = []
     open_pair([one, one], on_note=notes.append)
     assert any("poses begin anew" in text for text in notes) == is_told
+    one.X_WS[:, :3, 3] *= 1000.0
+    open_pair([one, one], on_note=notes.append)
+    assert notes[-1].endswith("; are they in metres?")
 
 
 @pytest.mark.parametrize(("height", "is_told"), [(1.79, False), (1.81, True)])
@@ -119,4 +122,6 @@ def test_states_of_a_verdict():
     assert world_of_frames("ab", ["map", "map"]).shared is True
     found = world_of_frames("ab", ["odom/x/a.bag", "odom/x/b.bag"])
     assert found.shared is False
+    assert WorldVerdict(True, False, "").doubt
+    assert not WorldVerdict(True, True, "").doubt
     assert "a in frame 'odom' of /x/a.bag; b in frame" in found.why
