@@ -25,8 +25,8 @@ When = Literal["auto", "always", "never"]
 
 # A pause between two scans is told if it is longer than this [s].
 _PAUSE = 10.0
-# If more of the steps are jumps, the unit of the poses may be wrong.
-_MOSTLY = 0.5
+# No vehicle is faster [m/s].
+_IN_MILLIMETRES = 1000.0
 # The mounts of two LiDARs are told if their heights differ by more [m].
 _MOUNT = 0.2
 # Drives that are nowhere closer than this have no place in common, and the
@@ -232,19 +232,21 @@ def _misfits(drives: Sequence[Drive]) -> list[str]:
     for drive in dict.fromkeys(drives):
         steps = np.diff(drive.stamps_ns) / NS_PER_S
         moves = np.linalg.norm(np.diff(drive.X_WS[:, :3, 3], axis=0), axis=1)
-        is_jump = moves > JUMP + FASTEST * steps
+        speed = float(np.median(moves / steps)) if len(steps) else 0.0
+        if speed > _IN_MILLIMETRES:
+            notes.append(
+                f"{drive.name}: moves at {speed:.0f} m/s; are the poses in"
+                " metres?"
+            )
+            continue
+        is_jump = moves > JUMP + max(FASTEST, 10.0 * speed) * steps
         if is_jump.any() or (steps > _PAUSE).any():
             worst = int((moves if is_jump.any() else steps).argmax())
-            advice = (
-                "are they in metres?"
-                if is_jump.mean() > _MOSTLY
-                else "give sessions whose poses begin anew as drives of their"
-                " own"
-            )
             notes.append(
                 f"{drive.name}: after scan {worst}, {steps[worst]:.2g} s"
                 " without a scan, in which the poses move by"
-                f" {moves[worst]:.1f} m; {advice}"
+                f" {moves[worst]:.1f} m; give sessions whose poses begin anew"
+                " as drives of their own"
             )
     heights = [
         float(drive.X_BS[2, 3]) for drive in drives if drive.X_BS is not None

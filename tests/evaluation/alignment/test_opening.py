@@ -82,14 +82,14 @@ def test_a_pause_is_told(pause_s, is_told):
 def test_poses_that_begin_anew_are_told(away, is_told):
     """A vehicle drives 5 m in 0.1 s at most; poses are off by 2 m at most."""
     one = drive("a")
+    one.X_WS[:, :2, 3] = 0.0
     one.X_WS[2:, 0, 3] += away
-    one.X_WS[:2, 0, 3] = one.X_WS[2, 0, 3] - away
     notes = []
     open_pair([one, one], on_note=notes.append)
     assert any("poses begin anew" in text for text in notes) == is_told
-    one.X_WS[:, :3, 3] *= 1000.0
+    one.X_WS[:, 0, 3] = 1000.0 * np.arange(5)
     open_pair([one, one], on_note=notes.append)
-    assert notes[-1].endswith("; are they in metres?")
+    assert notes[-1] == "a: moves at 10000 m/s; are the poses in metres?"
 
 
 @pytest.mark.parametrize(("height", "is_told"), [(1.79, False), (1.81, True)])
