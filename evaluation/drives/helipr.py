@@ -15,18 +15,13 @@ import numpy as np
 from evaluation.base import InputError
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.drive import as_given
-from evaluation.drives.drive_scenario import (
-    SCENARIO,
-    read_scenario,
-)
 from evaluation.drives.lidar_fields import LidarField
 from evaluation.drives.scan_files import (
     FileDrive,
-    PosedFiles,
+    OwnPoses,
     check_below,
     list_stamped,
     posed,
-    posed_by,
     read_packed,
 )
 from evaluation.drives.trajectories import read_quaternions
@@ -120,40 +115,38 @@ class HeliprDrive(FileDrive):
             )
         files, stamps_ns = list_stamped(drive / _SCANS / lidar, ".bin")
         super().__init__(
-            name=as_given(drive).name,
-            lidar=lidar,
-            scans=(
-                posed_by(poses, files, stamps_ns, pose_gap)
-                if poses
-                else _posed(drive, lidar, files, stamps_ns, pose_gap)
+            drive,
+            posed(
+                files,
+                stamps_ns,
+                partial(_own_poses, drive, lidar),
+                poses,
+                pose_gap,
             ),
-            read=partial(_read_scan, lidar),
-            tables=[drive / SCENARIO],
-            scenario=read_scenario(drive),
+            partial(_read_scan, lidar),
+            lidar=lidar,
             notes=chosen,
             unit=_UNITS.get(lidar),
         )
 
 
-def _posed(
-    drive: Path,
-    lidar: str,
-    files: list[Path],
-    stamps_ns: np.ndarray,
-    pose_gap: float | None,
-) -> PosedFiles:
-    """Gives scan files the poses of the drive."""
-    in_utm = (drive / _POSES / f"global_{lidar}_gt.txt").is_file()
-    poses_name = f"global_{lidar}_gt.txt" if in_utm else f"{lidar}_gt.txt"
-    poses_path = drive / _POSES / poses_name
-    trajectory = read_quaternions(poses_path, None)
-    found = posed(files, stamps_ns, trajectory, pose_gap)
-    return found._replace(
-        X_WS=to_world(found.X_WS, poses_path) if in_utm else found.X_WS,
-        world_frame=f"helipr{f'/{DATUM}' if in_utm else drive.resolve()}",
-        tables=(poses_path,),
-        datum=DATUM if in_utm else None,
-        has_own_world=not in_utm,
+def _own_poses(drive: Path, lidar: str) -> OwnPoses:
+    """Returns the poses of a LiDAR."""
+    table = drive / _POSES / f"global_{lidar}_gt.txt"
+    if table.is_file():
+        return OwnPoses(
+            read_quaternions(table, None),
+            f"helipr/{DATUM}",
+            (table,),
+            DATUM,
+            X_WS=lambda X_US: to_world(X_US, table),
+        )
+    own = drive / _POSES / f"{lidar}_gt.txt"
+    return OwnPoses(
+        read_quaternions(own, None),
+        f"helipr{drive.resolve()}",
+        (own,),
+        has_own_world=True,
     )
 
 

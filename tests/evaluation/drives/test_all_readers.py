@@ -99,7 +99,7 @@ class OwnFiles(FileDrive):
             X_WB,
             world_frame="odom",
         )
-        super().__init__(path.name, scans, read_own)
+        super().__init__(path, scans, read_own)
 
 
 class OwnDrive(Drive):
