@@ -342,7 +342,9 @@ def test_a_truncated_end_is_refused_by_name(tmp_path, name, share):
 # of rosbags, bags of several files, compressed files, `callerid` of
 # connections, several connections of a topic, and definitions of unknown types.
 LEFT_OUT = {
-    "rosbags: SQLite's write-ahead log": ("SQLite", "ride.db3-wal", "log only"),
+    "rosbags: SQLite's write-ahead log": (
+        "SQLite", "ride.db3-wal", "in this log only.*wal_checkpoint",
+    ),
     "rosbags: SQLite's journal": ("SQLite", "ride.db3-journal", "undoes"),
     "rosbags: files that metadata.yaml does not list": (
         "SQLite", "ride_7.db3", r"ride_7.db3: not one of the files",
@@ -370,7 +372,9 @@ def test_what_libraries_leave_out_is_refused_by_name(tmp_path, case):
     (file,) = (one for one in folder.iterdir() if one.suffix != ".yaml")
     if "-" in beside:
         beside = file.name + beside[beside.index("-") :]
-    assert len(open_drive(folder)) == NUM
+    (folder / beside).write_bytes(b"")
+    if "-" in beside:  # SQLite leaves an empty one.
+        assert len(open_drive(folder)) == NUM
     (folder / beside).write_bytes(file.read_bytes())
     with pytest.raises(InputError, match=words) as error:
         open_drive(folder)

@@ -3,10 +3,9 @@
 import os
 import pickle
 import shutil
-import struct
 import sys
 
-from helpers import helipr_drive, mulran_drive
+from helpers import drive_folders, helipr_drive, mulran_drive
 from helpers.dataset_folders import (
     make_points,
     make_poses,
@@ -53,26 +52,16 @@ def helipr(root):
 
 def nclt(root):
     folder = root / "2012-01-08"
-    rows = []
-    for k in range(3):
-        hit = struct.pack("<HHHBB", 20400, 19800, 20040, 31, 0)
-        write_bytes(folder / "velodyne_sync" / f"{1000 + k}.bin", hit)
-        rows.append(f"{1000 + k},{k}.0,0.0,-3.0,0.0,0.0,0.1")
-    table = root / "ground_truth" / "groundtruth_2012-01-08.csv"
-    write_bytes(table, "\n".join(rows).encode())
+    drive_folders.nclt(folder, [np.ones((5, 3))] * 8)
+    (root / "ground_truth").mkdir(exist_ok=True)
+    table = root / "groundtruth_2012-01-08.csv"
+    table.rename(root / "ground_truth" / table.name)
     return folder
 
 
 def boreas(root):
     folder = root / "boreas-2021-08-05-13-34"
-    rows = []
-    for k in range(3):
-        point = struct.pack("<6f", 3.0, 4.0, 1.0, 0.5, 7.0, 0.0)
-        write_bytes(folder / "lidar" / f"{1000 + k}.bin", point)
-        cells = (1000 + k, 0.8 * k, *[0.0] * 7, 0.1, 0, 0, 0)
-        rows.append(",".join(map(str, cells)))
-    table = folder / "applanix" / "lidar_poses.csv"
-    write_bytes(table, "\n".join(rows).encode())
+    drive_folders.boreas(folder, [np.ones((5, 3))] * 8)
     return folder
 
 
