@@ -10,12 +10,11 @@ from typing import Any, Literal
 import numpy as np
 
 from evaluation.alignment.align import AlignmentReport, align
-from evaluation.base import NS_PER_S, InputError, doing
+from evaluation.base import InputError, doing
 from evaluation.drives import (
-    FASTEST,
-    JUMP,
     SHARED_FRAMES,
     Drive,
+    PoseSteps,
     Reading,
     check_same_map,
     check_same_world,
@@ -230,23 +229,20 @@ def _misfits(drives: Sequence[Drive]) -> list[str]:
     """Returns notes on pauses of drives, and on mounts that do not fit."""
     notes = []
     for drive in dict.fromkeys(drives):
-        steps = np.diff(drive.stamps_ns) / NS_PER_S
-        moves = np.linalg.norm(np.diff(drive.X_WS[:, :3, 3], axis=0), axis=1)
-        speed = float(np.median(moves / steps)) if len(steps) else 0.0
-        if speed > _IN_MILLIMETRES:
+        steps = PoseSteps.of(drive.stamps_ns, drive.X_WS)
+        is_anew = steps.is_jump | (steps.times > _PAUSE)
+        if steps.speed > _IN_MILLIMETRES:
             notes.append(
-                f"{drive.name}: moves at {speed:.0f} m/s; are the poses in"
-                " metres?"
+                f"{drive.name}: moves at {steps.speed:.0f} m/s; are the poses"
+                " in metres?"
             )
-            continue
-        is_jump = moves > JUMP + max(FASTEST, 10.0 * speed) * steps
-        if is_jump.any() or (steps > _PAUSE).any():
-            worst = int((moves if is_jump.any() else steps).argmax())
+        elif is_anew.any():
+            worst = int(np.where(is_anew, steps.moves, -1.0).argmax())
             notes.append(
-                f"{drive.name}: after scan {worst}, {steps[worst]:.2g} s"
+                f"{drive.name}: after scan {worst}, {steps.times[worst]:.2g} s"
                 " without a scan, in which the poses move by"
-                f" {moves[worst]:.1f} m; give sessions whose poses begin anew"
-                " as drives of their own"
+                f" {steps.moves[worst]:.1f} m; give sessions whose poses begin"
+                " anew as drives of their own"
             )
     heights = [
         float(drive.X_BS[2, 3]) for drive in drives if drive.X_BS is not None

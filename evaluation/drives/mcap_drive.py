@@ -57,9 +57,8 @@ from evaluation.drives.point_layouts import from_layout
 from evaluation.drives.rosbag_file import RosbagFile, check_finished
 from evaluation.drives.scan_files import are_returns
 from evaluation.drives.stamped_poses import (
-    FASTEST,
-    JUMP,
     PosedScans,
+    PoseSteps,
     StampedPoses,
 )
 from evaluation.drives.trajectories import read_trajectory
@@ -486,33 +485,32 @@ class McapDrive(Drive):
             X_WB,
             num_unknown=num_unknown,
         )
-        self._check_joints(source, found.stamps_ns, found.X_WB[:, :3, 3])
+        self._check_joints(source, found.stamps_ns, found.X_WB)
         return found
 
     def _check_joints(
-        self, source: str, stamps_ns: np.ndarray, p_WB: np.ndarray
+        self, source: str, stamps_ns: np.ndarray, X_WB: np.ndarray
     ) -> None:
         """Refuses files that are joined where the poses begin anew.
 
         Args:
             source: file and topic of the poses, for errors.
             stamps_ns: (N,) stamps of the poses [ns].
-            p_WB: (N, 3) positions of the vehicle [m].
+            X_WB: (N, 4, 4) the poses.
         """
-        steps_s = np.diff(stamps_ns) / NS_PER_S
-        moves = np.linalg.norm(np.diff(p_WB, axis=0), axis=1)
-        is_jump = moves > JUMP + FASTEST * steps_s
+        steps = PoseSteps.of(stamps_ns, X_WB)
         for joint_ns in self._file.joints_ns:
             # Stamps are up to a second before or after the log's times.
             first, last = np.searchsorted(
                 stamps_ns, [joint_ns - NS_PER_S, joint_ns + NS_PER_S]
             )
             near = slice(max(first - 1, 0), last)
-            if is_jump[near].any():
+            if steps.is_jump[near].any():
                 raise InputError(
                     f"{source}: several recordings: the poses jump by"
-                    f" {moves[near].max():.1f} m where a file ends and the next"
-                    f" begins; give one of {' '.join(self._file.names)}"
+                    f" {steps.moves[near].max():.1f} m where a file ends and"
+                    " the next begins; give one of"
+                    f" {' '.join(self._file.names)}"
                 )
 
     @property

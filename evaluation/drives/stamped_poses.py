@@ -12,9 +12,11 @@ from evaluation.base import NS_PER_S, InputError, poses
 # Greatest time between two poses that are interpolated, by default [s].
 LONGEST_GAP = 1.0
 # Poses begin anew where they jump by more than this [m] ...
-JUMP = 2.0
-# ... and this speed of a vehicle allow [m/s].
-FASTEST = 50.0
+_JUMP = 2.0
+# ... and this speed of a vehicle [m/s] ...
+_FASTEST = 50.0
+# ... or this multiple of its usual speed allow.
+_FASTER = 10.0
 # Poses with one stamp are one pose if they are within this distance [m] ...
 _SAME_PLACE = 0.05
 # ... and this angle [rad].
@@ -32,6 +34,31 @@ def _differences(
     # The chord of a small angle is as long as its arc.
     chords = (X_WB - X_WA)[:, :3, :3]
     return away, np.linalg.norm(chords, axis=(1, 2)) / np.sqrt(2.0)
+
+
+class PoseSteps(NamedTuple):
+    """The steps between N poses.
+
+    Attributes:
+        times: (N - 1,) durations [s].
+        moves: (N - 1,) distances [m].
+        speed: median speed [m/s]; 0 for less than two poses.
+        is_jump: (N - 1,) bool, at which poses begin anew.
+    """
+
+    times: np.ndarray
+    moves: np.ndarray
+    speed: float
+    is_jump: np.ndarray
+
+    @classmethod
+    def of(cls, stamps_ns: np.ndarray, X: np.ndarray) -> PoseSteps:
+        """Returns the steps of poses (N, 4, 4) at increasing stamps (N,)."""
+        times = np.diff(stamps_ns) / NS_PER_S
+        moves = np.linalg.norm(np.diff(X[:, :3, 3], axis=0), axis=1)
+        speed = float(np.median(moves / times)) if len(times) else 0.0
+        allowed = _JUMP + max(_FASTEST, _FASTER * speed) * times
+        return cls(times, moves, speed, moves > allowed)
 
 
 class PosedScans(NamedTuple):
