@@ -574,6 +574,8 @@ class McapDrive(Drive):
             if base is None
             else f"no {_TF_STATIC_TOPIC} says where it is in {base!r}"
         )
+        if frame in self._transforms.moving:
+            why += f", and it moves on {_TF_TOPIC}"
         return np.eye(4), [
             f"{where}: {why}; the poses on {topic} are taken as those of this"
             " LiDAR"

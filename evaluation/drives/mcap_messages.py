@@ -127,7 +127,11 @@ def frame_name(name: str) -> str:
 
 
 class StaticTransforms:
-    """The frames in /tf_static: a tree with each frame's pose in its parent."""
+    """The frames in /tf_static: a tree with each frame's pose in its parent.
+
+    Attributes:
+        moving: frames on /tf that move in their parent.
+    """
 
     def __init__(self, edges: Iterable[Any], where: str):
         """Collects the transforms on /tf_static.
@@ -140,6 +144,7 @@ class StaticTransforms:
             InputError: two messages give different poses for one frame.
         """
         self._where = where
+        self.moving: set[str] = set()
         # Frame C -> its parent P, p_PC, quat_xyzw_PC.
         self._edges: dict[str, tuple] = {}
         for edge in edges:
@@ -155,12 +160,11 @@ class StaticTransforms:
     def add_fixed(self, edges: Iterable[Any]) -> None:
         """Adds frames on /tf that never move in their parent."""
         found: dict[str, tuple] = {}
-        moving = set()
         for edge in edges:
             child, new = _numbers(edge)
             if not _is_same(found.setdefault(child, new), new):
-                moving.add(child)
-        for child in found.keys() - moving:
+                self.moving.add(child)
+        for child in found.keys() - self.moving:
             self._edges.setdefault(child, found[child])
 
     def has(self, base: str, frame: str) -> bool:
