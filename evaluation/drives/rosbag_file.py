@@ -324,7 +324,7 @@ class _Opened:
         # rosbags puts the path of a SQLite file into an address as it is, and
         # knows endings in lower case.
         if any(
-            _IN_ADDRESSES.search(str(one)) or not one.suffix.islower()
+            _IN_ADDRESSES.search(str(one)) or one.suffix != one.suffix.lower()
             for one in paths
         ):
             link = tempfile.TemporaryDirectory(prefix="cns-drake-")
