@@ -52,7 +52,7 @@ from cns_drake import (
 )
 
 HERE = Path(__file__).resolve().parent
-PACKAGES = (HERE / "models", HERE.parent / "worlds")
+PACKAGES = (HERE / "models", HERE.parent / "cns_drake/motion/vehicle")
 
 
 @dataclass

@@ -25,6 +25,7 @@ import typer
 
 from cns_drake import command_line as cli
 from cns_drake.export import export_formats
+from cns_drake.motion import Speeds
 from cns_drake.scenarios import (
     CityConfig,
     DriverConfig,
@@ -79,15 +80,8 @@ from worlds.city import (
     StreetPlan,
 )
 from worlds.imports import map_sources
-from worlds.roads import (
-    JunctionEntry,
-    RoadEntry,
-    RoadsFile,
-    RoadStyle,
-    Route,
-    RouteLeg,
-    Speeds,
-)
+from worlds.roads import JunctionEntry, RoadEntry, RoadsFile, RoadStyle
+from worlds.shapes import Route, RouteLeg
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 Sections = dict[str, type[BaseModel]]

@@ -7,17 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.scene import (
-    load_world,
-    structures_in,
-)
+from cns_drake.scene import load_world, structures_in
 from evaluation.base import InputError
 from evaluation.drives import Drive, read_scenario
 from worlds.maps import MapFolder, shipped_maps
-from worlds.shapes import (
-    load_structure_table,
-    moving_id,
-)
+from worlds.shapes import load_structure_table, moving_id
 
 
 class Absence:

@@ -31,12 +31,7 @@ from cns_drake.ground_truth.exact_overlap import Sight, sights_of
 from cns_drake.ground_truth.labelled import LabelledDrive
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.simulation import SimulatedDrive
-from evaluation.base import (
-    cos,
-    num_cores,
-    sin,
-    track,
-)
+from evaluation.base import cos, num_cores, sin, track
 from evaluation.drives import sample_frames
 from evaluation.map_update import SIDES, Session
 

@@ -19,13 +19,14 @@ from cns_drake.motion.body_ride import (
     ride_motion,
 )
 from cns_drake.motion.path_geometry import PathJet, SmoothPath
+from cns_drake.motion.speeds import Speeds
 from cns_drake.motion.splines import (
     REACH,
     SplineDerivatives,
     make_uniform_spline,
 )
 from evaluation.base import cos, product, rotated, sin
-from worlds.roads import LanePath, Speeds
+from worlds.shapes import LanePath
 
 _UP = np.array([[0.0, 0.0, 1.0]])
 

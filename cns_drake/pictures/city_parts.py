@@ -14,11 +14,7 @@ from cns_drake.scene import (
     read_perception_geometry,
 )
 from evaluation.base import MAX_INSTANCE, distances_along
-from worlds.shapes import (
-    CLASS_RGB,
-    StructureTable,
-    kind_in_name,
-)
+from worlds.shapes import CLASS_RGB, StructureTable, kind_in_name
 
 # Colour of geometry without one in pictures.
 DEFAULT_RGB = (0.7, 0.7, 0.7)

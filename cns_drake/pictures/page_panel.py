@@ -16,10 +16,7 @@ from cns_drake.pictures.city_parts import PassedChange
 from cns_drake.pictures.drive_record import DriveRecord, ScanRecord
 from cns_drake.scene import World
 from evaluation.base import GONE_RGB, NEW_RGB, length_of
-from worlds.shapes import (
-    CLASS_IDS,
-    MOVING_IDS,
-)
+from worlds.shapes import CLASS_IDS, MOVING_IDS
 
 Rgb = tuple[float, float, float]
 

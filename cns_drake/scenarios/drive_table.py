@@ -23,12 +23,7 @@ from evaluation.base import (
     user_errors,
     write_csv,
 )
-from worlds.maps import (
-    MapFolder,
-    drive_name,
-    no_drives,
-    shipped_cities,
-)
+from worlds.maps import MapFolder, drive_name, no_drives, shipped_cities
 
 
 @dataclass(frozen=True)

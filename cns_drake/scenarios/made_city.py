@@ -1,13 +1,14 @@
-"""Makes the city of a drive: aged, or drawn anew along the same streets."""
+"""Makes the city of a drive: aged, or drawn anew along the same streets.
+
+What makes a city is imported only where one is made.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from cns_drake.scenarios.city_ageing import age_city
 from cns_drake.scenarios.map_step import MakeMap
 from cns_drake.scenarios.provenance import digest_file
-from cns_drake.scenarios.redrawing import REDRAWN_STAGE, redrawn_city
 from cns_drake.scenarios.scenario import Scenario
 from evaluation.base import (
     InputError,
@@ -17,8 +18,6 @@ from evaluation.base import (
     exclusive,
     fingerprint,
 )
-from worlds.ageing import DEFAULT_RATES, check_rates, read_rates
-from worlds.maps import MapFolder
 
 _FACTOR = "factor"
 # The stage of a map that was aged by one number of years; stage 01 is today.
@@ -42,6 +41,8 @@ class AgeCity(MakeMap):
     rates: tuple[tuple[str, float], ...]
 
     def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
+        from cns_drake.scenarios.city_ageing import age_city
+
         age_city(
             self.source,
             self.years,
@@ -52,6 +53,8 @@ class AgeCity(MakeMap):
         )
 
     def sources(self) -> dict[str, object]:
+        from worlds.maps import MapFolder
+
         files = MapFolder(self.source).files()
         return {
             "files": {one.name: digest_file(one) for one in files},
@@ -75,6 +78,10 @@ def city_step(scenario: Scenario, cities: Path) -> MakeMap | None:
     city = scenario.city
     if not city.is_made:
         return None
+    from cns_drake.scenarios.redrawing import redrawn_city
+    from worlds.ageing import DEFAULT_RATES
+    from worlds.maps import MapFolder
+
     source = f"{scenario.source}: city"
     folder = scenario.map_folder.path.resolve()
     if city.redraw is not None:
@@ -108,6 +115,8 @@ def in_made_city(scenario: Scenario, cities: Path) -> Scenario:
     step = city_step(scenario, cities)
     if step is None:
         return scenario.in_folder(None)
+    from cns_drake.scenarios.redrawing import REDRAWN_STAGE
+
     stage = _AGED_STAGE if scenario.city.years else REDRAWN_STAGE
     return scenario.in_folder((step.folder, stage))
 
@@ -137,6 +146,8 @@ def make_city(scenario: Scenario, cities: Path) -> Scenario:
 
 def _all_rates(rates: float | Mapping[str, float]) -> Mapping[str, float]:
     """Returns event -> rate per year, for the field `rates` of a city."""
+    from worlds.ageing import check_rates, read_rates
+
     given = dict(rates) if isinstance(rates, Mapping) else {_FACTOR: rates}
     factor = given.pop(_FACTOR, 1.0)
     check_rates(given, "rates")

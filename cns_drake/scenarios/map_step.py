@@ -21,8 +21,6 @@ from evaluation.base import (
 
 # The file in its folder with the fingerprint of a map.
 _PART = "drawn.data"
-# Expected seconds to make a map.
-_COST = 7.0
 
 
 @dataclass(frozen=True)
@@ -108,5 +106,5 @@ def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
         step.check()
     if steps:
         make_folder(output)
-    jobs = [Job(f"city {one.folder.name}", one, cost=_COST) for one in steps]
+    jobs = [Job(f"city {one.folder.name}", one) for one in steps]
     run_jobs(jobs, cluster, "cities")

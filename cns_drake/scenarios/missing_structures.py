@@ -31,7 +31,7 @@ def lost_structures(scenario: Scenario) -> tuple[str, ...]:
     removable = None
     if city.towards is not None:
         removable = _lacking_in(scenario, city.towards, source)
-    table = scenario.folder.structures
+    table = scenario.structures
     lost = _scattered_losses(table, city.shares, city.scattered_seed, source)
     if city.missing > 0.0:
         with errors_at(f"{source}.missing"):

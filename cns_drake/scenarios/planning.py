@@ -1,10 +1,13 @@
 """Plans the drive of a scenario."""
 
+from __future__ import annotations
+
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.geometry import FrameId
@@ -16,37 +19,31 @@ from cns_drake.motion import (
     load_car_masses,
     load_suspension_rates,
     ride_on_springs,
+    suspension_file,
+    vehicle_file,
 )
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.recording import frames_within
 from cns_drake.scenarios.missing_structures import lost_structures
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files
-from cns_drake.scene import (
-    InSight,
-    World,
-    load_world,
-    read_perception_geometry,
-)
+from cns_drake.scene import InSight, World, load_world, read_perception_geometry
 from evaluation.base import InputError, errors_at_option
-from worlds.maps import (
-    suspension_file,
-    vehicle_file,
-)
-from worlds.roads import (
+from worlds.shapes import (
     FINE_SPACING,
     POINT_SPACING,
     TIGHTEST_RADIUS,
     LanePath,
-    RoadNetwork,
     driven_path,
     kerbs,
-    load_road_network,
     load_waypoint_path,
-    make_lane_path,
     obstacle_points,
     read_waypoints,
 )
+
+if TYPE_CHECKING:
+    # A drive through a world without roads needs nothing that reads them.
+    from worlds.roads import RoadNetwork
 
 # Heights above the path at which rays look for obstacles, from below the top of
 # a kerb up to the car's roof [m].
@@ -109,11 +106,13 @@ class DrivePlan:
             InputError: the roads cannot be used.
         """
         scenario = self.scenario
-        roads = scenario.folder.roads
-        if scenario.route is None and (
-            scenario.map is None or not roads.is_file()
-        ):
+        if scenario.map is None:
             return None
+        roads = scenario.folder.roads
+        if scenario.route is None and not roads.is_file():
+            return None
+        from worlds.roads import load_road_network
+
         return load_road_network(roads)
 
     @cached_property
@@ -142,6 +141,8 @@ class DrivePlan:
             source = scenario.waypoints
             cure = "place waypoints farther apart, or leave some out"
         else:
+            from worlds.roads import make_lane_path
+
             # There is a route or waypoints, and a route is along roads.
             assert scenario.route is not None
             assert self.network is not None
@@ -176,7 +177,7 @@ class DrivePlan:
             POINT_SPACING,
             obstacle_points(_obstacles_beside(self.scenario, path.points))
             if self.scenario.waypoints is not None or self.network is None
-            else kerbs(self.network),
+            else kerbs(self.network.areas.lane_area),
             source,
             wander=driver.wander,
             wander_length=driver.wander_length,

@@ -6,22 +6,17 @@ import json
 from pathlib import Path
 import platform
 
+from cns_drake.motion import suspension_file, vehicle_file
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene import FileWatch, referenced_files
 from cns_drake.sensors import KALIBR_FILE
-from evaluation.base import (
-    __version__ as __version__,
-)
+from evaluation.base import __version__ as __version__
 from evaluation.base import (
     check_regular,
     fingerprint,
     installed_versions,
     is_there,
     user_errors,
-)
-from worlds.maps import (
-    suspension_file,
-    vehicle_file,
 )
 
 # Packages that can influence a message's bytes.
@@ -90,24 +85,25 @@ def digest_inputs(
 def _input_files(scenario: Scenario) -> dict[str, Path]:
     """Returns the input files by kind, except the file of the IMU's noise."""
     inputs = {"world": scenario.world_file, "vehicle": vehicle_file()}
-    folder = scenario.folder
     if scenario.city.towards is not None:
-        inputs["towards"] = folder.stage(scenario.city.towards)
-    structures = folder.structures
+        inputs["towards"] = scenario.folder.stage(scenario.city.towards)
+    structures = scenario.structures
     if is_there(structures):
         inputs["structures"] = structures
     if scenario.ride.profile() is not None:
         inputs["suspension"] = suspension_file()
     if scenario.waypoints is not None:
         inputs["waypoints"] = Path(scenario.waypoints)
-    roads = folder.roads
     traffic = scenario.traffic
+    with_roads = traffic.queues or not scenario.transient.is_off
     if scenario.waypoints is None or (
-        roads.is_file() and (traffic.queues or not scenario.transient.is_off)
+        with_roads
+        and scenario.map is not None
+        and scenario.folder.roads.is_file()
     ):
-        inputs["roads"] = roads
+        inputs["roads"] = scenario.folder.roads
     if traffic.is_recorded:
-        inputs["traffic"] = folder.traffic
+        inputs["traffic"] = scenario.folder.traffic
     if traffic.fcd is not None:
         inputs["fcd"] = Path(traffic.fcd)
     return inputs

@@ -22,10 +22,7 @@ from evaluation.base import (
     user_errors,
 )
 from worlds.city import generate_city, load_plan
-from worlds.maps import (
-    STAGES_NAME,
-    MapFolder,
-)
+from worlds.maps import STAGES_NAME, MapFolder
 
 # Start of the first line of each input that is written here.
 _MARK = "# Of a city drawn anew by cns-drake"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 import operator
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import (
@@ -17,7 +17,7 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.motion import RoadProfile, RoughnessClass
+from cns_drake.motion import RoadProfile, RoughnessClass, Speeds
 from cns_drake.sensors import (
     CameraSection,
     Echoes,
@@ -32,11 +32,11 @@ from cns_drake.sensors import (
 from evaluation.base import Name, Section, validated
 from evaluation.drives import check_sensor_name
 from evaluation.lidar_sheets import LidarSheet
-from worlds.maps import (
-    MapFolder,
-    shipped_maps,
-)
-from worlds.roads import Route, Speeds
+from worlds.shapes import STRUCTURES_NAME, Route
+
+if TYPE_CHECKING:
+    # A drive through a world that is no map needs nothing of maps.
+    from worlds.maps import MapFolder
 
 # Defaults are validated as well, because a rule may depend on another field.
 _Optional = Field(default=None, validate_default=True)
@@ -661,6 +661,8 @@ class Scenario(Section):
 
         If a city was made for the drive, the map is that of this city.
         """
+        from worlds.maps import MapFolder
+
         if self._made is not None:
             return MapFolder(self._made[0])
         return self.map_folder
@@ -668,6 +670,8 @@ class Scenario(Section):
     @property
     def map_folder(self) -> MapFolder:
         """The folder of the field `map`, or of the world's file."""
+        from worlds.maps import MapFolder, shipped_maps
+
         if self.world is not None:
             return MapFolder(Path(self.world).parent)
         assert self.map is not None  # Either a map or a world is given.
@@ -679,6 +683,11 @@ class Scenario(Section):
         if self.world is not None:
             return Path(self.world)
         return self.folder.stage(self.stage_in_folder)
+
+    @property
+    def structures(self) -> Path:
+        """The table of structures beside that file; it may be missing."""
+        return self.world_file.parent / STRUCTURES_NAME
 
     @property
     def stage_in_folder(self) -> str:
@@ -701,6 +710,12 @@ class Scenario(Section):
         """
         copy = self.replaced()
         copy._made = made
+        return copy
+
+    def in_city_of(self, other: Scenario) -> Scenario:
+        """Returns the drive through the city of another."""
+        copy = self.replaced(map=other.map, stage=other.stage, city=other.city)
+        copy._made = other._made
         return copy
 
     @property

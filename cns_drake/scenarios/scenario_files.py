@@ -1,6 +1,6 @@
 """Scenario files, and the files that a scenario names."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 import os
 from pathlib import Path
 import re
@@ -9,9 +9,7 @@ import yaml
 
 from cns_drake.scenarios.scenario import SUMO_INSTEAD, Scenario
 from cns_drake.sensors import KALIBR_FILE
-from evaluation.base import (
-    InputError as InputError,
-)
+from evaluation.base import InputError as InputError
 from evaluation.base import (
     check_writable,
     did_you_mean,
@@ -23,12 +21,6 @@ from evaluation.base import (
     validated,
     value_errors,
     write_text,
-)
-from worlds.maps import (
-    MapFolder,
-    drive_name,
-    shipped_drives,
-    shipped_maps,
 )
 
 
@@ -59,13 +51,15 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
 
         scenario = load_scenario("metropolis_04")
     """
-    shipped = shipped_drives()
-    path = shipped.get(str(name_or_file), Path(name_or_file))
+    path = _shipped_drive(name_or_file) or Path(name_or_file)
     # Unlike pathlib, os.path accepts names that no file can have.
     if not os.path.isfile(path):
+        from worlds.maps import shipped_drives, shipped_maps
+
+        shipped = shipped_drives()
         folder = shipped_maps().get(str(name_or_file), path)
         if os.path.isdir(folder):
-            raise InputError(_not_a_drive(name_or_file, MapFolder(folder)))
+            raise InputError(_not_a_drive(name_or_file, folder))
         if re.fullmatch(r"\w+", str(name_or_file)):
             raise InputError(
                 f"unknown drive '{name_or_file}'; there are: "
@@ -78,9 +72,33 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
     return scenario
 
 
-def _not_a_drive(given: str | Path, folder: MapFolder) -> str:
+def _shipped_drive(name: object) -> Path | None:
+    """Returns the file of the shipped drive with a name, if there is one."""
+    if not _is_name(name):
+        return None
+    from worlds.maps import shipped_drives
+
+    return shipped_drives().get(str(name))
+
+
+def _is_shipped_map(place: str) -> bool:
+    if not _is_name(place):
+        return False
+    from worlds.maps import shipped_maps
+
+    return place in shipped_maps()
+
+
+def _is_name(place: object) -> bool:
+    """Returns whether a shipped drive or map can have such a name."""
+    return re.fullmatch(r"\w+", str(place)) is not None
+
+
+def _not_a_drive(given: str | Path, folder: Path) -> str:
     """Returns the error for a folder that was given in place of a drive."""
-    files = folder.drives()
+    from worlds.maps import MapFolder, drive_name, shipped_drives
+
+    files = MapFolder(folder).drives()
     if not files:
         return f"{given}: a folder without a drive (sequence_NN.yaml)"
     names = [
@@ -121,10 +139,13 @@ def _read_fields(file: Path) -> dict:
     values = read_yaml(file)
     if not isinstance(values, dict):
         raise InputError(f"{file}: not a mapping of scenario fields")
-    name = values.setdefault("name", drive_name(file))
-    if name == drive_name(file) and not re.fullmatch(
-        r"[A-Za-z0-9]\w*", name, re.ASCII
-    ):
+    own_name = file.stem
+    if own_name.startswith(("sequence_", "other_")):
+        from worlds.maps import drive_name
+
+        own_name = drive_name(file)
+    name = values.setdefault("name", own_name)
+    if name == own_name and not re.fullmatch(r"[A-Za-z0-9]\w*", name, re.ASCII):
         raise InputError(
             f"{file}: name: {name!r}, from its path, has more than letters,"
             " digits and underscores; give a name"
@@ -149,8 +170,13 @@ def _check_own_map(values: dict, file: Path) -> None:
         InputError: the drive goes through a shipped map, and its folder has
             another name and stages of its own.
     """
-    name, folder = values.get("map"), MapFolder(file.parent.resolve())
-    if not isinstance(name, str) or file.resolve() not in folder.drives():
+    name = values.get("map")
+    if not isinstance(name, str):
+        return
+    from worlds.maps import MapFolder, shipped_maps
+
+    folder = MapFolder(file.parent.resolve())
+    if file.resolve() not in folder.drives():
         return
     shipped = shipped_maps().get(name)
     is_copy = shipped is not None and not shipped.samefile(folder.path)
@@ -170,10 +196,12 @@ def _find_base(
     """Returns the file of a scenario's base; None if it has no base."""
     if base is None:
         return None
-    drives = shipped_drives()
     # A value that is no text cannot be the name of a file.
-    file = drives.get(str(base), path.parent / str(base))
+    file = _shipped_drive(base) or path.parent / str(base)
     if not (isinstance(base, str) and os.path.isfile(file)):
+        from worlds.maps import shipped_drives
+
+        drives = shipped_drives()
         raise InputError(
             f"{path}: base: {base!r} is neither a file nor a shipped drive "
             f"({', '.join(drives)}){did_you_mean(base, drives)}"
@@ -199,7 +227,7 @@ def make_paths_absolute(values: dict, path: Path) -> None:
 
     def absolute(fields: dict, field: str) -> dict:
         place = fields.get(field)
-        if not isinstance(place, str) or place in shipped_maps():
+        if not isinstance(place, str) or _is_shipped_map(place):
             return fields
         with value_errors(f"{path}: {field}"):
             return {**fields, field: str((path.parent / place).resolve())}
@@ -257,6 +285,14 @@ def check_files(scenario: Scenario, source: object = None) -> None:
         InputError: one of these files does not exist.
     """
     source = source or scenario.source
+    for field, fault in _file_faults(scenario):
+        raise InputError(f"{source}: {field}: {fault}", field.partition(".")[0])
+    if scenario.imu.kalibr is not None:
+        scenario.imu.sample_rate(scenario.fastest_rate)
+
+
+def _file_faults(scenario: Scenario) -> Iterator[tuple[str, str]]:
+    """Yields each field with a file that is missing, and what is wrong."""
     for field, file in (
         ("world", scenario.world),
         ("waypoints", scenario.waypoints),
@@ -264,53 +300,50 @@ def check_files(scenario: Scenario, source: object = None) -> None:
         ("traffic.fcd", scenario.traffic.fcd),
     ):
         if file is not None and not os.path.isfile(file):
-            raise InputError(f"{source}: {field}: {file}: no such file")
+            yield field, f"{file}: no such file"
     for folder_of_models in scenario.model_paths:
         if not os.path.isdir(folder_of_models):
-            raise InputError(
-                f"{source}: model_paths: {folder_of_models}: no such folder"
-            )
-    if scenario.imu.kalibr is not None:
-        scenario.imu.sample_rate(scenario.fastest_rate)
+            yield "model_paths", f"{folder_of_models}: no such folder"
     traffic, city = scenario.traffic, scenario.city
     if scenario.map is None:
         if not city.is_off:
-            raise InputError(
-                f"{source}: city: a world is no city; give a map and its stage"
-            )
+            yield "city", "a world is no city; give a map and its stage"
         if not traffic.is_off:
-            raise InputError(
-                f"{source}: traffic: a world has no roads; give a map with some"
-            )
+            yield "traffic", "a world has no roads; give a map with some"
         return
     folder = scenario.folder
     if not os.path.isdir(folder.path):
+        from worlds.maps import shipped_maps
+
         known = ", ".join(shipped_maps())
-        raise InputError(
-            f"{source}: map: '{scenario.map}' is neither a shipped map "
-            f"({known}) nor a folder"
-            f"{did_you_mean(scenario.map, shipped_maps())}"
+        yield (
+            "map",
+            f"'{scenario.map}' is neither a shipped map ({known}) nor a"
+            f" folder{did_you_mean(scenario.map, shipped_maps())}",
         )
+    stages = ", ".join(folder.stages()) or "none"
     if not os.path.isfile(scenario.world_file):
-        stages = ", ".join(folder.stages()) or "none"
-        raise InputError(
-            f"{source}: stage: map '{scenario.map}' has no stage "
-            f"'{scenario.stage}'; it has: {stages}"
+        yield (
+            "stage",
+            f"map '{scenario.map}' has no stage '{scenario.stage}'; it has:"
+            f" {stages}",
         )
     if city.towards is not None and city.towards not in folder.stages():
-        raise InputError(
-            f"{source}: city.towards: map '{scenario.map}' has no stage "
-            f"'{city.towards}'; it has: {', '.join(folder.stages())}"
+        yield (
+            "city.towards",
+            f"map '{scenario.map}' has no stage '{city.towards}'; it has:"
+            f" {stages}",
         )
     if traffic.queues and not folder.roads.is_file():
-        raise InputError(
-            f"{source}: traffic: queues: no {folder.roads.name} in "
-            f"{folder.path}: {SUMO_INSTEAD}"
+        yield (
+            "traffic",
+            f"queues: no {folder.roads.name} in {folder.path}: {SUMO_INSTEAD}",
         )
     if traffic.is_recorded and not folder.traffic.is_file():
-        raise InputError(
-            f"{source}: traffic: no recorded traffic, {folder.traffic.name}, "
-            f"in {folder.path}: {SUMO_INSTEAD}"
+        yield (
+            "traffic",
+            f"no recorded traffic, {folder.traffic.name}, in {folder.path}:"
+            f" {SUMO_INSTEAD}",
         )
 
 
@@ -328,7 +361,7 @@ def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
     values = scenario.model_dump(mode="json", exclude_none=True)
 
     def moved(path: str) -> str:
-        if path in shipped_maps():
+        if _is_shipped_map(path):
             return path
         if folder is None:
             return Path(path).name

@@ -14,13 +14,8 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from evaluation.base import (
-    Element,
-    expanded_size,
-    read_bytes,
-    read_elements,
-    to_number,
-)
+from cns_drake.scene.expansion import expanded_size
+from evaluation.base import Element, read_bytes, read_elements, to_number
 
 # Elements that show what their `url` names.
 _INSTANCES = (

@@ -38,6 +38,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
+from cns_drake.scene.expansion import expanded_size
 from cns_drake.scene.mesh_files import mesh_shape_key
 from cns_drake.scene.model_check import SIZES, lacks_size, read_model
 from cns_drake.scene.model_finder import (
@@ -47,7 +48,7 @@ from cns_drake.scene.model_finder import (
 )
 from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE, MOST_COPIED_TRIANGLES
-from evaluation.base import InputError, expanded_size
+from evaluation.base import InputError
 
 # Boxes (N, 2, 3) in the world [m], each its least and greatest coordinates ->
 # (N,) bool, whether anything in a box can be seen.

@@ -6,11 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
-from evaluation.base import (
-    cos,
-    revolved,
-    sin,
-)
+from evaluation.base import cos, revolved, sin
 
 # Rays are cast in single precision, which cannot resolve a metre beyond this
 # [m].

@@ -35,11 +35,7 @@ from evaluation.base import (
     read_bytes,
     value_errors,
 )
-from worlds.shapes import (
-    STRUCTURES_NAME,
-    StructureTable,
-    load_structure_table,
-)
+from worlds.shapes import STRUCTURES_NAME, StructureTable, load_structure_table
 
 
 @dataclass(frozen=True)

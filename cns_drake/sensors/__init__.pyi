@@ -4,6 +4,7 @@ from .camera.camera_scene import CameraScene as CameraScene
 from .camera.config import CameraSection as CameraSection
 from .camera.renderer import check_renderer as check_renderer
 from .carriers import check_in_diagram as check_in_diagram
+from .carriers import check_unused_names as check_unused_names
 from .carriers import sensor_pose as sensor_pose
 from .imu.config import KALIBR_FILE as KALIBR_FILE
 from .imu.config import ImuSection as ImuSection
@@ -34,6 +35,7 @@ from .lidar_config import LIDAR_PRESETS as LIDAR_PRESETS
 from .lidar_config import LidarSection as LidarSection
 from .lidar_config import WeatherConfig as WeatherConfig
 from .lidar_config import describe_unit as describe_unit
+from .lidar_config import make_beam_pattern as make_beam_pattern
 from .lidar_config import make_lidar_config as make_lidar_config
 from .lidar_config import make_lidar_model as make_lidar_model
 from .lidar_config import make_pattern as make_pattern
@@ -43,14 +45,12 @@ from .odometry import Odometry as Odometry
 from .odometry import OdometryConfig as OdometryConfig
 from .odometry import OdometrySensor as OdometrySensor
 from .odometry import add_odometry as add_odometry
-from .odometry_config import OdometrySection as OdometrySection
 from .published_lidar import ApplyLidarConfig as ApplyLidarConfig
 from .published_lidar import LidarConfig as LidarConfig
 from .returns.calibrated import CalibratedReturns as CalibratedReturns
 from .returns.weather import Weather as Weather
+from .sensor_config import OdometrySection as OdometrySection
 from .sensor_config import SensorConfig as SensorConfig
 from .sensor_config import Triple as Triple
 from .sensor_config import check_rate as check_rate
 from .sensor_config import field_off_by_default as field_off_by_default
-from .sheet_patterns import make_beam_pattern as make_beam_pattern
-from .system_names import check_unused_names as check_unused_names

@@ -1,7 +1,8 @@
-"""Poses of sensors on their carriers, and the motion of the carriers."""
+"""What adding any sensor to a diagram takes: its name, pose and motion."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 import math
 from typing import TYPE_CHECKING
 
@@ -10,10 +11,13 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.tree import Frame, RigidBody
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 
-from evaluation.base import check_type
+from evaluation.base import check_type, of_type
 
 if TYPE_CHECKING:
     from cns_drake.sensors.sensor_config import Mount
+
+# Endings of the names of an IMU's systems.
+IMU_PARTS = ("accelerometer", "gyroscope", "noise")
 
 
 def sensor_pose(mount: Mount) -> RigidTransform:
@@ -99,3 +103,47 @@ def check_in_diagram(
             f"{argument}: {type(system).__name__} '{system.get_name()}' is not "
             "in this builder's diagram"
         )
+
+
+def check_new_sensor(
+    builder: DiagramBuilder, name: str, parts: Collection[str] = ()
+) -> None:
+    """Checks the name of a sensor that is added to a diagram.
+
+    Only a recorder asks more of a name: it becomes a part of a ROS 2 topic.
+
+    Args:
+        builder: builder of the diagram.
+        name: the name.
+        parts: endings of the names of the sensor's systems; an underscore
+            stands between the sensor's name and the ending.
+
+    Raises:
+        TypeError: the name is no text.
+        ValueError: the name is empty, or another system or sensor of the
+            diagram has it.
+    """
+    if not of_type(name, str, "name"):
+        raise ValueError("name: it is empty")
+    # An IMU has the first part, but no system of the name itself.
+    endings = dict.fromkeys((IMU_PARTS[0], *parts))
+    check_unused_names(builder, name, *(f"{name}_{part}" for part in endings))
+
+
+def check_unused_names(builder: DiagramBuilder, *names: str) -> None:
+    """Checks that a diagram has no systems of certain names yet.
+
+    A diagram with two systems of one name ends the process when it is built.
+
+    Raises:
+        TypeError: the builder is no DiagramBuilder, or a name no text.
+        ValueError: the diagram has a system of one of these names.
+    """
+    check_type("builder", builder, DiagramBuilder)
+    for name in names:
+        of_type(name, str, "name")
+        if builder.HasSubsystemNamed(name):
+            raise ValueError(
+                f"name: the diagram has a system '{name}'; give each a name "
+                "of its own"
+            )

@@ -1,9 +1,10 @@
-"""Adding a LiDAR to a diagram."""
+"""Adding a LiDAR to a diagram, without pydantic for one's own patterns."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
+import math
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, TypeVar
@@ -23,14 +24,15 @@ from cns_drake.scene import geometry_port
 from cns_drake.sensors.carriers import (
     body_and_pose,
     check_in_diagram,
+    check_new_sensor,
+    check_unused_names,
     find_motion,
 )
 from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.seen_geometry import Place, Structures
-from cns_drake.sensors.system_names import check_new_sensor, check_unused_names
-from evaluation.base import check_type
+from evaluation.base import check_type, of_type
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.
@@ -167,7 +169,7 @@ def add_lidar(
     unit = pattern if isinstance(pattern, str | Path) else None
     if unit is not None:
         # Imported here: patterns of the caller's own need no data sheets.
-        from cns_drake.sensors.sheet_patterns import (
+        from cns_drake.sensors.lidar_config import (
             make_beam_pattern,
             revolution_at_rate,
         )
@@ -180,14 +182,16 @@ def add_lidar(
         )
     model = _returns_model(returns, unit, seed, name)
     if model is not None and unit is not None:
-        from cns_drake.sensors.sheet_patterns import aimed
+        from cns_drake.sensors.lidar_config import aimed
 
         pattern = aimed(pattern, model.sheet)
     check_type("measurement", measurement, MeasurementModel, NoneType)
-    if model is not None:
-        _check_no_noise(measurement, range_noise, dropout)
-    else:
-        measurement = _noise_model(measurement, range_noise, dropout, seed)
+    noise = MeasurementModel(
+        range_noise=range_noise, dropout=dropout, seed=seed
+    )
+    measurement = _noise_model(
+        measurement, noise, is_calibrated=model is not None
+    )
     for argument, places in (
         ("body", [body]),
         ("unseen", unseen),
@@ -218,7 +222,7 @@ def add_lidar(
         frame_id,
         X_PB,
         pattern,
-        measurement=_with_name(measurement or IDEAL, name),
+        measurement=_with_name(measurement, name),
         returns=model,
         causal=causal,
         rate=rate,
@@ -292,7 +296,7 @@ def add_lidar_view(
 
     Raises:
         TypeError: an argument is of another type.
-        ValueError: the LiDAR has a view already.
+        ValueError: the LiDAR has a view already, or the period is negative.
 
     Example:
         from cns_drake import add_lidar_view
@@ -305,6 +309,10 @@ def add_lidar_view(
     check_unused_names(builder, f"{name}_view")
     if period is None:
         period = (lidar.samples or lidar.pattern).period
+    if not 0.0 <= of_type(period, float, "period") < math.inf:
+        # Drake would end the process.
+        raise ValueError(f"period: {period!r} is not a time from 0 s on")
+    of_type(point_size, float, "point_size")
     view = builder.AddNamedSystem(
         f"{name}_view",
         geometry.MeshcatPointCloudVisualizer(meshcat, name, period),
@@ -357,44 +365,34 @@ def _returns_model(
 
 
 def _noise_model(
-    measurement: MeasurementModel | None,
-    range_noise: float,
-    dropout: float,
-    seed: int,
-) -> MeasurementModel | None:
-    """Returns the model of noise of ideal returns, if there is any noise.
+    given: MeasurementModel | None,
+    noise: MeasurementModel,
+    *,
+    is_calibrated: bool,
+) -> MeasurementModel:
+    """Returns the model of noise, losses and rounding beside the returns.
 
-    The arguments are the same as for `add_lidar`.
+    Args:
+        given: argument `measurement` of `add_lidar`.
+        noise: model with the arguments `range_noise`, `dropout` and `seed`.
+        is_calibrated: whether the returns have noise of their own.
 
     Raises:
         ValueError: the noise is given twice.
     """
-    if not (range_noise or dropout or seed):
-        return measurement
-    if measurement is not None:
+    if is_calibrated:
+        if noise.is_random or (given is not None and given.is_random):
+            raise ValueError(
+                "range_noise, dropout, measurement: calibrated returns have "
+                "noise of their own; leave these out"
+            )
+    elif noise != IDEAL:
+        if given is None:
+            return noise
         raise ValueError(
             "measurement: give either it or range_noise, dropout and seed"
         )
-    return MeasurementModel(range_noise=range_noise, dropout=dropout, seed=seed)
-
-
-def _check_no_noise(
-    measurement: MeasurementModel | None, range_noise: float, dropout: float
-) -> None:
-    """Checks that a LiDAR with calibrated returns gets no other noise.
-
-    Raises:
-        ValueError: one of the arguments adds noise.
-    """
-    if (
-        range_noise
-        or dropout
-        or (measurement is not None and measurement.is_random)
-    ):
-        raise ValueError(
-            "range_noise, dropout, measurement: calibrated returns have "
-            "noise of their own; leave these out"
-        )
+    return given or IDEAL
 
 
 _Model = TypeVar("_Model", MeasurementModel, "CalibratedReturns")

@@ -1,11 +1,25 @@
-"""Descriptions of a LiDAR and the weather, and their conversion to models."""
+"""Descriptions of a LiDAR and the weather, and the models that follow.
+
+Scenarios are read with this module, and thus without Drake.
+"""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    NamedTuple,
+    TypeAlias,
+    TypeVar,
+)
+import warnings
 
+import numpy as np
 from pydantic import (
     BeforeValidator,
     Field,
@@ -15,21 +29,26 @@ from pydantic import (
     model_validator,
 )
 
+from cns_drake.sensors.lidar.beams import BeamPattern, period_of_rate
 from cns_drake.sensors.lidar.measurement import Echoes, MeasurementModel
-from cns_drake.sensors.lidar.patterns import SpinningPattern
-from cns_drake.sensors.sensor_config import Mount, Triple, field_off_by_default
-from cns_drake.sensors.sheet_patterns import (
-    UnitPattern,
-    aimed,
-    make_beam_pattern,
+from cns_drake.sensors.lidar.patterns import (
+    NoddingPattern,
+    RosettePattern,
+    SpinningPattern,
 )
-from evaluation.base import InputError, Section, validated
+from cns_drake.sensors.sensor_config import Mount, Triple, field_off_by_default
+from evaluation.base import InputError, Section, of_type, validated
 from evaluation.drives import LayoutName
 from evaluation.lidar_sheets import (
     DEFAULT_PRESET,
+    LONGEST_PERIOD,
     MOST_BEAMS,
     MOST_RINGS,
     LidarSheet,
+    NoddingSheet,
+    ReturnsSheet,
+    RosetteSheet,
+    SpinningSheet,
     check_one_unit,
     check_preset,
     find_sheet,
@@ -43,6 +62,9 @@ from evaluation.lidar_sheets import (
 
 if TYPE_CHECKING:
     from cns_drake.sensors.returns.calibrated import CalibratedReturns
+
+UnitPattern: TypeAlias = SpinningPattern | RosettePattern | NoddingPattern
+_Pattern = TypeVar("_Pattern", bound=BeamPattern)
 
 
 class WeatherConfig(Section):
@@ -147,6 +169,9 @@ class LidarSection(LidarDescription, Mount):
             the data sheet, instead of a preset.
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
+        hidden_deg: first and last azimuth, counterclockwise, of a sector that
+            something beside the LiDAR hides, from -180 to 180 [deg]; by
+            default nothing is hidden.
         resolution: step to which recorded coordinates are rounded [m]; the
             default is 2^-10 m, about 1 mm. 0 records exact values.
         rate: revolutions per second [Hz]. The rate of the fastest LiDAR of the
@@ -157,6 +182,7 @@ class LidarSection(LidarDescription, Mount):
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)
+    hidden_deg: tuple[float, float] | None = field_off_by_default(None)
     # The content of the file, so that a recording states all of it.
     unit: Annotated[
         LidarSheet | None,
@@ -238,7 +264,7 @@ class LidarSection(LidarDescription, Mount):
             raise ValueError(
                 f"min_range {nearest:g} is not below max_range {farthest:g}"
             )
-        make_pattern(self)
+        _without_hidden(make_pattern(self), self.hidden_deg)
         if self.returns == "calibrated":
             sheet.returns.check_range(farthest)
         return self
@@ -287,6 +313,141 @@ def make_lidar_config(unit: str | Path | LidarSheet) -> LidarSection:
     is_preset = not (unit is sheet or is_sheet_file(unit))
     fields = {"preset": str(unit)} if is_preset else {"unit": sheet}
     return validated(LidarSection, fields, "unit")
+
+
+def make_beam_pattern(
+    unit: str | Path | LidarSheet,
+    period: float | None = None,
+    *,
+    num_columns: int | None = None,
+    min_range: float | None = None,
+    max_range: float | None = None,
+) -> UnitPattern:
+    """Returns the beam pattern of a LiDAR.
+
+    Args:
+        unit: a key of `LIDAR_PRESETS`, the file of a data sheet, or a data
+            sheet.
+        period: duration of a revolution [s]; by default the duration in the
+            data sheet.
+        num_columns: columns in a revolution; by default the number in the data
+            sheet. If the lasers of a unit fire at a fixed rate, the period
+            determines this number.
+        min_range: nearest range that is measured [m]; by default the value in
+            the data sheet.
+        max_range: farthest range that is measured [m]; by default the value in
+            the data sheet.
+
+    Raises:
+        ValueError: there is no preset of that name, `num_columns` is given for
+            a LiDAR without columns, or a value is impossible.
+        InputError: the file cannot be read, or is no data sheet.
+
+    Example:
+        from cns_drake import LIDAR_PRESETS, make_beam_pattern
+
+        patterns = [make_beam_pattern(name, 0.1) for name in LIDAR_PRESETS]
+    """
+    sheet = find_sheet(unit)
+    of_type(period, float | None, "period")
+    if period is not None and not 0.0 < period <= LONGEST_PERIOD:
+        raise ValueError(
+            f"period: {period:g} s is not above 0 and up to {LONGEST_PERIOD:g}"
+        )
+    if isinstance(sheet, SpinningSheet):
+        if sheet.fires_steadily and period and num_columns is None:
+            num_columns = max(round(sheet.columns * period / sheet.period), 1)
+    elif num_columns is not None:
+        raise ValueError(
+            f"columns: a LiDAR with the pattern '{sheet.pattern}' has none"
+        )
+    common: dict[str, Any] = {
+        "period": sheet.period if period is None else period,
+        "min_range": sheet.ranges[0] if min_range is None else min_range,
+        "max_range": sheet.ranges[1] if max_range is None else max_range,
+    }
+    match sheet:
+        case SpinningSheet():
+            limits = sheet.azimuths_deg
+            return SpinningPattern(
+                tuple(np.deg2rad(sheet.elevations).tolist()),
+                sheet.columns if num_columns is None else num_columns,
+                azimuths_rad=(
+                    None
+                    if limits is None
+                    else tuple(np.deg2rad(limits).tolist())
+                ),
+                **common,
+            )
+        case RosetteSheet():
+            return RosettePattern(
+                sheet.fov_deg,
+                height_deg=sheet.height_deg,
+                num_lines=sheet.num_lines,
+                points_per_second=sheet.points_per_second,
+                **common,
+            )
+        case NoddingSheet():
+            return NoddingPattern(
+                sheet.elevations_deg,
+                num_lines=sheet.num_lines,
+                points_per_second=sheet.points_per_second,
+                **common,
+            )
+    raise AssertionError(sheet)  # There is no other kind.
+
+
+def revolution_at_rate(
+    unit: str | Path | LidarSheet,
+    rate: float | None,
+    num_columns: int | None = None,
+) -> float:
+    """Returns the duration of a revolution of a LiDAR that takes scans [s].
+
+    It is the duration in the data sheet, or 1 / `rate` if that is shorter.
+
+    Args:
+        unit: as for `make_beam_pattern`.
+        rate: scans per second; None for the duration in the data sheet.
+        num_columns: as for `make_beam_pattern`.
+
+    Raises:
+        ValueError: see `make_beam_pattern`, or the rate is out of range.
+
+    Warns:
+        UserWarning: the revolution has fewer beams than in the data sheet.
+    """
+    sheet = find_sheet(unit)
+    if rate is None:
+        return sheet.period
+    period = period_of_rate(rate, LONGEST_PERIOD)
+    if period >= sheet.period:
+        return sheet.period
+    num_beams, usual = (
+        make_beam_pattern(sheet, one, num_columns=num_columns).num_beams
+        for one in (period, None)
+    )
+    if num_beams != usual:
+        warnings.warn(
+            f"rate: {rate:g} scans per second: a revolution takes {period:g} s "
+            f"and has {num_beams} beams, not {sheet.period:g} s and {usual} "
+            "beams as in the data sheet",
+            stacklevel=3,
+        )
+    return period
+
+
+def aimed(pattern: _Pattern, sheet: ReturnsSheet) -> _Pattern:
+    """Returns a pattern with the elevations that were measured on one unit.
+
+    If the elevations are not known (see `Head`), or the pattern is not spinning
+    or has another number of rings, the pattern is returned unchanged.
+    """
+    own = tuple(map(math.radians, sheet.head.elevations_deg))
+    if not isinstance(pattern, SpinningPattern):
+        return pattern
+    is_own = len(own) == pattern.num_rings
+    return replace(pattern, elevations_rad=own) if is_own else pattern
 
 
 def make_pattern(
@@ -355,9 +516,27 @@ class LidarModel(NamedTuple):
         returns: the model of calibrated returns; None for ideal returns.
     """
 
-    pattern: UnitPattern
+    pattern: BeamPattern
     measurement: MeasurementModel
     returns: "CalibratedReturns | None"
+
+
+def _without_hidden(
+    pattern: BeamPattern, hidden_deg: tuple[float, float] | None
+) -> BeamPattern:
+    """Returns a pattern without the beams of a hidden sector."""
+    if hidden_deg is None:
+        return pattern
+    first, last = hidden_deg
+    if first == last:
+        raise ValueError(f"hidden_deg: {list(hidden_deg)} is no sector")
+    try:
+        return pattern.within(azimuths_deg=(last, first))
+    except ValueError:
+        raise ValueError(
+            f"hidden_deg: {list(hidden_deg)} is not two azimuths from -180 to"
+            " 180, or hides every beam"
+        ) from None
 
 
 def make_lidar_model(
@@ -379,7 +558,7 @@ def make_lidar_model(
     Raises:
         ValueError: see `make_pattern`.
     """
-    pattern = make_pattern(config, period)
+    pattern = _without_hidden(make_pattern(config, period), config.hidden_deg)
     measurement = MeasurementModel(
         resolution=config.resolution,
         range_noise=config.range_noise,

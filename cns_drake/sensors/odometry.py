@@ -17,7 +17,11 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.lcm import LcmBuses
 
-from cns_drake.sensors.carriers import body_and_pose, find_motion
+from cns_drake.sensors.carriers import (
+    body_and_pose,
+    check_new_sensor,
+    find_motion,
+)
 from cns_drake.sensors.lidar.beams import period_of_rate
 from cns_drake.sensors.published_sensor import (
     USUAL_RATE,
@@ -30,7 +34,7 @@ from cns_drake.sensors.published_sensor import (
     names_of_fields_in_errors,
     publish_measurements,
 )
-from cns_drake.sensors.system_names import check_new_sensor
+from evaluation.base import check_type
 
 
 @dataclass(frozen=True)
@@ -89,6 +93,7 @@ class OdometrySensor(LeafSystem):
             X_PB: pose of the observed frame B in P; by default B is P.
         """
         super().__init__()
+        check_type("body", body, RigidBody)
         self._body = body.index()
         self._X_PB = None if X_PB is None else RigidTransform(X_PB)
         plant = body.GetParentPlant()
@@ -239,6 +244,7 @@ def ApplyOdometryConfig(
 
         ApplyOdometryConfig(OdometryConfig(rate=100), builder)
     """
+    check_type("config", config, OdometryConfig)
     config.ValidateOrThrow()
     interface = find_interface(config, builder, lcm_buses, lcm)
     with errors_of(config):

@@ -1,4 +1,8 @@
-"""A LiDAR configured in YAML, in the same way as Drake's cameras."""
+"""A LiDAR configured in YAML, in the same way as Drake's cameras.
+
+It needs both Drake, which `lidar_config` does without, and pydantic, which
+`lidar_adding` does without.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,6 +24,7 @@ from cns_drake.sensors.lidar_config import (
     LidarDescription,
     LidarSection,
     make_lidar_model,
+    revolution_at_rate,
 )
 from cns_drake.sensors.noise_draws import check_seed
 from cns_drake.sensors.published_sensor import (
@@ -32,8 +37,7 @@ from cns_drake.sensors.published_sensor import (
     publish_measurements,
     section_of,
 )
-from cns_drake.sensors.sheet_patterns import revolution_at_rate
-from evaluation.base import one_line
+from evaluation.base import check_type, one_line
 from evaluation.lidar_sheets import DEFAULT_PRESET, LONGEST_PERIOD
 
 _ROLES = {
@@ -175,6 +179,7 @@ def ApplyLidarConfig(
 
         ApplyLidarConfig(LidarConfig(name="roof", rate=10), builder)
     """
+    check_type("config", config, LidarConfig)
     config.ValidateOrThrow()
     section = config._section()
     period = revolution_at_rate(section.sheet, config.rate, section.columns)

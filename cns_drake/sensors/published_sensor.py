@@ -6,14 +6,10 @@ and publishes its measurements on LCM. The sections of scenarios define which
 values the fields can have.
 """
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import copy
 from dataclasses import dataclass, field
-import numbers
-import os
-import types
-import typing
 from typing import Any, TypeAlias, TypeVar
 
 from drake import lcmt_drake_signal, lcmt_point_cloud
@@ -33,10 +29,14 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
 
 from cns_drake.scene import find_bus, shortly_before, starts_late
-from cns_drake.sensors.system_names import check_unused_names
+from cns_drake.sensors.carriers import check_unused_names
 from evaluation.base import (
     Section,
     describe_validation_error,
+    is_number,
+    no_such,
+    of_type,
+    types_of_fields,
 )
 
 # Messages per second of an IMU or odometry that names no rate.
@@ -44,82 +44,24 @@ USUAL_RATE = 20
 # Fields of a section that a config does not have, as `X_PB` replaces the mount
 # and only recordings have a layout, or that differ from the config's.
 _LEFT_OUT = ("xyz", "rpy_deg", "layout", "rate")
-_KINDS = {
-    bool: "true or false",
-    float: "a number",
-    int: "a whole number",
-    str: "a text",
-}
+_NUMBERS = (float, int, float | None, int | None)
 _Struct = TypeVar("_Struct")
 
 
 def names_of_fields_in_errors(struct: type[_Struct]) -> type[_Struct]:
-    """Makes a dataclass refuse values of a wrong type by the field's name.
+    """Makes Drake's reader of YAML leave wrong scalars to a config's class.
 
-    Drake's reader of YAML itself refuses `rate: fast` without the name of the
-    field. It accepts any scalar where the type of a field admits any; then the
-    dataclass refuses the value, also in Python.
+    The reader sets attributes of a new config. It refuses `rate: fast` without
+    the name of the field; but it sets any scalar where the type of a field
+    admits any, and the class then names the field.
     """
     fields: dict[str, Any] = struct.__dataclass_fields__  # type: ignore[attr-defined]  # A dataclass.
     # Without the limits, which a section of a scenario checks.
-    types = typing.get_type_hints(struct)
-    hints = {name: types[name] for name in fields}
-    for name, hint in hints.items():
+    for name, kind in types_of_fields(struct).items():
         # A copy: base classes share the field.
         fields[name] = copy.copy(fields[name])
-        fields[name].type = typing.Union[(hint, *_KINDS)]
-
-    def set_field(self: _Struct, name: str, value: Any) -> None:
-        if name in hints:
-            value = _of_type(value, hints[name], f"{struct.__name__}.{name}")
-        object.__setattr__(self, name, value)
-
-    struct.__setattr__ = set_field  # type: ignore[method-assign, assignment]  # Of this class.
+        fields[name].type = kind | bool | float | int | str
     return struct
-
-
-def _of_type(value: Any, hint: Any, name: str) -> Any:
-    """Returns a value as the type of a field; converts as Drake's reader does.
-
-    Raises:
-        ValueError: the value is of another type; the message begins with
-            `name`.
-    """
-    options = [hint]
-    if isinstance(hint, types.UnionType):
-        options = list(typing.get_args(hint))
-    if value is None and type(None) in options:
-        return None
-    kind = options[0]
-    fault = f"{name}: {value!r} is not {_KINDS.get(kind, 'a pose')}"
-    if typing.get_origin(kind) is list:
-        if isinstance(value, str) or not (
-            isinstance(value, Collection)
-            and all(isinstance(one, str) for one in value)
-        ):
-            raise ValueError(f"{name}: {value!r} is not a list of names")
-        return list(value)
-    if kind is bool:
-        if value in ("true", "false"):  # Quoted in YAML.
-            return value == "true"
-    elif kind is str and isinstance(value, os.PathLike):
-        return os.fspath(value)
-    elif kind in (int, float) and not isinstance(value, bool):
-        if isinstance(value, str):
-            try:
-                value = float(value)
-            except ValueError:
-                raise ValueError(fault) from None
-        if isinstance(value, numbers.Real) and (
-            kind is float or float(value).is_integer()
-        ):
-            return kind(value)
-        raise ValueError(fault)
-    if not isinstance(value, kind) or (
-        kind in (int, float) and isinstance(value, bool)
-    ):
-        raise ValueError(fault)
-    return value
 
 
 @dataclass(eq=False)
@@ -138,6 +80,29 @@ class PublishedSensor:
     name: str
     X_PB: Transform = field(default_factory=Transform)
     lcm_bus: str = "default"
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Sets a field, of which a wrong type is refused by name.
+
+        Arguments of the constructor are taken as they are. A text that is set
+        later, as Drake's reader does, may spell a number or a bool: PyYAML
+        takes `1e-3` for a text.
+
+        Raises:
+            AttributeError: there is no such field.
+            TypeError: the value is of another type.
+        """
+        kinds, struct = types_of_fields(type(self)), type(self).__name__
+        if name not in kinds:
+            raise AttributeError(f"{struct}: {no_such('field', name, kinds)}")
+        kind = kinds[name]
+        if name in vars(self) and isinstance(value, str):
+            if kind is bool:
+                value = {"true": True, "false": False}.get(value, value)
+            elif kind in _NUMBERS and is_number(value):
+                value = float(value)
+        value = of_type(value, kind, f"{struct}.{name}")
+        object.__setattr__(self, name, value)
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):

@@ -1,4 +1,4 @@
-"""Base classes and checks for the descriptions of all sensors.
+"""What the descriptions of all sensors share, and that of odometry.
 
 The descriptions are sections of a scenario. This module does not import Drake,
 which is slow to import.
@@ -109,6 +109,18 @@ class SensorConfig(Mount, abc.ABC):
             frame_id: name of the sensor's frame.
             stamp_ns: time of the value [ns].
         """
+
+
+class OdometrySection(Section):
+    """How often the vehicle's ground-truth motion is recorded.
+
+    Attributes:
+        rate: messages per second [Hz]: a multiple of the fastest LiDAR's rate,
+            at most 1000, and a whole number of nanoseconds apart. By default
+            one per scan.
+    """
+
+    rate: int | None = None
 
 
 def check_rate(

@@ -21,7 +21,6 @@ from cns_drake.traffic import (
     EgoPath,
     FcdTrace,
     TrafficPlan,
-    plan_queues,
     play_recorded,
     play_trace,
     read_fcd,
@@ -29,7 +28,6 @@ from cns_drake.traffic import (
     traffic_structures,
 )
 from evaluation.base import InputError, arctan2
-from worlds.maps import metres_on_map
 from worlds.shapes import (
     GROUND_CLASSES,
     MOVING_IDS,
@@ -38,7 +36,7 @@ from worlds.shapes import (
     Way,
 )
 
-# Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
+# Size of the car in `vehicle.sdf`, with mirrors and wheels [m].
 _EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
 # The ground is read this far around the places of a trace [m].
 _AROUND_TRACE = 20.0
@@ -83,6 +81,8 @@ def plan_traffic_of_drive(
         count_frames(scenario, trajectory) - 1
     ) * scenario.frame_period
     if wanted.queues:
+        from cns_drake.traffic import plan_queues
+
         assert drive.network is not None
         return plan_queues(
             drive.network,
@@ -92,6 +92,8 @@ def plan_traffic_of_drive(
             ego_box=_EGO_BOX,
         )
     if wanted.fcd is not None:
+        from worlds.maps import metres_on_map
+
         path = Path(wanted.fcd)
         trace = read_fcd(path, lambda: metres_on_map(scenario.folder))
         world = world or load_stage(drive, with_vehicle=False)

@@ -1,7 +1,7 @@
 """Recording the sensors of any diagram."""
 
 from collections.abc import Collection, Iterable, Mapping
-import numbers
+import math
 from pathlib import Path
 from types import NoneType
 
@@ -35,7 +35,7 @@ from cns_drake.sensors import (
     check_in_diagram,
     check_unused_names,
 )
-from evaluation.base import check_type, is_real
+from evaluation.base import check_type, of_type
 from evaluation.drives import check_sensor_names
 
 
@@ -109,7 +109,10 @@ def add_mcap_recorder(
             simulator.AdvanceTo(10.0)
     """
     cameras = cameras or {}
-    if not (isinstance(start_ns, numbers.Integral) and 0 <= start_ns < END_NS):
+    folder = Path(of_type(folder, str, "folder"))
+    overwrite = of_type(overwrite, bool, "overwrite")
+    start_ns = of_type(start_ns, int, "start_ns")
+    if not 0 <= start_ns < END_NS:
         raise ValueError(
             f"start_ns: {start_ns!r} is not an integer from 0 on, below"
             f" {END_NS}"
@@ -151,7 +154,7 @@ def add_mcap_recorder(
         depth_camera_names=[key for key, c in recorded.items() if c.depth],
     )
     bag = BagWriter(
-        Path(folder),
+        folder,
         topics,
         start_ns=start_ns,
         attachments={"calibration.json": make_calibration(fixed, X_BI)},
@@ -275,9 +278,8 @@ def _message_periods(
     }
     if period is None and not revolutions:
         raise ValueError("period: a recording without a LiDAR needs one")
-    if period is not None and not (
-        is_real(period) and period >= 1.0 / HIGHEST_RATE
-    ):
+    of_type(period, float | None, "period")
+    if period is not None and not 1.0 / HIGHEST_RATE <= period < math.inf:
         raise ValueError(
             f"period: {period!r} is not a number of seconds from"
             f" {1.0 / HIGHEST_RATE:g} on"
@@ -294,7 +296,7 @@ def _message_periods(
             raise ValueError(
                 f"rates: no sensor '{name}'; there are: {', '.join(periods)}"
             )
-        if not (is_real(rate) and 0.0 < rate <= HIGHEST_RATE):
+        if not 0.0 < of_type(rate, float, f"rates: {name}") <= HIGHEST_RATE:
             raise ValueError(
                 f"rates: {name}: {rate!r} is not a positive number of messages "
                 f"a second, at most {HIGHEST_RATE}"

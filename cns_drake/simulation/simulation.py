@@ -31,6 +31,7 @@ from cns_drake.scenarios import (
     dependency_versions,
     describe_scenario,
     digest_inputs,
+    make_city,
     recording_fingerprint,
 )
 from cns_drake.scene import FileWatch, InSight
@@ -150,11 +151,7 @@ def simulate(
             other = read_drive_page(Path(beside), _city(scenario))
         RecordingFolder(folder).check(overwrite)
         check_folder_writable(folder.parent)
-        if scenario.city.is_made:
-            # A drive through a city that is there needs nothing that makes one.
-            from cns_drake.scenarios import make_city
-
-            scenario = make_city(scenario, folder.parent / "cities")
+        scenario = make_city(scenario, folder.parent / "cities")
         plan = DrivePlan(scenario)
         if scenario.cameras:
             check_renderer()

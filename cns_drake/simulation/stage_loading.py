@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from cns_drake.motion import vehicle_file
 from cns_drake.scenarios import (
     DrivePlan,
     count_frames,
@@ -16,7 +17,6 @@ from cns_drake.scene import InSight, World
 from cns_drake.sensors import make_lidar_model
 from cns_drake.transient import change_world
 from evaluation.base import doing
-from worlds.maps import vehicle_file
 from worlds.shapes import Way
 
 # Distance from the car's middle line to its sides, with a margin [m].

@@ -11,18 +11,14 @@ from cns_drake.scenarios import (
     load_scenario,
     write_scenarios,
 )
-from cns_drake.studies.maps.experiment_maps import MapPairs, pairs_by_map
-from cns_drake.studies.pairs.changed_pairs import changed_pairs
-from cns_drake.studies.pairs.comparisons import ChangedPair
-from evaluation.base import (
-    Cluster,
-    InputError,
-    check_writable,
-    note,
-    write_csv,
+from cns_drake.studies.maps.experiment_maps import pairs_by_map
+from cns_drake.studies.pairs.changed_pairs import (
+    changed_pairs,
+    simulated_drives,
 )
+from evaluation.base import Cluster, InputError, check_writable, note, write_csv
 from evaluation.results import CAUSE
-from evaluation.study import ExperimentRun, load_experiment
+from evaluation.study import ExperimentRun, Pair, load_experiment
 from worlds.maps import recordable_drives
 
 
@@ -85,23 +81,15 @@ def study_drives(
     return _drives_of(_study_pairs(run, maps), run.source)
 
 
-def _study_pairs(
-    run: ExperimentRun, maps: Sequence[str]
-) -> list[tuple[MapPairs, ChangedPair]]:
+def _study_pairs(run: ExperimentRun, maps: Sequence[str]) -> list[Pair]:
     found = list(pairs_by_map(run, maps))
-    return [
-        (some, one)
-        for some, pairs in zip(found, changed_pairs(run, found), strict=True)
-        for one in pairs
-    ]
+    return [one for pairs in changed_pairs(run, found) for one in pairs]
 
 
-def _drives_of(
-    found: Iterable[tuple[MapPairs, ChangedPair]], source: str
-) -> list[Scenario]:
+def _drives_of(pairs: Iterable[Pair], source: str) -> list[Scenario]:
     drives: dict[str, Scenario] = {}
-    for _, pair in found:
-        for drive in pair.drives:
+    for pair in pairs:
+        for drive in simulated_drives(pair):
             if drives.setdefault(drive.name, drive) != drive:
                 raise InputError(f"{source}: two drives are named {drive.name}")
     return list(drives.values())
@@ -111,24 +99,25 @@ def _drives_of(
 _PAIR = ("map", "database", "query", "case", "seed")
 
 
-def _write_pairs(
-    found: Sequence[tuple[MapPairs, ChangedPair]], path: Path
-) -> None:
+def _write_pairs(pairs: Iterable[Pair], path: Path) -> None:
     """Writes the pairs of an experiment, by the names of their recordings.
 
     Several drives of a database are separated by spaces. The protocol's seed
     is the column `protocol_seed`; the others have the names of its fields.
     """
     rows: list[dict[str, Any]] = []
-    for some, pair in found:
-        *database, query = (drive.name for drive in pair.drives)
-        factors = {**some.factors, **pair.condition.factors}
+    for pair in pairs:
+        *database, query = (one.name for one in simulated_drives(pair))
         protocol = asdict(pair.protocol)
         protocol["protocol_seed"] = protocol.pop("seed")
-        case = factors.get(CAUSE)
-        values = some.map_name, " ".join(database), query, case, pair.seed
+        case = pair.factors.get(CAUSE)
+        values = pair.map_name, " ".join(database), query, case, pair.seed
         rows.append(
-            {**dict(zip(_PAIR, values, strict=True)), **factors, **protocol}
+            {
+                **dict(zip(_PAIR, values, strict=True)),
+                **pair.factors,
+                **protocol,
+            }
         )
     names = list(dict.fromkeys(name for row in rows for name in row))
     write_csv(path, names, ([row.get(name) for name in names] for row in rows))

@@ -31,10 +31,6 @@ from evaluation.base import (
     scratch_folder,
 )
 
-# Expected time to load a stage [s].
-_LOADING = 4.0
-# Expected time to simulate a frame with the default LiDAR [s].
-_FRAME = 0.011
 # Assumed number of frames of a drive that states none.
 _USUAL_FRAMES = 3000
 
@@ -116,12 +112,11 @@ def plan_recordings(
     for files in folders:
         files.check(overwrite)
     return [
-        Job(
-            name=step.scenario.name,
-            step=step,
-            cost=_LOADING + _FRAME * usual_frames([step.scenario]),
+        Job(step.scenario.name, step)
+        # Long drives first, so that no core waits for one at the end.
+        for step in sorted(
+            waiting, key=lambda one: -usual_frames([one.scenario])
         )
-        for step in waiting
     ]
 
 

@@ -1,7 +1,7 @@
 """Records the drives of maps, and measures the experiment `stages`."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from cns_drake.pictures import draw_drives, draw_stages, load_views
@@ -27,8 +27,10 @@ from evaluation.base import (
     Part,
     Reporter,
     Space,
+    forecast,
     make_folder,
     natural_key,
+    run_jobs,
 )
 from evaluation.drives import driven_way
 from evaluation.recognition import RetrievalProtocol, choose_methods
@@ -100,15 +102,25 @@ def reproduce_maps(
         if with_recordings:
             pictures += _plan_pictures(folder, output / "pictures")
     pages = {s.name: output / "pages" / f"{s.name}.html" for s in drives}
-    jobs = []
-    if with_recordings:
-        jobs = plan_recordings(
-            [*drives, *controls], output, pages=pages if with_pages else {}
-        )
-    make_folder(output)
     every = [*drives, *controls]
+    make_folder(output)
+    space: Space | None = _expected_space(
+        usual_frames(every),
+        len(drives) if with_pages and with_recordings else 0,
+        output,
+        with_recordings=with_recordings,
+    )
+    if with_recordings:
+        jobs = plan_recordings(every, output, pages=pages if with_pages else {})
+        if told := forecast([*jobs, *pictures], cluster, space):
+            on_note(told)
+        run_jobs([*jobs, *pictures], cluster, "drives")
+        space = None
     return study_recordings(
-        _recordings(every, output, with_recordings=with_recordings),
+        sorted(
+            (_drive_info(one, output) for one in every),
+            key=lambda one: one.name,
+        ),
         output / "report",
         cluster,
         chosen,
@@ -116,30 +128,10 @@ def reproduce_maps(
         source=", ".join(folder.name for folder in folders),
         with_costs=with_costs,
         printed=printed,
-        further_jobs=[*jobs, *pictures],
-        space=_expected_space(
-            usual_frames(every),
-            len(drives) if with_pages and with_recordings else 0,
-            output,
-            with_recordings=with_recordings,
-        ),
+        space=space,
         pages={name: f"../pages/{page.name}" for name, page in pages.items()},
         on_note=on_note,
     )
-
-
-def _recordings(
-    scenarios: Sequence[Scenario], output: Path, *, with_recordings: bool
-) -> list[RecordingInfo]:
-    """Returns the recordings to evaluate, in the order of `cns-eval report`."""
-    found = []
-    for scenario in scenarios:
-        is_waiting = not is_recorded(scenario, output)
-        info = recording_info(scenario, output, is_waiting and with_recordings)
-        if is_waiting and not with_recordings:
-            info = replace(info, made_by=SimulationSource(scenario))
-        found.append(info)
-    return sorted(found, key=lambda recording: recording.name)
 
 
 def _expected_space(
@@ -175,32 +167,22 @@ def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
     ]
 
 
-def recording_info(
-    scenario: Scenario, output: Path, is_waiting: bool
-) -> RecordingInfo:
-    """Returns the description of a recording, which need not exist yet.
-
-    Args:
-        scenario: scenario of the recording.
-        output: folder of the recordings.
-        is_waiting: whether the recording does not exist yet, and a job with the
-            name of the scenario will make it.
-    """
+def _drive_info(scenario: Scenario, output: Path) -> RecordingInfo:
+    """Returns the description of a drive, recorded in a folder or simulated."""
     assert scenario.stage is not None  # It has a map.
     fields = describe_scenario(scenario)
+    made_by = None
+    if not is_recorded(scenario, output):
+        made_by = SimulationSource(scenario)
     return RecordingInfo(
         name=scenario.name,
         path=output.absolute() / scenario.name,
         map_name=scenario.folder.name,
         stage=scenario.stage,
         way=driven_way(fields),
+        made_by=made_by,
         scenario=scenario_digest(fields),
-        needs=(scenario.name,) if is_waiting else (),
     )
-
-
-# Expected time to draw a stage [s].
-_STAGE_COST = 5.0
 
 
 @dataclass(frozen=True)
@@ -258,7 +240,6 @@ def _plan_pictures(folder: Path, pictures: Path) -> list[Job]:
                     (shown, picture),
                     figures=(picture,),
                 ),
-                cost=_STAGE_COST * len(shown),
             )
         )
     return jobs

@@ -18,14 +18,16 @@ from cns_drake.scenarios import (
     plan_drive,
     redrawn_city,
 )
+from cns_drake.simulation import SimulationSource
 from cns_drake.studies.cause_check import cause_fault
 from cns_drake.studies.maps.experiment_maps import MapPairs, pairs_by_map
-from cns_drake.studies.pairs.changed_pairs import changed_pairs
-from cns_drake.studies.pairs.comparisons import ChangedPair
-from cns_drake.studies.pairs.simulated_pairs import (
-    simulated_drive,
-    simulated_pair,
+from cns_drake.studies.pairs.changed_pairs import (
+    changed_pairs,
+    pair_fingerprint,
+    simulated_drives,
 )
+from cns_drake.studies.pairs.map_upkeep import UpkeptSource, plain_source
+from cns_drake.studies.recording import is_recorded
 from cns_drake.studies.tasks.map_task import DrivenMapTask
 from cns_drake.studies.tasks.seen_task import SeenTask
 from evaluation.alignment import When
@@ -39,7 +41,7 @@ from evaluation.base import (
     read_records,
     whole_number,
 )
-from evaluation.drives import sample_frames
+from evaluation.drives import DriveSource, RecordingSource, sample_frames
 from evaluation.results import LEVEL, PrintStyle
 from evaluation.study import (
     ChangeTask,
@@ -49,12 +51,13 @@ from evaluation.study import (
     Pair,
     PlaceTask,
     PoseTask,
-    ShownCity,
+    RecordedCity,
     Study,
+    StudyDrive,
     Task,
-    add_city,
     causes,
     condition_protocol,
+    draw_cities,
     drives_by_map,
     find_recordings,
     load_experiment,
@@ -123,8 +126,9 @@ def run_study(
         cluster,
         on_note,
     )
-    cities = plan_study(study, maps, align, pose_gap)
-    results, queries = study.measure()
+    pairs, cities = plan_study(study, maps, align, pose_gap)
+    shown = [asked for one in cities for asked in one.shown()]
+    results, queries = study.measure(pairs, shown)
     own = [one.name for one, _ in study.methods.values() if one.file]
     notes = [one.to_text() for one in study.protocols]
     if own and (changed := _unlike_shipped(study, maps)):
@@ -132,10 +136,13 @@ def run_study(
         own = []
     sections = []
     if cities:
-        sections = recorded_sections(cities, results, queries, study.output, {})
+        drawn = draw_cities(study, cities)
+        sections = recorded_sections(drawn, results, queries, study.output, {})
+    doing("writing the page")
     return study.write_page(
         results,
         queries,
+        pairs,
         notes,
         sections,
         own_methods=own,
@@ -178,8 +185,8 @@ def plan_study(
     maps: Sequence[str] = (),
     align: When = "auto",
     pose_gap: float | None = None,
-) -> list[ShownCity]:
-    """Plans how all pairs of drives in all conditions are measured.
+) -> tuple[list[Pair], list[RecordedCity]]:
+    """Chooses what is measured, and makes the cities of all drives.
 
     Args:
         study: the study.
@@ -187,7 +194,7 @@ def plan_study(
         align, pose_gap: see `run_study`.
 
     Returns:
-        What the page shows of recorded cities.
+        The pairs of all maps; the recorded cities that the page shows.
 
     Raises:
         InputError: a field of the experiment, a map or the folder cannot be
@@ -214,16 +221,23 @@ def plan_study(
     )
     doing("looking at all conditions")
     changed = changed_pairs(study, found)
-    cities: list[ShownCity] = []
-    for some, simulations in zip(found, changed, strict=True):
+    if experiment.frozen is not None:
+        _check_drives_are_frozen(experiment.frozen, changed)
+    pairs: list[Pair] = []
+    cities: list[RecordedCity] = []
+    for some, simulated in zip(found, changed, strict=True):
         if some.city is None:
-            pairs = [simulated_pair(study, some, one) for one in simulations]
+            of_map = [
+                _recorded_if_there(one, study.output) for one in simulated
+            ]
+            if any(one.num_distractors for one in of_map):
+                of_map = _with_distractors(study, some, of_map)
         else:
             conditions = [
                 (one, condition_protocol(one, study.source))
                 for one in experiment.conditions
             ]
-            pairs = list(
+            of_map = list(
                 recorded_pairs(
                     some.city,
                     conditions,
@@ -233,21 +247,37 @@ def plan_study(
                     both_ways=experiment.drives == "both-ways",
                 )
             )
-        if not pairs:
+            # Without maps of the drives, there is nothing to show.
+            if of_map and ChangeTask.name in study.tasks:
+                cities.append(RecordedCity(some.city, tuple(of_map)))
+        if not of_map:
             study.on_note(f"{some.map_name}: no two drives to compare")
-        others = [
-            simulated_drive(study, one)
-            for one in _distractors(study, some, pairs)
-        ]
-        if some.city is None:
-            study.add(pairs, others)
-        elif shown := add_city(study, some.city, pairs, others):
-            cities.append(shown)
-    if not study.jobs:
+        pairs += of_map
+    if not pairs:
         raise InputError(f"{study.source}: no condition that can be measured")
-    if experiment.frozen is not None:
-        _check_drives_are_frozen(experiment.frozen, found, changed)
-    return cities
+    return pairs, cities
+
+
+def _recorded_if_there(pair: Pair, output: Path) -> Pair:
+    """Returns a pair whose drives are read where they are recorded."""
+
+    def source(one: DriveSource) -> DriveSource:
+        if isinstance(one, UpkeptSource):
+            return replace(one, sources=tuple(map(source, one.sources)))
+        drive = plain_source(one).scenario
+        if not is_recorded(drive, output):
+            return one
+        return RecordingSource(output / drive.name)
+
+    def drive(one: StudyDrive) -> StudyDrive:
+        return replace(one, source=source(one.source))
+
+    return replace(
+        pair,
+        database=tuple(map(drive, pair.database)),
+        query=drive(pair.query),
+        way=pair.way and drive(pair.way),
+    )
 
 
 def _with_usable_causes(study: Study) -> Experiment:
@@ -273,29 +303,30 @@ def _with_usable_causes(study: Study) -> Experiment:
 _NOTED_DRIVES = 20
 
 
-def _distractors(
-    study: Study, some: MapPairs, found: Iterable[Pair]
-) -> list[Scenario]:
-    """Returns the drives through other cities that the pairs of a map need.
+def _with_distractors(
+    study: Study, some: MapPairs, pairs: Iterable[Pair]
+) -> list[Pair]:
+    """Returns the pairs of a map with the drives through other cities.
 
     Adding the places of these drives to a database makes recognition harder.
     The drives come in this order, until they have about as many places as a
-    pair adds at most: the shipped drives of other maps, each through its own
-    stage; if the map is shipped, drives along its streets between other
-    buildings; the drives of other maps through their other stages; and drives
-    along the streets of other maps, between other buildings.
+    pair adds: the shipped drives of other maps, each through its own stage; if
+    the map is shipped, drives along its streets between other buildings; the
+    drives of other maps through their other stages; and drives along the
+    streets of other maps, between other buildings.
 
     Raises:
         InputError: a shipped map cannot be used.
     """
-    most = max((one.distractors for one in found), default=0)
-    if not most:
-        return []
+    pairs = list(pairs)
+    most = max(one.num_distractors for one in pairs)
     # The same LiDARs see all places.
     database, _ = some.pairs[0]
     study.on_note(f"{database.name}: looking for {most} places elsewhere")
     spacing = study.protocols[0].place_spacing
-    drives: list[Scenario] = []
+    drives: list[StudyDrive] = []
+    # Number of places before each drive.
+    before: list[int] = []
     number = 0
     for drive in _drives_elsewhere(
         database, study.output / "cities", study.cluster
@@ -303,28 +334,36 @@ def _distractors(
         if number >= most:
             break
         drive = drive.replaced(lidars=database.lidars, offset=database.offset)
-        drives.append(drive)
+        drives.append(StudyDrive(drive.name, SimulationSource(drive)))
+        before.append(number)
         trajectory = plan_drive(drive)
         frames = np.arange(count_frames(drive, trajectory))
         _, p_WB = trajectory.poses(drive.frame_period * frames)
         number += len(sample_frames(p_WB, spacing))
         if len(drives) % _NOTED_DRIVES == 0:
             study.on_note(f"{database.name}: found {number} places elsewhere")
-    return drives
+    return [
+        replace(
+            one,
+            distractors=tuple(
+                drive
+                for drive, first in zip(drives, before, strict=True)
+                if first < one.num_distractors
+            ),
+        )
+        for one in pairs
+    ]
 
 
 def _check_drives_are_frozen(
-    table: str,
-    maps: Iterable[MapPairs],
-    changed: Iterable[Iterable[ChangedPair]],
+    table: str, changed: Iterable[Iterable[Pair]]
 ) -> None:
     """Checks that the drives of each map and level are those of a table."""
     prints: dict[tuple[str, int], list[str]] = {}
     worlds: dict[tuple, str] = {}
-    for some, pairs in zip(maps, changed, strict=True):
+    for pairs in changed:
         for one in pairs:
-            factors = {**some.factors, **one.condition.factors}
-            place = some.map_name, factors.get(LEVEL, 0)
+            place = one.map_name, one.factors.get(LEVEL, 0)
             drawn = drives_fingerprint(one, worlds)
             prints.setdefault(place, []).append(drawn)
     check_frozen(table, prints)
@@ -357,7 +396,7 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
     }
 
 
-def drives_fingerprint(pair: ChangedPair, worlds: dict[tuple, str]) -> str:
+def drives_fingerprint(pair: Pair, worlds: dict[tuple, str]) -> str:
     """Returns a hash of all drives and of the cities along these drives.
 
     Args:
@@ -368,25 +407,25 @@ def drives_fingerprint(pair: ChangedPair, worlds: dict[tuple, str]) -> str:
     Raises:
         InputError: a file of a world cannot be read.
     """
+    drives = simulated_drives(pair)
     keys = [
-        (drive.world_file, drive.model_paths, drive.traffic)
-        for drive in pair.drives
+        (drive.world_file, drive.model_paths, drive.traffic) for drive in drives
     ]
-    for drive, key in zip(pair.drives, keys, strict=True):
+    for drive, key in zip(drives, keys, strict=True):
         if key not in worlds:
             worlds[key] = combined_digest(digest_inputs(drive))
-    # Where the LiDARs pass counts, not by which field.
-    passing = [
-        one._replace(
-            drive=one.drive.replaced(
-                lidars=one.drive.mounted_lidars, offset=OffsetConfig()
-            )
-        )
-        for one in pair.dated
-    ]
     return fingerprint(
         {
-            "drives": replace(pair, dated=tuple(passing)).fingerprint(),
+            # Where the LiDARs pass counts, not by which field.
+            "drives": pair_fingerprint(
+                pair,
+                [
+                    one.replaced(
+                        lidars=one.mounted_lidars, offset=OffsetConfig()
+                    )
+                    for one in drives
+                ],
+            ),
             "worlds": [worlds[key] for key in keys],
         }
     )

@@ -7,8 +7,7 @@ import numpy as np
 
 from cns_drake.traffic.traffic_plan import Tracks
 from evaluation.base import cos, sin
-from worlds.roads import outlines
-from worlds.shapes import overlap
+from worlds.shapes import car_outlines, overlap
 
 # Greatest time between two comparisons of road users with the ego car [s]: they
 # notice everything that crosses its path.
@@ -54,7 +53,7 @@ class EgoBox(NamedTuple):
             yaw: (N,) headings of the car [rad].
         """
         ahead = np.column_stack([cos(yaw), sin(yaw)])
-        return outlines(xy, ahead, -self.rear, self.front, self.half_width)
+        return car_outlines(xy, ahead, -self.rear, self.front, self.half_width)
 
 
 # Number of times that are compared at once.
@@ -91,7 +90,7 @@ def meetings_with_ego(
         own = values[time, body]
         ahead = np.column_stack([cos(own[:, 3]), sin(own[:, 3])])
         long, wide = half[body, :1], half[body, 1:]
-        bodies = outlines(own[:, :2], ahead, long, long, wide)
+        bodies = car_outlines(own[:, :2], ahead, long, long, wide)
         own_car = box.corners(xy[time], yaw[time])
         do_meet = overlap(own_car, bodies)
         met[first + time[do_meet], body[do_meet]] = True

@@ -24,10 +24,7 @@ from cns_drake.sensors import check_unused_names
 from cns_drake.traffic.body_shapes import Limb, vehicle_limbs, walker_limbs
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 from evaluation.base import MAX_INSTANCE, InputError, cos, product, sin
-from worlds.shapes import (
-    StructureEntry,
-    StructureTable,
-)
+from worlds.shapes import StructureEntry, StructureTable
 
 # Faster bodies are labelled as moving, all others as standing [m/s].
 MOVING_SPEED = 0.5

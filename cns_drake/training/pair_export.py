@@ -52,8 +52,6 @@ _POINTS = 4096
 # Clouds are downsampled to this first, so that far walls keep points [m].
 _VOXEL = 0.3
 _GROUND = np.array(sorted(CLASS_IDS[name] for name in GROUND_CLASSES))
-# Expected time to export a drive [s].
-_DRIVE_COST = 20.0
 
 
 @dataclass(frozen=True)
@@ -128,7 +126,6 @@ def write_pairs(
                 export_run,
                 (SimulationSource(one), output / "runs" / one.name, options),
             ),
-            cost=_DRIVE_COST,
         )
         for one in every
     ]

@@ -24,11 +24,7 @@ from cns_drake.studies import turned_content
 from evaluation.base import draft_folder
 from evaluation.lidar_sheets import make_sheet
 from worlds.city import City, generate_city, make_city, start_city
-from worlds.maps import (
-    STAGES_NAME,
-    MapFolder,
-    shipped_maps,
-)
+from worlds.maps import STAGES_NAME, MapFolder, shipped_maps
 from worlds.roads import draw_route, load_road_network
 
 # First seed, far from the seeds of all experiments and tests.

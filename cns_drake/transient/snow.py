@@ -9,12 +9,7 @@ from cns_drake.transient.effect import Effect, Phase
 from cns_drake.transient.scene_editing import SceneEditing, SurfaceLook
 from cns_drake.transient.surroundings import Surroundings, change_rng
 from evaluation.base import sin
-from worlds.shapes import (
-    GROUND_CLASSES,
-    GroundSurface,
-    turned_up,
-    unit_normals,
-)
+from worlds.shapes import GROUND_CLASSES, GroundSurface, turned_up, unit_normals
 
 # Cause of these changes in the structure table.
 _CAUSE = "snow"

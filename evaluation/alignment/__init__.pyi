@@ -1,5 +1,4 @@
 from .align import AlignmentReport as AlignmentReport
-from .opening import Opened as Opened
 from .opening import When as When
 from .opening import WorldVerdict as WorldVerdict
 from .opening import open_pair as open_pair

@@ -56,7 +56,9 @@ from .errors import no_such as no_such
 from .errors import one_line as one_line
 from .errors import validated as validated
 from .errors import value_errors as value_errors
-from .expansion import expanded_size as expanded_size
+from .field_types import check_fields as check_fields
+from .field_types import of_type as of_type
+from .field_types import types_of_fields as types_of_fields
 from .figures import GONE_RGB as GONE_RGB
 from .figures import NEW_RGB as NEW_RGB
 from .figures import UNSEEN_RGB as UNSEEN_RGB
@@ -95,6 +97,8 @@ from .jobs.running import forecast as forecast
 from .jobs.running import run_jobs as run_jobs
 from .jobs.step import Reporter as Reporter
 from .jobs.step import Step as Step
+from .jobs.store import Key as Key
+from .jobs.store import Store as Store
 from .json_text import fingerprint as fingerprint
 from .json_text import json_values as json_values
 from .json_text import parse_json as parse_json

@@ -33,6 +33,8 @@ def file_digests(files: Sequence[Path]) -> list[str]:
     Raises:
         InputError: a file cannot be read, or is no regular file.
     """
+    if not files:
+        return []
     paths = [os.path.realpath(file) for file in files]
     name = hashlib.sha256("\0".join(paths).encode(errors="surrogateescape"))
     cache = own_cache("digests")

@@ -34,6 +34,7 @@ class InputError(Exception):
 
     Attributes:
         exit_status: exit status of a command that ends with this error.
+        field: name of the outermost field at fault, if it is known; or "".
 
     Example:
         from evaluation import InputError, open_drive
@@ -46,14 +47,16 @@ class InputError(Exception):
 
     exit_status = 2
 
-    def __init__(self, message: object):
+    def __init__(self, message: object, field: str = ""):
         """Makes an error with a message of one line.
 
         Args:
             message: the message; line breaks and control characters are
                 replaced.
+            field: see `InputError`.
         """
         super().__init__(one_line(message))
+        self.field = field
 
 
 class FailedJobsError(InputError):
@@ -81,13 +84,16 @@ def value_errors(place: object) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def errors_at(place: object, instead_of: str = "") -> Iterator[None]:
+def errors_at(
+    place: object, instead_of: str = "", field: str = ""
+) -> Iterator[None]:
     """Puts a place before the message of an InputError in a `with` block.
 
     Args:
         place: file, field or other place, in words.
         instead_of: text that is removed from the beginning of the message
             before the place is added.
+        field: the field at fault, if the error knows none.
 
     Raises:
         InputError: if the block raises InputError.
@@ -96,7 +102,7 @@ def errors_at(place: object, instead_of: str = "") -> Iterator[None]:
         yield
     except InputError as error:
         fault = str(error).removeprefix(instead_of)
-        raise InputError(f"{place}: {fault}") from error
+        raise InputError(f"{place}: {fault}", error.field or field) from error
 
 
 @contextlib.contextmanager
@@ -157,7 +163,8 @@ def validated(model: type[_Model], values: object, source: object) -> _Model:
         return model.model_validate(values)
     except ValidationError as error:
         fault = describe_validation_error(source, error, model)
-        raise InputError(fault) from None
+        place = min(error.errors(), key=_urgency)["loc"]
+        raise InputError(fault, str(place[0]) if place else "") from None
 
 
 def describe_validation_error(

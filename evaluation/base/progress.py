@@ -8,7 +8,7 @@ its parent process. By default, they are ignored.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 import contextlib
 from contextvars import ContextVar
 from typing import TypeVar
@@ -32,22 +32,15 @@ class Listener:
         """
 
     def jobs(
-        self,
-        costs: Mapping[str, float],
-        titles: Mapping[str, str],
-        num_done: int,
-        unit: str,
+        self, num_jobs: int, num_done: int, unit: str
     ) -> contextlib.AbstractContextManager[JobsListener]:
         """Returns a context manager whose value receives reports of jobs.
 
         The value may be called from any thread.
 
         Args:
-            costs: name of each job that is left -> expected time on one core
-                [s].
-            titles: name of each of these jobs -> what it works on, in words.
-            num_done: number of jobs that are not in `costs`, because they were
-                done before.
+            num_jobs: number of jobs.
+            num_done: number of these jobs that were done before.
             unit: what the jobs are, such as `cities`.
         """
         return contextlib.nullcontext(JobsListener())

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 import contextlib
 from dataclasses import dataclass
 import datetime
-import math
-import re
 import sys
 import threading
 import time
@@ -26,9 +24,6 @@ PATIENCE = 1.0
 _INTERVAL = 30.0
 # A line of a log names at most this number of jobs.
 _MOST_NAMED = 3
-# Part of a fingerprint at the end of a job's name, which keeps it unique. Words
-# and dates are none.
-_FINGERPRINT = re.compile(r" (?=\S*\d)(?=\S*[a-f])(?:[0-9a-f]{6}|[0-9a-f]{8})$")
 # Width of a bar [characters].
 _BAR = 20
 # An estimate is made once this share of the work is done.
@@ -36,135 +31,6 @@ _LEAST_SHARE = 0.1
 # No estimate is made before this time [s]: the first scans also load programs
 # and cities.
 _LEAST_TIME = 3.0
-# Work that is older than this share of all work hardly counts in the pace of
-# jobs, which follows the load of the machine.
-_MEMORY = 0.15
-# The pace of a kind is that of all jobs, as if jobs of this kind had done this
-# share of all work at that pace.
-_BORROWED = 0.02
-
-
-class TimeLeft:
-    """Estimates the time left for jobs from the time that others take.
-
-    The time of the jobs that have ended, or count how far they are, divided by
-    their expected time, is the pace of the jobs that are left. Jobs of the same
-    kind, and late jobs, count most, because machines differ in how fast they do
-    one kind of work, and their load changes.
-
-    The methods take the present time `now` [s], always of the same clock.
-    """
-
-    def __init__(self, costs: Mapping[str, float]):
-        """Makes an estimate for jobs, none of which has started.
-
-        Args:
-            costs: name of each job -> expected time on one core [s].
-        """
-        self._left = dict(costs)
-        self._total = sum(costs.values())
-        # Name of each running job -> when it started, or has begun.
-        self._since: dict[str, float] = {}
-        self._begun: set[str] = set()
-        self._most_running = 1
-        # Kind, expected and real time, in the order in which jobs ended.
-        self._ended: list[tuple[str, float, float]] = []
-
-    def start(self, name: str, now: float) -> None:
-        """Records that a job starts, or is started again."""
-        self._since[name] = now
-        self._begun.discard(name)
-        self._most_running = max(self._most_running, len(self._since))
-
-    def begin(self, name: str, now: float) -> None:
-        """Records that a job tells what it does.
-
-        Until then, the first job of a process loads the program, as no later
-        job does.
-        """
-        if name not in self._begun:
-            self._begun.add(name)
-            self._since[name] = now
-
-    def end(self, name: str, now: float) -> None:
-        """Records that a job has ended, perhaps without having started."""
-        cost = self._left.pop(name)
-        if name in self._since:
-            taken = now - self._since.pop(name)
-            self._ended.append((_kind(name), cost, taken))
-
-    def share(self) -> float:
-        """Returns the share of all work that has ended, 0 to 1."""
-        return 1.0 - sum(self._left.values()) / max(self._total, 1e-9)
-
-    def seconds(
-        self, now: float, counted: Mapping[str, float | None]
-    ) -> float | None:
-        """Returns the time left [s]; None while it cannot be estimated.
-
-        Args:
-            now: the present time [s].
-            counted: name of each running job -> its time left as it counts [s];
-                None if it does not.
-        """
-        # Other threads may start and end jobs meanwhile.
-        left, running = dict(self._left), dict(self._since)
-        if not left:
-            return 0.0
-        # A job that takes longer than expected counts as if it ended now, since
-        # the machine may have become slower.
-        ended = list(self._ended)
-        measured = list(ended)
-        for name, since in running.items():
-            cost, kind, rest = left.get(name), _kind(name), counted.get(name)
-            if cost is None:
-                continue
-            taken = now - since + (rest or 0.0)
-            if taken > cost * self._pace(ended, kind) if ended else rest:
-                measured.append((kind, cost, taken))
-        if not measured:
-            return None
-        known = self._total - sum(left.values())
-        times, longest = [], 0.0
-        for name, cost in left.items():
-            needed = cost * self._pace(measured, _kind(name))
-            if name in running:
-                taken = now - running[name]
-                known += cost * min(taken / needed, 1.0)
-                # One that takes longer than expected soon ends, perhaps.
-                needed = needed - taken if taken < needed else 0.1 * needed
-                longest = max(longest, needed)
-            times.append(needed)
-        if known < _LEAST_SHARE * self._total:
-            return None
-        # As many jobs run side by side as before, and the longest job bounds
-        # the time.
-        side_by_side = min(self._most_running, len(times))
-        return max(sum(times) / side_by_side, longest)
-
-    def _pace(
-        self, measured: list[tuple[str, float, float]], kind: str
-    ) -> float:
-        """Returns the time that a job takes, divided by its expected time."""
-        own, every, age = [0.0, 0.0], [0.0, 0.0], 0.0
-        for one, cost, seconds in reversed(measured):
-            weight = math.exp(-age / (_MEMORY * self._total))
-            for sums in (own, every) if one == kind else (every,):
-                sums[0] += weight * cost
-                sums[1] += weight * seconds
-            age += cost
-        borrowed = _BORROWED * self._total
-        pace = every[1] / every[0]
-        return (own[1] + borrowed * pace) / (own[0] + borrowed)
-
-
-def _kind(name: str) -> str:
-    """Returns the kind of a job, the first of several words of its name.
-
-    Jobs that record drives have the names of the drives, which are one word.
-    """
-    kind, *rest = name.split(maxsplit=1)
-    return kind if rest else ""
 
 
 @dataclass
@@ -221,11 +87,6 @@ class _Task:
         if is_early or done <= 0 or seconds < _LEAST_TIME:
             return None
         return seconds / done * (self.total - self.done)
-
-
-def _in_words(name: str) -> str:
-    """Returns the name of a job, without a fingerprint at its end, in words."""
-    return _FINGERPRINT.sub("", name).replace("_", " ")
 
 
 def shown_times(elapsed: float, left: float | None) -> str:
@@ -287,14 +148,10 @@ class Display(Listener):
 
     @contextlib.contextmanager
     def jobs(
-        self,
-        costs: Mapping[str, float],
-        titles: Mapping[str, str],
-        num_done: int,
-        unit: str,
+        self, num_jobs: int, num_done: int, unit: str
     ) -> Iterator[_JobsDisplay]:
         before = self._jobs
-        self._jobs = _JobsDisplay(costs, titles, num_done, unit, self._now)
+        self._jobs = _JobsDisplay(num_jobs, num_done, unit, self._now)
         try:
             yield self._jobs
         finally:
@@ -383,25 +240,21 @@ class _JobsDisplay(JobsListener):
 
     def __init__(
         self,
-        costs: Mapping[str, float],
-        titles: Mapping[str, str],
+        num_jobs: int,
         num_done: int,
         unit: str,
         clock: Callable[[], float],
     ):
-        self._left = TimeLeft(costs)
-        self._titles = titles
         self._tasks: dict[str, _Task] = {}
+        self._num_jobs = num_jobs
+        self._num_before = num_done
         self._num_ended = num_done
-        self._num_jobs = num_done + len(costs)
         self._unit = unit
         self._now = clock
         self._start = clock()
 
     def start(self, name: str) -> None:
-        self._left.start(name, self._now())
-        title = self._titles.get(name) or _in_words(name)
-        self._tasks[name] = _Task(title, "starting")
+        self._tasks[name] = _Task(name.replace("_", " "), "starting")
 
     def doing(
         self,
@@ -413,11 +266,9 @@ class _JobsDisplay(JobsListener):
     ) -> None:
         if name in self._tasks:
             now = self._now()
-            self._left.begin(name, now)
             self._tasks[name].update(activity, done, total, unit, now)
 
     def end(self, name: str, fault: bool = False) -> None:
-        self._left.end(name, self._now())
         self._num_ended += 1
         self._tasks.pop(name, None)
 
@@ -428,12 +279,15 @@ class _JobsDisplay(JobsListener):
         """
         # Other threads may start and end jobs meanwhile.
         tasks = dict(self._tasks)
-        left = self._left.seconds(
-            now, {name: one.left(now) for name, one in tasks.items()}
+        every = _Task(
+            done=self._num_ended,
+            total=self._num_jobs,
+            since=self._start,
+            first=self._num_before,
         )
-        times = shown_times(now - self._start, left)
+        times = shown_times(now - self._start, every.left(now))
         done = f"{self._num_ended} of {self._num_jobs} {self._unit} done"
         return [
-            (f"{done}, {times}", self._left.share()),
+            (f"{done}, {times}", every.share()),
             *((one.text(), one.share()) for one in tasks.values()),
         ]

@@ -45,7 +45,6 @@ def measure_localisation(
     database: Callable[[], Drive | Path],
     query: Callable[[], Drive],
     methods: tuple[str | Path, ...],
-    texts: tuple[str, ...],
     starts: tuple[Starts, ...],
     spacing: float,
     values: tuple[tuple[str, Any], ...] = (),
@@ -63,8 +62,6 @@ def measure_localisation(
         database: opens the drive of the map, or returns the file of its points.
         query: opens the drive whose scans are localised.
         methods: names of registration methods, or Python files with your own.
-        texts: contents of the Python files, and "" for names of shipped
-            methods. Results are computed again if a text changes.
         starts: how the random initial poses of the scans are sampled, one entry
             for each size of their errors.
         spacing: distance between two queries [m].

@@ -423,7 +423,6 @@ class BevPlace(Method[np.ndarray, np.ndarray]):
     source = "Luo et al.: ICCV 2023"
     order = 10
     skips_places = True
-    describe_time = 0.85
     config: BevPlaceConfig
 
     def __init__(self, config: BevPlaceConfig | None = None):

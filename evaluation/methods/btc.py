@@ -417,9 +417,6 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     source = "Yuan et al.: T-RO 2024"
     standard = True
     order = 4
-    describe_time = 0.01
-    query_time = 0.012
-    place_time = 1.2e-4
     Config = BtcConfig
     skips_places = True
     divides = True

@@ -526,9 +526,6 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     style = ("#E69F00", "-", "v")
     standard = True
     order = 5
-    describe_time = 0.0015
-    query_time = 0.018
-    place_time = 4e-5
     Config = LayeredOverlapConfig
     skips_places = True
     config: LayeredOverlapConfig

@@ -200,7 +200,6 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
     style = ("#56B4E9", "--", "P")
     standard = True
     order = 6
-    describe_time = 0.002
     Config = LearnedConfig
     skips_places = True
     divides = True

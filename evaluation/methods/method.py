@@ -91,11 +91,6 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
             searched part by part. If so, the score and the pose of a place must
             not depend on other places, except through `shortlist`. A method
             with a second stage cannot divide.
-        describe_time: typical CPU time to describe a cloud [s], from which a
-            study estimates its time left, as from the next two.
-        query_time: typical CPU time to answer a query, with geometric
-            verification [s].
-        place_time: typical CPU time to compare a query with one more place [s].
         config: the parameters in use.
 
     Example:
@@ -120,9 +115,6 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     skips_places: ClassVar[bool] = False
     rerank_best: ClassVar[int] = 0
     divides: ClassVar[bool] = False
-    describe_time: ClassVar[float] = 0.02
-    query_time: ClassVar[float] = 0.02
-    place_time: ClassVar[float] = 3e-5
     # The Python file of a user's own method.
     _file: ClassVar[Path | None] = None
 

@@ -169,9 +169,6 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     source = "Xu, Lu, Wu, Lu, Zhu, Liang, Xiong, Wang: T-RO 2023"
     standard = True
     order = 3
-    describe_time = 0.022
-    query_time = 0.025
-    place_time = 6e-5
     Config = RingPlusPlusConfig
     skips_places = True
     divides = True
@@ -577,7 +574,10 @@ def _normalised_spectrum(image: np.ndarray) -> np.ndarray:
 
 @compiled
 def _standardised(image: np.ndarray) -> np.ndarray:
-    """Returns an image with zero mean and unit norm, see above."""
+    """Returns an image with zero mean and unit norm, see above.
+
+    An image of one value, which lacks a direction, becomes zero.
+    """
     pixels = image.ravel()
     total, squares = 0.0, 0.0
     for value in pixels:
@@ -585,7 +585,7 @@ def _standardised(image: np.ndarray) -> np.ndarray:
     mean = total / len(pixels)
     for value in pixels:
         squares += (value - mean) * (value - mean)
-    norm = math.sqrt(squares)
+    norm = math.sqrt(squares) or 1.0
     result = np.empty_like(pixels)
     for k in range(len(pixels)):
         result[k] = (pixels[k] - mean) / norm

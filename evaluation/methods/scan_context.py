@@ -157,9 +157,6 @@ class ScanContext(Method[Contexts, ContextDatabase]):
     source = "Kim, Choi, Kim: T-RO 2022"
     standard = True
     order = 1
-    describe_time = 0.0015
-    query_time = 0.004
-    place_time = 9e-6
     Config = ScanContextConfig
     skips_places = True
     divides = True

@@ -139,9 +139,6 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     source = "Kim, Choi, Sim, Kim, Park: RA-L 2024"
     standard = True
     order = 2
-    describe_time = 0.0013
-    query_time = 0.003
-    place_time = 1e-7
     Config = SolidConfig
     skips_places = True
     divides = True

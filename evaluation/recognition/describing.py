@@ -54,16 +54,14 @@ class _CloudKind(NamedTuple):
     fields: tuple[str, ...]
 
 
-_SINGLE_SCAN = _CloudKind(1, 0, ())
-
-
 def describe_drive(
     drive: Drive,
     methods: Iterable[Method],
     roles: Set[Role],
     protocol: RetrievalProtocol = RECORDED_PROTOCOL,
-    visit: Callable[[int, np.ndarray], None] | None = None,
     further: Iterable[Request] = (),
+    visit: Callable[[int], None] = lambda frame: None,
+    visited: Iterable[int] = (),
     make_list: Callable[[], Any] = list,
     costs: list[DescribingCost] | None = None,
 ) -> list[DriveDescriptors]:
@@ -79,13 +77,11 @@ def describe_drive(
         roles: whether the drive has places, queries or both.
         protocol: protocol that determines the frames of places and queries, and
             how their clouds are made.
-        visit: function that is called with the frame number and the scan (N, 3)
-            of each place and query that `protocol` chooses. The scan is cropped
-            to the protocol's range, in the sensor's frame. If the drive has
-            only queries, the scan is changed as the protocol says: with a
-            random yaw, a tilt or an occluded sector.
         further: requests for further descriptors: each is a method, the roles
             to describe, and a protocol.
+        visit: function that is called with each frame in `visited`, before the
+            frame is described.
+        visited: frames at which `visit` is called.
         make_list: function that returns an empty sequence with a method
             `append`, which holds the descriptors of one method in one role.
         costs: list to which the cost of each result is appended.
@@ -104,9 +100,7 @@ def describe_drive(
         describing.append(
             _DriveDescriber(drive, *request, make_list, describing)
         )
-    visited = set().union(
-        *(_frames_of_role(drive, role, protocol).tolist() for role in roles)
-    )
+    visited = {*visited}
     wanted = sorted(
         visited.union(*(describer.frames for describer in describing))
     )
@@ -114,18 +108,16 @@ def describe_drive(
     for frame in track(
         wanted, f"describing {drive.name}", len(wanted), "scans"
     ):
+        if frame in visited:
+            visit(frame)
         seen = _FrameClouds(drive, frame)
-        if visit is not None and frame in visited:
-            of_query = "places" not in roles
-            shown = seen.sensor(protocol) if of_query else None
-            cloud = seen.cloud(shown, _SINGLE_SCAN, protocol.half_extent)
-            visit(frame, cloud)
         for describer in describing:
             describer.add(seen)
         num_points += seen.most_points
-    if num_points == 0:
+    if describing and num_points == 0:
+        reach = max(protocol.half_extent for *_, protocol in requests)
         raise InputError(
-            f"{drive.name}: no finite point within {protocol.half_extent:g} m"
+            f"{drive.name}: no finite point within {reach:g} m"
             f" of the LiDAR in any of {len(wanted)} scans"
         )
     found = [describer.finish() for describer in describing]

@@ -1,35 +1,33 @@
 """Measures place recognition between two drives."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cache, partial
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
 import math
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from evaluation.base import LongList, Part, Reporter, track
-from evaluation.drives import Drive, cloud_at
+from evaluation.base import Reporter, track
+from evaluation.drives import cloud_at
 from evaluation.methods import Method
 from evaluation.recognition.chosen_methods import MethodChoice
 from evaluation.recognition.describing import Role
 from evaluation.recognition.descriptors import DriveDescriptors, joined_scans
-from evaluation.recognition.features import KeptScans, describe_recording
+from evaluation.recognition.drive_data import (
+    Asked,
+    Descriptors,
+    DriveData,
+    KeptScans,
+    Scans,
+)
 from evaluation.recognition.overlap_truth import overlaps_with_best_match
 from evaluation.recognition.place_outcome import PlaceOutcome, QueryDrive
 from evaluation.recognition.place_selection import KEEP_ALL, kept_places
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.retrieval import (
-    compare_at_radii,
-    matches_within_radius,
-    query_batches,
-)
+from evaluation.recognition.retrieval import compare_at_radii
 from evaluation.recognition.search import Search, SearchCost
 from evaluation.recognition.stored_places import MOST_BYTES, StoredDrives
-
-# A function that opens a drive, such as a `DriveSource`; or the parts of its
-# scans and of its descriptors by each method.
-DescribedSource: TypeAlias = "Callable[[], Drive] | tuple[Part, ...]"
 
 # A method that takes longer for all queries is left out [s].
 _LONGEST = 3600.0
@@ -45,115 +43,72 @@ class _Searched(NamedTuple):
     Attributes:
         described: the described places.
         drives: name of each place's drive.
+        drive_of: (D,) number of each place's drive.
         num_here: number of places in the query's own world; they come first.
-        rows: (num_here,) for each of the first `num_here` places, its index
-            among all places of the drives through the query's world. (The
-            database may contain only some of these places.)
     """
 
     described: DriveDescriptors
     drives: list[str]
+    drive_of: np.ndarray
     num_here: int
-    rows: np.ndarray
 
 
-class PlaceComparison(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class PlaceComparison:
     """What is compared with what, and how.
 
     Attributes:
-        database: the drive of the places: either the source from which its
-            scans are read, or the files that already contain its scans and each
-            method's descriptors of them.
-        query: the drive of the queries, in the same world, like `database`.
+        database: the drives of the places, from older to newer, of which
+            `asked_of_places` has been asked.
+        query: the drive of the queries, in the same world, of which
+            `asked_of_queries` has been asked.
         methods: the methods.
         protocol: the protocol of the comparison; its field `radius` does not
             matter.
         radii: radii of a match [m].
-        distractors: for each drive through another city, and for each method,
-            the file with the method's descriptors of its places.
-        num_distractors: number of places of the drives in `distractors` that
-            are added to the database.
-        beside: the files of further drives in the same world, like the files of
-            `database`.
-        keep: see `Pair`.
+        keep: which places of the database are kept, see
+            `evaluation.recognition.place_selection.kept_places`.
+        distractors: drives through other cities, of which descriptors of places
+            have been asked.
+        num_distractors: number of places of these drives that are added to the
+            database.
         truth: (Q, D) overlap of each query with each place, if the protocol
             says that matches are by overlap.
-        overlaps: file with the share of each query's scan that its best match
-            shows, the result of `shown_overlaps`; None to compute it from the
-            scans.
         in_study: whether to leave out a method that would take more than an
             hour for all queries, and to find the costs of searches.
     """
 
-    database: DescribedSource
-    query: DescribedSource
+    database: tuple[DriveData, ...]
+    query: DriveData
     methods: tuple[MethodChoice, ...]
     protocol: RetrievalProtocol
     radii: tuple[float, ...]
-    distractors: tuple[tuple[Part, ...], ...] = ()
-    num_distractors: int = 0
-    beside: tuple[tuple[Part, ...], ...] = ()
     keep: str | int = KEEP_ALL
+    distractors: tuple[DriveData, ...] = ()
+    num_distractors: int = 0
     truth: np.ndarray | None = None
-    overlaps: Part | None = None
     in_study: bool = True
 
-    def by_methods(self, numbers: Collection[int]) -> "PlaceComparison":
-        """Returns the comparison by some methods, given their numbers."""
-
-        def of(drive: tuple[Part, ...]) -> tuple[Part, ...]:
-            scans, *described = drive
-            return scans, *(described[k] for k in numbers)
-
-        database, query = (
-            of(one) if isinstance(one, tuple) else one
-            for one in (self.database, self.query)
-        )
-        return self._replace(
-            database=database,
-            query=query,
-            methods=tuple(self.methods[k] for k in numbers),
-            distractors=tuple(
-                tuple(parts[k] for k in numbers) for parts in self.distractors
-            ),
-            beside=tuple(map(of, self.beside)),
-        )
-
-    @property
-    def stored(self) -> tuple[tuple[Part, ...], tuple[Part, ...]]:
-        """The files of both drives, which must be in files."""
-        assert isinstance(self.database, tuple)
-        assert isinstance(self.query, tuple)
-        return self.database, self.query
-
-    def searched(
-        self, number: int, database: DriveDescriptors | Part, method: Method
-    ) -> _Searched:
+    def searched(self, choice: MethodChoice, method: Method) -> _Searched:
         """Returns the database that a method searches.
 
-        The places of further drives in the same world follow those of
-        `database`. The drives through other cities come last. They are moved so
-        far away that none of their places is a match; the first
-        `num_distractors` of their places are added, or all if there are fewer.
+        The drives through other cities come last. They are moved so far away
+        that none of their places is a match; the first `num_distractors` of
+        their places are added, or all if there are fewer.
 
         Args:
-            number: number of the method.
-            database: the method's descriptors of the drive of the places.
+            choice: the method.
             method: the method. If it `divides`, descriptors that are too large
                 for the memory are read while they are searched.
         """
-        further = [parts[1 + number] for parts in self.beside]
-        num_near = 1 + len(further)
-        further += [parts[number] for parts in self.distractors]
-        if isinstance(database, Part):
-            reader, size = database.read, database.size()
-        else:
-            reader = partial(replace, database)
-            size = getattr(database.places.descriptors, "num_bytes", 0)
+        asked = Descriptors(choice, "places", self.protocol)
+        num_near = len(self.database)
+        readers, sizes = zip(
+            *(one.reader(asked) for one in (*self.database, *self.distractors)),
+            strict=True,
+        )
         store = StoredDrives(
-            [reader, *(one.read for one in further)],
-            [size, *(one.size() for one in further)],
-            MOST_BYTES if method.divides else math.inf,
+            readers, sizes, MOST_BYTES if method.divides else math.inf
         )
         near = [store.undescribed(k) for k in range(num_near)]
         here = joined_scans(near, [0] * num_near)
@@ -168,7 +123,7 @@ class PlaceComparison(NamedTuple):
         stored = [drive_of[rows]]
         stored_rows = [own_row[rows]]
         most = len(rows) + self.num_distractors
-        for k in range(num_near, 1 + len(further)):
+        for k in range(num_near, len(readers)):
             if sum(map(len, stored)) >= most:
                 break
             every.append(store.undescribed(k))
@@ -183,108 +138,115 @@ class PlaceComparison(NamedTuple):
                 here.chosen(np.arange(0)),
             ),
             [store.name(k) for k in of.tolist()],
+            of,
             len(rows),
-            rows,
         )
 
 
-@dataclass(frozen=True)
-class ScansOf:
-    """The scans of a comparison by any method, for `shown_overlaps`.
+def asked_of_places(
+    methods: Sequence[MethodChoice], protocol: RetrievalProtocol
+) -> tuple[Asked, ...]:
+    """Returns what is asked of a drive whose places are compared."""
+    scans = Scans(protocol.place_spacing, protocol.half_extent)
+    return (*_descriptors(methods, "places", protocol), scans)
+
+
+def asked_of_queries(
+    methods: Sequence[MethodChoice], protocol: RetrievalProtocol
+) -> tuple[Asked, ...]:
+    """Returns what is asked of a drive whose queries are compared."""
+    scans = Scans(protocol.query_spacing, protocol.half_extent)
+    return (*_descriptors(methods, "queries", protocol), scans)
+
+
+def _descriptors(
+    methods: Sequence[MethodChoice], role: Role, protocol: RetrievalProtocol
+) -> list[Descriptors]:
+    return [Descriptors(one, role, protocol) for one in methods]
+
+
+@dataclass
+class _ShownOverlaps:
+    """How much of each query's scan its best match shows, for all methods.
+
+    Matches follow from the positions of the scans and not from a method, so
+    that overlaps are computed once.
 
     Attributes:
-        compared: the comparison; the poses of the scans are read from the
-            descriptors of its first method.
+        compared: the comparison.
     """
 
     compared: PlaceComparison
+    _known: dict[tuple[float, range], np.ndarray] = field(default_factory=dict)
 
-    def identity(self) -> list[object]:
-        """Returns what determines scans and poses; other methods share them."""
+    def __post_init__(self) -> None:
         compared = self.compared
-        (scans, *_), (asked, *_) = compared.stored
-        files = scans, asked, *(parts[0] for parts in compared.beside)
-        protocol = compared.protocol.of(compared.methods[0].make())
-        return [
-            [one.identity() for one in files],
-            protocol.to_json(),
-            list(compared.radii),
-            compared.keep,
-        ]
-
-
-def shown_overlaps(
-    reporter: Reporter, scans_of: ScansOf
-) -> dict[float, np.ndarray]:
-    """Returns the share of each query's scan that its best match shows.
-
-    Args:
-        reporter: unused.
-        scans_of: the scans. Their files contain a `KeptScans`, or a list of
-            scans.
-
-    Returns:
-        Radius -> (Q,) overlaps; NaN without a match.
-    """
-    compared = scans_of.compared.by_methods([0])
-    # The method registers the type of its descriptors.
-    method = compared.methods[0].make()
-    (scans, described), (asked_scans, described_query) = compared.stored
-    protocol, radii = compared.protocol, compared.radii
-    query = described_query.read()
-    queries = query.queries
-    asked = asked_scans.read()
-    are_recorded = isinstance(asked, KeptScans)
-    if are_recorded:
-        asked = LongList.of(
-            protocol.query_scan(asked, frame).astype(np.float32)
-            for frame in queries.frames.tolist()
+        protocol = compared.protocol
+        places = Scans(protocol.place_spacing, protocol.half_extent)
+        queries = Scans(protocol.query_spacing, protocol.half_extent)
+        # Read when the first overlap is computed.
+        self._places = cache(
+            lambda: [one.take(places) for one in compared.database]
         )
-    here = compared._replace(distractors=(), num_distractors=0)
-    searched = here.searched(0, described, method)
-    database = searched.described
-    found = {radius: np.full(len(queries.frames), math.nan) for radius in radii}
-    drive_of = database.places.drive_of
-    if drive_of is None:
-        drive_of = np.zeros(len(searched.rows), np.int64)
-    first = 0
-    for number, part in enumerate(
-        [scans, *(parts[0] for parts in compared.beside)]
-    ):
-        of = drive_of == number
-        kept = part.read()
-        are_recorded = isinstance(kept, KeptScans)
-        if are_recorded:
-            chosen = LongList.of(
-                cloud_at(kept, frame, 1, protocol.half_extent).astype(
-                    np.float32
-                )
-                for frame in database.places.frames[of].tolist()
-            )
-        else:
-            rows_here = searched.rows[of] - first
-            first += len(kept)
-            chosen = kept
-            if len(rows_here) < len(kept):
-                chosen = LongList.of(kept[row] for row in rows_here)
-        for rows in query_batches(len(asked), len(of)):
-            batch = slice(rows.start, rows.stop)
-            matches = [
-                matches_within_radius(
-                    database, query, replace(protocol, radius=radius), rows
-                )[:, of]
-                for radius in radii
-            ]
-            shown = overlaps_with_best_match(
-                chosen,
-                database.places.X_WS[of],
-                asked[batch],
+        self._queries = cache(lambda: compared.query.take(queries))
+
+    def of(
+        self,
+        radius: float,
+        rows: range,
+        matches: np.ndarray,
+        database: _Searched,
+        query: DriveDescriptors,
+    ) -> np.ndarray:
+        """Returns the overlaps (R,) of some queries; NaN without a match.
+
+        Args:
+            radius: radius of a match [m].
+            rows: numbers of the R queries.
+            matches: (R, D) whether a place is a true match.
+            database, query: places and queries, described by any method.
+        """
+        if (radius, rows) in self._known:
+            return self._known[radius, rows]
+        protocol, queries = self.compared.protocol, query.queries
+        batch = slice(rows.start, rows.stop)
+        asked = [
+            protocol.query_scan(self._queries(), frame).astype(np.float32)
+            for frame in queries.frames[batch].tolist()
+        ]
+        places, here = database.described.places, database.num_here
+        shown = np.full(len(asked), math.nan)
+        for number, kept in enumerate(self._places()):
+            of = np.flatnonzero(database.drive_of[:here] == number)
+            scans = _CroppedScans(kept, places.frames[of], protocol.half_extent)
+            (found,) = overlaps_with_best_match(
+                scans,
+                places.X_WS[of],
+                asked,
                 queries.X_WS[batch],
-                np.array(matches),
+                matches[None, :, of],
             )
-            for radius, by_radius in zip(radii, shown, strict=True):
-                found[radius][batch] = np.fmax(found[radius][batch], by_radius)
-    return found
+            shown = np.fmax(shown, found)
+        self._known[radius, rows] = shown
+        return shown
+
+
+class _CroppedScans(Sequence[np.ndarray]):
+    """Scans (N, 3) float32 of some frames, cropped when they are used."""
+
+    def __init__(self, kept: KeptScans, frames: np.ndarray, half_extent: float):
+        # A drive as far as its scans are concerned.
+        self._kept: Any = kept
+        self._frames = frames
+        self._half_extent = half_extent
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def __getitem__(self, index: Any) -> Any:
+        frame = int(self._frames[index])
+        cloud = cloud_at(self._kept, frame, 1, self._half_extent)
+        return cloud.astype(np.float32)
 
 
 def measure_places(
@@ -306,50 +268,13 @@ def measure_places(
             a method returns an invalid result.
     """
     methods, protocol = compared.methods, compared.protocol
-    scans, places = _described_drive(
-        compared.database, "places", methods, protocol
-    )
-    asked_scans, queries = _described_drive(
-        compared.query, "queries", methods, protocol
-    )
-    known: Mapping[float, np.ndarray] = {}
-    if compared.overlaps is not None:
-        known = compared.overlaps.read()
-    # Matches follow from the positions of the scans, and not from a method, so
-    # that overlaps are computed once for all methods.
-    overlaps: dict[tuple[float, range], np.ndarray] = {}
-
-    def shown(
-        radius: float,
-        rows: range,
-        matches: np.ndarray,
-        X_WP: np.ndarray,
-        X_WQ: np.ndarray,
-    ) -> np.ndarray:
-        batch = slice(rows.start, rows.stop)
-        if radius in known:
-            return known[radius][batch]
-        if (radius, rows) not in overlaps:
-            number = len(scans())
-            (overlaps[radius, rows],) = overlaps_with_best_match(
-                scans(),
-                X_WP[:number],
-                asked_scans()[batch],
-                X_WQ[batch],
-                matches[None, :, :number],
-            )
-        return overlaps[radius, rows]
-
-    for k, choice in enumerate(
-        track(methods, "comparing", len(methods), "methods")
-    ):
+    shown = _ShownOverlaps(compared)
+    for choice in track(methods, "comparing", len(methods), "methods"):
         # The method comes first, because it registers the type of its
         # descriptors.
         method = choice.make()
-        mapped, asked = places.pop(0), queries.pop(0)
-        if isinstance(asked, Part):
-            asked = asked.read()
-        searched = compared.searched(k, mapped, method)
+        asked = compared.query.take(Descriptors(choice, "queries", protocol))
+        searched = compared.searched(choice, method)
         search = Search(method, searched.described.places)
         outcomes = _method_outcomes(
             choice, search, searched, asked, compared, shown, reporter
@@ -363,7 +288,7 @@ def _method_outcomes(
     database: _Searched,
     query: DriveDescriptors,
     compared: PlaceComparison,
-    shown: Callable[..., np.ndarray],
+    shown: _ShownOverlaps,
     reporter: Reporter,
 ) -> list[PlaceOutcome]:
     """Returns a method's outcomes; none if the method would take too long.
@@ -374,13 +299,10 @@ def _method_outcomes(
         database: the places that are searched.
         query: the described queries.
         compared: the comparison.
-        shown: function that takes a radius, the numbers of R queries, their
-            matches (R, D) within this radius, and the poses of all places and
-            queries, and returns how much of each query's scan its best match
-            shows (R,).
+        shown: how much of each query its best match shows.
         reporter: reports notes.
     """
-    searched, drives, num_here, _ = database
+    searched, drives, _, num_here = database
     protocol, radii = compared.protocol, compared.radii
     truth = compared.truth
     if (
@@ -415,13 +337,7 @@ def _method_outcomes(
             matches = plain.matches
             if truth is None:
                 matches = (plain.distances <= radius) & plain.is_known
-            overlaps = shown(
-                radius,
-                rows,
-                matches,
-                searched.places.X_WS,
-                query.queries.X_WS,
-            )
+            overlaps = shown.of(radius, rows, matches, database, query)
             for is_verified, found in enumerate((plain, verified)):
                 outcomes[2 * k + is_verified].append(
                     PlaceOutcome.of(
@@ -448,23 +364,3 @@ def _takes_long(
     is_known = np.ones((len(rows), num_places), bool)
     search.scores(query, rows.tolist(), is_known)
     return number * search.query_time > _LONGEST
-
-
-def _described_drive(
-    drive: DescribedSource,
-    role: Role,
-    methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol,
-) -> tuple[Callable[[], Sequence[np.ndarray]], list[DriveDescriptors | Part]]:
-    """Returns a drive's scans, and each method's descriptors or their file.
-
-    Scans in a file are read when they are asked for. Only the descriptors of a
-    method that is compared should be in memory: take them out of the list.
-    """
-    if isinstance(drive, tuple):
-        scans, *files = drive
-        return cache(scans.read), [*files]
-    asked = {one.key: (one.make(), {role}, protocol) for one in methods}
-    found = describe_recording(drive(), {role}, asked, protocol)
-    shown = found.shown_scans
-    return lambda: shown, [*found.described.values()]

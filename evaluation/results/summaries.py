@@ -25,13 +25,7 @@ from evaluation.recognition import (
     metric_named,
     weighted_metrics,
 )
-from evaluation.results.keys import (
-    CAUSE,
-    LEVEL,
-    NO_CAUSE,
-    Key,
-    check_columns,
-)
+from evaluation.results.keys import CAUSE, LEVEL, NO_CAUSE, Key, check_columns
 from evaluation.results.table import Answers, QueryRows, Results, Row
 
 # Factor: what updates the map of several drives.

@@ -1,26 +1,24 @@
-"""A city of recordings in a study: its pairs, and what the page shows of it."""
+"""What the page of a study shows of recorded cities, and how it is drawn."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from evaluation.base import Job, MakePart, Part, Reporter, doing, make_folder
-from evaluation.drives import DriveSource, RecordingSource
-from evaluation.recognition import (
-    RANDOM_YAW_PROTOCOL,
-    DescribedSource,
-    FeatureExtraction,
-    FeatureFiles,
-    Further,
-    MethodChoice,
-    PlaceOutcome,
-    RetrievalProtocol,
-    Role,
-    described_key,
+from evaluation.base import (
+    Job,
+    MakePart,
+    Part,
+    Reporter,
+    doing,
+    file_name,
+    make_folder,
+    run_jobs,
+    user_errors,
 )
+from evaluation.drives import DriveSource, RecordingSource
+from evaluation.recognition import Asked, Map, Picture, PlaceOutcome, asked_key
 from evaluation.results import (
     OWN,
     STAGE,
@@ -30,281 +28,194 @@ from evaluation.results import (
     make_page_drive,
     nearest_images,
 )
+from evaluation.study.pair import Pair, StudyDrive
 from evaluation.study.recordings.map_drives import MapDrives
+from evaluation.study.run import DriveAsked
 from evaluation.study.study import Study
 from evaluation.study.tasks.change import ChangeTask
-from evaluation.study.tasks.jobs import STARTING_COST, Jobs
-from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 from evaluation.study.tasks.place import PlaceTask
-
-# Expected seconds to draw a city or a change.
-_COST = 5.0
 
 
 @dataclass(frozen=True)
-class ShownCity:
-    """What the page shows of a city, once the jobs of the study are done.
+class RecordedCity:
+    """A city of recordings in a study.
 
     Attributes:
         city: the recordings.
-        drives: file with name -> `PageDrive` of the compared drives.
-        changes: pictures of what changed between stages.
-        places: for each pair whose queries the page shows, the files with the
-            outcomes of all methods.
+        pairs: pairs of these recordings in all conditions; the first has the
+            main protocol.
     """
 
     city: MapDrives
-    drives: Part
-    changes: tuple[ChangePicture, ...]
-    places: tuple[tuple[Result, ...], ...]
+    pairs: tuple[Pair, ...]
 
-    def outcomes(self) -> list[list[PlaceOutcome]]:
+    def shown(self) -> Iterator[DriveAsked]:
+        """Yields what the page needs of the drives that are compared."""
+        compared = {name for one in self.pairs for name in one.names}
+        for one in self.city.recordings:
+            if one.name in compared:
+                yield one.drive, Map()
+                yield one.drive, self._picture(one.drive)
+
+    def outcomes(self, study: Study) -> list[list[PlaceOutcome]]:
         """Returns the methods' outcomes on each pair with a match.
 
         The outcomes are without geometric verification.
         """
+        task = study.tasks[PlaceTask.name]
         found = []
-        for parts in self.places:
+        for pair in self.pairs:
+            if (
+                pair.is_composed
+                or pair.factors.get(STAGE, OWN) != OWN
+                or pair.protocol != self.pairs[0].protocol
+            ):
+                continue
             of_pair = [
                 one
-                for part in parts
-                for one in part.read()
+                for one in task.found(pair, study.store)
                 if not one.protocol.verified and one.outcomes.has_match.any()
             ]
             if of_pair:
                 found.append(of_pair)
         return found
 
-
-def add_city(
-    study: Study,
-    city: MapDrives,
-    pairs: Sequence[Pair],
-    distractors: Sequence[NamedDrive] = (),
-) -> ShownCity | None:
-    """Adds the pairs of a city to a study, and jobs that draw it for the page.
-
-    Args:
-        study: the study.
-        city: the recordings.
-        pairs: pairs of these recordings in all conditions; the first has the
-            main protocol.
-        distractors: drives through other cities, see `Study.add`.
-
-    Returns:
-        What the page shows; None if the study does not measure the change, and
-        therefore makes no maps.
-    """
-    with_map = ChangeTask.name in study.tasks
-    planned = study.add(
-        pairs, distractors, _ExtractionJobs if with_map else Jobs
-    )
-    if not (isinstance(planned, _ExtractionJobs) and pairs):
-        return None
-    shown = ShownCity(
-        city,
-        _draw_drives(city, pairs, planned, study.pictures),
-        tuple(_draw_changes(city, pairs, planned, study)),
-        tuple(
-            study.results[one][PlaceTask.name]
-            for one in pairs
-            if PlaceTask.name in study.results[one]
-            and not one.is_composed
-            and one.factors.get(STAGE, OWN) == OWN
-            and one.protocol == pairs[0].protocol
-        ),
-    )
-    study.jobs |= planned.jobs
-    return shown
-
-
-# Expected time to map a drive of usual length [s].
-_MAP_COST = 19.0
-
-
-@dataclass
-class _ExtractionJobs(Jobs):
-    """Jobs of a study with maps, which read each drive once.
-
-    One job extracts the features of a drive: it maps the drive, describes its
-    places and its queries by all methods, and keeps their scans. If pairs use
-    several protocols, the first protocol is the main one. The job also serves a
-    further protocol that chooses the same scans and changes only how queries
-    are seen; see `RetrievalProtocol.with_queries_of`. For any other protocol,
-    the drive is read again.
-    """
-
-    # Drive -> its roles. They are known before the first job is added.
-    _roles: dict[str, set[Role]] = field(default_factory=dict)
-    # Drive -> key of descriptors -> the descriptors by a further protocol.
-    _further: dict[str, dict[str, Further]] = field(
-        default_factory=lambda: defaultdict(dict)
-    )
-    _protocol: RetrievalProtocol | None = None
-
-    def expect(self, pair: Pair) -> None:
-        super().expect(pair)
-        if self._protocol is None:
-            self._protocol = pair.protocol
-        beside: list[tuple[NamedDrive, Role]]
-        beside = [(drive, "places") for drive in pair.beside]
-        if not self._chooses_same_scans(pair.protocol):
-            return
-        for drive, role in (*pair.roles, *beside):
-            self._roles.setdefault(drive.name, set()).add(role)
-            for choice in self.methods:
-                if not pair.has_method(choice.name):
-                    continue
-                key = self._key(choice, role, pair.protocol)
-                if key != choice.key:
-                    further = self._further[drive.name]
-                    _, roles, _ = further.get(key, (None, frozenset(), None))
-                    further[key] = choice, roles | {role}, pair.protocol
-
-    def described(
-        self,
-        drive: NamedDrive,
-        role: Role,
-        protocol: RetrievalProtocol,
-        needs: list[str],
-        *,
-        kept: bool = False,
-    ) -> DescribedSource:
-        if not self._chooses_same_scans(protocol):
-            return super().described(drive, role, protocol, needs, kept=kept)
-        files = self.features(drive, needs)
-        keys = [self._key(one, role, protocol) for one in self.methods]
-        return (files.scans, *map(files.described, keys))
-
-    def mapped(
-        self, drive: NamedDrive, spacing: float | None, needs: list[str]
-    ) -> Result:
-        if spacing is not None:
-            return super().mapped(drive, spacing, needs)
-        return self.features(drive, needs).drive
-
-    def features(self, drive: NamedDrive, needs: list[str]) -> FeatureFiles:
-        """Returns the files of a drive's features.
-
-        The job that makes these files is added.
-
-        Args:
-            drive: the drive.
-            needs: list to which the name of the job is appended.
-        """
-        name = f"features of {drive.name}"
-        needs.append(name)
-        files = self.files.features(drive.name)
-        if name not in self.jobs:
-            roles = frozenset(self._roles.get(drive.name, ()))
-            protocol = self._protocol or RANDOM_YAW_PROTOCOL
-            step = FeatureExtraction(
-                drive.source,
-                roles,
-                self.methods,
-                protocol,
-                files,
-                with_scans=bool(roles),
-                further=tuple(self._further[drive.name].values()),
+    def changes(self, study: Study) -> Iterator[tuple[ChangePicture, MakePart]]:
+        """Yields each picture of what changed, and the step that draws it."""
+        task, store = study.tasks[ChangeTask.name], study.store
+        for earlier, later in self.city.change_pairs():
+            pair = next(
+                (
+                    one
+                    for one in self.pairs
+                    if one.names == (earlier.name, later.name)
+                    and one.factors.get(STAGE, OWN) == OWN
+                    and task.keys(one)
+                ),
+                None,
             )
-            # All scans are read for the map.
-            cost = STARTING_COST + _MAP_COST * drive.share
-            for role in roles:
-                cost += self.description_cost(drive, role, protocol)
-            title = drive.title or drive.name
-            self.jobs[name] = Job(name, step, drive.needs, cost, title)
-        return files
+            if pair is None:
+                continue
+            stages = earlier.stage, later.stage
+            picture = ChangePicture(self.city.name, stages, study.figures)
+            (key,) = task.keys(pair)
+            maps, clouds = (
+                tuple(
+                    _part(study, one.drive, asked(one.drive))
+                    for one in (earlier, later)
+                )
+                for asked in (lambda _: Map(), self._picture)
+            )
+            step = MakePart(
+                _witness(study, picture.stem.name),
+                draw_change,
+                (
+                    self.city.name,
+                    stages,
+                    picture.folder,
+                    store.part(key),
+                    maps,
+                    clouds,
+                ),
+                figures=picture.files,
+            )
+            yield picture, step
 
-    def _chooses_same_scans(self, protocol: RetrievalProtocol) -> bool:
-        """Returns whether a protocol needs no other scans than the main one."""
-        assert self._protocol is not None
-        protocol = protocol.with_queries_of(self._protocol)
-        return (
-            protocol.descriptor_options() == self._protocol.descriptor_options()
+    def page_drives(self, study: Study) -> MakePart:
+        """Returns the step that makes name -> `PageDrive` of the drives."""
+        drives = {drive.digest: drive for drive, _ in self.shown()}
+        part = Part(
+            study.store.folder / "pages" / f"{file_name(self.city.name)}.data"
         )
-
-    def _key(
-        self, choice: MethodChoice, role: Role, protocol: RetrievalProtocol
-    ) -> str:
-        """Returns the key of a method's descriptors of places or queries."""
-        assert self._protocol is not None
-        method = choice.make()
-        own, main = (
-            one.of(method).descriptor_options(queries=role == "queries")
-            for one in (protocol, self._protocol)
-        )
-        return (
-            choice.key if own == main else described_key(choice.key, protocol)
-        )
-
-
-def _draw_drives(
-    city: MapDrives,
-    pairs: Sequence[Pair],
-    planned: _ExtractionJobs,
-    pictures: dict[str, Job],
-) -> Part:
-    """Adds the job that makes pictures of drives; returns its file."""
-    compared = {name for one in pairs for name in one.names}
-    shown = [one.named for one in city.recordings if one.name in compared]
-    features = [planned.features(one, []) for one in shown]
-    part = planned.files.part("pages", city.name)
-    step = MakePart(
-        part,
-        make_page_drives,
-        (
-            tuple(
-                (found.drive, found.fine, one.source)
-                for one, found in zip(shown, features, strict=True)
-            ),
-        ),
-    )
-    name = f"draw {city.name}"
-    pictures[name] = Job(name, step, (), _COST)
-    return part
-
-
-def _draw_changes(
-    city: MapDrives,
-    pairs: Sequence[Pair],
-    planned: _ExtractionJobs,
-    study: Study,
-) -> list[ChangePicture]:
-    """Adds jobs that draw changes between stages; returns the pictures."""
-    found = []
-    for earlier, later in city.change_pairs():
-        parts = [
-            part
-            for one in pairs
-            if one.names == (earlier.name, later.name)
-            and one.factors.get(STAGE, OWN) == OWN
-            for part in study.results[one].get(ChangeTask.name, ())
-            if isinstance(part, Part)
-        ]
-        if not parts:
-            continue
-        stages = earlier.stage, later.stage
-        picture = ChangePicture(city.name, stages, planned.files.figures)
-        first, last = (
-            planned.features(one.named, []) for one in (earlier, later)
-        )
-        step = MakePart(
-            planned.files.change(picture.stem.name),
-            draw_change,
+        arguments = tuple(
             (
-                city.name,
-                stages,
-                picture.folder,
-                parts[0],
-                (first.drive, last.drive),
-                (first.fine, last.fine),
-            ),
-            figures=picture.files,
+                _part(study, one, Map()),
+                _part(study, one, self._picture(one)),
+                one.source,
+            )
+            for one in drives.values()
         )
-        name = f"draw {city.name} {stages[0]} > {stages[1]}"
-        study.pictures[name] = Job(name, step, (), _COST)
-        found.append(picture)
-    return found
+        return MakePart(part, make_page_drives, (arguments,))
+
+    def _picture(self, drive: StudyDrive) -> Picture:
+        """Returns what to ask for, of the scans by the main protocol."""
+        main = self.pairs[0].protocol
+        spacings: dict[float, None] = {}
+        for one in self.pairs:
+            protocol = one.protocol.with_queries_of(main)
+            if protocol.descriptor_options() != main.descriptor_options():
+                continue
+            if drive in one.database:
+                spacings[main.place_spacing] = None
+            if drive == one.query:
+                spacings[main.query_spacing] = None
+        return Picture(tuple(spacings), main.half_extent)
+
+
+@dataclass(frozen=True)
+class ShownCity:
+    """A city as the page shows it.
+
+    Attributes:
+        city: the recordings.
+        drives: name -> what the page shows of each drive that is compared.
+        changes: pictures of what changed between stages.
+        outcomes: see `RecordedCity.outcomes`.
+    """
+
+    city: MapDrives
+    drives: dict[str, PageDrive]
+    changes: tuple[ChangePicture, ...]
+    outcomes: list[list[PlaceOutcome]]
+
+
+def draw_cities(
+    study: Study, cities: Sequence[RecordedCity]
+) -> list[ShownCity]:
+    """Draws cities for the page, once the tables are written.
+
+    A picture that cannot be drawn takes no number along. Pictures of an earlier
+    run, of drives that are no longer there, are removed.
+
+    Raises:
+        InputError: a picture cannot be drawn, or a file not be removed.
+    """
+    changes = [tuple(one.changes(study)) for one in cities]
+    pages = [one.page_drives(study) for one in cities]
+    jobs = [
+        Job(f"drawing {one.city.name}", page)
+        for one, page in zip(cities, pages, strict=True)
+    ]
+    jobs += [
+        Job(f"drawing {picture.title}", step)
+        for some in changes
+        for picture, step in some
+    ]
+    run_jobs(jobs, study.cluster, "pictures")
+    kept = {path for some in changes for one, _ in some for path in one.files}
+    for path in sorted({*study.figures.glob("change_*.*")} - kept):
+        # Its witness says that this program drew it.
+        if _witness(study, path.stem).path.is_file():
+            with user_errors(path):
+                path.unlink()
+    return [
+        ShownCity(
+            one.city,
+            page.part.read(),
+            tuple(picture for picture, _ in some),
+            one.outcomes(study),
+        )
+        for one, page, some in zip(cities, pages, changes, strict=True)
+    ]
+
+
+def _part(study: Study, drive: StudyDrive, asked: Asked) -> Part:
+    return study.store.part(asked_key(drive.digest, asked))
+
+
+def _witness(study: Study, stem: str) -> Part:
+    """Returns the file that names the inputs of a picture of a change."""
+    return Part(study.store.folder / "changes" / f"{stem}.data")
 
 
 def make_page_drives(
@@ -314,24 +225,24 @@ def make_page_drives(
 
     Args:
         reporter: reports progress.
-        drives: for each drive, the file with its `DriveSummary`, the file with
-            a cloud for pictures, and its source. If a drive is recorded, the
-            result includes the images of its camera.
+        drives: for each drive, the files with its `DriveMapping` and its
+            `DrivePicture`, and its source. If a drive is recorded, the result
+            includes the images of its camera.
     """
     found = {}
-    for done, (summary, fine, source) in enumerate(drives):
+    for done, (mapped, pictured, source) in enumerate(drives):
         doing("drawing the maps", done, len(drives), "drives")
-        drive = summary.read()
+        drive, picture = mapped.read(), pictured.read()
         images = None
         if isinstance(source, RecordingSource):
-            stamps_ns = drive.stamps_ns[drive.frames]
+            stamps_ns = drive.stamps_ns[picture.frames]
             images = nearest_images(source(), stamps_ns, reporter.note)
         found[drive.name] = make_page_drive(
             drive.name,
-            fine.read(),
+            picture.fine,
             drive.X_WS,
-            drive.frames,
-            drive.thumbnails,
+            picture.frames,
+            picture.thumbnails,
             images,
         )
     return found
@@ -343,8 +254,8 @@ def draw_change(
     stages: tuple[str, str],
     folder: Path,
     change: Part,
-    drives: tuple[Part, Part],
-    clouds: tuple[Part, Part],
+    maps: tuple[Part, Part],
+    pictures: tuple[Part, Part],
 ) -> float:
     """Draws the change between two drives, and returns TCR_sym.
 
@@ -352,16 +263,17 @@ def draw_change(
         reporter: unused.
         map_name, stages, folder: see `ChangePicture`.
         change: file with the result of the task `change`.
-        drives: files with a `DriveSummary` of the earlier and of the later
-            drive, both in one world frame.
-        clouds: files with the clouds of the earlier and the later drive.
+        maps, pictures: files with the `DriveMapping` and the `DrivePicture` of
+            the earlier and of the later drive, both in one world frame.
     """
     doing("drawing the change")
     make_folder(folder)
     earlier, later = (
-        DrivenMap(cloud.read(), drive.coarse.merged(), drive.X_WS[:, :3, 3])
-        for drive, cloud in zip(
-            (part.read() for part in drives), clouds, strict=True
+        DrivenMap(
+            picture.read().fine, drive.voxels.merged(), drive.X_WS[:, :3, 3]
+        )
+        for drive, picture in zip(
+            (part.read() for part in maps), pictures, strict=True
         )
     )
     ChangePicture(map_name, stages, folder).draw(earlier, later)

@@ -8,13 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from evaluation.alignment import When
-from evaluation.base import Cluster, InputError, Job, Space
+from evaluation.base import Cluster, InputError, Space
 from evaluation.paper import paper, paper_section
 from evaluation.recognition import (
     PAPER_PROTOCOL,
     PROTOCOLS,
+    DescribingTime,
+    Descriptors,
     MethodChoice,
     RetrievalProtocol,
+    asked_key,
 )
 from evaluation.results import (
     LAST,
@@ -36,7 +39,8 @@ from evaluation.results import (
 )
 from evaluation.study.experiments.experiment import Experiment
 from evaluation.study.experiments.experiment_files import load_experiment
-from evaluation.study.recorded_city import ShownCity, add_city
+from evaluation.study.pair import Pair
+from evaluation.study.recorded_city import RecordedCity, ShownCity, draw_cities
 from evaluation.study.recordings.map_drives import (
     RecordingInfo,
     drives_by_map,
@@ -45,9 +49,8 @@ from evaluation.study.recordings.map_drives import (
 )
 from evaluation.study.recordings.recorded_pairs import recorded_pairs
 from evaluation.study.study import Study
-from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.change import ChangeTask
-from evaluation.study.tasks.place import PlaceTask, PoseTask, search_cost
+from evaluation.study.tasks.place import PlaceTask, PoseTask, search_key
 from evaluation.study.tasks.task import Task
 
 # The seed of the experiment.
@@ -68,7 +71,6 @@ def study_recordings(
     *,
     source: str,
     with_costs: bool = False,
-    further_jobs: Iterable[Job] = (),
     space: Space | None = None,
     pages: Mapping[str, str] | None = None,
     printed: PrintStyle | None = None,
@@ -82,8 +84,7 @@ def study_recordings(
     repeated.
 
     Args:
-        recordings: the recordings. A recording that does not exist yet is made
-            by the jobs that its attribute `needs` names.
+        recordings: the recordings.
         output: folder of the results.
         cluster: runs the jobs.
         methods: the methods.
@@ -92,8 +93,7 @@ def study_recordings(
             `paper` measures the paper's methods alone.
         source: where the recordings come from, for errors.
         with_costs: whether the page shows the times and memory of methods.
-        further_jobs: jobs that make recordings, or belong beside the study.
-        space: space on the disk that all jobs need, if known.
+        space: space on the disk that is needed, if known.
         pages: name of a recording -> address of its 3-D page, relative to
             `output`. Pages that do not exist are left out.
         printed: style of the charts for print; None for the default.
@@ -119,7 +119,7 @@ def study_recordings(
         if (name := one.factors.get(PROTOCOL_BASE, main)) == main
         or one.factors[STAGE] != LAST
     ]
-    shown: list[ShownCity] = []
+    measured: list[RecordedCity] = []
     for city in cities:
         pairs = recorded_pairs(
             city,
@@ -130,24 +130,23 @@ def study_recordings(
             both_ways=True,
             with_itself=with_itself,
         )
-        measured = [
+        of_city = tuple(
             replace(one, methods=_further_methods(name))
             if (name := one.factors.get(PROTOCOL_BASE, main)) != main
             else one
             for one in pairs
-        ]
-        if (one := add_city(study, city, measured)) is not None:
-            shown.append(one)
+        )
+        if of_city:
+            measured.append(RecordedCity(city, of_city))
     alone = [] if with_itself else nothing_to_compare(cities)
-    if not shown:
+    if not measured:
         raise InputError(f"{source}: {alone[0]}")
     for text in alone:
         on_note(text)
-    study.jobs = {**{job.name: job for job in further_jobs}, **study.jobs}
-    results, queries = study.measure(space)
-    StudyFiles(study.output).remove_other_changes(
-        [path for city in shown for one in city.changes for path in one.files]
-    )
+    every = [pair for one in measured for pair in one.pairs]
+    shown = [asked for one in measured for asked in one.shown()]
+    results, queries = study.measure(every, shown, space)
+    drawn = draw_cities(study, measured)
     _note_missed_routes(results, on_note)
     own = [one.name for one in methods if one.file is not None]
     if own and (changed := unlike_shipped(recordings)):
@@ -156,14 +155,15 @@ def study_recordings(
     page = study.write_page(
         results,
         queries,
+        every,
         [
             *(f"{name}: {one.to_text()}" for name, one in protocols.items()),
             *_without_control(protocols),
             *alone,
         ],
         [
-            *recorded_sections(shown, results, queries, output, pages or {}),
-            *([_costs_section(study)] if with_costs else []),
+            *recorded_sections(drawn, results, queries, output, pages or {}),
+            *([_costs_section(study, every[0])] if with_costs else []),
         ],
         about=_ALONE if lacks_baseline(results) else None,
         own_methods=own,
@@ -192,11 +192,11 @@ def recorded_sections(
         for name, address in pages.items()
         if (output / address).is_file()
     }
-    drives_of = {one.city.name: one.drives.read() for one in cities}
+    drives_of = {one.city.name: one.drives for one in cities}
     drives: dict[str, PageDrive] = {}
     for of_city in drives_of.values():
         drives |= of_city
-    outcomes = [of_pair for one in cities for of_pair in one.outcomes()]
+    outcomes = [of_pair for one in cities for of_pair in one.outcomes]
     stages = {
         drive.name: drive.stage
         for one in cities
@@ -281,18 +281,17 @@ def _note_missed_routes(
         on_note(f"{query}: no query has a match in {database}")
 
 
-def _costs_section(study: Study) -> PageSection:
-    """Returns the section with the costs of the methods on the first pair."""
-    pair = next(one for one in study.results if study.results[one])
-    files = StudyFiles(study.output)
-    described = files.features(pair.query.name)
-    costs = {
-        choice.name: (
-            described.cost(key).read(),
-            search_cost(files, pair.key, key).read(),
+def _costs_section(study: Study, pair: Pair) -> PageSection:
+    """Returns the section with the costs of the methods on a pair."""
+    store = study.store
+    costs = {}
+    for choice, _ in study.methods.values():
+        described = Descriptors(choice, "queries", pair.protocol)
+        time = asked_key(pair.query.digest, DescribingTime(described))
+        costs[choice.name] = (
+            store.read(time),
+            store.read(search_key(pair, choice)),
         )
-        for key, (choice, _) in study.methods.items()
-    }
     return page_section(
         "costs",
         "Costs",

@@ -1,20 +1,14 @@
-"""A study: an experiment with its pairs of drives, their jobs and tables."""
+"""A study: an experiment, its methods and tasks, and its tables and page."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+import functools
+from functools import partial
+import os
 from pathlib import Path
 from typing import Any
 
-from evaluation.base import (
-    InputError,
-    Job,
-    Space,
-    doing,
-    errors_at,
-    forecast,
-    no_such,
-    run_jobs,
-)
+from evaluation.base import InputError, Space, Store, doing, errors_at, no_such
 from evaluation.methods import SETTINGS, known_methods, optional_methods
 from evaluation.recognition import (
     STANDARD,
@@ -34,6 +28,7 @@ from evaluation.results import (
     chart_factors,
     check_factors,
     check_metric_names,
+    check_output,
     made_by,
     make_output,
     write_page,
@@ -49,46 +44,40 @@ from evaluation.study.experiments.experiment import (
 from evaluation.study.experiments.experiment_run import ExperimentRun
 from evaluation.study.experiments.factors import FLEET, SESSIONS
 from evaluation.study.experiments.method_variants import method_variants
-from evaluation.study.study_files import StudyFiles
+from evaluation.study.pair import Pair
+from evaluation.study.run import DriveAsked, measure_pairs
 from evaluation.study.tasks.change import ChangeTask
-from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.map import MapTask
-from evaluation.study.tasks.pair import NamedDrive, Pair, Result
-from evaluation.study.tasks.place import CostTask, PlaceTask, PoseTask
+from evaluation.study.tasks.place import CostTask, PlaceTask
 from evaluation.study.tasks.task import Task
-
-# What a study takes is told if it takes longer, as costs of jobs say [s].
-_LONG = 60.0
 
 
 @dataclass
 class Study(ExperimentRun):
     """An experiment that is run.
 
-    First call `choose`, then add the pairs of each map with `add`, and then
-    call `measure`.
+    First call `choose`, then `measure` with the pairs of all maps.
 
     Attributes:
         tasks: name -> task.
         methods: key of a method -> the method, and the columns of its
             settings.
-        jobs: name -> job.
-        pictures: name -> job that draws from the files of other jobs. They run
-            once the tables are written, so that a picture that cannot be drawn
-            takes no number along.
-        results: pair -> name of a task -> its results, as files or in memory.
     """
 
     tasks: dict[str, Task] = field(default_factory=dict)
     methods: dict[str, tuple[MethodChoice, Mapping[str, Any]]] = field(
         default_factory=dict
     )
-    jobs: dict[str, Job] = field(default_factory=dict)
-    pictures: dict[str, Job] = field(default_factory=dict)
-    results: dict[Pair, dict[str, tuple[Result, ...]]] = field(
-        default_factory=dict
-    )
-    _notes: dict[str, None] = field(default_factory=dict)
+
+    @property
+    def store(self) -> Store:
+        """The store of everything that is read and measured."""
+        return Store(self.output / "parts")
+
+    @property
+    def figures(self) -> Path:
+        """The folder of all figures."""
+        return self.output / "figures"
 
     def choose(
         self,
@@ -111,25 +100,27 @@ class Study(ExperimentRun):
         with errors_at(f"{self.source}: metrics"):
             metrics = choose_metrics(self.experiment.metrics)
             check_metric_names(metrics, self.experiment.factor_names)
-        for name, settings in self._wanted_tasks().items():
+        wanted = self._wanted_tasks()
+        for name in wanted:
             if name not in known:
                 raise InputError(
                     f"{self.source}: tasks: {no_such('task', name, known)}"
                 )
-            self.tasks[name] = known[name](settings, self.source)
         if methods is not None:
             self.methods = {one.key: (one, one.columns) for one in methods}
         else:
             with errors_at(f"{self.source}: methods", "--method: "):
                 self.methods = _chosen_methods(self.experiment)
-        baselines = _method_baselines(
-            self.methods, baseline_values(self.experiment)
-        )
-        for task in self.tasks.values():
-            if isinstance(task, PoseTask):
-                task.baselines = baselines
+        choices = [choice for choice, _ in self.methods.values()]
+        self.tasks = {
+            name: known[name](settings, self.source, choices)
+            for name, settings in wanted.items()
+        }
         self._check_charts()
-        StudyFiles(self.output).check()
+        check_output(self.output, ["page"])
+        for folder in (self.store.folder, self.figures):
+            if os.path.lexists(folder) and not folder.is_dir():
+                raise InputError(f"{folder}: not a folder")
         self._note_lower_levels()
 
     @property
@@ -220,79 +211,61 @@ class Study(ExperimentRun):
         if fewer:
             self.on_note(f"measured at their last level: {', '.join(fewer)}")
 
-    def add(
+    def measure(
         self,
         pairs: Sequence[Pair],
-        distractors: Sequence[NamedDrive] = (),
-        make_jobs: Callable[..., Jobs] = Jobs,
-    ) -> Jobs:
-        """Adds the jobs of all pairs on one map, and returns the jobs.
+        shown: Sequence[DriveAsked] = (),
+        space: Space | None = None,
+    ) -> tuple[Results, QueryRows]:
+        """Measures all pairs, writes both tables, and returns the tables.
 
         Args:
-            pairs: the pairs.
-            distractors: drives through other cities, whose places are added to
-                databases in this order.
-            make_jobs: class of the jobs, which says how drives are read.
-        """
-        planned = make_jobs(
-            StudyFiles(self.output),
-            tuple(choice for choice, _ in self.methods.values()),
-            distractors,
-        )
-        if any(task.asks for task in self.tasks.values()):
-            for one in pairs:
-                planned.expect(one)
-        self.results |= {one: {} for one in pairs}
-        for name, task in self.tasks.items():
-            seen: set[tuple[object, ...]] = set()
-            for one in pairs:
-                is_new = not one.may_repeat or one.drives not in seen
-                if (task.asks or is_new) and (
-                    parts := task.measure(one, planned)
-                ):
-                    self.results[one][name] = parts
-                seen.add(one.drives)
-        self.jobs |= planned.jobs
-        self._notes |= planned.notes
-        return planned
-
-    def measure(self, space: Space | None = None) -> tuple[Results, QueryRows]:
-        """Runs all jobs, writes both tables, and returns the tables.
-
-        Args:
-            space: space on the disk that the jobs need, if known.
+            pairs: the pairs of all maps.
+            shown: what else is read of the drives, for the page.
+            space: space on the disk that is needed, if known.
 
         Raises:
-            InputError: a step failed, or a file cannot be written.
+            InputError: a step failed, nothing could be measured, or a file
+                cannot be written.
         """
-        for text in self._notes:
+        for text in dict.fromkeys(
+            text for task in self.tasks.values() for text in task.notes()
+        ):
             self.on_note(text)
         make_output(self.output, ["page"])
-        jobs = list(self.jobs.values())
-        pictures = list(self.pictures.values())
-        told = forecast([*jobs, *pictures], self.cluster, space, least=_LONG)
-        if told is not None:
-            self.on_note(
-                f"{told}; after an interruption, run the same command again"
-            )
-        run_jobs(jobs, self.cluster)
+        doing("looking at what is measured already")
+        measured = self._measured(pairs)
+        measure_pairs(
+            measured, shown, self.store, self.cluster, self.on_note, space
+        )
         doing("writing the tables")
-        tables = self.tables()
+        tables = self.tables(measured)
         if not tables[0].rows:
             raise InputError(
                 f"{self.experiment.name}: nothing could be measured; the notes"
                 " say why"
             )
         write_tables(self.output, *tables)
-        if pictures:
-            run_jobs(pictures, self.cluster)
-        doing("writing the page")
         return tables
+
+    def _measured(self, pairs: Iterable[Pair]) -> dict[Pair, list[Task]]:
+        """Returns the tasks that measure each pair."""
+        found: dict[Pair, list[Task]] = {one: [] for one in pairs}
+        for task in self.tasks.values():
+            seen: set[tuple[str, str]] = set()
+            for one in found:
+                drives = one.map_name, str(one.drives)
+                is_new = not one.may_repeat or drives not in seen
+                if (task.is_of_queries or is_new) and task.keys(one):
+                    found[one].append(task)
+                seen.add(drives)
+        return found
 
     def write_page(
         self,
         results: Results,
         queries: QueryRows,
+        pairs: Iterable[Pair],
         notes: Sequence[str],
         sections: Sequence[PageSection] = (),
         *,
@@ -304,6 +277,7 @@ class Study(ExperimentRun):
 
         Args:
             results, queries: the tables.
+            pairs: the pairs that were measured.
             notes: lines for the end of the page.
             sections: further sections of the page.
             about: the question, if it is not that of the experiment.
@@ -323,67 +297,66 @@ class Study(ExperimentRun):
             charts=experiment.charts,
             metrics=choose_metrics(experiment.metrics),
             experiment_text=experiment.text,
-            notes=[*self._worlds(), *notes],
+            notes=[*_worlds(pairs), *notes],
             sections=sections,
             own_methods=own_methods,
             printed=printed,
             on_note=self.on_note,
         )
 
-    def _worlds(self) -> list[str]:
-        """Returns what the page says of the worlds of recordings."""
-        found = (
-            f"World of {one.map_name}: {one.world.why}."
-            for one in self.results
-            if one.world is not None
-        )
-        return list(dict.fromkeys(found))
+    def tables(
+        self, measured: Mapping[Pair, Sequence[Task]]
+    ) -> tuple[Results, QueryRows]:
+        """Returns the tables of results and of queries of measured pairs.
 
-    def tables(self) -> tuple[Results, QueryRows]:
-        """Returns the tables of results and of queries of finished jobs.
+        Args:
+            measured: the pairs, each with the tasks that measured it.
 
         Raises:
-            InputError: a job has not been done.
+            InputError: a result is missing in the store.
         """
+        store = self.store
         rows: list[Row] = []
         answers: list[Answers] = []
         # The pairs by map, drives and factors, each by its seed.
         by_condition: dict[tuple, dict[int, Pair]] = {}
-        for one in self.results:
+        for one in measured:
             condition = _condition(one, one.factors)
             by_condition.setdefault(condition, {})[one.seed] = one
         baselines: dict[tuple[Pair, str], Any] = {}
         named = baseline_values(self.experiment)
         baseline = "; ".join(f"{n}={v}" for n, v in named.items())
-        for one, parts in self.results.items():
+        compared = _method_baselines(self.methods, named)
+        for one, tasks in measured.items():
             alike = {}
             if one.baseline is not None:
                 alike = by_condition.get(_condition(one, one.baseline), {})
             base = alike.get(one.seed) or next(iter(alike.values()), None)
-            for name, files in parts.items():
-                task = self.tasks[name]
-                found = task.found(one, files)
+            for task in tasks:
+                found = task.found(one, store)
                 before = found if base is one else None
                 if base is not None and base is not one:
-                    if (base, name) not in baselines and (
-                        of_base := self.results[base].get(name)
-                    ):
-                        baselines[base, name] = task.found(base, of_base)
-                    before = baselines.get((base, name))
-                for number in task.numbers(found, before):
-                    key = self._key(one, name, number.method, number.verified)
-                    key["world"] = one.world.state if one.world else ""
-                    rows.append(Row.of(number, baseline=baseline, **key))
-                for method, verified, columns in task.answers(found):
-                    key = self._key(one, name, method, verified)
-                    answers.append(Answers(**key, columns=columns))
+                    key = base, task.name
+                    if key not in baselines and task in measured[base]:
+                        baselines[key] = task.found(base, store)
+                    before = baselines.get(key)
+                columns = functools.cache(partial(self._columns, one, task))
+                world = one.world.state if one.world else ""
+                for number in task.numbers(found, before, compared):
+                    own = columns(number.method, number.verified)
+                    rows.append(
+                        Row.of(number, baseline=baseline, world=world, **own)
+                    )
+                for method, verified, given in task.answers(found):
+                    own = columns(method, verified)
+                    answers.append(Answers(**own, columns=given))
         return Results.of(rows), QueryRows.of(answers)
 
-    def _key(
-        self, one: Pair, task: str, method: str, verified: bool
+    def _columns(
+        self, one: Pair, task: Task, method: str, verified: bool
     ) -> dict[str, Any]:
         factors = {name: as_factor(v) for name, v in one.factors.items()}
-        settings = dict(self.tasks[task].changed_settings)
+        settings = dict(task.changed_settings)
         if method in self.methods:
             choice, columns = self.methods[method]
             method = choice.name
@@ -402,11 +375,21 @@ class Study(ExperimentRun):
             "query": query,
             "seed": one.seed,
             "factors": factors,
-            "task": task,
+            "task": task.name,
             "method": method,
             "verified": verified,
             **made_by(one.stated, settings),
         }
+
+
+def _worlds(pairs: Iterable[Pair]) -> list[str]:
+    """Returns what the page says of the worlds of recordings."""
+    found = (
+        f"World of {one.map_name}: {one.world.why}."
+        for one in pairs
+        if one.world is not None
+    )
+    return list(dict.fromkeys(found))
 
 
 def _condition(one: Pair, factors: Mapping[str, Any]) -> tuple[object, ...]:

@@ -180,7 +180,6 @@ def localise(
             if str(method).endswith(".py")
             else str(method),
         ),
-        ("",),
         (starts,),
         spacing,
         values,

@@ -24,11 +24,14 @@ from evaluation.drives import NOT_FINITE, CountedDrive, Drive, Reading
 from evaluation.methods import Method
 from evaluation.recognition import (
     PROTOCOLS,
+    DriveData,
     MethodChoice,
     Mode,
     PlaceComparison,
     PlaceOutcome,
     RetrievalProtocol,
+    asked_of_places,
+    asked_of_queries,
     check_has_match,
     choose_method,
     compared_frames,
@@ -204,12 +207,13 @@ def recognise(
     places, queries = drives = [_scans_of(one) for one in opened.drives]
     _check_returns(places, queries, protocol)
     overlaps = _overlaps(places, queries, protocol, exact_overlaps)
+    chosen = (choice,)
     ((outcomes, _),) = measure_places(
         noting(on_note),
         PlaceComparison(
-            lambda: places,
-            lambda: queries,
-            (choice,),
+            (DriveData(lambda: places, asked_of_places(chosen, protocol)),),
+            DriveData(lambda: queries, asked_of_queries(chosen, protocol)),
+            chosen,
             protocol,
             (protocol.radius,),
             truth=overlaps,

@@ -31,10 +31,7 @@ import time
 import numpy as np
 from processes import in_process
 
-from evaluation.base import (
-    LongList,
-    Part,
-)
+from evaluation.base import LongList, Part
 from evaluation.methods import Method, make_method
 from evaluation.recognition import (
     MOST_BYTES,

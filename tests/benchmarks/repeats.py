@@ -24,12 +24,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.motion import pose_at
-from cns_drake.scenarios import (
-    DrivePlan,
-    RideConfig,
-    Scenario,
-    load_scenario,
-)
+from cns_drake.scenarios import DrivePlan, RideConfig, Scenario, load_scenario
 from evaluation.drives import Drive
 from worlds.maps import recordable_drives
 

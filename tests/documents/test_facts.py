@@ -96,6 +96,24 @@ def test_names_in_modules_exist():
         assert pydoc.locate(code.partition("(")[0]) is not None, code
 
 
+def test_each_command_begins_with_its_function():
+    page = documents.read("CONTRIBUTING.md")
+    rows = documents.table(page, "| command | function |")
+    assert rows
+    for _, text in rows:
+        pieces = re.findall(r"`([^`]+)`", text)
+        places = [one for one in pieces if "/" in one]
+        code = "".join(
+            path.read_text()
+            for place in places
+            for path in documents.ROOT.glob(
+                place + "*/*.py" * ("." not in place)
+            )
+        )
+        for name in set(pieces).difference(places):
+            assert f"\ndef {name}(" in code, name
+
+
 def test_topics(short_recording):
     page = documents.read("docs/recordings.md")
     said = {

@@ -4,10 +4,11 @@ import numpy as np
 from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 import yaml
 
-from cns_drake.motion import Trajectory
+from cns_drake.motion import Speeds, Trajectory
 from cns_drake.scenarios import Scenario
 from worlds.maps import recordable_drives
-from worlds.roads import LanePath, Speeds, load_road_network, make_lane_path
+from worlds.roads import load_road_network, make_lane_path
+from worlds.shapes import LanePath
 
 SPACING = 2.0
 NO_LIMIT = 100.0

@@ -43,7 +43,8 @@ from helpers.small_cityjson import CityWriter
 from helpers.small_map import box_visual, world_text
 from helpers.small_osm import write_corner
 from worlds.city import load_plan, load_stages, make_city
-from worlds.roads import Route, load_road_network, make_lane_path
+from worlds.roads import load_road_network, make_lane_path
+from worlds.shapes import Route
 
 REFUSALS = (InputError, ReadingError)
 

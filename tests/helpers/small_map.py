@@ -5,10 +5,7 @@ import shutil
 import numpy as np
 import yaml
 
-from worlds.maps import (
-    recordable_drives,
-    shipped_maps,
-)
+from worlds.maps import recordable_drives, shipped_maps
 
 _WORLD = """<?xml version="1.0"?>
 <sdf version="1.9">

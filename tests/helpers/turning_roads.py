@@ -3,14 +3,9 @@
 import numpy as np
 import yaml
 
-from cns_drake.motion import Trajectory
-from worlds.roads import (
-    POINT_SPACING,
-    Route,
-    Speeds,
-    load_road_network,
-    make_lane_path,
-)
+from cns_drake.motion import Speeds, Trajectory
+from worlds.roads import load_road_network, make_lane_path
+from worlds.shapes import POINT_SPACING, Route
 
 
 def network_of(folder, *, kerb_radius=8.0, **style):

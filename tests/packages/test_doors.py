@@ -1,12 +1,21 @@
 """Packages are imported through their doors, and doors offer what they list."""
 
+import ast
+from collections import defaultdict
+import functools
 import importlib
 from pathlib import Path
 import re
 import subprocess
 import sys
 
-from helpers.door_contract import ROOTS, inner_imports, listed, offered_modules
+from helpers.door_contract import (
+    ROOTS,
+    inner_imports,
+    listed,
+    offered_modules,
+    package_of,
+)
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -42,6 +51,51 @@ def test_a_door_says_why_the_package_ends_there(package):
     """CONTRIBUTING.md has the three reasons."""
     first, _, _ = importlib.import_module(package).__doc__.partition("\n")
     assert re.search(r"\ba (wall|family)\b|\b(a )?public nouns?\b", first)
+
+
+@functools.cache
+def users():
+    """Returns (package, name) -> who imports the name: packages and folders."""
+    found = defaultdict(set)
+    for path in (*ROOT.rglob("*/*.py"), *ROOT.glob("*/__init__.pyi")):
+        place = path.relative_to(ROOT)
+        if place.parts[0] not in (*ROOTS, "diagrams", "docs", "tests"):
+            continue
+        module = ".".join(place.with_suffix("").parts)
+        user = package_of(module) or place.parts[0]
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom):
+                home = node.module or ""
+                # Of names that a whole house offers.
+                home = f"{place.parts[0]}.{home}" if node.level else home
+                for alias in node.names:
+                    found[home, alias.name].add(user)
+    return found
+
+
+@pytest.mark.parametrize("package", DOORS)
+def test_a_door_offers_what_somebody_uses(package):
+    house, _, name = package.partition(".")
+    as_a_whole = users()[house, name]
+    taken = {n: users()[package, n] | as_a_whole for n in listed(package)}
+    assert [n for n, some in taken.items() if not some - {package}] == []
+
+
+def test_base_holds_what_several_packages_use():
+    base = "evaluation.base"
+    modules = defaultdict(set)
+    for name, home in listed(base).items():
+        module = home if home != base else f"{base}.{name}"
+        modules[module] |= users()[base, name]
+        modules[module] |= {
+            user
+            for (place, _), some in users().items()
+            if place == module
+            for user in some
+        }
+    assert modules
+    for module, some in modules.items():
+        assert len(some - {"tests", "docs"}) > 1, module
 
 
 @pytest.mark.parametrize("package", DOORS)
@@ -82,7 +136,7 @@ def late():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("package", DOORS)
+@pytest.mark.parametrize("package", [*ROOTS, *DOORS])
 def test_a_door_loads_nothing_before_a_name_is_used(package):
     code = f"import {package}, sys; print(*sys.modules)"
     loaded = subprocess.check_output(

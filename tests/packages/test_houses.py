@@ -1,4 +1,4 @@
-"""Which packages of `worlds` a drive needs: none that builds a city."""
+"""Which packages of `worlds` a drive needs: shapes, and a map its roads."""
 
 import os
 from pathlib import Path
@@ -29,7 +29,13 @@ WORLD = """<sdf version="1.9"><world name="yard"><model name="yard">
 <geometry><box><size>99 99 0.02</size></box></geometry></visual>
 </link></model></world></sdf>
 """
-IN_YARD = "{world: yard.sdf, waypoints: way.csv, speeds: {cruise: 5}}"
+IN_YARD = """
+world: yard.sdf
+waypoints: way.csv
+speeds: {cruise: 5}
+driver: {wander: 0.3}
+ride: {roughness: B}
+"""
 IN_TOWN = """
 map: town
 stage: "02"
@@ -84,12 +90,18 @@ def test_a_scan_needs_shapes_alone(folder):
     [
         ("scan", "yard.sdf", "--pose", *"001000", "--output", "scan.pcd"),
         ("simulate", "yard.yaml", *DRIVE),
-        ("simulate", "town.yaml", *DRIVE),
-        ("simulate", "town.yaml", *DRIVE, "--transient", EACH_CHANGE),
+        ("simulate", "yard.yaml", *DRIVE, "--transient", EACH_CHANGE),
     ],
-    ids=["scan", "foreign-world", "map", "temporary-changes"],
+    ids=["scan", "drive", "temporary-changes"],
 )
-def test_a_drive_needs_nothing_that_builds_a_city(folder, words):
-    needed = packages_after(COMMAND, folder, *words)
-    assert "shapes" in needed
-    assert needed <= {"shapes", "maps", "roads"}
+def test_a_foreign_world_needs_shapes_alone(folder, words):
+    assert packages_after(COMMAND, folder, *words) == {"shapes"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("changes", [(), ("--transient", EACH_CHANGE)])
+def test_a_map_needs_its_roads_and_nothing_that_builds_it(folder, changes):
+    needed = packages_after(
+        COMMAND, folder, "simulate", "town.yaml", *DRIVE, *changes
+    )
+    assert needed == {"shapes", "maps", "roads"}

@@ -12,14 +12,8 @@ from shapely.geometry.base import BaseGeometry
 from evaluation.base import InputError
 from worlds.ageing.old_world import OldWorld
 from worlds.ageing.plots import PARTY_WALL, Plot
-from worlds.city import (
-    lines_along,
-    lot_at,
-)
-from worlds.shapes import (
-    Structure,
-    polygons_of,
-)
+from worlds.city import lines_along, lot_at
+from worlds.shapes import Structure, polygons_of
 
 # Widths of new plots along streets, tried in turn [m].
 _PLOT_WIDTHS = (22.0, 16.0, 11.0)

@@ -23,10 +23,7 @@ from evaluation.base import (
 )
 from worlds.ageing import kinds
 from worlds.imports import YEAR_COLUMN
-from worlds.maps import (
-    MESH_FOLDER,
-    MapFolder,
-)
+from worlds.maps import MESH_FOLDER, MapFolder
 from worlds.roads import load_road_network
 from worlds.shapes import (
     Area,

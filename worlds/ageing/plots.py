@@ -11,11 +11,7 @@ from shapely import affinity
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from worlds.shapes import (
-    Model,
-    Structure,
-    largest_rectangle,
-)
+from worlds.shapes import Model, Structure, largest_rectangle
 
 # Neighbours closer than this have blank walls towards each other [m].
 PARTY_WALL = 3.1

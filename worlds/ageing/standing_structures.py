@@ -10,12 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from worlds.ageing.events import PUT_UP, TAKEN_DOWN, Event
 from worlds.ageing.old_world import OldWorld
-from worlds.shapes import (
-    GROUND_CLASSES,
-    Structure,
-    StructureEntry,
-    part_mesh,
-)
+from worlds.shapes import GROUND_CLASSES, Structure, StructureEntry, part_mesh
 
 
 class StandingStructures:

@@ -12,12 +12,7 @@ from worlds.ageing.old_world import OldWorld
 from worlds.ageing.standing_structures import StandingStructures
 from worlds.ageing.yearly_draws import YearlyDraws
 from worlds.imports import random_generator
-from worlds.shapes import (
-    SPECIES,
-    Structure,
-    StructureGeometry,
-    scaled_plant,
-)
+from worlds.shapes import SPECIES, Structure, StructureGeometry, scaled_plant
 
 # Least and greatest growth of a tree in a year [m].
 _GROWTH = (0.3, 0.5)

@@ -4,8 +4,6 @@ from .map_files import YEAR_COLUMN as YEAR_COLUMN
 from .map_source import map_sources as map_sources
 from .named_randomness import random_generator as random_generator
 from .named_randomness import random_share as random_share
-from .options import DriveOn as DriveOn
 from .options import ImportOptions as ImportOptions
-from .options import Undated as Undated
 from .report import REPORT_NAME as REPORT_NAME
 from .report import ImportReport as ImportReport

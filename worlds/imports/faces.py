@@ -9,17 +9,9 @@ from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 from shapely.validation import make_valid
 
-from evaluation.base import (
-    dot,
-)
-from worlds.imports.faults import (
-    ImportFaults,
-)
-from worlds.shapes import (
-    GRID,
-    long_normals,
-    triangulate,
-)
+from evaluation.base import dot
+from worlds.imports.faults import ImportFaults
+from worlds.shapes import GRID, long_normals, triangulate
 
 # Faces with less area are dropped [m^2].
 LEAST_AREA = 1e-5

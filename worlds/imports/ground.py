@@ -10,27 +10,11 @@ from scipy.ndimage import correlate1d
 import shapely
 from shapely.geometry import Point
 
-from evaluation.base import (
-    exp,
-)
-from worlds.imports.faces import (
-    joined_triangles,
-)
-from worlds.imports.imported_objects import (
-    Base,
-    ImportedObject,
-)
-from worlds.imports.surface_samples import (
-    surface_samples,
-)
-from worlds.shapes import (
-    Mesh,
-    MeshShape,
-    Model,
-    Part,
-    Structure,
-    hull_of,
-)
+from evaluation.base import exp
+from worlds.imports.faces import joined_triangles
+from worlds.imports.imported_objects import Base, ImportedObject
+from worlds.imports.surface_samples import surface_samples
+from worlds.shapes import Mesh, MeshShape, Model, Part, Structure, hull_of
 
 # Cell size of a guessed ground [m].
 CELL = 4.0

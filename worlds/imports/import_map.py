@@ -34,19 +34,14 @@ from worlds.imports.map_source import MapSource, source_of
 from worlds.imports.options import DriveOn, ImportOptions
 from worlds.imports.report import ImportReport
 from worlds.imports.staged_city import StagedCity, stage_city
-from worlds.maps import (
-    MESH_FOLDER,
-    check_new_map,
-)
-from worlds.roads import (
+from worlds.maps import MESH_FOLDER, check_new_map
+from worlds.shapes import (
     POINT_SPACING,
     TIGHTEST_RADIUS,
-    load_waypoint_path,
-    read_waypoints,
-)
-from worlds.shapes import (
     Mesh,
     MeshShape,
+    load_waypoint_path,
+    read_waypoints,
 )
 
 # Plausible heights of the median building of a city, and a usual one [m].

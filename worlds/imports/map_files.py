@@ -6,12 +6,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from worlds.city import (
-    stage_size,
-    structures_csv,
-    triangles_in,
-    world_sdf,
-)
+from worlds.city import stage_size, structures_csv, triangles_in, world_sdf
 from worlds.imports.dressing.dressed_city import Dressing
 from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity

@@ -7,22 +7,10 @@ import numpy as np
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
-from evaluation.base import (
-    cos,
-    dot,
-    sin,
-)
-from worlds.imports.faces import (
-    LEAST_AREA,
-    flat_surface,
-    level_rings,
-)
-from worlds.imports.faults import (
-    ImportFaults,
-)
-from worlds.shapes import (
-    long_normals,
-)
+from evaluation.base import cos, dot, sin
+from worlds.imports.faces import LEAST_AREA, flat_surface, level_rings
+from worlds.imports.faults import ImportFaults
+from worlds.shapes import long_normals
 
 # The ends of a hipped roof's ridge are inset by at most this share of its
 # length.

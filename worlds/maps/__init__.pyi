@@ -17,6 +17,4 @@ from .shipped import recordable_maps as recordable_maps
 from .shipped import shipped_cities as shipped_cities
 from .shipped import shipped_drives as shipped_drives
 from .shipped import shipped_maps as shipped_maps
-from .shipped import suspension_file as suspension_file
-from .shipped import vehicle_file as vehicle_file
 from .shipped import worlds_folder as worlds_folder

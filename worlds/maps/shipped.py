@@ -43,16 +43,6 @@ def worlds_folder() -> Path:
     return unpacked(archive) if archive.exists() else package
 
 
-def vehicle_file() -> Path:
-    """Returns the SDF file of the vehicle."""
-    return worlds_folder() / "vehicle.sdf"
-
-
-def suspension_file() -> Path:
-    """Returns the YAML file of the vehicle's springs."""
-    return worlds_folder() / "suspension.yaml"
-
-
 @functools.cache
 def shipped_cities() -> Mapping[str, Path]:
     """Returns name -> folder of each of the paper's four cities."""

@@ -13,17 +13,9 @@ from shapely.geometry.base import BaseGeometry
 
 from evaluation.base import InputError, value_errors, wrapped
 from worlds.roads import carriageway
-from worlds.roads.centreline import Centreline, blend
-from worlds.roads.road import (
-    DIRECTIONS,
-    ENDS,
-    Arm,
-    End,
-    Junction,
-    LaneRef,
-    Road,
-)
+from worlds.roads.road import ENDS, Arm, End, Junction, Road
 from worlds.roads.roads_file import RoadEntry, RoadsFile, read_roads_file
+from worlds.shapes import DIRECTIONS, Centreline, LaneRef, blend
 
 Turn = Literal["left", "straight", "right"]
 # x, y, z [m] and heading [rad].

@@ -7,7 +7,8 @@ import numpy as np
 
 from evaluation.base import distances_along
 from worlds.roads.network import Connection, RoadNetwork
-from worlds.roads.road import ENDS, End, LaneRef, Road
+from worlds.roads.road import ENDS, End, Road
+from worlds.shapes import LaneRef
 
 # Distance of stop lines from the end of a road with a crossing, and without one
 # [m].

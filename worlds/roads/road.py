@@ -2,34 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from evaluation.base import cos, sin
-from worlds.roads.centreline import Centreline, sample_stations
 from worlds.roads.roads_file import RoadEntry
+from worlds.shapes import DIRECTIONS, Centreline, Direction, sample_stations
 
 End = Literal["start", "end"]
 ENDS: tuple[End, End] = ("start", "end")
-Direction = Literal["forward", "backward"]
-DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
-
-
-class LaneRef(NamedTuple):
-    """Identifies a lane of a road network.
-
-    Attributes:
-        road: name of the road.
-        direction: driving direction of the lane: `forward` along the road's
-            centreline, or `backward` against it.
-        lane: number of the lane, from 1 next to the middle of the road.
-    """
-
-    road: str
-    direction: Direction
-    lane: int
 
 
 class Road:

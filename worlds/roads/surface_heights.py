@@ -7,13 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from evaluation.base import (
-    cos,
-    sin,
-)
-from worlds.roads.network import (
-    RoadNetwork,
-)
+from evaluation.base import cos, sin
+from worlds.roads.network import RoadNetwork
 
 # Returns the heights (N,) of sidewalks above the road at places (N, 2) [m].
 KerbMap = Callable[[np.ndarray], np.ndarray]

@@ -1,6 +1,7 @@
-"""Shapes, a public noun: meshes, areas, objects, and structures of these.
+"""Shapes, a public noun: meshes, areas, structures, and paths of cars.
 
-A kit for what builds or changes a world; nothing here imports Drake.
+A kit for what builds, changes or drives through a world. Nothing here imports
+Drake.
 """
 
 import lazy_loader

@@ -10,18 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from evaluation.base import (
-    cos,
-    rotated,
-    sin,
-)
-from worlds.shapes.materials import (
-    MATERIALS,
-)
-from worlds.shapes.mesh import (
-    Mesh,
-    box_mesh,
-)
+from evaluation.base import cos, rotated, sin
+from worlds.shapes.materials import MATERIALS
+from worlds.shapes.mesh import Mesh, box_mesh
 
 # Number of sides of the prisms that stand for round shapes.
 _ROUND_SIDES = 12

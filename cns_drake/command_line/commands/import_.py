@@ -102,11 +102,7 @@ def import_(
         )
     with ended_by_interrupts("cns-drake"):
         from cns_drake.scenarios import write_table
-        from worlds.imports import (
-            ImportOptions,
-            import_city,
-            with_usual_growth,
-        )
+        from worlds.imports import ImportOptions, import_city, with_usual_growth
 
     options = ImportOptions(
         stages,

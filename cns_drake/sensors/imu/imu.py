@@ -1,7 +1,6 @@
 """An IMU: Drake's accelerometer and gyroscope, with optional errors."""
 
 from dataclasses import dataclass, replace
-import math
 from types import NoneType
 
 import numpy as np
@@ -19,13 +18,15 @@ from pydrake.systems.framework import (
 from pydrake.systems.lcm import LcmBuses
 from pydrake.systems.sensors import Accelerometer, Gyroscope
 
-from cns_drake.sensors import carriers, system_names
+from cns_drake.sensors import carriers
 from cns_drake.sensors.imu.config import ImuDescription, ImuSection
-from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
-from cns_drake.sensors.imu.sampling import MEASUREMENTS, last_sample
-from cns_drake.sensors.noise_draws import (
-    check_seed,
+from cns_drake.sensors.imu.noise import (
+    MEASUREMENTS,
+    ImuErrors,
+    ImuNoise,
+    last_sample,
 )
+from cns_drake.sensors.noise_draws import check_seed
 from cns_drake.sensors.published_sensor import (
     USUAL_RATE,
     Interface,
@@ -40,8 +41,11 @@ from cns_drake.sensors.published_sensor import (
 )
 from evaluation.base import (
     check_type,
-    is_real,
+    of_type,
 )
+
+# Beyond, events hardly advance the time of a long simulation [1/s].
+_HIGHEST_SAMPLE_RATE = 1e6
 
 
 class NoisyImu(LeafSystem):
@@ -162,8 +166,8 @@ def add_imu(
     Raises:
         RuntimeError: the plant is not finalized.
         TypeError: an argument is of another type.
-        ValueError: there is noise without a rate, the rate is not positive, the
-            pose is not finite, or the name is taken or empty.
+        ValueError: there is noise without a rate, the rate is not positive or
+            above 1e6, the pose is not finite, or the name is taken or empty.
 
     Example:
         from cns_drake import add_imu
@@ -172,16 +176,15 @@ def add_imu(
         builder.ExportOutput(imu.ports()["specific_force"], "specific_force")
     """
     check_type("noise", noise, ImuNoise, NoneType)
-    if rate is not None and not (is_real(rate) and rate > 0.0):
-        raise ValueError(
-            f"rate: {rate!r} is not a positive number of samples a second"
-        )
+    rate = of_type(rate, float | None, "rate")
+    if rate is not None:
+        _check_sample_rate(rate)
     if noise is not None and rate is None:
         raise ValueError("noise: it needs a rate; give rate as well")
     if noise is not None and noise.sensor_name == ImuNoise.sensor_name:
         noise = replace(noise, sensor_name=name)
-    parts = system_names.IMU_PARTS
-    system_names.check_new_sensor(builder, name, parts)
+    parts = carriers.IMU_PARTS
+    carriers.check_new_sensor(builder, name, parts)
     systems = [f"{name}_{part}" for part in parts]
     body, X_BI = carriers.body_and_pose(body, X_PB)
     poses, velocities, accelerations = carriers.find_motion(
@@ -213,6 +216,14 @@ def add_imu(
     return replace(imu, noisy=noisy)
 
 
+def _check_sample_rate(rate: float) -> None:
+    if not 0.0 < rate <= _HIGHEST_SAMPLE_RATE:
+        raise ValueError(
+            f"rate: {rate!r} is not a positive number of samples a second, up "
+            f"to {_HIGHEST_SAMPLE_RATE:g}"
+        )
+
+
 @names_of_fields_in_errors
 @dataclass(eq=False)
 class ImuConfig(ImuDescription, PublishedSensor):
@@ -238,11 +249,7 @@ class ImuConfig(ImuDescription, PublishedSensor):
 
     def _validate(self) -> None:
         check_seed(self.seed)
-        if not self.sample_rate() > 0.0 or math.isinf(self.sample_rate()):
-            raise ValueError(
-                f"rate: {self.rate!r} is not a positive number of samples a "
-                "second"
-            )
+        _check_sample_rate(self.sample_rate())
 
     def _section(self) -> ImuSection:
         """Returns the section of a scenario with the same fields."""
@@ -289,6 +296,7 @@ def ApplyImuConfig(
 
         ApplyImuConfig(ImuConfig(rate=200), builder)
     """
+    check_type("config", config, ImuConfig)
     config.ValidateOrThrow()
     section, rate = config._section(), config.sample_rate()
     interface = find_interface(config, builder, lcm_buses, lcm)

@@ -1,14 +1,19 @@
-"""The errors of an IMU, as functions of the sample number."""
+"""What an IMU measures: its samples, and their errors by their numbers."""
 
 from dataclasses import dataclass
 from functools import lru_cache
-import numbers
+import math
 import sys
 
 import numpy as np
 
 from cns_drake.sensors.noise_draws import check_seed, noise_generator
+from evaluation.base import check_fields
 
+# The measurements of an IMU, in the order of the columns of its errors.
+MEASUREMENTS = ("specific_force", "angular_velocity")
+# Tolerance for the rounding of a sample's time, in periods.
+_TOLERANCE = 1e-6
 # Purposes of random numbers. They differ from a LiDAR's purposes, since an IMU
 # and a LiDAR in a user's diagram may have the same name.
 _TURN_ON, _WHITE, _WALK_AT_BLOCK, _WALK_STEPS = range(16, 20)
@@ -17,6 +22,23 @@ _BLOCK = 1024
 # Blocks of the random walk until its first node: a century at 1,000 samples a
 # second.
 _FIRST_NODE = 1 << 32
+
+
+def last_sample(time: float, rate: float) -> int:
+    """Returns the number of the last sample up to a time.
+
+    Sample k is taken at the time k / rate.
+
+    Args:
+        time: the time [s].
+        rate: samples per second.
+    """
+    return math.floor(time * rate + _TOLERANCE)
+
+
+def is_sample_time(time: float, rate: float) -> bool:
+    """Returns whether a sample is taken at a time [s], up to rounding."""
+    return abs(time * rate - last_sample(time, rate)) <= _TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -48,6 +70,7 @@ class ImuNoise:
             replaces the default by its own `name`.
 
     Raises:
+        TypeError: a value is of another type.
         ValueError: a value is negative or not a number, or a density, random
             walk or bias is infinite.
 
@@ -69,13 +92,13 @@ class ImuNoise:
     sensor_name: str = "imu"
 
     def __post_init__(self) -> None:
+        check_fields(self)
         check_seed(self.seed)
         for name, value in vars(self).items():
             if name in ("seed", "sensor_name"):
                 continue
             most = np.inf if name.endswith("_range") else sys.float_info.max
-            is_number = isinstance(value, numbers.Real)
-            if not (is_number and 0.0 <= float(value) <= most):
+            if not 0.0 <= value <= most:
                 raise ValueError(f"{name}: {value!r} is not a number from 0 on")
 
     def variances(self, rate: float) -> tuple[float, float]:

@@ -23,9 +23,9 @@ from cns_drake.motion import Trajectory
 from cns_drake.sensors import carriers
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.imu.imu import add_imu
-from cns_drake.sensors.imu.noise import ImuErrors
-from cns_drake.sensors.imu.sampling import (
+from cns_drake.sensors.imu.noise import (
     MEASUREMENTS,
+    ImuErrors,
     is_sample_time,
     last_sample,
 )

@@ -6,16 +6,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 import math
-from numbers import Real
 
 import numpy as np
 
-from evaluation.base import (
-    arcsin,
-    arctan2,
-    check_type,
-    is_real,
-)
+from evaluation.base import arcsin, arctan2, of_type
 
 # Height of the elevation bands in which beams of irregular patterns are cast.
 _BAND_RAD = 0.03
@@ -142,8 +136,11 @@ class BeamPattern(ABC):
         """Checks that the range limits and the period are possible.
 
         Raises:
+            TypeError: one of them is no number.
             ValueError: one of them is impossible.
         """
+        for name in ("min_range", "max_range", "period"):
+            of_type(getattr(self, name), float, name)
         if not 0.0 <= self.min_range < self.max_range:
             raise ValueError(
                 f"min_range {self.min_range:g}, max_range {self.max_range:g}: "
@@ -206,7 +203,8 @@ class LimitedPattern(BeamPattern):
             ("azimuths_deg", azimuths_deg, 180.0),
             ("elevations_deg", elevations_deg, 90.0),
         ):
-            if np.shape(limits) != (2,) or not np.all(np.abs(limits) <= most):
+            limits = of_type(limits, tuple[float, float], name)
+            if not np.all(np.abs(limits) <= most):
                 raise ValueError(
                     f"{name}: {limits} is not two numbers from {-most:g} to "
                     f"{most:g}"
@@ -266,10 +264,8 @@ def period_of_rate(rate: float, longest: float = math.inf) -> float:
         TypeError: the rate is no number.
         ValueError: the rate is not positive, or is out of range.
     """
-    check_type("rate", rate, Real)
-    if not (
-        is_real(rate) and 0.0 < rate <= HIGHEST_RATE and rate * longest >= 1
-    ):
+    of_type(rate, float, "rate")
+    if not (0.0 < rate <= HIGHEST_RATE and rate * longest >= 1):
         least = f"at least {1.0 / longest:g} and " if longest < math.inf else ""
         raise ValueError(
             f"rate: {rate!r} is not a positive number per second, {least}"

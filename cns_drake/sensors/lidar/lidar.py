@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 import math
-from numbers import Real
 from types import NoneType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -59,7 +58,7 @@ from cns_drake.sensors.lidar.seen_geometry import (
 from evaluation.base import (
     NS_PER_S,
     check_type,
-    is_real,
+    of_type,
     product,
     rotated,
 )
@@ -154,8 +153,7 @@ def sample_times(
         ("capture_offset", capture_offset, math.inf),
         ("output_delay", output_delay, period),
     ):
-        check_type(name, time, Real)
-        if not (is_real(time) and 0.0 <= time < end):
+        if not 0.0 <= of_type(time, float, name) < end:
             raise ValueError(
                 f"{name}: {time!r} is not a time from 0 to below {end:g} s"
             )
@@ -299,14 +297,10 @@ class Lidar(LeafSystem):
             measurement: the model of noise, losses and rounding.
             returns: the model of a real unit; None for ideal returns. With a
                 model, only the resolution is taken from `measurement`.
-            causal: whether a scan is the revolution that ends at the time of
-                the output; by default the revolution starts at that time.
-            rate: scans per second of a discrete LiDAR, at most 1000 and at most
-                one scan per revolution. By default the LiDAR is continuous: it
-                has a scan for each time at which its ports are evaluated.
-            capture_offset: time of a discrete LiDAR's first periodic scan [s].
-            output_delay: time from a scan of a discrete LiDAR to its appearance
-                on the ports [s], less than 1 / `rate`.
+            causal: see `add_lidar`, as for the following arguments.
+            rate: scans per second, at most 1000 and one per revolution.
+            capture_offset: time of the first periodic scan [s].
+            output_delay: time until a scan is on the ports [s].
             moving_bodies: frame -> index of its body in the port
                 `body_spatial_velocities`. The LiDAR has this port only if this
                 argument is given.
@@ -329,6 +323,9 @@ class Lidar(LeafSystem):
             anchored_frames=anchored_frames,
             num_threads=num_threads,
         )
+        check_type("parent_frame_id", parent_frame_id, FrameId)
+        check_type("X_PB", X_PB, RigidTransform)
+        check_type("pattern", pattern, BeamPattern)
         check_type("measurement", measurement, MeasurementModel)
         check_type("causal", causal, bool)
         check_type("moving_bodies", moving_bodies, Mapping, NoneType)

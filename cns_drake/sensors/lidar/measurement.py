@@ -2,14 +2,13 @@
 
 from dataclasses import dataclass
 from enum import Enum
-import numbers
 import sys
 from typing import NamedTuple
 
 import numpy as np
 
 from cns_drake.sensors.noise_draws import check_seed, noise_generator
-from evaluation.base import exp32
+from evaluation.base import check_fields, exp32
 
 # Intensity falls with distance as in CARLA's ray-cast LiDAR with its default
 # atmosphere: exp(-a d), a = 0.004 / m (docs/ref_sensors of CARLA).
@@ -90,8 +89,10 @@ class MeasurementModel:
         """Checks the values.
 
         Raises:
+            TypeError: a value is of another type.
             ValueError: a value is out of range.
         """
+        check_fields(self)
         for name, most, kind in (
             ("resolution", sys.float_info.max, "length"),
             ("range_noise", sys.float_info.max, "length"),
@@ -99,9 +100,7 @@ class MeasurementModel:
             ("faint_dropout", 1.0, "probability"),
         ):
             value = getattr(self, name)
-            if not (
-                isinstance(value, numbers.Real) and 0.0 <= float(value) <= most
-            ):
+            if not 0.0 <= value <= most:
                 raise ValueError(f"{name}: {value!r} is not a {kind}")
         check_seed(self.seed)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import dataclass, field
 from functools import lru_cache
 import math
 
@@ -11,11 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cns_drake.sensors.lidar.beams import BeamPattern, Beams, make_beams
-from evaluation.base import (
-    cos,
-    sin,
-    sinc,
-)
+from evaluation.base import check_fields, cos, of_type, sin, sinc
 
 
 @dataclass(frozen=True)
@@ -39,6 +35,7 @@ class SpinningPattern(BeamPattern):
         azimuths_rad: first and last azimuth [rad]; None for all azimuths.
 
     Raises:
+        TypeError: a value is of another type.
         ValueError: a value is impossible, or elevations ascend.
 
     Example:
@@ -56,17 +53,12 @@ class SpinningPattern(BeamPattern):
     azimuths_rad: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self)
         self.check()
-        if not (self.num_columns >= 1 and self.num_columns % 1 == 0):
+        if self.num_columns < 1:
             raise ValueError(f"num_columns: {self.num_columns} is no number")
-        object.__setattr__(self, "num_columns", int(self.num_columns))
-        elevations = np.asarray(self.elevations_rad, float)
-        azimuths = np.zeros(2)
-        if self.azimuths_rad is not None:
-            azimuths = np.asarray(self.azimuths_rad, float)
-            object.__setattr__(self, "azimuths_rad", tuple(azimuths.tolist()))
-        # Equal patterns are found by their hash, which an array has not.
-        object.__setattr__(self, "elevations_rad", tuple(elevations.tolist()))
+        elevations = np.asarray(self.elevations_rad)
+        azimuths = self.azimuths_rad or (0.0, 0.0)
         if not (
             elevations.size
             and (np.abs(elevations) <= math.pi / 2.0).all()
@@ -76,7 +68,7 @@ class SpinningPattern(BeamPattern):
                 "elevations_rad: they must descend, from pi/2 at most to "
                 "-pi/2 at least, and there must be one"
             )
-        if azimuths.shape != (2,) or not np.ptp(azimuths) <= 2 * math.pi + 1e-9:
+        if not np.ptp(azimuths) <= 2 * math.pi + 1e-9:
             raise ValueError(
                 f"azimuths_rad: {self.azimuths_rad} is no range within 360 deg"
             )
@@ -236,6 +228,7 @@ def make_flash_pattern(
         period: time between two flashes [s].
 
     Raises:
+        TypeError: a value is of another type.
         ValueError: a value is impossible.
 
     Example:
@@ -245,7 +238,8 @@ def make_flash_pattern(
             160, 120, (60.0, 45.0), min_range=0.2, max_range=30.0, period=0.05
         )
     """
-    across, up = np.deg2rad(fov_deg)
+    width, height = of_type(width, int, "width"), of_type(height, int, "height")
+    across, up = np.deg2rad(of_type(fov_deg, tuple[float, float], "fov_deg"))
     if not (0.0 < across <= 2.0 * math.pi and 0.0 < up <= math.pi):
         raise ValueError(
             f"fov_deg: {fov_deg} is not above 0, up to 360 and 180 deg"
@@ -282,7 +276,7 @@ _TURNS_HZ = 100.0
 _NODS_HZ = 5.0 * (np.sqrt(5.0) - 1.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _TimedPattern(BeamPattern):
     """A pattern of `num_lines` beams that fire together at a constant rate.
 
@@ -290,7 +284,6 @@ class _TimedPattern(BeamPattern):
     frame in s.
     """
 
-    _: KW_ONLY
     points_per_second: float
     min_range: float
     max_range: float
@@ -305,8 +298,10 @@ class _TimedPattern(BeamPattern):
         """Checks the values.
 
         Raises:
+            TypeError: one of them is of another type.
             ValueError: one of them is impossible.
         """
+        check_fields(self)
         self.check()
         if not 0.0 < self.points_per_second < math.inf:
             raise ValueError(

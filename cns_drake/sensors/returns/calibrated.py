@@ -14,6 +14,7 @@ from cns_drake.ray_casting import RayCastingScene, SceneHits, rotate
 from cns_drake.scene import PerceptionGeometry
 from cns_drake.sensors.lidar.beams import BeamPattern, Beams
 from cns_drake.sensors.lidar.measurement import Echoes
+from cns_drake.sensors.noise_draws import check_seed
 from cns_drake.sensors.returns.echoes import Receiver, Reported, report_echoes
 from cns_drake.sensors.returns.footprint import correct_side_hits, find_sides
 from cns_drake.sensors.returns.light import BeamHits, Shots
@@ -27,6 +28,7 @@ from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
 from evaluation.base import (
     arcsin,
     arctan2,
+    check_fields,
     cos,
     sin,
 )
@@ -208,6 +210,10 @@ class CalibratedReturns:
             different random numbers.
         unit_seed: seed of the errors of the unit.
 
+    Raises:
+        TypeError: a value is of another type.
+        ValueError: a seed is negative.
+
     Example:
         from cns_drake import CalibratedReturns
 
@@ -220,6 +226,11 @@ class CalibratedReturns:
     seed: int = 0
     sensor_name: str = ""
     unit_seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        for seed in (self.seed, self.unit_seed):
+            check_seed(seed)
 
     @classmethod
     def of_preset(

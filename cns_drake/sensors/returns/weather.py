@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.sensors.returns import link_budget
-from evaluation.base import exp
+from evaluation.base import check_fields, exp
 
 
 def _geometric_sequence(first: float, last: float, count: int) -> np.ndarray:
@@ -62,7 +62,8 @@ class Weather:
         snowfall: rate of snowfall, as melted water [mm/h].
 
     Raises:
-        ValueError: if a value is out of range.
+        TypeError: a value is of another type.
+        ValueError: a value is out of range.
 
     Example:
         from cns_drake import Weather
@@ -75,6 +76,7 @@ class Weather:
     snowfall: float = 0.0
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.visibility is not None and not 5.0 <= self.visibility <= 1e6:
             raise ValueError(
                 f"visibility: {self.visibility} is not within 5 m and 1000 km"

@@ -29,7 +29,8 @@ from evaluation.base import (
 from evaluation.map_update import MAINTAINERS, NOT_MAINTAINED
 from evaluation.results import OWN
 from evaluation.study import FLEET, SESSIONS, Changes
-from worlds.roads import RoadNetwork, Route, draw_route, load_road_network
+from worlds.roads import RoadNetwork, draw_route, load_road_network
+from worlds.shapes import Route
 
 # Fields of the database that no drive has.
 DATABASE_FIELDS = (FLEET, "distractors", SESSIONS, "keep", "maintain")
@@ -54,18 +55,20 @@ def check_side(place: str, changes: Changes, source: str) -> None:
     if isinstance(city, Mapping) and isinstance(city.get("redraw"), Mapping):
         raise InputError(
             f"{source}: {place}.city.redraw: give a number, or frozen: it is a"
-            " field of both, and of no case"
+            " field of both, and of no case",
+            "city",
         )
     for name in DATABASE_FIELDS if place == "query" else ():
         if name in changes:
             raise InputError(
-                f"{source}: {place}.{name}: it is a field of database"
+                f"{source}: {place}.{name}: it is a field of database", name
             )
     number = changes.get("distractors", 0)
     if type(number) is not int or not 0 <= number <= _MOST_DISTRACTORS:
         raise InputError(
             f"{source}: {place}.distractors: {number!r} is not from 0 to"
-            f" {_MOST_DISTRACTORS}"
+            f" {_MOST_DISTRACTORS}",
+            "distractors",
         )
 
 
@@ -145,7 +148,7 @@ class DriveChanger:
             InputError: a field is unknown or not usable.
         """
         left = {n: one for n, one in changes.items() if n != "distractors"}
-        with errors_at(f"{self._source}: {place}.stage"):
+        with errors_at(f"{self._source}: {place}.stage", field="stage"):
             stage = find_stage(
                 left.pop("stage", OWN), unchanged, self._last_stage
             )
@@ -205,7 +208,8 @@ class DriveChanger:
         for name in left:
             if name not in known and (near := did_you_mean(name, known)):
                 raise InputError(
-                    f"{self._source}: {place}: {name}: no such field{near}"
+                    f"{self._source}: {place}: {name}: no such field{near}",
+                    name,
                 )
         if left:
             self._check_lidars(place, drive, left.get("lidars"))
@@ -242,7 +246,8 @@ class DriveChanger:
                     f"{self._source}: {place}.lidars: the drive has no LiDAR"
                     f" {name!r} (it has: {', '.join(drive.lidars)})"
                     f"{did_you_mean(str(name), drive.lidars)}; for a new one in"
-                    f" its place, set {kept[0]}: null"
+                    f" its place, set {kept[0]}: null",
+                    "lidars",
                 )
 
     def _check_map(self, place: str, drive: Scenario, given: Changes) -> None:
@@ -261,7 +266,9 @@ class DriveChanger:
             return
         world = drive.world_file, drive.without, drive.city.model_dump_json()
         if "without" in given and world not in self._loaded:
-            with errors_at(f"{where}.without", f"{drive.source}: without: "):
+            with errors_at(
+                f"{where}.without", f"{drive.source}: without: ", "without"
+            ):
                 load_scenario_world(drive)
             self._loaded.add(world)
         with errors_at(where, f"{drive.source}: "):

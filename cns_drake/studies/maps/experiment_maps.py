@@ -8,12 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cns_drake.scenarios import (
-    OffsetConfig,
-    Scenario,
-    load_scenario,
-    make_maps,
-)
+from cns_drake.scenarios import OffsetConfig, Scenario, load_scenario, make_maps
 from cns_drake.studies.maps.frozen_redraws import redraw_frozen
 from cns_drake.studies.maps.made_maps import made_map_step
 from evaluation.base import InputError, errors_at, natural_key

@@ -24,11 +24,7 @@ from cns_drake.studies.maps.turned_inputs import turned_bounds, turned_content
 from evaluation.base import Cluster, InputError, read_records, read_yaml
 from evaluation.results import FROZEN_REDRAW
 from worlds.city import make_city
-from worlds.maps import (
-    MapFolder,
-    shipped_maps,
-    worlds_folder,
-)
+from worlds.maps import MapFolder, shipped_maps, worlds_folder
 
 _COLUMNS = ("map", "number", "seed", "turn_deg", "stages")
 # The driver, frozen with the seeds.

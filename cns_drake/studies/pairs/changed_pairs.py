@@ -1,21 +1,25 @@
 """Pairs of simulated drives, changed as the conditions of an experiment say."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from pathlib import Path
 
-from cns_drake.scenarios import city_step, in_made_city, make_maps
+from cns_drake.scenarios import Scenario, city_step, make_maps
 from cns_drake.studies.drives.named_stages import MissingError
 from cns_drake.studies.maps.experiment_maps import MapPairs
-from cns_drake.studies.pairs.comparisons import ChangedPair, PairMaker
-from evaluation.base import InputError
+from cns_drake.studies.pairs.comparisons import PairMaker
+from cns_drake.studies.pairs.map_upkeep import UpkeptSource, plain_source
+from evaluation.base import fingerprint
+from evaluation.map_update import NOT_MAINTAINED
+from evaluation.recognition import KEEP_ALL
 from evaluation.results import CAUSE
-from evaluation.study import ExperimentRun
+from evaluation.study import ExperimentRun, Pair
+
+# Fields of the protocol that change the scans of queries.
+_QUERY_SCANS = ("turn_queries", "tilt_queries", "hide_sector")
 
 
 def changed_pairs(
     run: ExperimentRun, maps: Sequence[MapPairs]
-) -> list[list[ChangedPair]]:
+) -> list[list[Pair]]:
     """Returns the pairs of each map, changed as its conditions say.
 
     All pairs are built before a city is made, because faults come before
@@ -25,61 +29,97 @@ def changed_pairs(
         InputError: a field of a condition cannot be used, or a city cannot
             be made.
     """
-    cities = run.output / "cities"
     found = []
     for some in maps:
         noted: dict[str, None] = {}
         found.append(_built(run, some, noted.setdefault))
         for text in noted:
             run.on_note(f"{some.map_name}: {text}")
-    steps = {}
-    for one in (one for pairs in found for one in pairs):
-        for drive in one.drives:
-            try:
-                step = city_step(drive, cities)
-            except InputError as error:
-                raise InputError(f"{run.source}: {error}") from None
-            if step is not None:
-                steps[step.folder] = step
+    cities = run.output / "cities"
+    steps = {
+        step.folder: step
+        for pairs in found
+        for one in pairs
+        for drive in simulated_drives(one)
+        if (step := city_step(drive, cities)) is not None
+    }
     make_maps([*steps.values()], cities, run.cluster)
-    return [[_in_cities(one, cities) for one in pairs] for pairs in found]
+    return found
 
 
-def _in_cities(pair: ChangedPair, cities: Path) -> ChangedPair:
-    """Returns a pair whose drives go through the cities that were made."""
-    dated = [
-        one._replace(drive=in_made_city(one.drive, cities))
-        for one in pair.dated
-    ]
-    return replace(pair, dated=tuple(dated))
+def simulated_drives(pair: Pair) -> list[Scenario]:
+    """Returns the drives of a database, from older to newer, and the query."""
+    drives = (*pair.database, pair.query)
+    return [plain_source(one.source).scenario for one in drives]
+
+
+def pair_fingerprint(pair: Pair, drives: Sequence[Scenario]) -> str:
+    """Returns a hash of drives, and of how a pair compares them.
+
+    Drives that differ only in their names have different hashes.
+
+    Args:
+        pair: the pair.
+        drives: the drives of its database, and the query.
+    """
+    database, *beside, query = (one.model_dump(mode="json") for one in drives)
+    source = pair.database[0].source
+    several = {
+        "beside": beside,
+        "keep": pair.keep,
+        "maintain": source.maintain
+        if isinstance(source, UpkeptSource)
+        else NOT_MAINTAINED,
+    }
+    is_one = not beside and pair.keep == KEEP_ALL
+    of_cause = {
+        name: getattr(pair.protocol, name)
+        for name in _QUERY_SCANS
+        if getattr(pair.protocol, name) != getattr(pair.stated, name)
+    }
+    if of_cause:
+        of_cause["seed"] = pair.seed
+    return fingerprint(
+        {
+            "database": database,
+            "query": query,
+            "distractors": pair.num_distractors,
+            **({} if is_one else several),
+            **of_cause,
+        }
+    )
 
 
 def _built(
     run: ExperimentRun, some: MapPairs, on_note: Callable[[str], object]
-) -> list[ChangedPair]:
+) -> list[Pair]:
     """Returns a map's pairs in each possible condition."""
-    experiment, source = run.experiment, run.source
+    experiment = run.experiment
     found = []
     for database, query in some.pairs:
-        pair = PairMaker(
+        maker = PairMaker(
             database,
             query,
             experiment.drives == "same-route",
-            source,
+            some.map_name,
+            some.factors,
+            run.output,
+            run.source,
             on_note,
         )
         known: set[str] = set()
         for condition in experiment.conditions:
             for seed in experiment.seeds:
                 try:
-                    changed = pair.build(condition, seed)
+                    pair = maker.build(condition, seed)
                 except MissingError as error:
                     label = condition.factors.get(CAUSE, "a condition")
                     on_note(f"{label} left out: {error}")
                     break
                 # A condition without random numbers is measured once.
-                key = f"{condition.factors} {changed.fingerprint()}"
+                drawn = pair_fingerprint(pair, simulated_drives(pair))
+                key = f"{condition.factors} {drawn}"
                 if key not in known:
                     known.add(key)
-                    found.append(changed)
+                    found.append(pair)
     return found

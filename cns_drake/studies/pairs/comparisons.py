@@ -1,11 +1,13 @@
-"""Makes the two drives of each condition of an experiment."""
+"""Makes the pair of drives of each condition of an experiment."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from pathlib import Path
 import re
-from typing import Any, NamedTuple
+from typing import Any
 
-from cns_drake.scenarios import Scenario
+from cns_drake.scenarios import Scenario, in_made_city
+from cns_drake.simulation import SimulationSource
 from cns_drake.studies.drives.changed_drives import (
     DATABASE_FIELDS,
     DriveChanger,
@@ -16,8 +18,10 @@ from cns_drake.studies.drives.changed_drives import (
 )
 from cns_drake.studies.drives.named_stages import MissingError, find_stage
 from cns_drake.studies.drives.sampled_drives import Fleet
+from cns_drake.studies.pairs.map_upkeep import with_upkept_maps
 from evaluation.base import (
     InputError,
+    Store,
     errors_at,
     fingerprint,
     merged,
@@ -25,104 +29,24 @@ from evaluation.base import (
     validated,
 )
 from evaluation.map_update import NOT_MAINTAINED
-from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
+from evaluation.recognition import KEEP_ALL, checked_keep
 from evaluation.results import CAUSE, LEVEL, NO_CAUSE, OWN
 from evaluation.study import (
     FLEET,
     SESSIONS,
-    USUAL_LENGTH,
     Changes,
     Condition,
+    Pair,
+    StudyDrive,
+    condition_protocol,
     factors_in_words,
     protocol_from_fields,
 )
 
 # Fields of the protocol that change the scans of the queries at random.
 _QUERY_SCANS = ("turn_queries", "tilt_queries", "hide_sector")
-# Mean speed of the shipped drives [m/s].
-_USUAL_SPEED = 10.0
 # Greatest length of a value in the name of a drive, which names its folder.
 _LONGEST_LABEL = 48
-
-
-class DatedDrive(NamedTuple):
-    """A drive that is compared.
-
-    Attributes:
-        years: the years by which its city has aged.
-        length: its approximate length [m].
-        drive: the drive.
-        title: what drive it is, in words.
-    """
-
-    years: int
-    length: float
-    drive: Scenario
-    title: str
-
-
-@dataclass(frozen=True)
-class ChangedPair:
-    """The drives of a database and a query drive, as a condition changes them.
-
-    Attributes:
-        condition: the condition.
-        seed: seed of the condition's random choices.
-        names: names of the database drive and of the query drive before the
-            change.
-        unchanged: the query drive before the change.
-        dated: the drives of the database, from older to newer, and the query.
-        protocol: protocol of the queries.
-        distractors: number of places of other cities that are added to the
-            database, to make recognition harder.
-        asked: field -> value, for the fields of the protocol with which the
-            condition gives the queries a random yaw, a tilt or an occluded
-            sector.
-        keep: which places of the database are kept, see
-            `evaluation.recognition.place_selection.kept_places`.
-        maintain: what updates the maps of older drives by newer drives, see
-            `evaluation.map_update.upkeep`.
-    """
-
-    condition: Condition
-    seed: int
-    names: tuple[str, str]
-    unchanged: Scenario
-    dated: tuple[DatedDrive, ...]
-    protocol: RetrievalProtocol
-    distractors: int = 0
-    asked: Changes = field(default_factory=dict)
-    keep: str | int = KEEP_ALL
-    maintain: str = NOT_MAINTAINED
-
-    @property
-    def drives(self) -> tuple[Scenario, ...]:
-        """The drives of the database, from older to newer, and the query."""
-        return tuple(one.drive for one in self.dated)
-
-    def fingerprint(self) -> str:
-        """Returns a hash of the drives of the database and the query drive.
-
-        Drives that differ only in their names have different hashes.
-        """
-        database, *beside, query = (
-            one.model_dump(mode="json") for one in self.drives
-        )
-        several = {
-            "beside": beside,
-            "keep": self.keep,
-            "maintain": self.maintain,
-        }
-        is_one = not beside and self.keep == KEEP_ALL
-        return fingerprint(
-            {
-                "database": database,
-                "query": query,
-                "distractors": self.distractors,
-                **({} if is_one else several),
-                **self.asked,
-            }
-        )
 
 
 @dataclass
@@ -133,6 +57,9 @@ class PairMaker:
         database: the drive that makes the database, without any change.
         query: the drive that makes the queries, without any change.
         same_route: whether the database drive follows the query's route.
+        map_name: name of the map in tables.
+        of_map: values of factors that only this map has.
+        output: folder of the study, with the cities that are made.
         source: file of the experiment, for errors.
         on_note: is called with a note on everything that is left out.
     """
@@ -140,6 +67,9 @@ class PairMaker:
     database: Scenario
     query: Scenario
     same_route: bool
+    map_name: str
+    of_map: Changes
+    output: Path
     source: str
     on_note: Callable[[str], object]
 
@@ -161,8 +91,10 @@ class PairMaker:
             for side, drive in self._unchanged.items()
         }
 
-    def build(self, condition: Condition, seed: int) -> ChangedPair:
-        """Returns the database drive and the query drive under a condition.
+    def build(self, condition: Condition, seed: int) -> Pair:
+        """Returns the pair of drives under a condition.
+
+        Cities that must be made are not there yet.
 
         Args:
             condition: the changes to make to the two drives.
@@ -176,10 +108,10 @@ class PairMaker:
             return self._build(condition, seed)
         except InputError as error:
             raise InputError(
-                _as_written(str(error), self.source, condition)
+                _as_written(error, self.source, condition)
             ) from error
 
-    def _build(self, condition: Condition, seed: int) -> ChangedPair:
+    def _build(self, condition: Condition, seed: int) -> Pair:
         fields = self._fields(condition)
         both = fields.get("both", {})
         database = merged(both, fields.get("database", {}))
@@ -194,16 +126,16 @@ class PairMaker:
             check_side("database", database, self.source)
         check_side("query", query, self.source)
         drives = self._database_drives(sessions, query, condition, seed)
-        query_drive = self._names["query"].named(
-            self._changer.changed(
-                self._unchanged["query"], "query", query, seed
-            ),
-            condition.factors,
-            seed,
+        changed = self._changer.changed(
+            self._unchanged["query"], "query", query, seed
         )
-        asked = self._asked(fields, condition, seed)
+        asked_drive = self._names["query"].named(
+            changed, condition.factors, seed
+        )
+        stated = condition_protocol(condition, self.source)
+        of_cause = self._query_scans(fields, condition, seed)
         protocol = protocol_from_fields(
-            {**fields.get("protocol", {}), **asked}, self.source
+            {**fields.get("protocol", {}), **of_cause}, self.source
         )
         where = f"{self.source}: database"
         keep = checked_keep(database.get("keep", KEEP_ALL), f"{where}.keep")
@@ -212,24 +144,60 @@ class PairMaker:
             len(drives),
             f"{where}.maintain",
         )
-        asked_drive = DatedDrive(
-            query_drive.city.years,
-            _drive_length(query, query_drive),
-            query_drive,
-            self._names["query"].title(query_drive),
+        # Without a later year, the city of the query has not aged.
+        ages = asked_drive.city.years > 0
+        places = tuple(self._drive("database", one, ages) for one in drives)
+        way = None
+        if self.same_route:
+            older = self._way_through_older_city(drives[0], asked_drive)
+            way = self._drive("query", older, ages)
+        distractors = database.get("distractors", 0)
+        return Pair(
+            map_name=self.map_name,
+            names=(
+                self.database.name.removesuffix("_database"),
+                self.query.name,
+            ),
+            factors={**self.of_map, **condition.factors},
+            seed=seed,
+            baseline={**self.of_map, **condition.baseline},
+            stated=stated,
+            database=with_upkept_maps(
+                places, maintainer, Store(self.output / "parts")
+            ),
+            query=self._drive("query", asked_drive, ages),
+            protocol=protocol,
+            num_distractors=distractors,
+            keep=keep,
+            way=way,
+            may_repeat=bool(of_cause or distractors),
         )
-        return ChangedPair(
-            condition,
-            seed,
-            (self.database.name.removesuffix("_database"), self.query.name),
-            self.query,
-            (*drives, asked_drive),
-            protocol,
-            database.get("distractors", 0),
-            asked,
-            keep,
-            maintainer,
+
+    def _drive(self, side: str, drive: Scenario, ages: bool) -> StudyDrive:
+        with errors_at(self.source):
+            in_city = in_made_city(drive, self.output / "cities")
+        return StudyDrive(
+            drive.name,
+            SimulationSource(in_city),
+            self._names[side].title(drive),
+            drive.city.years if ages else None,
         )
+
+    def _way_through_older_city(
+        self, database: Scenario, query: Scenario
+    ) -> Scenario:
+        """Returns the query's drive, but through the city of the database."""
+        plain = self.query
+        city = ("map", "stage", "without", "city", "transient")
+        drive = query.replaced(
+            **{name: getattr(database, name) for name in city}, name=plain.name
+        )
+        if drive.replaced(name=query.name) == query:
+            return query
+        if drive == plain:
+            return plain
+        content = fingerprint(drive.model_dump(mode="json"))[:8]
+        return drive.replaced(name=f"{plain.name}_way_{content}")
 
     def _fields(self, condition: Condition) -> dict[str, Any]:
         """Returns the fields of a condition and of its causes, by section.
@@ -293,7 +261,7 @@ class PairMaker:
 
     def _find_stage(self, place: str, side: str, wanted: Any) -> str:
         """Returns the stage that a drive's field `stage` = `wanted` means."""
-        with errors_at(f"{self.source}: {place}.stage"):
+        with errors_at(f"{self.source}: {place}.stage", field="stage"):
             return find_stage(wanted, self._unchanged[side], self._last_stage)
 
     def _check_traffic(self, traffic: Any) -> None:
@@ -342,7 +310,7 @@ class PairMaker:
         query: Changes,
         condition: Condition,
         seed: int,
-    ) -> list[DatedDrive]:
+    ) -> list[Scenario]:
         """Returns the drives of a database, from older to newer.
 
         Args:
@@ -379,17 +347,9 @@ class PairMaker:
                 )
             found.append(((years, natural_key(stage)), place, drive))
         found.sort(key=lambda one: one[0])
-        return [
-            DatedDrive(
-                drive.city.years,
-                _drive_length(sessions[place], drive),
-                drive,
-                self._names["database"].title(drive),
-            )
-            for _, place, drive in found
-        ]
+        return [drive for *_, drive in found]
 
-    def _asked(
+    def _query_scans(
         self, fields: Changes, condition: Condition, seed: int
     ) -> dict[str, Any]:
         """Returns the fields with which causes change the queries' scans.
@@ -418,34 +378,24 @@ def _years(changes: Changes) -> int:
     return years if type(years) is int else 0
 
 
-def _drive_length(changes: Changes, drive: Scenario) -> float:
-    """Returns the approximate length of a drive, given its changes [m]."""
-    route = changes.get("route")
-    length = USUAL_LENGTH
-    if isinstance(route, Mapping):
-        length = float(route["length"])
-    if drive.frames is None:
-        return length
-    return min(length, _USUAL_SPEED * drive.frames * drive.frame_period)
-
-
 # Fields that describe a database, not its drives.
 _OF_DATABASE = ("keep", "maintain")
 # Fields that put a drive into another frame of reference.
 _FRAME_FIELDS = ("map", "world")
 
 
-def _as_written(fault: str, source: str, condition: Condition) -> str:
+def _as_written(error: InputError, source: str, condition: Condition) -> str:
     """Returns a fault of a drive's field, with the section that sets the field.
 
     That can be `both` or a case, of which the drive's section knows nothing.
     """
-    found = re.match(
-        rf"{re.escape(source)}: (database|query)[.:] ?(\w+)", fault
-    )
-    if found is None:
+    fault, field = str(error), error.field
+    for side in ("database", "query"):
+        start = f"{source}: {side}"
+        if field and fault.startswith(start):
+            break
+    else:
         return fault
-    side, field = found.groups()
     sections = {n: condition.changes.get(n, {}) for n in (side, "both")}
     case = f"cases.{condition.factors.get(CAUSE)}"
     for cause in condition.causes:
@@ -457,8 +407,7 @@ def _as_written(fault: str, source: str, condition: Condition) -> str:
             }
     for section, fields in sections.items():
         if field in fields:
-            start, end = found.span(1)
-            return fault[:start] + section + fault[end:]
+            return f"{source}: {section}{fault.removeprefix(start)}"
     return fault
 
 

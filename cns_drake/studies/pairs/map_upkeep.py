@@ -1,6 +1,6 @@
 """Maps of simulated drives that are updated after each drive."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 import shutil
@@ -14,9 +14,11 @@ from cns_drake.ground_truth import (
     label_points,
     labelled_drive,
 )
-from evaluation.base import Part, Reporter
+from cns_drake.simulation import SimulationSource
+from evaluation.base import Key, Store, doing, exclusive
 from evaluation.drives import DriveSource
 from evaluation.map_update import (
+    NOT_MAINTAINED,
     TRUTH,
     Label,
     PairLabels,
@@ -28,6 +30,7 @@ from evaluation.map_update import (
     run_baseline,
     write_session,
 )
+from evaluation.study import StudyDrive
 
 # Counts the changes of how maps are updated. Raise it with each such change.
 UPKEEP_VERSION = 1
@@ -45,31 +48,57 @@ class UpkeptSource:
         sources: sources of all drives of the map, from older to newer.
         number: number of the drive among `sources`.
         maintain: what updates the map, see `update_maps`.
-        updates: file with the result of `update_maps`.
+        store: keeps the updates.
     """
 
     sources: tuple[DriveSource, ...]
     number: int
     maintain: str
-    updates: Part
+    store: Store = field(compare=False)
 
     def __call__(self) -> UpkeptDrive:
+        made_of, store = self._made_of(), self.store
+        key = Key("upkeep", {"updated": made_of}, UPKEEP_VERSION)
+        with exclusive(store.part(key).path, lambda: doing("waiting")):
+            if not store.has(key):
+                found = update_maps(self.sources, self.maintain)
+                store.write(key, found)
         drive = self.sources[self.number]()
-        return UpkeptDrive(drive, self.updates.read(), self.number)
+        return UpkeptDrive(drive, store.read(key), self.number)
 
     def identity(self) -> list[object]:
-        """Returns the identities of the drives and of the updates."""
-        made_of = [one.identity() for one in self.sources]
-        return [made_of, self.number, self.maintain, UPKEEP_VERSION]
+        """Returns the identities of the drives, and what updates the map."""
+        return [*self._made_of(), self.number, UPKEEP_VERSION]
+
+    def _made_of(self) -> list[object]:
+        return [[one.identity() for one in self.sources], self.maintain]
 
 
-def update_maps(
-    reporter: Reporter, sources: tuple[DriveSource, ...], maintain: str
-) -> Updates:
+def with_upkept_maps(
+    drives: tuple[StudyDrive, ...], maintain: str, store: Store
+) -> tuple[StudyDrive, ...]:
+    """Returns drives in maps that later drives update."""
+    if maintain == NOT_MAINTAINED:
+        return drives
+    sources = tuple(one.source for one in drives)
+    return tuple(
+        replace(one, source=UpkeptSource(sources, number, maintain, store))
+        for number, one in enumerate(drives)
+    )
+
+
+def plain_source(source: DriveSource) -> SimulationSource:
+    """Returns the source of a simulated drive, whatever updates its map."""
+    if isinstance(source, UpkeptSource):
+        source = source.sources[source.number]
+    assert isinstance(source, SimulationSource)
+    return source
+
+
+def update_maps(sources: tuple[DriveSource, ...], maintain: str) -> Updates:
     """Returns the changes that each drive makes to the map of earlier drives.
 
     Args:
-        reporter: unused.
         sources: sources of the drives, from older to newer.
         maintain: name of a change detector; or `TRUTH`, for exact labels.
     """

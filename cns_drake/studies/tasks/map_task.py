@@ -1,48 +1,66 @@
 """The task `map`: scores of change detectors on the maps of two drives."""
 
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 import tempfile
 
 from cns_drake.ground_truth import labelled_drive, write_truth
-from cns_drake.simulation import SimulationSource
-from evaluation.base import Reporter
-from evaluation.drives import RecordingSource
+from evaluation.base import Key, Reporter, Store
+from evaluation.drives import DriveSource
 from evaluation.map_update import BASELINES, TRUTH, MapScores, score_methods
-from evaluation.study import Jobs, MapTask, Pair, Result
-
-_COST = 25.0
+from evaluation.study import DataOf, MapTask, Pair
 
 
 class DrivenMapTask(MapTask):
     """The task `map` on drives; makes their maps, with exact labels."""
 
-    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
-        methods = self.settings["methods"]
-        if methods is None:
-            # M3C2 needs the extra map-update.
-            methods = [TRUTH, *BASELINES]
-            if find_spec("py4dgeo") is None:
-                methods.remove("m3c2")
-                note = "m3c2 is left out: it needs the extra map-update"
-                jobs.notes[note] = None
-        arguments = (
-            pair.database.source,
+    def notes(self) -> Iterator[str]:
+        if self.settings["methods"] is None and not _has_m3c2():
+            yield "m3c2 is left out: it needs the extra map-update"
+
+    def keys(self, pair: Pair) -> list[Key]:
+        made_of = {
+            "drives": [pair.database[0].digest, pair.query.digest],
+            "methods": list(self._names),
+            "spacing": float(self.settings["spacing"]),
+        }
+        return [Key(self.name, made_of, self.version)]
+
+    def measure(
+        self,
+        pairs: Sequence[Pair],
+        data_of: DataOf,
+        store: Store,
+        reporter: Reporter,
+    ) -> None:
+        pair = pairs[0]
+        found = measure_maps(
+            reporter,
+            pair.database[0].source,
             pair.query.source,
-            tuple(methods),
+            self._names,
             float(self.settings["spacing"]),
         )
-        part = jobs.files.part("map", pair.key)
-        found = jobs.add(
-            part, measure_maps, arguments, (), _COST, self.version, pair.title
-        )
-        return (found,)
+        (key,) = self.keys(pair)
+        store.write(key, found)
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        if self.settings["methods"] is not None:
+            return tuple(self.settings["methods"])
+        known = (TRUTH, *BASELINES)
+        return tuple(one for one in known if one != "m3c2" or _has_m3c2())
+
+
+def _has_m3c2() -> bool:
+    return find_spec("py4dgeo") is not None
 
 
 def measure_maps(
     reporter: Reporter,
-    database: SimulationSource | RecordingSource,
-    query: SimulationSource | RecordingSource,
+    database: DriveSource,
+    query: DriveSource,
     methods: tuple[str, ...],
     spacing: float,
 ) -> dict[str, MapScores]:

@@ -8,25 +8,20 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from cns_drake.simulation import SimulatedDrive, SimulationSource
-from cns_drake.studies.pairs.map_upkeep import UpkeptSource
+from cns_drake.studies.pairs.map_upkeep import plain_source
 from evaluation.base import (
+    Key,
     Reporter,
-    fingerprint,
+    Store,
+    doing,
+    exclusive,
     is_there,
     read_records,
     track,
     whole_number,
 )
-from evaluation.drives import DriveSource, sample_frames
-from evaluation.study import (
-    OPENING_COST,
-    SCAN_COST,
-    Jobs,
-    Pair,
-    Result,
-    Task,
-    check_positive,
-)
+from evaluation.drives import sample_frames
+from evaluation.study import DataOf, Pair, Task, check_positive
 from worlds.ageing import HISTORY_NAME, PUT_UP, TAKEN_DOWN
 
 # Events in which a structure appears under its own name; in all others, the
@@ -181,55 +176,54 @@ class SeenTask(Task):
     def check(self, name: str, value: Any, where: str) -> None:
         check_positive(value, where)
 
-    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
+    def keys(self, pair: Pair) -> list[Key]:
+        """Returns the keys of all sightings, and of the city's events."""
         if pair.query.years is None:
-            return ()
-        drives = (pair.database, *pair.beside, pair.query)
-        sources = [plain_source(one.source) for one in drives]
-        first = sources[0]
-        parts: list[Result] = []
-        for drive, source in zip(drives, sources, strict=True):
-            arguments = source, first, float(self.settings["spacing"])
-            digest = fingerprint(
+            return []
+        first, *_ = drives = (*pair.database, pair.query)
+        found = [
+            Key(
+                self.name,
                 {
-                    "first": first.scenario.name,
-                    "spacing": arguments[2],
-                    "query": drive is pair.query,
-                }
-            )[:8]
-            part = jobs.files.part("seen", drive.name, digest)
-            # The drive is simulated in two cities.
-            scans = drive.length / arguments[2]
-            cost = 2.0 * (OPENING_COST + SCAN_COST * scans)
-            found = jobs.add(
-                part,
-                sight_structures,
-                arguments,
-                (),
-                cost,
+                    "drive": plain_source(one.source).identity(),
+                    "first": plain_source(first.source).identity(),
+                    "spacing": float(self.settings["spacing"]),
+                },
                 self.version,
-                drive.title,
             )
-            parts.append(found)
-        part = jobs.files.part("changes", pair.key)
-        found = jobs.add(
-            part,
-            changes_until,
-            (sources[-1],),
-            (),
-            1.0,
-            self.version,
-            pair.title,
-        )
-        parts.append(found)
-        return tuple(parts)
+            for one in drives
+        ]
+        made_of = {"city": plain_source(pair.query.source).identity()}
+        return [*found, Key("events", made_of, self.version)]
 
-    def found(self, pair: Pair, results: Sequence[Result]) -> Any:
-        *sightings, years = [part.read() for part in results]
-        drives = pair.database, *pair.beside
+    def measure(
+        self,
+        pairs: Sequence[Pair],
+        data_of: DataOf,
+        store: Store,
+        reporter: Reporter,
+    ) -> None:
+        pair = pairs[0]
+        if not (keys := self.keys(pair)):
+            return
+        *sightings, events = keys
+        first, *_ = sources = [
+            plain_source(one.source) for one in (*pair.database, pair.query)
+        ]
+        for source, key in zip(sources, sightings, strict=True):
+            # Several pairs have the drive.
+            with exclusive(store.part(key).path, lambda: doing("waiting")):
+                if not store.has(key):
+                    spacing = float(self.settings["spacing"])
+                    found = sight_structures(source, first, spacing)
+                    store.write(key, found)
+        store.write(events, changes_until(sources[-1]))
+
+    def found(self, pair: Pair, store: Store) -> Sightings:
+        *sightings, years = map(store.read, self.keys(pair))
         dated = [
             (one.years or 0, sighting)
-            for one, sighting in zip(drives, sightings[:-1], strict=True)
+            for one, sighting in zip(pair.database, sightings[:-1], strict=True)
         ]
         query = sightings[-1]
         every, by_query = (
@@ -239,16 +233,7 @@ class SeenTask(Task):
         return Sightings(every, every.chosen(by_query.is_noticed))
 
 
-def plain_source(source: DriveSource) -> SimulationSource:
-    """Returns the source of a simulated drive, whatever updates its map."""
-    if isinstance(source, UpkeptSource):
-        source = source.sources[source.number]
-    assert isinstance(source, SimulationSource)
-    return source
-
-
 def sight_structures(
-    reporter: Reporter,
     source: SimulationSource,
     first: SimulationSource,
     spacing: float,
@@ -256,15 +241,13 @@ def sight_structures(
     """Returns the structures from which a drive gets returns.
 
     Args:
-        reporter: unused.
         source: the drive.
         first: the oldest drive of the database. The city of this drive is the
             city before all changes.
         spacing: distance driven between two scans that count [m].
     """
     drive = source()
-    city = {name: getattr(first.scenario, name) for name in ("map", "stage")}
-    back = SimulationSource(source.scenario.replaced(**city))
+    back = SimulationSource(source.scenario.in_city_of(first.scenario))
     returned = _seen_names(drive, spacing)
     before = returned
     if back.scenario != source.scenario:
@@ -286,12 +269,11 @@ def _seen_names(drive: SimulatedDrive, spacing: float) -> Set[str]:
 
 
 def changes_until(
-    reporter: Reporter, query: SimulationSource
+    query: SimulationSource,
 ) -> tuple[dict[str, int], dict[str, int]]:
     """Returns when structures of an aged city appeared and disappeared.
 
     Args:
-        reporter: unused.
         query: the query, in the aged city.
 
     Returns:

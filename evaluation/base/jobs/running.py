@@ -8,7 +8,7 @@ of its own, too.
 from __future__ import annotations
 
 import asyncio
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -21,7 +21,6 @@ from concurrent.futures import (
 import contextlib
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-import graphlib
 import logging
 import multiprocessing
 import os
@@ -45,6 +44,7 @@ from evaluation.base.jobs.processes import (
 from evaluation.base.jobs.step import Step
 from evaluation.base.process import num_cores
 from evaluation.base.progress import JobsListener, listener
+from evaluation.base.repetitions import repeated
 from evaluation.base.terminal import note, resumable
 
 # Environment variable with the address of a scheduler; the name is Dask's.
@@ -53,6 +53,8 @@ _ADDRESS_VARIABLE = "DASK_SCHEDULER_ADDRESS"
 _ANSWER_TIMEOUT = 10.0
 # How often a job is started again after its process has died.
 _RETRIES = 2
+# So many jobs are not worth a message before they start.
+_FEW = 4
 # Most memory of a job [bytes].
 _JOB_MEMORY = 1.2e9
 
@@ -70,20 +72,14 @@ class Job:
     """A step to be run in a process of its own.
 
     Attributes:
-        name: unique name.
+        name: unique name, in words.
         step: the work. `step.is_done` is called before a process is started, to
             save the process, and again in the process, because another copy of
             the job may have finished first.
-        needs: names of the jobs that must succeed before this job starts.
-        cost: expected time on one core [s].
-        title: what it works on, in words; by default its name.
     """
 
     name: str
     step: Step
-    needs: tuple[str, ...] = ()
-    cost: float = 1.0
-    title: str = ""
 
 
 @dataclass(frozen=True)
@@ -171,10 +167,7 @@ class Space:
 
 
 def forecast(
-    jobs: Sequence[Job],
-    cluster: Cluster,
-    space: Space | None = None,
-    least: float = 0.0,
+    jobs: Sequence[Job], cluster: Cluster, space: Space | None = None
 ) -> str | None:
     """Returns how many jobs are left, and what space they need.
 
@@ -185,18 +178,13 @@ def forecast(
         jobs: the jobs, of which some may be done.
         cluster: runs the jobs.
         space: space on the disk that the jobs need, if it is known.
-        least: shortest time of all jobs that is worth a message [s].
 
     Returns:
-        One line of text; None if all jobs are done, if they take less than
-        `least`, or if nothing is known about them.
+        One line of text; None if only a few jobs are left, or if nothing is
+        known about them.
     """
-    # Whether a job is done, which takes a look at the disk, is asked only if
-    # all jobs together may take long enough.
-    if sum(job.cost for job in jobs) < least:
-        return None
     left = [job for job in jobs if not nothing_left(job.step)]
-    if not left or sum(job.cost for job in left) < least:
+    if len(left) <= _FEW:
         return None
     parts = []
     if cluster.slots is not None:
@@ -219,11 +207,10 @@ def run_jobs(
     *,
     resumes: bool = True,
 ) -> None:
-    """Runs jobs on a cluster, the longest chains of dependent jobs first.
+    """Runs jobs on a cluster, in their order.
 
     Notes of the jobs are printed on stderr. A job whose process or worker dies
-    is repeated, and a note says so. A job that fails stops only the jobs that
-    need it.
+    is repeated, and a note says so. A job that fails does not stop the others.
 
     Args:
         jobs: the jobs.
@@ -237,60 +224,28 @@ def run_jobs(
             jobs.
         InputError: if the scheduler does not answer.
     """
-    by_name = _by_name(jobs)
-    needs = {name: job.needs for name, job in by_name.items()}
-    order = list(graphlib.TopologicalSorter(needs).static_order())
-    # Name -> cost of the longest chain that begins with the job.
-    urgency = {name: job.cost for name, job in by_name.items()}
-    for name in reversed(order):
-        for need in needs[name]:
-            cost = by_name[need].cost + urgency[name]
-            urgency[need] = max(urgency[need], cost)
-    done: set[str] = set()
-    for name in order:
-        if done.issuperset(needs[name]) and nothing_left(by_name[name].step):
-            done.add(name)
-    left = {name: by_name[name] for name in by_name if name not in done}
+    jobs = list(jobs)
+    if repeats := repeated(job.name for job in jobs):
+        raise ValueError(f"{repeats[0]}: several jobs have this name")
+    left = [job for job in jobs if not nothing_left(job.step)]
     if not left:
         return
-    left = dict(sorted(left.items(), key=lambda one: -urgency[one[0]]))
     with (
         resumable() if resumes else nullcontext(),
-        listener().jobs(
-            {name: job.cost for name, job in left.items()},
-            {name: job.title for name, job in left.items()},
-            len(done),
-            unit,
-        ) as shown,
+        listener().jobs(len(jobs), len(jobs) - len(left), unit) as shown,
     ):
-        run = _Run(left, done, shown)
+        run = _Run(left, shown)
         with cluster.connect(run.hear) as (executor, function):
             run.run(executor, function, cluster.slots)
     run.raise_faults()
 
 
-def _by_name(jobs: Iterable[Job]) -> dict[str, Job]:
-    jobs = list(jobs)
-    by_name = {job.name: job for job in jobs}
-    if len(by_name) < len(jobs):
-        name, _ = Counter(job.name for job in jobs).most_common(1)[0]
-        raise ValueError(f"{name}: several jobs have this name")
-    for job in jobs:
-        for need in job.needs:
-            if need not in by_name:
-                raise ValueError(f"{job.name}: needs {need}, which is no job")
-    return by_name
-
-
 class _Run:
     """One run of jobs on an executor."""
 
-    def __init__(
-        self, jobs: dict[str, Job], done: set[str], shown: JobsListener
-    ):
-        """Takes the jobs that are left, the most urgent first."""
-        self._waiting = jobs
-        self._done = done
+    def __init__(self, jobs: Sequence[Job], shown: JobsListener):
+        """Takes the jobs that are left."""
+        self._waiting = deque(jobs)
         self._shown = shown
         # Names of the jobs whose present copy has started.
         self._started: set[str] = set()
@@ -316,7 +271,7 @@ class _Run:
         function: Callable[[str, bytes], None],
         slots: int | None,
     ) -> None:
-        """Runs jobs until none is left that can run."""
+        """Runs jobs until none is left."""
         running = self._running
 
         def submit(job: Job) -> None:
@@ -325,11 +280,8 @@ class _Run:
 
         try:
             while True:
-                while slots is None or len(running) < slots:
-                    job = self._next()
-                    if job is None:
-                        break
-                    submit(job)
+                while self._waiting and (slots is None or len(running) < slots):
+                    submit(self._waiting.popleft())
                 if not running:
                     return
                 for future in wait(running, None, FIRST_COMPLETED).done:
@@ -346,24 +298,7 @@ class _Run:
         if not self._faults:
             return
         parts = [f"{name}: {fault}" for name, fault in self._faults.items()]
-        if self._waiting:
-            parts.append(
-                "not run, since they need failed jobs: "
-                f"{', '.join(self._waiting)}"
-            )
         raise FailedJobsError("; ".join(parts))
-
-    def _next(self) -> Job | None:
-        """Returns the most urgent job that can start, and takes it out."""
-        for name, job in list(self._waiting.items()):
-            if self._done.issuperset(job.needs):
-                del self._waiting[name]
-                # The jobs it needs may have left it nothing to do.
-                if not (job.needs and nothing_left(job.step)):
-                    return job
-                self._done.add(name)
-                self._shown.end(name)
-        return None
 
     def _must_repeat(self, name: str, future: Future) -> bool:
         """Takes the result of a job, and returns whether it must run again."""
@@ -390,7 +325,6 @@ class _Run:
                 note(traceback.format_exc())
                 fault = one_line(f"{type(error).__name__}: {error}")
         else:
-            self._done.add(name)
             self._shown.end(name)
             return False
         self._faults[name] = fault

@@ -8,12 +8,7 @@ from typing import Annotated
 
 import typer
 
-from evaluation.base import (
-    InputError,
-    check_writable,
-    shared_options,
-    terminal,
-)
+from evaluation.base import InputError, check_writable, shared_options, terminal
 from evaluation.command_line.printed_text import spaced_interval
 
 # Endings of figures.

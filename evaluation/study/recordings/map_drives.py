@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 import csv
 from dataclasses import dataclass, replace
-import math
 from pathlib import Path
 
 from evaluation.alignment import When, WorldVerdict, open_pair
@@ -17,7 +16,7 @@ from evaluation.drives import (
     Placement,
     RecordingSource,
 )
-from evaluation.study.tasks.pair import USUAL_LENGTH, NamedDrive
+from evaluation.study.pair import StudyDrive
 
 _GUESSED = (
     " Map and stage were guessed from the drive's name; a scenario.yaml in its"
@@ -52,7 +51,7 @@ def unlike_shipped(recordings: Iterable[RecordingInfo]) -> str:
 
 @dataclass(frozen=True)
 class RecordingInfo:
-    """A recording that exists or will be made, with its map and stage.
+    """A drive with its map and stage, recorded or simulated.
 
     Attributes:
         name: name of the recording.
@@ -62,7 +61,6 @@ class RecordingInfo:
             order, are in the order of time.
         way: fields of the scenario that determine the path of the drive; None
             if unknown.
-        needs: names of the jobs that make the recording; empty if it exists.
         made_by: function that opens the drive; None to open the recording at
             `path` with its default options.
         lidar_field: number of rings and field of view of the LiDAR; None if
@@ -70,9 +68,8 @@ class RecordingInfo:
         is_guessed: whether map and stage come from the name of the drive.
         scenario: digest of the drive's scenario, see `scenario_digest`; empty
             if unknown.
-        length, num_scans: see `NamedDrive`.
         world: name of the world of its poses, see `Drive.world`; None if the
-            recording does not exist yet.
+            drive is simulated.
     """
 
     name: str
@@ -80,13 +77,10 @@ class RecordingInfo:
     map_name: str
     stage: str
     way: dict | None
-    needs: tuple[str, ...] = ()
     made_by: DriveSource | None = None
     lidar_field: LidarField | None = None
     is_guessed: bool = False
     scenario: str = ""
-    length: float = USUAL_LENGTH
-    num_scans: float = math.inf
     world: str | None = None
 
     @property
@@ -95,11 +89,9 @@ class RecordingInfo:
         return self.made_by or RecordingSource(self.path.absolute())
 
     @property
-    def named(self) -> NamedDrive:
+    def drive(self) -> StudyDrive:
         """The drive, in the form in which tasks take drives."""
-        return NamedDrive(
-            self.name, self.source, self.needs, self.length, self.num_scans
-        )
+        return StudyDrive(self.name, self.source)
 
     def drives_like(self, other: RecordingInfo) -> bool:
         """Returns whether another drive follows the same route.
@@ -123,8 +115,8 @@ class MapDrives:
         stages: stage -> the drive through this stage.
         others: further drives, such as controls. A control follows the route of
             the drive through one stage, but goes through another stage.
-        world: the world of the drives; None if they do not exist yet, or none
-            is compared.
+        world: the world of the drives; None if they are simulated, or none is
+            compared.
     """
 
     name: str

@@ -3,19 +3,13 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
-from evaluation.base import (
-    InputError,
-    fingerprint,
-    natural_key,
-    no_such,
-    repeated,
-)
+from evaluation.base import InputError, natural_key, no_such, repeated
 from evaluation.recognition import KEEP_ALL, RetrievalProtocol, checked_keep
 from evaluation.results import CAUSE, LAST, OWN, STAGE
 from evaluation.study.experiments.experiment import Condition
 from evaluation.study.experiments.factors import SESSIONS, SIDES
+from evaluation.study.pair import Pair
 from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
-from evaluation.study.tasks.pair import Pair
 
 # Clocks of recordings that begin at 0 say nothing about their order: the first
 # stamps of others are years after 1970 [ns].
@@ -76,9 +70,7 @@ def recorded_pairs(
             recordings = pair if stage == OWN else control
             if recordings is None:
                 continue
-            database, query = (one.named for one in recordings)
-            # Queries are scored once for all radii.
-            asked = protocol.to_json() | {"radius": None}
+            database, query = (one.drive for one in recordings)
             yield Pair(
                 map_name=city.name,
                 names=(pair[0].name, pair[1].name),
@@ -86,8 +78,7 @@ def recorded_pairs(
                 seed=seed,
                 baseline=condition.baseline,
                 stated=protocol,
-                key=f"{database.name} {query.name} {fingerprint(asked)[:8]}",
-                database=database,
+                database=(database,),
                 query=query,
                 protocol=protocol,
                 world=city.world,
@@ -189,18 +180,10 @@ def _composed_pair(
     is_list = isinstance(names, list) and bool(names)
     if not (is_list and all(isinstance(one, str) for one in names)):
         raise InputError(f"{where}: not a list of names of recordings")
-    named = [one.named for one in _chosen_recordings(city, names, where)]
+    database = _chosen_recordings(city, names, where)
     keep = checked_keep(
         fields.get("keep", KEEP_ALL), f"{source}: database.keep"
     )
-    digest = fingerprint(
-        {
-            **protocol.to_json(),
-            "radius": None,
-            "drives": [recording.name for recording in named],
-            "keep": keep,
-        }
-    )[:8]
     return Pair(
         map_name=city.name,
         names=(city.name, query.name),
@@ -208,11 +191,9 @@ def _composed_pair(
         seed=seed,
         baseline=condition.baseline,
         stated=protocol,
-        key=f"{named[0].name} {query.name} {digest}",
-        database=named[0],
-        query=query.named,
+        database=tuple(one.drive for one in database),
+        query=query.drive,
         protocol=protocol,
-        beside=tuple(named[1:]),
         keep=keep,
         world=city.world,
     )

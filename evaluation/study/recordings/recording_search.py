@@ -17,7 +17,6 @@ from evaluation.drives import (
     RecordingSource,
     driven_way,
     find_data_sets,
-    travelled,
 )
 from evaluation.study.recordings.map_drives import (
     RecordingInfo,
@@ -230,7 +229,5 @@ def _recording_info(
         lidar_field=drive.lidar_field,
         is_guessed=is_guessed,
         scenario=scenario_digest(scenario),
-        length=float(travelled(drive.X_WS[:, :3, 3])[-1]),
-        num_scans=len(drive),
         world=drive.world,
     )

@@ -1,17 +1,13 @@
 """The task `change`: how much the city changed between two drives."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
-from evaluation.base import Reporter
-from evaluation.change import ChangeReport, DriveMap, change_of_maps
-from evaluation.recognition import DriveSummary
-from evaluation.study.tasks.jobs import Jobs
-from evaluation.study.tasks.pair import NamedDrive, Pair, Result
-from evaluation.study.tasks.task import Task, check_positive
-
-# Expected time to compare two maps [s].
-_COST = 0.5
+from evaluation.base import Key, Reporter, Store
+from evaluation.change import DriveMap, change_of_maps
+from evaluation.recognition import Asked, Map
+from evaluation.study.pair import Pair, StudyDrive
+from evaluation.study.tasks.task import DataOf, Task, check_positive
 
 
 class ChangeTask(Task):
@@ -20,13 +16,8 @@ class ChangeTask(Task):
     The query drive is compared with a drive on the same route through the
     database's city, so that only the city differs. If there is no such drive,
     the query drive is compared with the database drive.
-
-    Attributes:
-        ways: pair -> the drive on the query's route through the database's
-            city, if it is another than the database drive.
     """
 
-    ways: Mapping[Pair, NamedDrive] = {}
     name = "change"
     defaults: ClassVar[Mapping[str, Any]] = {"spacing": None}
 
@@ -34,45 +25,48 @@ class ChangeTask(Task):
         if value is not None:
             check_positive(value, where)
 
-    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
+    def asks(
+        self, pair: Pair, store: Store
+    ) -> Iterator[tuple[StudyDrive, Asked]]:
+        if not all(map(store.has, self.keys(pair))):
+            for drive in self._drives(pair):
+                yield drive, Map(self.settings["spacing"])
+
+    def keys(self, pair: Pair) -> list[Key]:
+        drives = self._drives(pair)
+        made_of = {
+            "drives": [one.digest for one in drives],
+            "spacing": self.settings["spacing"],
+        }
+        return [Key(self.name, made_of, self.version)] if drives else []
+
+    def measure(
+        self,
+        pairs: Sequence[Pair],
+        data_of: DataOf,
+        store: Store,
+        reporter: Reporter,
+    ) -> None:
+        maps = [
+            data_of(drive).take(asked)
+            for drive, asked in self.asks(pairs[0], store)
+        ]
+        if maps:
+            # Without the spread over shifted grids, which would take sixteen
+            # times as long as all other computations.
+            first, last = (
+                DriveMap(one.name, one.voxels, one.X_WS[:, :3, 3])
+                for one in maps
+            )
+            (key,) = self.keys(pairs[0])
+            store.write(key, change_of_maps(first, last))
+
+    def _drives(self, pair: Pair) -> tuple[StudyDrive, ...]:
+        """Returns the two drives that are compared; none to measure nothing."""
+        first = pair.database[0]
         closes_loops = (
-            pair.database == pair.query
-            and pair.protocol.exclude_recent is not None
+            first == pair.query and pair.protocol.exclude_recent is not None
         )
         if closes_loops or pair.is_composed:
             return ()
-        way = self.ways.get(pair, pair.database)
-        needs: list[str] = []
-        maps = tuple(
-            jobs.mapped(drive, self.settings["spacing"], needs)
-            for drive in (way, pair.query)
-        )
-        # The change does not depend on the protocol.
-        part = jobs.files.part("change", way.name, pair.query.name)
-        found = jobs.add(
-            part, measure_change, maps, needs, _COST, self.version, pair.title
-        )
-        return (found,)
-
-
-def measure_change(
-    reporter: Reporter, first: Result, second: Result
-) -> ChangeReport:
-    """Returns how much changed between two drives.
-
-    The result does not contain the spread over shifted grids, which would take
-    sixteen times as long as all other computations.
-
-    Args:
-        reporter: reports progress.
-        first, second: files with the maps of the two drives: a `DriveMap`, or a
-            `DriveSummary`.
-    """
-    maps = (part.read() for part in (first, second))
-    a, b = (
-        DriveMap(one.name, one.coarse, one.X_WS[:, :3, 3])
-        if isinstance(one, DriveSummary)
-        else one
-        for one in maps
-    )
-    return change_of_maps(a, b)
+        return pair.way or first, pair.query

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from evaluation.base import InputError, read_bytes
+from evaluation.base import InputError, Key, Reporter, Store, file_digests
 from evaluation.drives import JoinedSource
 from evaluation.localisation import (
     KISS_MATCHER,
@@ -17,16 +17,11 @@ from evaluation.localisation import (
     measure_localisation,
 )
 from evaluation.recognition import Number, numbers_of
-from evaluation.study.tasks.jobs import OPENING_COST, Jobs
-from evaluation.study.tasks.pair import Pair, Result
-from evaluation.study.tasks.task import Answered, Task, check_positive
+from evaluation.study.pair import Pair
+from evaluation.study.tasks.task import Answered, DataOf, Task, check_positive
 
 # The methods that need no optional package.
 SHIPPED = tuple(name for name in METHODS if name != KISS_MATCHER)
-# Expected time to localise the queries of a usual drive [s].
-_QUERIES_COST = 5.0
-# Expected time to add a usual drive to the map [s].
-_MAP_COST = 15.0
 
 
 class LocaliseTask(Task):
@@ -79,50 +74,47 @@ class LocaliseTask(Task):
         seed = self.settings["seed"]
         return tuple(Starts(float(r), float(turn), seed) for r, turn in values)
 
-    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
-        # Estimators of the user are identified by path and content.
-        named = tuple(
-            Path(one).absolute() if one.endswith(".py") else one
-            for one in self.settings["methods"]
-        )
-        texts = tuple(
-            read_bytes(one).hex() if isinstance(one, Path) else ""
-            for one in named
-        )
-        starts = self._starts(self.settings["starts"])
-        part = jobs.files.part("localise", pair.key)
+    def keys(self, pair: Pair) -> list[Key]:
         spacing = self.settings["spacing"] or pair.protocol.query_spacing
-        drives = pair.database, *pair.beside
-        database = pair.database.source
-        openings = 2
+        made_of = {
+            **pair.drives,
+            **self.settings,
+            "spacing": spacing,
+            # Estimators of the user are identified by name and content.
+            "methods": [Path(one).name for one in self.settings["methods"]],
+            "files": file_digests(
+                [one for one in self.settings["methods"] if _is_file(one)]
+            ),
+        }
+        return [Key(self.name, made_of, self.version)]
+
+    def measure(
+        self,
+        pairs: Sequence[Pair],
+        data_of: DataOf,
+        store: Store,
+        reporter: Reporter,
+    ) -> None:
+        pair = pairs[0]
+        database = pair.database[0].source
         if pair.is_composed:
-            sources = tuple(one.source for one in drives)
+            sources = tuple(one.source for one in pair.database)
             database = JoinedSource(sources, pair.keep)
-            # A joined drive opens its drives for their poses, then for scans.
-            openings = 1 + 2 * len(drives)
-        arguments = (
+        found = measure_localisation(
+            reporter,
             database,
             pair.query.source,
-            named,
-            texts,
-            starts,
-            spacing,
+            tuple(
+                Path(one).absolute() if _is_file(one) else one
+                for one in self.settings["methods"]
+            ),
+            self._starts(self.settings["starts"]),
+            self.settings["spacing"] or pair.protocol.query_spacing,
             tuple(self.settings["estimator"].items()),
             self.settings["odometry_drift"],
         )
-        cost = openings * OPENING_COST + _QUERIES_COST * pair.query.share
-        cost += sum(_MAP_COST * one.share for one in drives)
-        needs = [need for one in (*drives, pair.query) for need in one.needs]
-        found = jobs.add(
-            part,
-            measure_localisation,
-            arguments,
-            needs,
-            cost,
-            self.version,
-            pair.title,
-        )
-        return (found,)
+        (key,) = self.keys(pair)
+        store.write(key, found)
 
     def _named_results(
         self, found: Sequence[np.ndarray]
@@ -133,12 +125,14 @@ class LocaliseTask(Task):
         if not found:
             return
         for method in self.settings["methods"]:
-            stem = Path(method).stem if method.endswith(".py") else method
+            stem = Path(method).stem if _is_file(method) else method
             for radius, _ in starts:
                 far = f" from {radius:g} m" if len(starts) > 1 else ""
                 yield f"{stem}{far}", next(rows)
 
-    def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
+    def numbers(
+        self, found: Any, before: Any | None, compared: Any
+    ) -> Iterator[Number]:
         then = dict(self._named_results(before or ()))
         for method, rows in self._named_results(found):
             base = then.get(method)
@@ -152,6 +146,10 @@ class LocaliseTask(Task):
     def answers(self, found: Any) -> Iterator[Answered]:
         for method, rows in self._named_results(found):
             yield method, False, localisation_columns(rows)
+
+
+def _is_file(method: str) -> bool:
+    return method.endswith(".py")
 
 
 def _check(name: str, value: Any, where: str) -> None:

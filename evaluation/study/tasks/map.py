@@ -25,7 +25,7 @@ class MapTask(Task):
                 raise InputError(f"{where}: {no_such('method', one, known)}")
 
     def numbers(
-        self, found: Mapping[str, MapScores], before: Any | None
+        self, found: Mapping[str, MapScores], before: Any, compared: Any
     ) -> Iterator[Number]:
         for method, one in found.items():
             yield from numbers_of(self.name, one, method=method)

@@ -1,17 +1,24 @@
 """The interface of a study's tasks."""
 
 import abc
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from evaluation.base import InputError, no_such, repeated
-from evaluation.recognition import Number, numbers_of
-from evaluation.study.tasks.jobs import Jobs
-from evaluation.study.tasks.pair import Pair, Result
+from evaluation.base import InputError, Key, Reporter, Store, no_such, repeated
+from evaluation.recognition import (
+    Asked,
+    DriveData,
+    MethodChoice,
+    Number,
+    numbers_of,
+)
+from evaluation.study.pair import Pair, StudyDrive
 
+# A function that returns what has been asked of a drive.
+DataOf: TypeAlias = Callable[[StudyDrive], DriveData]
 # A method, whether geometric verification was used, and answers to Q queries:
 # column -> Q values.
 Answered: TypeAlias = "tuple[str, bool, Mapping[str, np.ndarray]]"
@@ -25,30 +32,38 @@ class Task(abc.ABC):
         version: counts the changes of the task's results for the same inputs.
             Raise it with each such change: results of other versions are
             computed again.
-        asks: whether the results depend on the protocol of the queries and on
-            the places of the database. Otherwise they depend only on the
+        is_of_queries: whether the results depend on the protocol of the queries
+            and on the places of the database. Otherwise they depend only on the
             drives.
         defaults: name -> default value of each setting of the task.
         settings: name -> value of each setting.
+        methods: the methods of place recognition that the study runs.
     """
 
     name: ClassVar[str]
     version: ClassVar[int] = 1
-    asks: ClassVar[bool] = False
+    is_of_queries: ClassVar[bool] = False
     defaults: ClassVar[Mapping[str, Any]] = {}
 
-    def __init__(self, settings: Mapping[str, Any], source: str):
+    def __init__(
+        self,
+        settings: Mapping[str, Any],
+        source: str,
+        methods: Sequence[MethodChoice] = (),
+    ):
         """Takes and checks the settings of the task.
 
         Args:
             settings: name -> value, for settings that differ from their
                 defaults.
             source: file of the experiment, for error messages.
+            methods: the methods of place recognition that the study runs.
 
         Raises:
             InputError: a setting is unknown or of another type.
         """
         self.settings = {**self.defaults, **settings}
+        self.methods = tuple(methods)
         for name, value in settings.items():
             where = f"{source}: tasks.{self.name}.{name}"
             if name not in self.defaults:
@@ -83,29 +98,58 @@ class Task(abc.ABC):
             if name != "methods" and value != self.defaults[name]
         }
 
-    @abc.abstractmethod
-    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
-        """Adds the jobs that measure a pair of drives to `jobs`.
+    def notes(self) -> Iterable[str]:
+        """Yields notes for the user on what the task leaves out."""
+        return ()
 
-        Returns:
-            The results: files that the jobs write, or objects in memory. There
-            are none if the task does not apply to the pair.
+    def asks(
+        self, pair: Pair, store: Store
+    ) -> Iterable[tuple[StudyDrive, Asked]]:
+        """Yields drives, and what is asked of them for results not in a store.
+
+        By default a task opens its drives by itself.
+        """
+        return ()
+
+    @abc.abstractmethod
+    def keys(self, pair: Pair) -> Sequence[Key]:
+        """Returns the keys of the task's results for a pair of drives.
+
+        There are none if the task does not apply to the pair.
         """
 
-    def found(self, pair: Pair, results: Sequence[Result]) -> Any:
-        """Returns the task's result for a pair of drives.
+    @abc.abstractmethod
+    def measure(
+        self,
+        pairs: Sequence[Pair],
+        data_of: DataOf,
+        store: Store,
+        reporter: Reporter,
+    ) -> None:
+        """Adds the results that are missing to the store.
 
         Args:
-            pair: the pair.
-            results: what `measure` returned for the pair; its jobs are done.
+            pairs: pairs that differ only in the radius of a match.
+            data_of: returns what `asks` has asked of a drive.
+            store: the store.
+            reporter: reports progress and notes.
+
+        Raises:
+            InputError: a drive cannot be read, or a method fails.
+        """
+
+    def found(self, pair: Pair, store: Store) -> Any:
+        """Returns the task's result for a pair of drives, once it is measured.
 
         Raises:
             InputError: a file cannot be read.
         """
-        (part,) = results
-        return part.read()
+        (key,) = self.keys(pair)
+        return store.read(key)
 
-    def numbers(self, found: Any, before: Any | None) -> Iterable[Number]:
+    def numbers(
+        self, found: Any, before: Any | None, compared: Mapping[str, str]
+    ) -> Iterable[Number]:
         """Yields the results of a pair of drives, a `Number` for each metric.
 
         By default `found` has the values of the metrics of the task.
@@ -115,6 +159,8 @@ class Task(abc.ABC):
             before: the task's result for the same drives in the baseline;
                 `found` itself if the pair is the baseline, None if there is no
                 baseline.
+            compared: key of a method of place recognition -> key of the method
+                with which the baseline compares it.
         """
         return numbers_of(self.name, found, before)
 

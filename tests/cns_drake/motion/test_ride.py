@@ -16,14 +16,14 @@ import pytest
 
 from cns_drake.motion import (
     RoadProfile,
+    Speeds,
     Suspension,
     Trajectory,
     load_car_masses,
     load_suspension_rates,
     ride_on_springs,
+    vehicle_file,
 )
-from worlds.maps import vehicle_file
-from worlds.roads import Speeds
 
 
 class Level:

@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 
-from cns_drake.motion import Suspension, load_car_masses, load_suspension_rates
+from cns_drake.motion import (
+    Suspension,
+    load_car_masses,
+    load_suspension_rates,
+    vehicle_file,
+)
 from evaluation.base import InputError
-from worlds.maps import vehicle_file
 
 GRAVITY = 9.81
 

@@ -14,8 +14,8 @@ from helpers.drives import (
 import numpy as np
 import pytest
 
-from cns_drake.motion import Trajectory
-from worlds.roads import LanePath, Speeds
+from cns_drake.motion import Speeds, Trajectory
+from worlds.shapes import LanePath
 
 
 def motion(trajectory, t):

@@ -14,8 +14,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
-from cns_drake.motion import Trajectory, VehicleMotion
-from worlds.maps import vehicle_file
+from cns_drake.motion import Trajectory, VehicleMotion, vehicle_file
 
 WHEELS = {
     f"{end}_{side}_wheel": (x, y)

@@ -16,11 +16,7 @@ from cns_drake.scenarios import (
     write_table,
 )
 from evaluation.base import InputError
-from worlds.maps import (
-    MapFolder,
-    recordable_drives,
-    shipped_maps,
-)
+from worlds.maps import MapFolder, recordable_drives, shipped_maps
 
 # A box has twelve triangles.
 BOX = 12

@@ -17,6 +17,8 @@ from cns_drake.scenarios import (
 from cns_drake.sensors import (
     LidarSection,
     WeatherConfig,
+    make_lidar_config,
+    make_lidar_model,
     make_pattern,
     sensor_pose,
 )
@@ -451,3 +453,26 @@ def test_the_name_of_a_folder_may_be_no_name(small_map, tmp_path, folder):
         load_scenario(file)
     file.write_text(yaml.safe_dump({**values, "name": "mine"}))
     assert load_scenario(file).name == "mine"
+
+
+@pytest.mark.parametrize("hidden", [(150, -150), (-30, 30), (20, 10)])
+def test_a_hidden_sector_lacks_its_beams_alone(hidden):
+    """Counterclockwise from its first azimuth to its last."""
+    section = make_lidar_config("vlp-16")
+    whole, seen = (
+        make_lidar_model(one, "lidar", 0).pattern.beams(0).d_Sset
+        for one in (section, section.replaced(hidden_deg=hidden))
+    )
+    first, last = hidden
+    azimuth = np.degrees(np.arctan2(whole[:, 1], whole[:, 0]))
+    inside = (azimuth - first) % 360.0 < (last - first) % 360.0
+    on_limit = np.isclose(azimuth, first) | np.isclose(azimuth, last)
+    np.testing.assert_array_equal(seen, whole[~inside | on_limit])
+
+
+@pytest.mark.parametrize("hidden", [[10, 10], [0, 200], [1]])
+def test_a_sector_that_is_none_is_refused(hidden):
+    with pytest.raises(InputError, match="hidden_deg"):
+        load_scenario("suburbia_01").with_fields(
+            {"lidars": {"*": {"hidden_deg": hidden}}}, "mine"
+        )

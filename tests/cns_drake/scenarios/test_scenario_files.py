@@ -6,10 +6,7 @@ from helpers.small_map import scenario_values, write_small_map
 import pytest
 import yaml
 
-from cns_drake.scenarios import (
-    load_scenario,
-    write_scenarios,
-)
+from cns_drake.scenarios import load_scenario, write_scenarios
 from evaluation.base import InputError
 from worlds.maps import shipped_maps
 

@@ -12,11 +12,7 @@ from scipy.spatial import cKDTree
 from shapely import contains, distance, linestrings, points, polygons, prepare
 
 from cns_drake.recording import FRAME_PERIOD, frames_within
-from cns_drake.scenarios import (
-    count_frames,
-    make_scenario,
-    plan_drive,
-)
+from cns_drake.scenarios import count_frames, make_scenario, plan_drive
 from evaluation.drives import sample_frames
 from evaluation.recognition import PAPER_PROTOCOL
 from worlds.maps import recordable_drives

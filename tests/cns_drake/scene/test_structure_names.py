@@ -3,15 +3,8 @@
 from helpers.small_map import box_visual, world_text
 import pytest
 
-from cns_drake.scene import (
-    load_world,
-    read_perception_geometry,
-    structure_name,
-)
-from worlds.shapes import (
-    StructureEntry,
-    kind_in_name,
-)
+from cns_drake.scene import load_world, read_perception_geometry, structure_name
+from worlds.shapes import StructureEntry, kind_in_name
 
 
 @pytest.mark.parametrize(

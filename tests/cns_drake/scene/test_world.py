@@ -7,14 +7,11 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.scene import (
-    load_world,
-    read_perception_geometry,
-)
+from cns_drake.motion import vehicle_file
+from cns_drake.scene import load_world, read_perception_geometry
 from cns_drake.sensors import make_beam_pattern
 from cns_drake.simulation import scan_world
 from evaluation.base import InputError
-from worlds.maps import vehicle_file
 from worlds.shapes import StructureEntry
 
 MESH = "<mesh><uri>{}</uri></mesh>"

@@ -8,16 +8,10 @@ import pytest
 from scipy import stats
 from scipy.special import erf
 
-from cns_drake.scene import (
-    TriangleSurface,
-    is_closed,
-)
+from cns_drake.scene import TriangleSurface, is_closed
 from cns_drake.sensors import Echoes, make_beam_pattern
 from evaluation.lidar_sheets import LIDAR_PRESETS
-from worlds.shapes import (
-    StructureEntry,
-    StructureTable,
-)
+from worlds.shapes import StructureEntry, StructureTable
 
 TREE = StructureTable([StructureEntry(1, "tree", "vegetation")])
 HOUSE = StructureTable(

@@ -281,10 +281,8 @@ def test_a_start_at_the_time_of_a_scan_takes_it(start, delay):
     assert found == start or (start == 5.02 and delay and np.isnan(found))
 
 
-@pytest.mark.parametrize("start", [0.0, 0.3, 5.0, 5.02])
-@pytest.mark.parametrize("delay", [0.0, 0.04])
-def test_messages_begin_with_the_scan_of_the_start(start, delay):
-    """And none is published before there is a scan to show."""
+def publishing(delay):
+    """A simulator, and the times [us] of the messages that it publishes."""
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, 0.01)
     wall = RigidTransform([5, 0, 0])
@@ -303,34 +301,33 @@ def test_messages_begin_with_the_scan_of_the_start(start, delay):
 
     lcm.Subscribe("DRAKE_POINT_CLOUD_lidar", keep)
     simulator = Simulator(builder.Build())
+
+    def advance(end):
+        simulator.AdvanceTo(end)
+        lcm.HandleSubscriptions(0)
+
+    return simulator, advance, seen
+
+
+@pytest.mark.parametrize("start", [0.0, 0.3, 5.0, 5.02])
+@pytest.mark.parametrize("delay", [0.0, 0.04])
+def test_messages_begin_with_the_scan_of_the_start(start, delay):
+    """And none is published before there is a scan to show."""
+    simulator, advance, seen = publishing(delay)
     simulator.get_mutable_context().SetTime(start)
     for step in range(26):
-        simulator.AdvanceTo(start + 0.01 * step)
-        lcm.HandleSubscriptions(0)
+        advance(start + 0.01 * step)
     first = 5.1 if start == 5.02 else start
     number = 2 if start == 5.02 else 3
-    expected = [round((first + 0.1 * k) * 1e6) for k in range(number)]
-    assert seen == expected
+    assert seen == [round((first + 0.1 * k) * 1e6) for k in range(number)]
 
 
 def test_no_message_of_a_scan_that_was_forgotten():
     """Initialize comes between a scan and its appearance."""
-    builder = DiagramBuilder()
-    AddMultibodyPlantSceneGraph(builder, 0.01)[0].Finalize()
-    lcm, seen = DrakeLcm("memq://"), []
-    with pytest.warns(UserWarning, match="no geometry"):
-        ApplyLidarConfig(
-            LidarConfig(rate=10, output_delay=0.04), builder, lcm=lcm
-        )
-    lcm.Subscribe(
-        "DRAKE_POINT_CLOUD_lidar",
-        lambda one: seen.append(lcmt_point_cloud.decode(one).utime),
-    )
-    simulator = Simulator(builder.Build())
+    simulator, advance, seen = publishing(0.04)
     for end in (0.12, 0.3):
         simulator.Initialize()
-        simulator.AdvanceTo(end)
-        lcm.HandleSubscriptions(0)
+        advance(end)
     assert seen == [0, 200_000]
 
 
@@ -454,38 +451,13 @@ def test_advancing_in_pieces_changes_nothing(casts):
     np.testing.assert_array_equal(*found)
 
 
-def test_a_lidar_config_with_a_rate_is_discrete(casts):
-    for rate, expected in ((10.0, 11), (None, 101)):
-        casts[0] = 0
-        builder = DiagramBuilder()
-        plant, _ = AddMultibodyPlantSceneGraph(builder, 0.01)
-        plant.RegisterVisualGeometry(
-            plant.world_body(), RigidTransform(), Box(9, 9, 9), "b", np.ones(4)
-        )
-        # It moves, so that every step needs a scan of its own.
-        plant.AddRigidBody(
-            "ball", SpatialInertia.SolidBoxWithMass(1.0, 1.0, 1.0, 1.0)
-        )
-        plant.Finalize()
-        lidar = ApplyLidarConfig(
-            LidarConfig(preset="hokuyo-ust-20lx", rate=rate, columns=8),
-            builder,
-            lcm=DrakeLcm("memq://"),
-        )
-        port = lidar.GetOutputPort("scan")
-        reader = builder.AddSystem(Reader([port], lambda scan: None))
-        builder.Connect(port, reader.get_input_port())
-        Simulator(builder.Build()).AdvanceTo(1.0)
-        assert casts[0] == expected
-
-
 @pytest.mark.parametrize(
     ("options", "fault"),
     [
         ({"rate": 0}, "rate: 0 is not a positive"),
         ({"rate": -1.0}, "rate: "),
         ({"rate": np.nan}, "rate: "),
-        ({"rate": True}, "rate: True is not a positive"),
+        ({"rate": True}, "rate: True is not a number"),
         ({"rate": 20}, "rate: 20 scans per second, but a revolution takes 0.1"),
         ({"output_delay": 0.1}, "output_delay: 0.1 is not .* below 0.1 s"),
         ({"output_delay": np.nan}, "output_delay: nan"),
@@ -493,13 +465,13 @@ def test_a_lidar_config_with_a_rate_is_discrete(casts):
         ({"capture_offset": -0.1}, "capture_offset: -0.1"),
         ({"capture_offset": np.inf}, "capture_offset: inf"),
         ({"rate": None, "capture_offset": 0.1}, "capture_offset: only"),
-        ({"rate": "10"}, "rate: '10' is no Real"),
-        ({"output_delay": "0"}, "output_delay: '0' is no Real"),
+        ({"rate": "10"}, "rate: '10' is not a number"),
+        ({"output_delay": "0"}, "output_delay: '0' is not a number"),
     ],
 )
 def test_rates_that_cannot_be(options, fault):
-    is_text = any(isinstance(one, str) for one in options.values())
-    with pytest.raises(TypeError if is_text else ValueError, match=f"^{fault}"):
+    error = TypeError if "not a number" in fault else ValueError
+    with pytest.raises(error, match=f"^{fault}"):
         Site(**options)
 
 

@@ -16,9 +16,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from cns_drake.motion import Trajectory, VehicleMotion
+from cns_drake.motion import Trajectory, VehicleMotion, vehicle_file
 from cns_drake.sensors import add_imu, add_odometry
-from worlds.maps import vehicle_file
 
 GRAVITY = 9.81
 

@@ -16,10 +16,7 @@ from pydrake.perception import PointCloud
 import pytest
 
 from cns_drake.sensors import POINT_DTYPE, MeasurementModel
-from worlds.shapes import (
-    StructureEntry,
-    StructureTable,
-)
+from worlds.shapes import StructureEntry, StructureTable
 
 
 def test_box_room():

@@ -11,10 +11,7 @@ from pydrake.systems.framework import LeafSystem
 import pytest
 
 from cns_drake.sensors import MeasurementModel
-from worlds.shapes import (
-    StructureEntry,
-    StructureTable,
-)
+from worlds.shapes import StructureEntry, StructureTable
 
 POSE = {"geometry_query", "sweep", "frame_poses"}
 ALL = POSE | {"geometry", "moving_instances"}

@@ -1,5 +1,7 @@
 """Names of sensors: what Drake takes, and what a recording takes."""
 
+import math
+
 import numpy as np
 from pydrake.geometry import Box, Meshcat
 from pydrake.lcm import DrakeLcm
@@ -82,7 +84,7 @@ WAYS = [name for name in vars(Site) if not name.startswith("_")]
 def test_a_name_is_any_that_drake_takes(way):
     for name in ("", 3, None):
         site = Site()
-        with pytest.raises(ValueError, match=r"name: "):
+        with pytest.raises((TypeError, ValueError), match=r"name: "):
             getattr(site, way)(name)
         assert len(site.builder.GetSystems()) == 2
     site = Site()
@@ -121,7 +123,10 @@ def test_a_lidar_has_one_view():
     site = Site()
     meshcat = Meshcat()
     lidar = site.lidar("roof")
-    add_lidar_view(site.builder, lidar, meshcat)
+    for period in (-0.1, math.nan, math.inf):
+        with pytest.raises(ValueError, match=f"^period: {period} is not"):
+            add_lidar_view(site.builder, lidar, meshcat, period=period)
+    add_lidar_view(site.builder, lidar, meshcat, period=0.0)
     with pytest.raises(ValueError, match="has a system 'roof_view'"):
         add_lidar_view(site.builder, lidar, meshcat)
     site.builder.Build()

@@ -16,10 +16,7 @@ from cns_drake.sensors import (
     make_pattern,
 )
 from evaluation.lidar_sheets import Response
-from worlds.shapes import (
-    StructureEntry,
-    StructureTable,
-)
+from worlds.shapes import StructureEntry, StructureTable
 
 # Elevations of the first and the last laser of each block of an HDL-64E [deg].
 LIMITS = 2.0, -8.33, -8.83, -24.33

@@ -7,11 +7,7 @@ import pytest
 from scipy import integrate
 
 from cns_drake.sensors import Weather
-from worlds.shapes import (
-    CLASS_IDS,
-    StructureEntry,
-    StructureTable,
-)
+from worlds.shapes import CLASS_IDS, StructureEntry, StructureTable
 
 OUTLIER = CLASS_IDS["outlier"]
 DIAMETERS_MM = np.linspace(0.01, 25.0, 4_000)

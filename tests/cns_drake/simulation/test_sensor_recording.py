@@ -388,8 +388,11 @@ def test_slips_in_the_arguments_of_a_recorder(tmp_path):
             "^cameras: c: 3 is no RgbdSensor",
         ),
         ({"rates": 5}, TypeError, "^rates: 5 is no Mapping"),
-        ({"rates": {"lidar": "a"}}, ValueError, "^rates: lidar: 'a' is not"),
-        ({"period": "x"}, ValueError, "^period: 'x' is not"),
+        ({"rates": {"lidar": "9"}}, TypeError, "^rates: lidar: '9' is not"),
+        ({"period": "1"}, TypeError, "^period: '1' is not"),
+        ({"start_ns": True}, TypeError, "^start_ns: True is not"),
+        ({"overwrite": "no"}, TypeError, "^overwrite: 'no' is not"),
+        ({"name": 3}, TypeError, "^name: 3 is not"),
         ({"lidars": lidars[0]}, TypeError, "^lidars: .* is no Collection"),
         ({"lidars": lidars}, RuntimeError, "^lidars: Lidar 'lidar' is not in"),
     ):

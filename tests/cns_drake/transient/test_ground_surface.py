@@ -4,11 +4,7 @@ from helpers.transient_town import DRIVE, X_WT
 import numpy as np
 import pytest
 
-from worlds.shapes import (
-    GroundSurface,
-    turned_up,
-    unit_normals,
-)
+from worlds.shapes import GroundSurface, turned_up, unit_normals
 
 
 def test_kerbs_and_heights_of_a_plane_road(changed):

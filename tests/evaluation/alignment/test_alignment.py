@@ -30,10 +30,7 @@ from evaluation.change import temporal_change
 from evaluation.drives import Drive, Reading, RecordingSource, open_drive
 from evaluation.map_update import write_session
 from evaluation.maps import map_drive
-from evaluation.study import (
-    RecordingInfo,
-    drives_by_map,
-)
+from evaluation.study import RecordingInfo, drives_by_map
 from evaluation.verbs import update_map
 
 pytestmark = pytest.mark.slow

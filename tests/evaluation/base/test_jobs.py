@@ -28,36 +28,29 @@ from evaluation.base import (
 pytestmark = pytest.mark.slow
 
 
-def job(
-    name, function, *arguments, needs=(), cost=1.0, output=None, is_done=None
-):
-    step = Call(function, arguments, output, is_done)
-    return Job(name, step, tuple(needs), cost)
+def job(name, function, *arguments, output=None, is_done=None):
+    return Job(name, Call(function, arguments, output, is_done))
 
 
 def test_finished_steps_start_no_process(tmp_path, monkeypatch):
-    """No cluster starts if all is done; jobs that need other work do start."""
+    """No cluster starts if all is done."""
     old, path = tmp_path / "old", tmp_path / "path"
     old.write_text("old")
     done = job(
         "done", job_functions.join, [], old, is_done=job_functions.is_there
     )
-    also = job(
-        "also", job_functions.refuse, needs=["done"], is_done=job_functions.yes
-    )
+    also = job("also", job_functions.refuse, is_done=job_functions.yes)
     with monkeypatch.context() as patched:
         patched.setattr(Cluster, "connect", None)
         run_jobs([also, done], Cluster(num_workers=1))
     assert old.read_text() == "old"
     new = job(
-        "new", job_functions.join, [], path, needs=["done"],
-        is_done=job_functions.is_there,
-    )  # fmt: skip
+        "new", job_functions.join, [], path, is_done=job_functions.is_there
+    )
     # This step is checked in its own process, after `new` is done.
     again = job(
-        "again", job_functions.join, [], path, needs=["new"],
-        is_done=job_functions.is_there,
-    )  # fmt: skip
+        "again", job_functions.join, [], path, is_done=job_functions.is_there
+    )
     unknown = job(
         "unknown", job_functions.join, [], tmp_path / "unknown",
         is_done=job_functions.cannot_check,
@@ -67,7 +60,7 @@ def test_finished_steps_start_no_process(tmp_path, monkeypatch):
     assert (tmp_path / "unknown").is_file()
     assert path.read_text() == "path"
     # The number is that of all jobs, however many were done before.
-    assert heard.numbers == [(3, 1, "jobs")]
+    assert heard.numbers == [(4, 1, "jobs")]
 
 
 def test_a_job_checks_again_before_its_output(tmp_path):
@@ -162,19 +155,6 @@ def test_two_runs_at_once_from_stdin_within_an_event_loop(tmp_path):
 
 def test_nothing_to_do_starts_nothing():
     run_jobs([], Cluster(scheduler="nowhere"))
-
-
-@pytest.mark.parametrize(
-    ("need_of_a", "message"),
-    [("b", "cycle"), ("c", "a: needs c, which is no job")],
-)
-def test_needs_must_make_sense(need_of_a, message):
-    jobs = [
-        job("a", job_functions.refuse, needs=[need_of_a]),
-        job("b", job_functions.refuse, needs=["a"]),
-    ]
-    with pytest.raises(ValueError, match=message):
-        run_jobs(jobs, Cluster())
 
 
 def test_names_differ():

@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from evaluation.base import (
-    InputError,
-    LongList,
-    Part,
-)
+from evaluation.base import InputError, LongList, Part
 
 # Number of items that are written together.
 BLOCK = 64

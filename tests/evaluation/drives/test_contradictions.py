@@ -90,7 +90,7 @@ def test_a_channel_that_the_summary_does_not_name(recording):
 
 
 _READ = """
-import sys
+import resource, sys
 from evaluation.drives import (open_drive)
 from evaluation.base.errors import InputError
 try:
@@ -99,9 +99,12 @@ try:
     print("read")
 except InputError as error:
     print(error)
-# getrusage counts the process from which this one was forked, too.
-(peak,) = (row for row in open("/proc/self/status") if "VmHWM" in row)
-print(peak.split()[1])
+if sys.platform == "linux":
+    # getrusage counts the process from which this one was forked, too.
+    (peak,) = (row for row in open("/proc/self/status") if "VmHWM" in row)
+    print(int(peak.split()[1]) * 1024)
+else:
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 
@@ -132,4 +135,4 @@ def test_a_small_file_takes_little_memory(recording, topic):
         text=True,
     ).stdout.splitlines()
     assert output[0].startswith(str(path))
-    assert int(output[1]) * 1024 < 500_000_000
+    assert int(output[1]) < 500_000_000

@@ -316,8 +316,8 @@ for _name, _change in SCENARIOS.items():
 
     @way(
         f"scenario: {_name}", "x.yaml" if _name != "far waypoints" else "t.csv",
-        "cns_drake.scenarios.load_scenario", "worlds.roads.read_waypoints",
-        "worlds.roads.load_waypoint_path",
+        "cns_drake.scenarios.load_scenario", "worlds.shapes.read_waypoints",
+        "worlds.shapes.load_waypoint_path",
         use=plan,
     )  # fmt: skip
     def _(folder, change=_change):
@@ -1243,6 +1243,7 @@ NO_FILES = {
     "evaluation.base.read_only": "an array",
     "evaluation.base.start_python": "modules of this project",
     "worlds.city.start_city": "reads by load_road_network",
+    "worlds.shapes.find_u_turn": "a place",
     "cns_drake.motion.load_car_masses": "a shipped model",
     "cns_drake.pictures.read_drive_page": "bounded by the limit of a page",
     "cns_drake.scene.find_bus": "an object",

@@ -11,16 +11,16 @@ class Heard(Listener):
 
     Attributes:
         said: activity, done, total and unit of each message.
-        numbers: jobs left, jobs done before and unit, of each run of jobs.
+        numbers: jobs, jobs done before and unit, of each run of jobs.
     """
 
     def __init__(self):
         self.said = []
         self.numbers = []
 
-    def jobs(self, costs, titles, num_done, unit):
-        self.numbers.append((len(costs), num_done, unit))
-        return super().jobs(costs, titles, num_done, unit)
+    def jobs(self, num_jobs, num_done, unit):
+        self.numbers.append((num_jobs, num_done, unit))
+        return super().jobs(num_jobs, num_done, unit)
 
     def doing(self, activity, done=0, total=0, unit=""):
         self.said.append((activity, done, total, unit))

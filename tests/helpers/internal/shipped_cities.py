@@ -15,10 +15,7 @@ from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
 from evaluation.base import fingerprint
-from worlds.city import (
-    City,
-    make_city,
-)
+from worlds.city import City, make_city
 from worlds.city.generation import rendering
 from worlds.city.growth.stage_structures import GrowingCity
 from worlds.maps import worlds_folder

@@ -18,7 +18,13 @@ from evaluation.recognition import (
     choose_methods,
     chosen_methods,
 )
-from evaluation.study import find_recordings, study, study_recordings
+from evaluation.study import (
+    find_recordings,
+    recorded_city,
+    run,
+    study,
+    study_recordings,
+)
 
 
 def do(jobs):
@@ -54,11 +60,12 @@ def jobs_here(patch):
 
     runs = []
     run_here(patch, map_step, recording)
-    patch.setattr(
-        study,
-        "run_jobs",
-        lambda jobs, cluster, unit="": runs.append(do(jobs)),
-    )
+    for module in (run, recorded_city):
+        patch.setattr(
+            module,
+            "run_jobs",
+            lambda jobs, cluster, unit="": runs.append(do(jobs)),
+        )
     patch.setattr(
         study,
         "write_page",
@@ -95,7 +102,7 @@ def report(recordings, output, methods=None, protocols=None, **more):
     """Measures a folder of recordings; returns the path of the page."""
     chosen = choose_methods() if methods is None else tuple(methods)
     with pytest.MonkeyPatch.context() as patch:
-        run_here(patch, study)
+        run_here(patch, run, recorded_city)
         return study_recordings(
             find_recordings(recordings),
             output,
@@ -105,38 +112,6 @@ def report(recordings, output, methods=None, protocols=None, **more):
             source=str(recordings),
             **more,
         )
-
-
-def planned(recordings, output, methods=None, protocols=None, **more):
-    """Returns the jobs of the study of recordings that need not exist."""
-    jobs = []
-
-    class PlannedError(Exception):
-        """All jobs are known."""
-
-    def keep(found, *_, **__):
-        """The jobs, and those that draw once the tables are written."""
-        jobs.extend(found)
-
-    def stop(found, cluster, unit=""):
-        raise PlannedError
-
-    chosen = choose_methods() if methods is None else tuple(methods)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study, "run_jobs", stop)
-        patch.setattr(study, "forecast", keep)
-        patch.setattr(study, "make_output", lambda path, writes: None)
-        with pytest.raises(PlannedError):
-            study_recordings(
-                recordings,
-                output,
-                Cluster(),
-                chosen,
-                protocols or {"random-yaw": RANDOM_YAW_PROTOCOL},
-                source="recordings",
-                **more,
-            )
-    return jobs
 
 
 def leave_figures_unrendered(patch):

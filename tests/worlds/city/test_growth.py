@@ -11,12 +11,7 @@ import pytest
 from shapely.geometry import box
 
 from worlds.city import ARCHETYPES, building_site
-from worlds.shapes import (
-    Structure,
-    lowered,
-    part_mesh,
-    top_of,
-)
+from worlds.shapes import Structure, lowered, part_mesh, top_of
 
 # Height of the walls that the edge of the roof covers [m].
 BAND = 0.51

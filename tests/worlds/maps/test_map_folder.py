@@ -5,10 +5,7 @@ import os
 import pytest
 
 from evaluation.base import InputError
-from worlds.maps import (
-    MapFolder,
-    drive_name,
-)
+from worlds.maps import MapFolder, drive_name
 
 
 def test_existing_files(tmp_path):

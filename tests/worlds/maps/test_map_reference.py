@@ -8,11 +8,7 @@ import pytest
 import yaml
 
 from evaluation.base import InputError
-from worlds.maps import (
-    MapFolder,
-    metres_on_map,
-    projected_system,
-)
+from worlds.maps import MapFolder, metres_on_map, projected_system
 
 # Longitudes and latitudes in Delft [deg].
 DEGREES = np.array([(4.36, 52.01), (4.37, 52.012), (4.358, 52.0)])

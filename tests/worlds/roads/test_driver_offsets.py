@@ -13,13 +13,8 @@ from cns_drake.scenarios import (
     make_scenario,
     plan_drive,
 )
-from worlds.roads import (
-    FINE_SPACING,
-    LanePath,
-    driven_path,
-    kerbs,
-    load_road_network,
-)
+from worlds.roads import load_road_network
+from worlds.shapes import FINE_SPACING, LanePath, driven_path, kerbs
 
 NOTHING = shapely.STRtree([])
 # Absolute lateral offsets of two real drives along one route: the quantiles of
@@ -107,13 +102,13 @@ def test_drivers_keep_clear_of_kerbs(name, seed):
     p, along = positions(trajectory, 1.0)
     along /= np.linalg.norm(along, axis=1)[:, None]
     left = np.column_stack([-along[:, 1], along[:, 0]])
-    # The car of worlds/vehicle.sdf, mirrors included.
+    # The car of `vehicle.sdf`, mirrors included.
     corners = [
         p + x * along + y * left
         for x, y in ((-1.0, -1.03), (3.7, -1.03), (3.7, 1.03), (-1.0, 1.03))
     ]
     cars = shapely.polygons(np.stack(corners, axis=1))
-    near, _ = kerbs(network).query(cars, "dwithin", 0.3)
+    near, _ = kerbs(network.areas.lane_area).query(cars, "dwithin", 0.3)
     assert len(near) == 0
     still = positions(plan_drive(scenario), 1.0)[0]
     assert np.quantile(cKDTree(still).query(p)[0], 0.9) > 0.2

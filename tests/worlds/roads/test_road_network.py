@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapely.geometry import Point
 
-from worlds.roads import LaneRef
+from worlds.shapes import LaneRef
 
 
 def test_roads_are_cut_back_to_the_kerb_tangents(load, cross):

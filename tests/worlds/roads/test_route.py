@@ -7,7 +7,8 @@ from scipy.spatial import cKDTree
 
 from evaluation.base import InputError
 from worlds.maps import worlds_folder
-from worlds.roads import Route, load_road_network, make_lane_path
+from worlds.roads import load_road_network, make_lane_path
+from worlds.shapes import Route
 
 # From the middle of a car to the kerb, at least [m].
 CAR_ROOM = 1.4

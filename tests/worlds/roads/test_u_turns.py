@@ -6,17 +6,12 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
-from cns_drake.motion import Trajectory, VehicleMotion
-from cns_drake.scenarios import (
-    load_scenario,
-    plan_drive,
-)
+from cns_drake.motion import Speeds, Trajectory, VehicleMotion, vehicle_file
+from cns_drake.scenarios import load_scenario, plan_drive
 from evaluation.base import InputError
-from worlds.maps import vehicle_file
-from worlds.roads import (
+from worlds.shapes import (
     POINT_SPACING,
     TIGHTEST_RADIUS,
-    Speeds,
     load_waypoint_path,
     make_waypoint_path,
 )

@@ -2,12 +2,7 @@
 
 import pytest
 
-from worlds.shapes import (
-    MATERIALS,
-    StructureEntry,
-    read_materials,
-    shortened,
-)
+from worlds.shapes import MATERIALS, StructureEntry, read_materials, shortened
 
 
 @pytest.mark.parametrize(

@@ -3,13 +3,7 @@ from helpers.mesh_checks import rotation_matrix
 import numpy as np
 import pytest
 
-from worlds.shapes import (
-    OBJECTS,
-    assemble,
-    bar,
-    block,
-    post,
-)
+from worlds.shapes import OBJECTS, assemble, bar, block, post
 
 
 def test_post_spans_from_the_root_to_its_height():

@@ -5,10 +5,7 @@ import pytest
 from shapely.affinity import rotate
 from shapely.geometry import Point, box
 
-from worlds.shapes import (
-    snap,
-    surface_mesh,
-)
+from worlds.shapes import snap, surface_mesh
 
 
 def ring(yaw_deg: float = 17.0):

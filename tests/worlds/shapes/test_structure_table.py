@@ -3,11 +3,7 @@
 import pytest
 
 from evaluation.base import InputError
-from worlds.shapes import (
-    StructureEntry,
-    StructureTable,
-    load_structure_table,
-)
+from worlds.shapes import StructureEntry, StructureTable, load_structure_table
 
 
 def write(tmp_path, text):

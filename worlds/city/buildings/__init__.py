@@ -21,10 +21,7 @@ from shapely.geometry import Polygon
 from evaluation.base import parse_yaml
 from worlds.city.buildings.landmarks import LANDMARKS, Landmark
 from worlds.city.facades.building import Archetype, Building
-from worlds.shapes import (
-    Model,
-    Site,
-)
+from worlds.shapes import Model, Site
 
 __all__ = ["ARCHETYPES", "sample"]
 

@@ -19,12 +19,7 @@ from worlds.city.facades import (
     foot_band,
     tiers,
 )
-from worlds.shapes import (
-    Mesh,
-    equip_roof,
-    merge_meshes,
-    outlines,
-)
+from worlds.shapes import Mesh, equip_roof, merge_meshes, outlines
 
 # Room for balconies in front, and for canopies [m].
 _FRONT_M = 1.7

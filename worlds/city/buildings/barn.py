@@ -16,10 +16,7 @@ from worlds.city.facades import (
     wing_roofs,
 )
 from worlds.city.facades.reliefs import Patch
-from worlds.shapes import (
-    Mesh,
-    outlines,
-)
+from worlds.shapes import Mesh, outlines
 
 # Free strip around the walls, for eaves [m].
 _MARGIN_M = 0.5

@@ -18,10 +18,7 @@ from worlds.city.facades import (
     top_band,
     wing_roofs,
 )
-from worlds.shapes import (
-    Mesh,
-    outlines,
-)
+from worlds.shapes import Mesh, outlines
 
 # Free strip around the walls, for eaves and buttresses [m].
 _MARGIN_M = 0.45

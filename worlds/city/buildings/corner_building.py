@@ -21,13 +21,7 @@ from worlds.city.facades import (
     tiers,
     top_band,
 )
-from worlds.shapes import (
-    FRONT_LEFT,
-    FRONT_RIGHT,
-    Mesh,
-    equip_roof,
-    outlines,
-)
+from worlds.shapes import FRONT_LEFT, FRONT_RIGHT, Mesh, equip_roof, outlines
 
 _ROOF_ITEMS = ("stair_house", "skylight", "vents", "ac_unit")
 # The radius of the corner depends on the site up to this side [m].

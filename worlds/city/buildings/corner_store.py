@@ -15,13 +15,7 @@ from worlds.city.facades import (
     tiers,
     top_band,
 )
-from worlds.shapes import (
-    FRONT_LEFT,
-    FRONT_RIGHT,
-    Mesh,
-    equip_roof,
-    outlines,
-)
+from worlds.shapes import FRONT_LEFT, FRONT_RIGHT, Mesh, equip_roof, outlines
 
 # Greatest number of windows along the front and one side together.
 _MOST_BAYS = 20

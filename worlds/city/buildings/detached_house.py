@@ -29,12 +29,7 @@ from worlds.city.facades import (
     wing_openings,
     wing_roofs,
 )
-from worlds.shapes import (
-    Mesh,
-    add_chimney,
-    merge_meshes,
-    outlines,
-)
+from worlds.shapes import Mesh, add_chimney, merge_meshes, outlines
 
 # Greatest depth of the main wing [m].
 _MOST_DEPTH_M = 10.0

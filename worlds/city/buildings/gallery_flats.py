@@ -18,11 +18,7 @@ from worlds.city.facades import (
     tiers,
     top_band,
 )
-from worlds.shapes import (
-    Mesh,
-    merge_meshes,
-    outlines,
-)
+from worlds.shapes import Mesh, merge_meshes, outlines
 
 # Greatest number of flats beside one another.
 _MOST_FLATS = 12

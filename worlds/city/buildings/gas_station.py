@@ -12,12 +12,7 @@ from worlds.city.facades import (
     roofs,
     solids,
 )
-from worlds.shapes import (
-    Mesh,
-    equip_roof,
-    merge_meshes,
-    outlines,
-)
+from worlds.shapes import Mesh, equip_roof, merge_meshes, outlines
 
 # Depth of the windows behind the wall [m].
 _RECESS_M = 0.18

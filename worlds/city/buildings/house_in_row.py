@@ -21,12 +21,7 @@ from worlds.city.facades import (
     wing_openings,
     wing_roofs,
 )
-from worlds.shapes import (
-    Assembly,
-    Mesh,
-    add_chimney,
-    outlines,
-)
+from worlds.shapes import Assembly, Mesh, add_chimney, outlines
 
 # Party walls rise this far above a roof whose ridge follows the street [m].
 _FIREWALL_M = 0.25

@@ -19,10 +19,7 @@ from worlds.city.facades import (
     roofs,
     solids,
 )
-from worlds.shapes import (
-    Mesh,
-    outlines,
-)
+from worlds.shapes import Mesh, outlines
 
 # Distance between the tables of a shelter [m].
 _TABLE_PITCH_M = 3.0

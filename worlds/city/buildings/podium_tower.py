@@ -16,12 +16,7 @@ from worlds.city.facades import (
     solids,
     tiers,
 )
-from worlds.shapes import (
-    Finish,
-    Mesh,
-    merge_meshes,
-    outlines,
-)
+from worlds.shapes import Finish, Mesh, merge_meshes, outlines
 
 _ROOF_ITEMS = (
     "lift_house",

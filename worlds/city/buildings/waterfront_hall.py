@@ -17,11 +17,7 @@ from worlds.city.facades import (
     top_band,
 )
 from worlds.city.facades.walls import Facade, facade_mesh, glass_mesh
-from worlds.shapes import (
-    Mesh,
-    merge_meshes,
-    outlines,
-)
+from worlds.shapes import Mesh, merge_meshes, outlines
 
 # Greatest number of bays of the front and one side together.
 _MOST_BAYS = 15

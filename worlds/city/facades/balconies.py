@@ -5,11 +5,7 @@ import math
 import numpy as np
 
 from worlds.city.facades.wall_frames import WallFrame
-from worlds.shapes import (
-    Assembly,
-    Finish,
-    Mesh,
-)
+from worlds.shapes import Assembly, Finish, Mesh
 
 # Length of the shared mesh of a railing [m].
 _RAILING_M = 2.0

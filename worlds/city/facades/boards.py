@@ -5,9 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from worlds.city.facades.reliefs import Relief
-from worlds.shapes import (
-    Mesh,
-)
+from worlds.shapes import Mesh
 
 
 def casings(

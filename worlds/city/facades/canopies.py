@@ -10,11 +10,7 @@ from numpy.typing import ArrayLike
 from worlds.city.facades import bays, solids
 from worlds.city.facades.building import Building
 from worlds.city.facades.wall_frames import WallFrame
-from worlds.shapes import (
-    Mesh,
-    box_mesh,
-    merge_meshes,
-)
+from worlds.shapes import Mesh, box_mesh, merge_meshes
 
 
 def canopy(x0: float, x1: float, reach: float, z: float) -> Mesh:

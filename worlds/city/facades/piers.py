@@ -7,11 +7,7 @@ from numpy.typing import ArrayLike
 
 from worlds.city.facades import bays, solids
 from worlds.city.facades.wall_frames import WallFrame
-from worlds.shapes import (
-    Mesh,
-    merge_meshes,
-    outlines,
-)
+from worlds.shapes import Mesh, merge_meshes, outlines
 
 # Width of a pilaster [m].
 _PILASTER_M = 0.5

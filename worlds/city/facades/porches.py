@@ -4,11 +4,7 @@ import numpy as np
 
 from worlds.city.facades import roofs, solids
 from worlds.city.facades.wall_frames import WallFrame
-from worlds.shapes import (
-    Assembly,
-    Mesh,
-    merge_meshes,
-)
+from worlds.shapes import Assembly, Mesh, merge_meshes
 
 # Side of the square posts of a porch [m].
 _POST_M = 0.16

@@ -14,11 +14,7 @@ from numpy.typing import ArrayLike
 
 from worlds.city.facades import bays, solids
 from worlds.city.facades.reliefs import Patch
-from worlds.shapes import (
-    Mesh,
-    merge_meshes,
-    outlines,
-)
+from worlds.shapes import Mesh, merge_meshes, outlines
 
 Line = Sequence[tuple[float, float]]
 # Gables reach this far into the roof above them, so that no ray slips between

@@ -9,16 +9,8 @@ import itertools
 import numpy as np
 from numpy.typing import ArrayLike
 
-from evaluation.base import (
-    rotated,
-)
-from worlds.shapes import (
-    Mesh,
-    box_mesh,
-    cut_ears,
-    merge_meshes,
-    outlines,
-)
+from evaluation.base import rotated
+from worlds.shapes import Mesh, box_mesh, cut_ears, merge_meshes, outlines
 
 # Least and greatest coordinate along an axis [m].
 Range = tuple[float, float]

@@ -12,13 +12,7 @@ from worlds.city.facades import bays, piers, solids
 from worlds.city.facades.bays import Bay
 from worlds.city.facades.reliefs import Band
 from worlds.city.facades.walls import Facade, facade_mesh, glass_mesh
-from worlds.shapes import (
-    Assembly,
-    Mesh,
-    equip_roof,
-    merge_meshes,
-    outlines,
-)
+from worlds.shapes import Assembly, Mesh, equip_roof, merge_meshes, outlines
 
 # A pane reaches this far into the reveals in front of it, so that no ray passes
 # between them [m].

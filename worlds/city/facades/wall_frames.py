@@ -6,9 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from worlds.city.facades import solids
-from worlds.shapes import (
-    Mesh,
-)
+from worlds.shapes import Mesh
 
 
 class WallFrame:

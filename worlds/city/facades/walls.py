@@ -15,18 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from evaluation.base import (
-    dot,
-)
-from worlds.city.facades.reliefs import (
-    Arch,
-    Band,
-    Relief,
-    lifted,
-)
-from worlds.shapes import (
-    Mesh,
-)
+from evaluation.base import dot
+from worlds.city.facades.reliefs import Arch, Band, Relief, lifted
+from worlds.shapes import Mesh
 
 Layout = Callable[[int, float], Sequence[Relief]]
 # Patches keep this distance from the ends of a wall [m]: two walls meet there,

@@ -7,9 +7,7 @@ from collections.abc import Iterable, Sequence
 from worlds.city.facades import bays, boards, canopies
 from worlds.city.facades.reliefs import Patch, Relief
 from worlds.city.facades.wing_walls import Openings
-from worlds.shapes import (
-    Mesh,
-)
+from worlds.shapes import Mesh
 
 # Depth of windows behind the wall [m].
 GLASS_M = 0.12

@@ -11,10 +11,7 @@ from worlds.city.facades import bays, roofs, solids
 from worlds.city.facades.reliefs import Patch
 from worlds.city.facades.wall_frames import WallFrame
 from worlds.city.facades.wings import SEAT, Wing
-from worlds.shapes import (
-    Assembly,
-    Mesh,
-)
+from worlds.shapes import Assembly, Mesh
 
 # Returns the windows of a gable between two places along its wall.
 Attic = Callable[[float, float], list[Patch]]

@@ -11,16 +11,10 @@ import itertools
 
 import numpy as np
 
-from evaluation.base import (
-    dot,
-)
+from evaluation.base import dot
 from worlds.city.facades import bays, roofs
-from worlds.city.facades.wall_frames import (
-    WallFrame,
-)
-from worlds.shapes import (
-    outlines,
-)
+from worlds.city.facades.wall_frames import WallFrame
+from worlds.shapes import outlines
 
 # Overlap of a roof's underside with the top of the walls [m].
 SEAT = 0.02

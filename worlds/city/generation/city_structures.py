@@ -37,13 +37,7 @@ from worlds.roads import (
     SurfaceHeights,
     load_road_network,
 )
-from worlds.shapes import (
-    OBJECTS,
-    Structure,
-    UpperSides,
-    ground_triangles,
-    snap,
-)
+from worlds.shapes import OBJECTS, Structure, UpperSides, ground_triangles, snap
 
 
 class City(NamedTuple):

@@ -25,10 +25,7 @@ from evaluation.base import (
 from worlds.city.generation.city_structures import City, make_city
 from worlds.city.generation.rendering import render_city
 from worlds.maps import MESH_FOLDER, STAGES_NAME, stage_name
-from worlds.shapes import (
-    STRUCTURES_NAME,
-    Structure,
-)
+from worlds.shapes import STRUCTURES_NAME, Structure
 
 
 def generate_city(

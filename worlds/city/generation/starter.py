@@ -19,15 +19,9 @@ import yaml
 from evaluation.base import parse_yaml, write_text
 from worlds.city.city_plan import CityPlan, load_plan
 from worlds.city.generation.city_structures import City, lay_out
-from worlds.maps import (
-    STAGES_NAME,
-    MapFolder,
-)
+from worlds.maps import STAGES_NAME, MapFolder
 from worlds.roads import Areas, RoadNetwork, draw_route, load_road_network
-from worlds.shapes import (
-    polygons_of,
-    snap,
-)
+from worlds.shapes import polygons_of, snap
 
 # The generated world extends this far beyond the roads [m].
 _MARGIN = 45.0

@@ -10,10 +10,7 @@ from shapely.ops import unary_union
 from evaluation.base import InputError
 from worlds.city.city_plan import CityPlan, DistrictPlan, PatchPlan
 from worlds.city.ground.elevation import Pad
-from worlds.shapes import (
-    polygons_of,
-    snap,
-)
+from worlds.shapes import polygons_of, snap
 
 
 class District(NamedTuple):

@@ -6,15 +6,14 @@ import itertools
 import numpy as np
 
 from worlds.city.ground.coverings import Covering
-from worlds.roads import (
-    ENDS,
+from worlds.roads import ENDS, End, Road, RoadNetwork
+from worlds.shapes import (
     Direction,
-    End,
-    Road,
-    RoadNetwork,
+    Mesh,
+    Structure,
+    merge_meshes,
     sample_stations,
 )
-from worlds.shapes import Mesh, Structure, merge_meshes
 
 _RGB = (0.80, 0.79, 0.74)
 # Paint lies this high above the road, so that they are not in one plane [m].

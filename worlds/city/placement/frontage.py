@@ -10,14 +10,8 @@ from shapely.geometry import LineString, Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import linemerge
 
-from evaluation.base import (
-    arctan2,
-    dot,
-    wrapped,
-)
-from worlds.shapes import (
-    placed,
-)
+from evaluation.base import arctan2, dot, wrapped
+from worlds.shapes import placed
 
 # A vertex at which a line turns by more than this is a corner [rad].
 _CORNER = math.radians(25)

@@ -6,8 +6,8 @@ from numpy.random import Generator
 import shapely
 
 from worlds.city.placement.draft import Draft
-from worlds.roads import Arm, Direction, Junction, Road, RoadNetwork
-from worlds.shapes import OBJECTS
+from worlds.roads import Arm, Junction, Road, RoadNetwork
+from worlds.shapes import OBJECTS, Direction
 
 # Distance of posts from the kerb [m].
 _FROM_KERB = 0.7

@@ -7,11 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pyproj
 
-from evaluation.base import (
-    InputError,
-    one_line,
-    rotated,
-)
+from evaluation.base import InputError, one_line, rotated
 from worlds.maps import projected_system
 
 # Direction of an axis -> its row among east, north and up, and its sign.

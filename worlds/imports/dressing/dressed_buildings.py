@@ -25,11 +25,7 @@ from worlds.imports.dressing.facade_plan import (
     with_shops,
 )
 from worlds.imports.dressing.styles import Style, make_style
-from worlds.imports.dressing.wall_panels import (
-    Panel,
-    find_panels,
-    is_upright,
-)
+from worlds.imports.dressing.wall_panels import Panel, find_panels, is_upright
 from worlds.imports.drives.steerable_drives import WaypointRoute
 from worlds.imports.faces import joined_triangles
 from worlds.imports.ground import Ground

@@ -12,10 +12,7 @@ from shapely.geometry import LineString, MultiLineString
 from shapely.geometry.base import BaseGeometry
 
 from evaluation.base import MAX_INSTANCE, InputError
-from worlds.city import (
-    DASH,
-    DASH_GAP,
-)
+from worlds.city import DASH, DASH_GAP
 from worlds.imports.colours import WHITE_PAINT, Rgb
 from worlds.imports.dressing.dressed_buildings import (
     DressedBuildings,
@@ -37,11 +34,7 @@ from worlds.imports.faces import flat_surface, joined_triangles, parts_of
 from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity
 from worlds.imports.ground import Ground, ground_structures
-from worlds.imports.imported_objects import (
-    Base,
-    ImportedObject,
-    make_object,
-)
+from worlds.imports.imported_objects import Base, ImportedObject, make_object
 from worlds.imports.staged_city import StagedCity
 from worlds.imports.streets import (
     KERB_HEIGHT,
@@ -49,14 +42,7 @@ from worlds.imports.streets import (
     Street,
     ends_at_nodes,
 )
-from worlds.shapes import (
-    GRID,
-    Mesh,
-    MeshShape,
-    Part,
-    Structure,
-    turned_up,
-)
+from worlds.shapes import GRID, Mesh, MeshShape, Part, Structure, turned_up
 
 # Colour of paving stones.
 _PAVED: Rgb = (0.57, 0.56, 0.53)

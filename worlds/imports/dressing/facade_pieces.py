@@ -39,12 +39,7 @@ from worlds.imports.dressing.facade_plan import (
 from worlds.imports.dressing.wall_panels import Panel
 from worlds.imports.faces import parts_of
 from worlds.imports.imported_objects import to_mesh
-from worlds.shapes import (
-    GRID,
-    Assembly,
-    Mesh,
-    triangulate,
-)
+from worlds.shapes import GRID, Assembly, Mesh, triangulate
 
 # How far parts protrude from their wall [m].
 _PLINTH_REACH = 0.06

@@ -20,11 +20,7 @@ from worlds.imports.faults import ImportFaults
 from worlds.imports.ground import Ground
 from worlds.imports.imported_objects import ImportedObject
 from worlds.imports.streets import KERB_HEIGHT, SIDEWALK_WIDTH
-from worlds.shapes import (
-    GRID,
-    looks_up,
-    turned_up,
-)
+from worlds.shapes import GRID, looks_up, turned_up
 
 # Half the width of a street of unknown width [m].
 HALF_STREET = 3.9

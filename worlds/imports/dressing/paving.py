@@ -10,11 +10,7 @@ from shapely.geometry.base import BaseGeometry
 from worlds.imports.drives.steerable_drives import WaypointRoute
 from worlds.imports.faces import joined_triangles, parts_of
 from worlds.imports.imported_objects import ImportedObject, make_object
-from worlds.shapes import (
-    GRID,
-    looks_up,
-    turned_up,
-)
+from worlds.shapes import GRID, looks_up, turned_up
 
 # Within this distance of drives, sidewalks get kerbs and missing ones are added
 # [m].

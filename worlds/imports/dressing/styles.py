@@ -10,11 +10,7 @@ import numpy as np
 
 from evaluation.base import parse_yaml
 from worlds.imports.openstreetmap.tags import count
-from worlds.shapes import (
-    Dice,
-    Finish,
-    triple,
-)
+from worlds.shapes import Dice, Finish, triple
 
 _USE_KEYS = (
     "building",

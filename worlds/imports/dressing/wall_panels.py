@@ -13,19 +13,10 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from evaluation.base import (
-    dot,
-)
-from worlds.city import (
-    WallFrame,
-)
-from worlds.imports.faces import (
-    joined_triangles,
-)
-from worlds.shapes import (
-    long_normals,
-    unit_normals,
-)
+from evaluation.base import dot
+from worlds.city import WallFrame
+from worlds.imports.faces import joined_triangles
+from worlds.shapes import long_normals, unit_normals
 
 # A face is vertical if the absolute z of its unit normal is below this.
 _UPRIGHT = 0.02

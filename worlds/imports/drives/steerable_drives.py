@@ -9,23 +9,10 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import BSpline
 from shapely.geometry import LineString
 
-from evaluation.base import (
-    InputError,
-    distances_along,
-    length_of,
-    power,
-)
-from worlds.imports.drives.free_space import (
-    FreeSpace,
-)
-from worlds.imports.faults import (
-    ImportFaults,
-)
-from worlds.roads import (
-    POINT_SPACING,
-    TIGHTEST_RADIUS,
-    make_waypoint_path,
-)
+from evaluation.base import InputError, distances_along, length_of, power
+from worlds.imports.drives.free_space import FreeSpace
+from worlds.imports.faults import ImportFaults
+from worlds.shapes import POINT_SPACING, TIGHTEST_RADIUS, make_waypoint_path
 
 # Paths of vehicles are quintic splines (`cns_drake.motion`). The points of a
 # path are their control points.

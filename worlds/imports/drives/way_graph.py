@@ -7,15 +7,8 @@ import math
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from evaluation.base import (
-    arctan2,
-    cos,
-    sin,
-)
-from worlds.imports.drives.steerable_drives import (
-    Obstacle,
-    WaypointRoute,
-)
+from evaluation.base import arctan2, cos, sin
+from worlds.imports.drives.steerable_drives import Obstacle, WaypointRoute
 
 # Greatest share by which lengths are made unequal.
 _UNEQUAL = 0.04

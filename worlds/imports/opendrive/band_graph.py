@@ -7,25 +7,10 @@ import math
 import numpy as np
 from scipy.spatial import cKDTree
 
-from evaluation.base import (
-    dot,
-    length_of,
-    step_lengths,
-    wrapped,
-)
-from worlds.imports.drives import (
-    search,
-    steerable_drives,
-    way_graph,
-)
-from worlds.imports.drives.steerable_drives import (
-    Obstacle,
-    WaypointRoute,
-)
-from worlds.imports.opendrive.lanes import (
-    DRIVEN,
-    LaneBand,
-)
+from evaluation.base import dot, length_of, step_lengths, wrapped
+from worlds.imports.drives import search, steerable_drives, way_graph
+from worlds.imports.drives.steerable_drives import Obstacle, WaypointRoute
+from worlds.imports.opendrive.lanes import DRIVEN, LaneBand
 
 # A lane follows another one if its start is within this distance of the other's
 # end [m].

@@ -11,12 +11,7 @@ from shapely.geometry import LinearRing, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from evaluation.base import arctan2, dot, length_of, wrapped
-from worlds.city import (
-    TILE,
-    Covering,
-    kerb_area,
-    parking_bays,
-)
+from worlds.city import TILE, Covering, kerb_area, parking_bays
 from worlds.imports.opendrive.lanes import (
     LaneBand,
     is_raised,
@@ -24,10 +19,7 @@ from worlds.imports.opendrive.lanes import (
     lane_polygon,
 )
 from worlds.roads import Areas, union_without_slits
-from worlds.shapes import (
-    polygons_of,
-    snap,
-)
+from worlds.shapes import polygons_of, snap
 
 # Slits between lanes are closed up to twice this width [m].
 _SEAM = 0.05

@@ -7,12 +7,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from evaluation.base import cos, sin, tan
-from worlds.imports.opendrive.lanes import (
-    LEAST_WIDTH,
-    SAG,
-    LaneBand,
-    is_raised,
-)
+from worlds.imports.opendrive.lanes import LEAST_WIDTH, SAG, LaneBand, is_raised
 
 # Number of nearby places whose planes are averaged.
 _NEIGHBOURS = 8

@@ -15,38 +15,14 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from evaluation.base import (
-    cos,
-    dot,
-    sin,
-)
-from worlds.city import (
-    DASH,
-    DASH_GAP,
-)
-from worlds.imports.colours import (
-    WHITE,
-    Rgb,
-)
-from worlds.imports.faces import (
-    parts_of,
-)
-from worlds.imports.imported_objects import (
-    make_object,
-)
-from worlds.imports.opendrive.lanes import (
-    LaneBand,
-)
-from worlds.imports.opendrive.road_model import (
-    MarkLine,
-    RoadMark,
-)
-from worlds.shapes import (
-    GRID,
-    Finish,
-    Structure,
-    triangulate,
-)
+from evaluation.base import cos, dot, sin
+from worlds.city import DASH, DASH_GAP
+from worlds.imports.colours import WHITE, Rgb
+from worlds.imports.faces import parts_of
+from worlds.imports.imported_objects import make_object
+from worlds.imports.opendrive.lanes import LaneBand
+from worlds.imports.opendrive.road_model import MarkLine, RoadMark
+from worlds.shapes import GRID, Finish, Structure, triangulate
 
 # The end moves inwards by at most this share of the border's last piece.
 _MOST_INWARDS = 0.5

@@ -10,11 +10,7 @@ from shapely.geometry.base import BaseGeometry
 from worlds.imports import faces
 from worlds.imports.colours import Rgb
 from worlds.imports.faults import ImportFaults
-from worlds.imports.imported_objects import (
-    Base,
-    ImportedObject,
-    make_object,
-)
+from worlds.imports.imported_objects import Base, ImportedObject, make_object
 from worlds.imports.solids import extruded
 from worlds.shapes import Finish
 

@@ -8,12 +8,7 @@ import re
 from typing import NamedTuple
 
 from worlds.imports.faults import ImportFaults
-from worlds.imports.openstreetmap.tags import (
-    TABLES,
-    count,
-    length,
-    tag_value,
-)
+from worlds.imports.openstreetmap.tags import TABLES, count, length, tag_value
 
 STOREY_HEIGHT = 3.0  # [m]
 # Number of levels of a building of unknown kind.

@@ -21,11 +21,7 @@ from worlds.imports.building_years import (
 from worlds.imports.colours import RED_ROOF
 from worlds.imports.faces import parts_of, valid_parts
 from worlds.imports.faults import ImportFaults
-from worlds.imports.imported_objects import (
-    Base,
-    ImportedObject,
-    make_object,
-)
+from worlds.imports.imported_objects import Base, ImportedObject, make_object
 from worlds.imports.openstreetmap.building_tags import (
     LEAST_WALL,
     building_kind,

@@ -24,11 +24,7 @@ from worlds.imports import faces
 from worlds.imports.colours import WHITE_PAINT
 from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity, SmallObject
-from worlds.imports.imported_objects import (
-    Base,
-    ImportedObject,
-    make_object,
-)
+from worlds.imports.imported_objects import Base, ImportedObject, make_object
 from worlds.imports.openstreetmap import reading, streets
 from worlds.imports.openstreetmap.area_looks import AreaLook, raised_object
 from worlds.imports.openstreetmap.bridges import (
@@ -45,21 +41,14 @@ from worlds.imports.openstreetmap.buildings import (
     standing_buildings,
     works_at_points,
 )
-from worlds.imports.openstreetmap.element_kinds import (
-    is_building,
-    was_building,
-)
+from worlds.imports.openstreetmap.element_kinds import is_building, was_building
 from worlds.imports.openstreetmap.features import (
     OsmArea,
     OsmFeatures,
     OsmWay,
     Tags,
 )
-from worlds.imports.openstreetmap.grounds import (
-    coasts_of,
-    ground_areas,
-    sea,
-)
+from worlds.imports.openstreetmap.grounds import coasts_of, ground_areas, sea
 from worlds.imports.openstreetmap.passages import (
     HEADROOM,
     THROUGH,

@@ -11,11 +11,10 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
-from cns_drake.motion import Trajectory, VehicleMotion
+from cns_drake.motion import Trajectory, VehicleMotion, vehicle_file
 from cns_drake.sensors import ImuErrors, ImuNoise
 from cns_drake.sensors.imu.imu import NoisyImu
 from cns_drake.sensors.imu.vehicle_imu import VehicleImu
-from worlds.maps import vehicle_file
 
 FILES = ("/vehicle_motion.py", "/imu.py", "/noise.py")
 NOISE = ImuNoise(gyroscope_noise_density=0.01, gyroscope_random_walk=0.001)

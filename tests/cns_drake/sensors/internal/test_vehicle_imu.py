@@ -19,11 +19,11 @@ from cns_drake.motion import (
     load_car_masses,
     load_suspension_rates,
     ride_on_springs,
+    vehicle_file,
 )
 from cns_drake.sensors import ImuErrors, ImuNoise, add_imu
 from cns_drake.sensors.imu.imu import NoisyImu
 from cns_drake.sensors.imu.vehicle_imu import VehicleImu
-from worlds.maps import vehicle_file
 
 X_BI = RigidTransform(RollPitchYaw(0.3, -0.2, 1.1), [-1.0, 0.4, 1.6])
 GRAVITY_W = np.array([0.0, 0.0, -9.81])

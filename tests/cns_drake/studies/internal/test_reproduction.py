@@ -1,4 +1,4 @@
-"""`cns-drake reproduce`: one graph of jobs from recordings to pictures."""
+"""`cns-drake reproduce`: from recordings to tables."""
 
 from helpers.counting_method import COUNTING
 from helpers.internal import studies
@@ -9,7 +9,7 @@ from cns_drake.studies import reproduction
 from evaluation.base import Cluster
 from evaluation.recognition import RANDOM_YAW_PROTOCOL
 from evaluation.results import QueryRows, Results
-from evaluation.study import study
+from evaluation.study import recorded_city, run
 
 pytestmark = pytest.mark.slow
 RANDOM_YAW = {"random-yaw": RANDOM_YAW_PROTOCOL}
@@ -28,7 +28,7 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch, own_methods):
     """The tables include controls, and come from simulation alone."""
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
     town = write_town(tmp_path / "town", routes, 40)
-    studies.run_here(monkeypatch, study)
+    studies.run_here(monkeypatch, run, recorded_city, reproduction)
     cluster = Cluster()
     own = tmp_path / "counting.py"
     own.write_text(COUNTING)

@@ -80,27 +80,25 @@ def test_time_left_of_an_activity(clock, log):
 def test_jobs_in_a_log(clock, log):
     log.doing("planning")
     clock.now += 1.0
-    titles = {"a": "town 01, stage 2"}
-    costs = dict.fromkeys([*"abc", "place 1 4 e4a20126"], 10.0)
-    with log.jobs(costs, titles, 1, "cities") as jobs:
-        jobs.start("a")
+    names = ["town_01, stage 2", "b", "c", "d"]
+    with log.jobs(5, 1, "cities") as jobs:
+        jobs.start(names[0])
         assert log.line() == (
             "1 of 5 cities done, elapsed 0:00; town 01, stage 2: starting"
         )
-        for name in list(costs)[1:]:
+        for name in names[1:]:
             jobs.start(name)
-        jobs.doing("a", "drawing", 2, 6, "streets")
+        jobs.doing(names[0], "drawing", 2, 6, "streets")
         jobs.doing("unknown", "drawing")
         assert log.line() == (
             "1 of 5 cities done, elapsed 0:00; town 01, stage 2: drawing, 2 of"
             " 6 streets; b: starting; c: starting; and 1 more"
         )
-        for name in "abc":
+        for name in names[:3]:
             clock.now += 10.0
             jobs.end(name, fault=name == "b")
         assert log.line() == (
-            "4 of 5 cities done, elapsed 0:30, about 0:03 left;"
-            " place 1 4: starting"
+            "4 of 5 cities done, elapsed 0:30, about 0:10 left; d: starting"
         )
     assert log.line() == "planning, elapsed 0:31"
 
@@ -115,7 +113,7 @@ def test_bars_on_a_terminal(clock, monkeypatch, width):
         monkeypatch.setattr(sys, "stdout", stream)
         display = Display(stream, clock)
         monkeypatch.setattr(progress_display, "PATIENCE", 0.0)
-        with display.jobs({"a": 1.0, "b": 1.0}, {}, 0, "jobs") as jobs:
+        with display.jobs(2, 0, "jobs") as jobs:
             jobs.start("a")
             jobs.doing("a", "describing", 120, 240, "scans")
             display._keep_telling()

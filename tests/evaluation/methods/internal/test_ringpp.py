@@ -439,3 +439,14 @@ def test_the_raster_has_the_symmetry_of_a_quarter_turn():
         differences.append(np.abs(shifted - other).max() / one.max())
     assert differences[0] < 1e-12
     assert differences[1] > 1e-3
+
+
+@pytest.mark.slow
+def test_a_corner_that_a_heading_turns_out_of_the_map():
+    """A query there shows nothing in the map of another heading."""
+    method = ring()
+    query = method.describe(post(69.0, 69.0, 0.0, 2.0))
+    places = [method.describe_place(make_scene(k)) for k in range(4)]
+    database = method.build_database(places)
+    for X_PQ in method.relative_poses(query, database, range(4)):
+        assert np.isfinite(X_PQ).all()

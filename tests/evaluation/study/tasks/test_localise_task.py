@@ -28,7 +28,7 @@ def found(towns):
     """The results of two methods from two starts each."""
     sources = (RecordingSource(towns / f"town_0{i}") for i in (2, 1))
     return measure_localisation(
-        Reporter(), *sources, ("plane-icp", "gicp"), ("", ""), STARTS, 10.0
+        Reporter(), *sources, ("plane-icp", "gicp"), STARTS, 10.0
     )
 
 
@@ -50,7 +50,7 @@ def test_numbers_of_a_pair(found):
         {"methods": ["plane-icp", "gicp"], "starts": [[0.5, 5], [2, 10]]},
         "mine.yaml",
     )
-    numbers = list(task.numbers(found, None))
+    numbers = list(task.numbers(found, None, {}))
     names = [f"{m} from {r} m" for m in ("plane-icp", "gicp") for r in (0.5, 2)]
     assert list(dict.fromkeys(n.method for n in numbers)) == names
     for name, rows in zip(names, found, strict=True):
@@ -67,7 +67,9 @@ def test_numbers_of_a_pair(found):
     for rows in better:
         rows["translation_error"] = 0.1
     kept = [
-        n for n in task.numbers(worse, better) if n.metric == "relative_success"
+        n
+        for n in task.numbers(worse, better, {})
+        if n.metric == "relative_success"
     ]
     assert [n.value for n in kept] == [0.5] * 4
     ((_, _, columns), *_) = task.answers(worse)
@@ -76,7 +78,7 @@ def test_numbers_of_a_pair(found):
 
 def test_one_start_needs_no_name(found):
     task = LocaliseTask({"methods": "gicp"}, "mine.yaml")
-    assert {n.method for n in task.numbers(found[2:3], None)} == {"gicp"}
+    assert {n.method for n in task.numbers(found[2:3], None, {})} == {"gicp"}
 
 
 def test_a_query_far_from_the_map_is_not_localised(towns):
@@ -91,11 +93,11 @@ def test_a_query_far_from_the_map_is_not_localised(towns):
     reporter = Reporter(
         lambda kind, *values: kind == "note" and notes.extend(values)
     )
-    found = measure_localisation(
-        reporter, mapped, far, ("gicp",), ("",), STARTS, 10.0
-    )
+    found = measure_localisation(reporter, mapped, far, ("gicp",), STARTS, 10.0)
     assert found == []
     (note,) = notes
     assert note.endswith(": not localised")
     task = LocaliseTask({}, "mine.yaml")
-    assert list(task.numbers(found, None)) == list(task.answers(found)) == []
+    assert (
+        list(task.numbers(found, None, {})) == list(task.answers(found)) == []
+    )

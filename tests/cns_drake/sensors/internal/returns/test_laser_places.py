@@ -9,10 +9,7 @@ from pydrake.math import RigidTransform
 from cns_drake.ray_casting import SceneHits, SurfaceFrames
 from cns_drake.sensors import CalibratedReturns, make_beam_pattern
 from cns_drake.sensors.returns.materials import LAMBERT, Materials
-from worlds.shapes import (
-    StructureEntry,
-    StructureTable,
-)
+from worlds.shapes import StructureEntry, StructureTable
 
 # The frame of surfaces that do not move.
 STILL = SurfaceFrames(np.zeros(1, int), np.eye(3)[None], np.zeros((1, 3)))

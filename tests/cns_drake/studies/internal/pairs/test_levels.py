@@ -7,9 +7,12 @@ from helpers.small_map import scenario_values, write_small_map
 import pytest
 
 from cns_drake.scenarios import make_scenario
+from cns_drake.simulation import SimulationSource
 from cns_drake.studies.maps.experiment_maps import pairs_by_map
-from cns_drake.studies.pairs.changed_pairs import changed_pairs
-from cns_drake.studies.pairs.comparisons import ChangedPair, DatedDrive
+from cns_drake.studies.pairs.changed_pairs import (
+    changed_pairs,
+    pair_fingerprint,
+)
 from cns_drake.studies.study import (
     check_frozen,
     drives_fingerprint,
@@ -18,7 +21,7 @@ from cns_drake.studies.study import (
 )
 from evaluation.base import Cluster, InputError, fingerprint
 from evaluation.recognition import RECORDED_PROTOCOL
-from evaluation.study import Condition, Study, load_experiment
+from evaluation.study import Pair, Study, StudyDrive, load_experiment
 from worlds.maps import worlds_folder
 
 TABLE = "levels.csv"
@@ -44,9 +47,9 @@ def test_the_levels_are_as_they_were_frozen(tmp_path):
     plan_study(run)
     maps = list(pairs_by_map(run, ()))
     worlds = {}
-    for some, pairs in zip(maps, changed_pairs(run, maps), strict=True):
+    for pairs in changed_pairs(run, maps):
         for one in pairs:
-            key = some.map_name, one.condition.factors["level"]
+            key = one.map_name, one.factors["level"]
             drawn = drives_fingerprint(one, worlds)
             found.setdefault(key, []).append(drawn)
     assert frozen == {
@@ -77,12 +80,18 @@ def test_other_drives_are_not_the_frozen_ones(tmp_path, change):
 
 def pair_of(*drives):
     """The drives of a database, and the query."""
-    return ChangedPair(
-        Condition({}, {}),
-        1,
+    *database, query = (
+        StudyDrive(one.name, SimulationSource(one)) for one in drives
+    )
+    return Pair(
+        "small",
         ("a", "b"),
-        drives[-1],
-        tuple(DatedDrive(0, 1.0, one, one.name) for one in drives),
+        {},
+        1,
+        None,
+        RECORDED_PROTOCOL,
+        tuple(database),
+        query,
         RECORDED_PROTOCOL,
     )
 
@@ -93,16 +102,16 @@ def test_a_rebuilt_city_is_not_the_frozen_one(tmp_path):
     compared = pair_of(drive, drive)
     before = drives_fingerprint(compared, {})
     assert drives_fingerprint(compared, {}) == before
-    known = compared.fingerprint()
+    known = pair_fingerprint(compared, [drive, drive])
     world = drive.world_file
     world.write_text(world.read_text().replace("<world", "<!-- new --><world"))
     assert drives_fingerprint(compared, {}) != before
     # The drives alone do not show it.
-    assert compared.fingerprint() == known
+    assert pair_fingerprint(compared, [drive, drive]) == known
     # Neither does the city of another session hide behind the first one's.
     former = drive.replaced(stage="01" if drive.stage != "01" else "04")
     several = pair_of(drive, former, drive)
-    assert several.fingerprint() != known
+    assert pair_fingerprint(several, [drive, former, drive]) != known
     before = drives_fingerprint(several, {})
     world = former.world_file
     assert world != drive.world_file

@@ -51,7 +51,7 @@ def test_numbers_of_all_changes_and_of_those_that_the_query_sees():
     )
     task = SeenTask({}, "mine.yaml")
     sightings = Sightings(every, every.chosen(by_query.is_noticed))
-    numbers = task.numbers(sightings, None)
+    numbers = task.numbers(sightings, None, {})
     found = {one.metric: (one.value, one.n) for one in numbers}
     assert found == {
         "changed": (4.0, 4),

@@ -5,7 +5,7 @@ import pytest
 from shapely.geometry import LineString, Point
 
 from evaluation.base import InputError
-from worlds.roads import load_waypoint_path, make_waypoint_path
+from worlds.shapes import load_waypoint_path, make_waypoint_path
 
 
 def level(xy):

@@ -12,16 +12,20 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 import shapely
 from shapely import STRtree
+from shapely.geometry.base import BaseGeometry
 
-from worlds.roads.car_outline import (
+from worlds.shapes.paths.car_outline import (
     FRONT,
     HALF_WIDTH,
     REAR,
+    car_outlines,
     directions,
-    outlines,
 )
-from worlds.roads.lane_path import LanePath, sample_lane_path, smooth_step
-from worlds.roads.network import RoadNetwork
+from worlds.shapes.paths.lane_path import (
+    LanePath,
+    sample_lane_path,
+    smooth_step,
+)
 
 # Distance between the points of the path that `driven_path` needs [m].
 FINE_SPACING = 0.5
@@ -49,13 +53,13 @@ _SMOOTHING_REACH = 20.0
 _ITERATIONS = 40
 
 
-def kerbs(network: RoadNetwork) -> STRtree:
+def kerbs(lane_area: BaseGeometry) -> STRtree:
     """Returns an index of the edges of lanes, divided into short pieces.
 
     The edges are kerbs, medians and parking bays. Each piece is a line of a few
     metres.
     """
-    outline = np.asarray(shapely.get_parts(network.areas.lane_area.boundary))
+    outline = np.asarray(shapely.get_parts(lane_area.boundary))
     corners, line = shapely.get_coordinates(outline, return_index=True)
     pairs = np.stack([corners[:-1], corners[1:]], axis=1)
     return STRtree(shapely.linestrings(pairs[line[:-1] == line[1:]]))
@@ -131,7 +135,7 @@ def _has_room(
     along = directions(points[:, :2])[:, None]
     left = np.stack([-along[..., 1], along[..., 0]], axis=-1)
     middle = points[:, None, :2] + offsets[:, None] * left
-    corners = outlines(middle, along, REAR, FRONT, HALF_WIDTH)
+    corners = car_outlines(middle, along, REAR, FRONT, HALF_WIDTH)
     cars = np.asarray(shapely.polygons(corners)).ravel()
     hit, _ = obstacles.query(cars, "dwithin", _CLEARANCE + _SMOOTHING_SLACK)
     free = np.ones(len(cars), dtype=bool)

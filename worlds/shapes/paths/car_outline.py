@@ -22,7 +22,7 @@ def swept_area(points: ArrayLike) -> BaseGeometry:
     points = np.asarray(points, dtype=float)
     along = directions(points)
     return shapely.union_all(
-        shapely.polygons(outlines(points, along, REAR, FRONT, HALF_WIDTH))
+        shapely.polygons(car_outlines(points, along, REAR, FRONT, HALF_WIDTH))
     )
 
 
@@ -33,7 +33,7 @@ def directions(points: np.ndarray) -> np.ndarray:
     return along
 
 
-def outlines(
+def car_outlines(
     places: np.ndarray,
     ahead: np.ndarray,
     rear: float | np.ndarray,

@@ -2,29 +2,22 @@
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-import math
-from typing import Any, Protocol
+from functools import cached_property
+from typing import Any
 
 from evaluation.alignment import WorldVerdict
+from evaluation.base import fingerprint
 from evaluation.drives import DriveSource
-from evaluation.recognition import KEEP_ALL, RetrievalProtocol, Role
-
-# Length of a drive through a shipped city, about [m].
-USUAL_LENGTH = 1400.0
+from evaluation.recognition import KEEP_ALL, RetrievalProtocol
 
 
 @dataclass(frozen=True)
-class NamedDrive:
+class StudyDrive:
     """A drive that is measured.
 
     Attributes:
         name: unique name of the drive.
         source: function that opens the drive.
-        needs: names of the jobs that record the drive; empty if it is recorded
-            already, or is simulated while it is read.
-        length: about how long the drive is [m], to estimate costs.
-        num_scans: number of the drive's scans, if known; at most this number of
-            scans is described.
         title: what drive it is, in words; by default its name.
         years: number of years by which its city has aged; None if it does not
             age.
@@ -32,27 +25,22 @@ class NamedDrive:
 
     name: str
     source: DriveSource
-    needs: tuple[str, ...] = ()
-    length: float = USUAL_LENGTH
-    num_scans: float = math.inf
     title: str = ""
     years: int | None = None
 
-    @property
-    def share(self) -> float:
-        """Its length as a share of `USUAL_LENGTH`."""
-        return self.length / USUAL_LENGTH
-
-
-class Result(Protocol):
-    """The result of a job, such as a `Part`."""
-
-    def read(self) -> Any:
-        """Returns the result.
+    @cached_property
+    def digest(self) -> str:
+        """Digest of what identifies the drive.
 
         Raises:
-            InputError: the result cannot be read.
+            InputError: there is no drive.
         """
+        return fingerprint({"drive": self.source.identity()})
+
+    @property
+    def words(self) -> str:
+        """What drive it is, in words."""
+        return self.title or self.name.replace("_", " ")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,16 +60,18 @@ class Pair:
             which can be this condition itself; None to compare with nothing.
         stated: protocol that the tables name: the protocol of the experiment,
             before the condition changes its queries.
-        key: name of the results. Two pairs have the same key only if they
-            measure the same thing; only the radius of a match can differ.
-        database, query: the drives.
+        database: the drives of the database, all in the query's world, from
+            older to newer.
+        query: the drive of the queries.
         protocol: protocol of place recognition.
-        distractors: number of places of other cities that are added to the
-            database.
-        beside: further drives in the same world, whose places are added to the
-            database, from older to newer.
-        keep: which places of these drives and of the database drive are kept,
-            see `evaluation.recognition.place_selection.kept_places`.
+        distractors: drives through other cities, of which the first
+            `num_distractors` places are added to the database.
+        num_distractors: number of these places.
+        keep: which places of the database are kept, see
+            `evaluation.recognition.place_selection.kept_places`.
+        way: the drive on the query's route through the database's city, with
+            which the task `change` compares the query; None for the drive of
+            the database.
         may_repeat: whether the pair can repeat drives of another pair, because
             its condition changes the queries (random yaw, tilt or occluded
             sector) or adds distractors. A task whose results depend only on the
@@ -97,13 +87,13 @@ class Pair:
     seed: int
     baseline: Mapping[str, Any] | None
     stated: RetrievalProtocol
-    key: str
-    database: NamedDrive
-    query: NamedDrive
+    database: tuple[StudyDrive, ...]
+    query: StudyDrive
     protocol: RetrievalProtocol
-    distractors: int = 0
-    beside: tuple[NamedDrive, ...] = ()
+    distractors: tuple[StudyDrive, ...] = ()
+    num_distractors: int = 0
     keep: str | int = KEEP_ALL
+    way: StudyDrive | None = None
     may_repeat: bool = False
     methods: Collection[str] | None = None
     world: WorldVerdict | None = None
@@ -119,24 +109,38 @@ class Pair:
         return factors_in_words(drives, self.factors.items())
 
     @property
-    def roles(self) -> tuple[tuple[NamedDrive, Role], ...]:
-        """Both drives, each with its role: `places` or `queries`."""
-        return (self.database, "places"), (self.query, "queries")
-
-    @property
     def is_composed(self) -> bool:
         """Whether the database is anything but all places of one drive.
 
         A composed database has places of several drives, or only some places of
         one drive.
         """
-        return bool(self.beside) or self.keep != KEEP_ALL
+        return len(self.database) > 1 or self.keep != KEEP_ALL
 
     @property
-    def drives(self) -> tuple[object, ...]:
-        """Names of the drives of database and query, and the field `keep`."""
-        database = [one.name for one in (self.database, *self.beside)]
-        return (*database, self.keep, self.query.name)
+    def drives(self) -> dict[str, object]:
+        """What identifies the database and the query."""
+        return {
+            "database": [one.digest for one in self.database],
+            "keep": self.keep,
+            "query": self.query.digest,
+        }
+
+    def asked(self, *, with_radius: bool = True) -> dict[str, object]:
+        """Returns what identifies the answers to the queries, but the method.
+
+        Args:
+            with_radius: whether the radius of a match counts.
+        """
+        protocol = self.protocol.to_json()
+        if not with_radius:
+            del protocol["radius"]
+        return {
+            **self.drives,
+            "protocol": protocol,
+            "distractors": [one.digest for one in self.distractors],
+            "num_distractors": self.num_distractors,
+        }
 
 
 def factors_in_words(name: str, factors: Iterable[tuple[str, Any]]) -> str:

@@ -4,8 +4,8 @@ from helpers.turning_roads import drive, driven, leg, network_of
 import numpy as np
 import pytest
 
-from worlds.roads import TIGHTEST_RADIUS
-from worlds.roads.car_outline import swept_area
+from worlds.shapes import TIGHTEST_RADIUS
+from worlds.shapes.paths.car_outline import swept_area
 
 # Numbers of lanes, and lanes of the turn; the loop is as wide as their
 # distance.

@@ -82,7 +82,7 @@ def sample_lane_path(
             length of the polyline [m].
         source: text with which error messages begin.
         beside: (N, 2) distances to the neighbouring lanes on the left and right
-            of each corner [m]; see `worlds.roads.lane_path.LanePath`.
+            of each corner [m]; see `worlds.shapes.paths.lane_path.LanePath`.
 
     Raises:
         InputError: the polyline is too short or too long for a drive.

@@ -10,20 +10,11 @@ import shapely
 from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
-from evaluation.base import (
-    cos,
-    dot,
-    sin,
-)
-from worlds.roads.car_outline import (
-    swept_area,
-)
-from worlds.roads.centreline import (
-    Centreline,
-    sample_stations,
-)
+from evaluation.base import cos, dot, sin
+from worlds.shapes.paths.car_outline import swept_area
+from worlds.shapes.paths.centreline import Centreline, sample_stations
 
-# From the car in worlds/vehicle.sdf: its wheelbase [m].
+# From the simulator's car, `vehicle.sdf`: its wheelbase [m].
 _WHEELBASE = 2.8
 # Distance from the car's middle to a front wheel [m].
 _HALF_TRACK = 0.79

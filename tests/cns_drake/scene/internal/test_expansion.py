@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evaluation.base import expanded_size
+from cns_drake.scene.expansion import expanded_size
 
 
 def test_sizes_are_those_of_the_expanded_graph():

@@ -22,14 +22,14 @@ from evaluation.base import (
     to_number,
     wrapped,
 )
-from worlds.roads.centreline import Centreline
-from worlds.roads.lane_path import (
+from worlds.shapes.paths.centreline import Centreline
+from worlds.shapes.paths.lane_path import (
     DENSE_SPACING,
     LanePath,
     check_length,
     sample_lane_path,
 )
-from worlds.roads.u_turn import LOOP_RADIUS, loop_corners
+from worlds.shapes.paths.u_turn import LOOP_RADIUS, loop_corners
 
 # Radius of the arcs that round corners, where the neighbouring waypoints leave
 # room for it [m].

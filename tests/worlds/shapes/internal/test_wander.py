@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import shapely
 
-from worlds.roads import FINE_SPACING, LanePath
-from worlds.roads.driver_offsets import _change_lanes, _draw_offsets
+from worlds.shapes import FINE_SPACING, LanePath
+from worlds.shapes.paths.driver_offsets import _change_lanes, _draw_offsets
 
 NOTHING = shapely.STRtree([])
 

@@ -1,0 +1,214 @@
+"""Measures pairs of drives: first the drives are read, then all pairs measured.
+
+A drive that several pairs need is read once, for all that they ask of it. Each
+pair is measured in a process of its own. All that is found is in the store,
+from which the tables are made.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TypeAlias
+
+from evaluation.base import (
+    Cluster,
+    Job,
+    Key,
+    Reporter,
+    Space,
+    Step,
+    Store,
+    forecast,
+    run_jobs,
+)
+from evaluation.recognition import Asked, DriveData
+from evaluation.study.pair import Pair, StudyDrive
+from evaluation.study.tasks.task import Task
+
+# A drive, and what is asked of it.
+DriveAsked: TypeAlias = tuple[StudyDrive, Asked]
+
+
+def measure_pairs(
+    pairs: Mapping[Pair, Sequence[Task]],
+    shown: Iterable[DriveAsked],
+    store: Store,
+    cluster: Cluster,
+    on_note: Callable[[str], None],
+    space: Space | None = None,
+) -> None:
+    """Adds to a store what tasks find about pairs, as far as it is missing.
+
+    Args:
+        pairs: the pairs, each with the tasks that measure it.
+        shown: what else is read of drives, for a page.
+        store: the store.
+        cluster: runs the jobs.
+        on_note: is called with a note on many jobs.
+        space: space on the disk that is needed, if known.
+
+    Raises:
+        InputError: drives could not be read, or pairs not be measured; the
+            error names all of them.
+    """
+    left = [one for one in _alike(pairs, store) if not one.is_done()]
+    drives = _drives_of(left, shown, store)
+    readings = _jobs(
+        (one.words, ReadDrive(data))
+        for one, data in drives.values()
+        if data.store is not None
+    )
+    measurements = _jobs(
+        (one.pairs[0].title, one.reading(drives)) for one in left
+    )
+    told = forecast([*readings, *measurements], cluster, space)
+    if told is not None:
+        on_note(f"{told}; after an interruption, run the same command again")
+    run_jobs(readings, cluster, "drives")
+    run_jobs(measurements, cluster, "pairs")
+
+
+@dataclass(frozen=True, eq=False)
+class ReadDrive(Step):
+    """A job step that reads a drive for several pairs.
+
+    Attributes:
+        data: what is asked of the drive, and the store.
+    """
+
+    data: DriveData
+
+    @property
+    def output(self) -> Path:
+        store, asked = self.data.store, self.data.asked
+        assert store is not None
+        return store.part(self.data.key(asked[0])).path
+
+    def is_done(self) -> bool:
+        return not self.data.missing()
+
+    def run(self, reporter: Reporter) -> None:
+        self.data.fill()
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurePair(Step):
+    """A job step that measures a pair of drives by all tasks.
+
+    Attributes:
+        pairs: the pair; several if they differ only in the radius of a match.
+        tasks: the tasks.
+        store: gets the results.
+        drives: digest of a drive -> what is asked of it.
+    """
+
+    pairs: tuple[Pair, ...]
+    tasks: tuple[Task, ...]
+    store: Store
+    drives: Mapping[str, DriveData] = field(default_factory=dict)
+
+    @property
+    def output(self) -> Path:
+        # Tasks lock the files of results that several pairs share.
+        return self.store.folder / "pairs" / next(self._keys()).digest
+
+    def is_done(self) -> bool:
+        return all(map(self.store.has, self._keys()))
+
+    def run(self, reporter: Reporter) -> None:
+        for task in self.tasks:
+            keys = (key for pair in self.pairs for key in task.keys(pair))
+            if not all(map(self.store.has, keys)):
+                task.measure(
+                    self.pairs,
+                    lambda drive: self.drives[drive.digest],
+                    self.store,
+                    reporter,
+                )
+
+    def asks(self) -> Iterator[DriveAsked]:
+        """Yields what the tasks that are left ask of drives."""
+        for task in self.tasks:
+            for pair in self.pairs:
+                yield from task.asks(pair, self.store)
+
+    def reading(
+        self, drives: Mapping[str, tuple[StudyDrive, DriveData]]
+    ) -> "MeasurePair":
+        """Returns the step with what has been asked of its drives."""
+        own = dict.fromkeys(drive.digest for drive, _ in self.asks())
+        found = {digest: drives[digest][1] for digest in own}
+        return replace(self, drives=found)
+
+    def _keys(self) -> Iterator[Key]:
+        for task in self.tasks:
+            for pair in self.pairs:
+                yield from task.keys(pair)
+
+
+def _alike(
+    measured: Mapping[Pair, Sequence[Task]], store: Store
+) -> list[MeasurePair]:
+    """Returns a step for all pairs that differ only in the radius of a match.
+
+    Queries are scored once for all radii.
+    """
+    groups: dict[str, tuple[dict[Pair, None], dict[Task, None]]] = {}
+    for one, tasks in measured.items():
+        asked = f"{one.asked(with_radius=False)} {one.methods}"
+        pairs, known = groups.setdefault(asked, ({}, {}))
+        if tasks:
+            pairs[one] = None
+            known |= dict.fromkeys(tasks)
+    return [
+        MeasurePair(tuple(pairs), tuple(tasks), store)
+        for pairs, tasks in groups.values()
+        if tasks
+    ]
+
+
+def _drives_of(
+    groups: Iterable[MeasurePair], shown: Iterable[DriveAsked], store: Store
+) -> dict[str, tuple[StudyDrive, DriveData]]:
+    """Returns the drives to read, by digest, with what is asked of them.
+
+    What several pairs need, or what may not fit into memory, is in the store.
+    """
+    asked: dict[str, tuple[StudyDrive, dict[Asked, None]]] = {}
+    stored: set[str] = set()
+
+    def ask(drive: StudyDrive, one: Asked) -> None:
+        asked.setdefault(drive.digest, (drive, {}))[1][one] = None
+
+    for group in groups:
+        before = {*asked}
+        for drive, one in group.asks():
+            if drive.digest in before:
+                stored.add(drive.digest)
+            ask(drive, one)
+        pair = group.pairs[0]
+        stored |= {one.digest for one in pair.distractors}
+        if pair.is_composed:
+            stored |= {one.digest for one in pair.database}
+    for drive, one in shown:
+        stored.add(drive.digest)
+        ask(drive, one)
+    found = {}
+    for digest, (drive, some) in asked.items():
+        data = DriveData(drive.source, tuple(some), digest, store)
+        if digest not in stored and data.missing():
+            data = replace(data, store=None)
+        found[digest] = drive, data
+    return found
+
+
+def _jobs(steps: Iterable[tuple[str, Step]]) -> list[Job]:
+    """Returns jobs with the given names, numbered where two are equal."""
+    known: Counter[str] = Counter()
+    jobs = []
+    for name, step in steps:
+        known[name] += 1
+        number = known[name]
+        jobs.append(Job(f"{name} ({number})" if number > 1 else name, step))
+    return jobs

@@ -1,0 +1,1 @@
+"""Paths of cars, and the routes and waypoints that they follow."""
