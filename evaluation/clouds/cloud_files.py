@@ -102,13 +102,13 @@ def read_blocks(
         for points in reader(path, block, on_note):
             check_range(points, poses.FARTHEST, first=read)
             read += len(points)
-            if not is_noted and (step_note := _coarse_note(points)):
+            if not is_noted and (step_note := coarse_note(points)):
                 is_noted = True
                 on_note(f"{path}: {step_note}")
             yield points
 
 
-def _coarse_note(points: np.ndarray) -> str:
+def coarse_note(points: np.ndarray) -> str:
     """Returns a note on coordinates whose type is coarse; "" if it is not.
 
     A type is coarse if the step between its numbers is, at the farthest point.

@@ -128,9 +128,10 @@ class McapFile:
 
     Attributes:
         path: path of the file.
-        notes, joints_ns: as of `RosbagFile`; there is one file.
+        names, notes, joints_ns: as of `RosbagFile`; there is one file.
     """
 
+    names: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     joints_ns: tuple[int, ...] = ()
 

@@ -127,41 +127,53 @@ def frame_name(name: str) -> str:
 
 
 class StaticTransforms:
-    """The frames in /tf_static: a tree with each frame's pose in its parent."""
+    """The frames in /tf_static: a tree with each frame's pose in its parent.
 
-    def __init__(self, messages: Iterable[Any], where: str):
-        """Collects the transforms of messages of /tf_static.
+    Attributes:
+        moving: frames on /tf that move in their parent.
+    """
+
+    def __init__(self, edges: Iterable[Any], where: str):
+        """Collects the transforms on /tf_static.
 
         Args:
-            messages: messages of type tf2_msgs/msg/TFMessage.
+            edges: messages of type geometry_msgs/msg/TransformStamped.
             where: file or topic, with which an error message begins.
 
         Raises:
             InputError: two messages give different poses for one frame.
         """
         self._where = where
+        self.moving: set[str] = set()
         # Frame C -> its parent P, p_PC, quat_xyzw_PC.
         self._edges: dict[str, tuple] = {}
-        for message in messages:
-            for edge in message.transforms:
-                new = (
-                    frame_name(edge.header.frame_id),
-                    xyz(edge.transform.translation),
-                    xyzw(edge.transform.rotation),
+        for edge in edges:
+            # Nodes repeat what is fixed.
+            child, new = _numbers(edge)
+            old = self._edges.setdefault(child, new)
+            if not _is_same(old, new):
+                raise InputError(
+                    f"{where}: {edge.child_frame_id}: at"
+                    f" {stamp_ns(edge.header)} ns {new}, before {old}"
                 )
-                # Nodes repeat what is fixed.
-                child = frame_name(edge.child_frame_id)
-                old = self._edges.setdefault(child, new)
-                is_same = (
-                    old[0] == new[0]
-                    and poses.same_numbers(old[1], new[1])
-                    and poses.same_turns(old[2], new[2])
-                )
-                if not is_same:
-                    raise InputError(
-                        f"{where}: {edge.child_frame_id}: at"
-                        f" {stamp_ns(edge.header)} ns {new}, before {old}"
-                    )
+
+    def add_fixed(self, edges: Iterable[Any]) -> None:
+        """Adds frames on /tf that never move in their parent."""
+        found: dict[str, tuple] = {}
+        for edge in edges:
+            child, new = _numbers(edge)
+            if not _is_same(found.setdefault(child, new), new):
+                self.moving.add(child)
+        for child in found.keys() - self.moving:
+            self._edges.setdefault(child, found[child])
+
+    def has(self, base: str, frame: str) -> bool:
+        """Returns whether transforms lead from a frame to another."""
+        return (
+            not self._in_ancestors(base)
+            .keys()
+            .isdisjoint(self._in_ancestors(frame))
+        )
 
     def pose(self, base: str, frame: str) -> np.ndarray:
         """Returns the pose (4, 4) of a frame in another frame of the tree.
@@ -205,6 +217,23 @@ class StaticTransforms:
             for child, (parent, *_) in sorted(self._edges.items())
         ]
         return f"there are: {', '.join(edges) or 'none'}"
+
+
+def _numbers(edge: Any) -> tuple[str, tuple]:
+    """Returns a frame C, and its parent P with p_PC and quat_xyzw_PC."""
+    return frame_name(edge.child_frame_id), (
+        frame_name(edge.header.frame_id),
+        xyz(edge.transform.translation),
+        xyzw(edge.transform.rotation),
+    )
+
+
+def _is_same(old: tuple, new: tuple) -> bool:
+    return (
+        old[0] == new[0]
+        and poses.same_numbers(old[1], new[1])
+        and poses.same_turns(old[2], new[2])
+    )
 
 
 def checked_poses(
