@@ -32,13 +32,17 @@ COLLECTIONS = (
 SHAPES = ((0,), (0, 2), (0, 3), (0, 3, 3), (0, 4, 4), (0, 2, 2), (0, 0))
 # Points of a scan, and results of a localisation.
 RECORDS = [*POINT_DTYPE.descr, *QUERY.descr]
-# Functions of three numbers, an image, an outline, elevations, polygons, a
-# drive, and of one choice at least: their sequences cannot be empty.
+# Functions of three numbers, an image, an outline, elevations, polygons, poses,
+# a drive, and of one choice, drive or method at least: their sequences cannot
+# be empty.
 NEVER_EMPTY = (
     "cns_drake.recording.make_compressed_image",
     "cns_drake.recording.make_image",
     "cns_drake.sensors.SpinningPattern",
     "evaluation.base.revolved",
+    "evaluation.recognition.common_blocks",
+    "evaluation.recognition.joined_scans",
+    "evaluation.recognition.pose_error",
     "evaluation.results.make_page_drive",
     "worlds.shapes.block",
     "worlds.shapes.cut_ears",
@@ -46,8 +50,6 @@ NEVER_EMPTY = (
     "worlds.shapes.roll_pitch_yaw",
     "worlds.shapes.triple",
 )
-# Doors that the list lacks.
-REWRITTEN = ("cns_drake.studies", "evaluation.recognition", "evaluation.study")
 # Type of another parameter -> a value.
 VALUES = {
     float: 1.0,
@@ -115,11 +117,13 @@ def calls(function):
 
 def functions():
     seen = {}
-    for package in sorted({*PACKAGES} - {*REWRITTEN}):
+    for package in PACKAGES:
         door = importlib.import_module(package)
         for name in listed(package):
             function = getattr(door, name)
             is_one = inspect.isfunction(function) or inspect.isclass(function)
+            if inspect.isabstract(function):
+                continue
             if is_one and calls(function):
                 seen.setdefault(function, f"{package}.{name}")
     return {k: name for k, name in seen.items() if name not in NEVER_EMPTY}
