@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 import functools
 import operator
+from pathlib import Path
 import threading
 import warnings
 import weakref
@@ -40,6 +41,7 @@ from cns_drake.scene.surfaces import LARGEST_SIZE, Surface, TriangleSurface
 from evaluation.base import (
     InputError,
     cos,
+    reading,
     sin,
 )
 
@@ -363,7 +365,7 @@ def read_geometry(
         UserWarning: a deformable geometry is left out, told once.
     """
     found = []
-    with ForeignMeshes() as foreign:
+    with reading(Path("the world's meshes")), ForeignMeshes() as foreign:
         meshes = MeshFiles(foreign)
         for record in records:
             if record.is_deformable:

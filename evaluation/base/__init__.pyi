@@ -3,6 +3,9 @@ from . import poses as poses
 from . import program as program
 from . import shared_options as shared_options
 from . import terminal as terminal
+from .budget import limit_process as limit_process
+from .budget import not_counted as not_counted
+from .budget import reading as reading
 from .caches import cache_folder as cache_folder
 from .caches import is_own as is_own
 from .caches import mark_used as mark_used
@@ -56,7 +59,7 @@ from .errors import no_such as no_such
 from .errors import one_line as one_line
 from .errors import validated as validated
 from .errors import value_errors as value_errors
-from .expansion import expanded_size as expanded_size
+from .expansion import check_expansion as check_expansion
 from .figures import GONE_RGB as GONE_RGB
 from .figures import NEW_RGB as NEW_RGB
 from .figures import UNSEEN_RGB as UNSEEN_RGB

@@ -22,14 +22,13 @@ from evaluation.base import (
     mark_used,
     own_cache,
     read_npz,
+    reading,
     remove_unused,
     settled_state,
 )
 
 # Greatest size of the contents that are kept of a topic.
 _MOST_BYTES = 1 << 26
-# Greatest size of a file of the cache.
-_CACHE_BYTES = 1 << 28
 # Changes whenever files of the cache get another form.
 _FORM = 1
 
@@ -127,7 +126,9 @@ class BagIndex:
             missing = [one for one in wanted if one not in self._found]
             if missing:
                 kept = [one for one in missing if self._kept.get(one)]
-                self._found |= _collect(missing, self._read(missing, kept))
+                with reading(self._files[0]):
+                    found = _collect(missing, self._read(missing, kept))
+                self._found |= found
                 for one in missing:
                     _cache(self._files, states, one, self._found[one])
         return self._found[topic]
@@ -191,7 +192,7 @@ def _cached(
         if place is None or None in states or not place.is_file():
             return None
         names = ("of", *TopicIndex._fields)
-        columns = read_npz(place, names, _CACHE_BYTES)
+        columns = read_npz(place, names)
         of = columns.pop("of")
         found = TopicIndex(**columns)
         number = len(found.log_times_ns)

@@ -10,7 +10,7 @@ the whole file is read once.
 
 The package's records are used, but not its readers: they check only the
 checksums of chunks, and reserve the sizes that a record or a chunk declares.
-Here every size is checked against the file and a limit before memory is
+Here every size of a record is checked against the file before memory is
 reserved, and every checksum is checked.
 """
 
@@ -48,6 +48,7 @@ import numpy as np
 from evaluation.base import (
     InputError,
     check_regular,
+    reading,
     unpacked,
     user_errors,
     value_errors,
@@ -58,9 +59,6 @@ from evaluation.drives.mcap_messages import read_stamp
 _MAGIC = b"\x89MCAP0\r\n"
 # Opcode and length.
 _RECORD_HEADER = struct.Struct("<BQ")
-# An index has a few megabytes; as Python objects it takes a hundred times as
-# much memory.
-_SUMMARY_LIMIT_BYTES = 1 << 25
 # The last record: its header, where the summary begins, its offsets, its
 # checksum.
 _FOOTER = struct.Struct("<BQQQI")
@@ -69,18 +67,10 @@ _FOOTER = struct.Struct("<BQQQI")
 _CHUNK_INDEX = struct.Struct("<16xQ8xI")
 # An entry of this table: a channel id, and an offset.
 _CHUNK_INDEX_ENTRY = struct.Struct("<HQ")
-# A broken or hostile length must not be taken for the size of a buffer. A
-# chunk holds a few scans.
-CHUNK_LIMIT_BYTES = 1 << 26
-# A table of structures has a few megabytes, too.
-_ATTACHMENT_LIMIT_BYTES = 1 << 23
-# Size of a chunk's record without its data.
-_CHUNK_FIELDS_BYTES = 1 << 10
 # Greatest size of all uncompressed chunks together: for any file, and for each
 # byte of the file. Recordings compress to a tenth; a hostile file, to nothing.
 _UNPACKED_BYTES = 1 << 30
 _UNPACKED_PER_BYTE = 200
-_RECORD_LIMIT_BYTES = CHUNK_LIMIT_BYTES + _CHUNK_FIELDS_BYTES
 # A message, after its record header: channel id, sequence, two times.
 _MESSAGE_HEADER = struct.Struct("<HIQQ")
 # A message index, after its record header: channel id, length of the rest.
@@ -109,7 +99,6 @@ _FAULTS = (
     McapError,
     EOFError,
     StopIteration,
-    MemoryError,
     OverflowError,
     ValueError,
     RuntimeError,
@@ -275,8 +264,7 @@ class McapFile:
             if found != name:
                 continue
             with self._reading() as stream, _place_named(offset):
-                limit = _ATTACHMENT_LIMIT_BYTES
-                _, body = _read_record(stream, offset, limit, "an attachment")
+                _, body = _read_record(stream, offset, "an attachment")
                 data = _parse_attachment(body).data
             if content not in (None, data):
                 raise InputError(
@@ -296,12 +284,7 @@ class McapFile:
         for record_name, offset in self._contents.metadata:
             if record_name == name:
                 with self._reading() as stream, _place_named(offset):
-                    _, body = _read_record(
-                        stream,
-                        offset,
-                        _ATTACHMENT_LIMIT_BYTES,
-                        "a metadata record",
-                    )
+                    _, body = _read_record(stream, offset, "a metadata record")
                     content = Metadata.read(_RecordContent(body))
                     found.append(content.metadata)
         return found
@@ -315,9 +298,7 @@ class McapFile:
         """
         start = len(_MAGIC)
         with self._reading() as stream, _place_named(start):
-            _, body = _read_record(
-                stream, start, _ATTACHMENT_LIMIT_BYTES, "the header"
-            )
+            _, body = _read_record(stream, start, "the header")
             return Header.read(_RecordContent(body)).library
 
     def _kind(self, channel: Channel) -> str:
@@ -402,9 +383,7 @@ class McapFile:
         """Reads and uncompresses a chunk whose checksum is right."""
         start = self._contents.blocks[number]
         with self._reading() as stream, _place_named(start):
-            opcode, body = _read_record(
-                stream, start, _RECORD_LIMIT_BYTES, "a chunk"
-            )
+            opcode, body = _read_record(stream, start, "a chunk")
             if opcode == Opcode.MESSAGE:
                 return memoryview(_RECORD_HEADER.pack(opcode, len(body)) + body)
             chunk = Chunk.read(_RecordContent(body))
@@ -432,6 +411,7 @@ class McapFile:
     def _reading(self) -> Iterator:
         with (
             user_errors(self.path),
+            reading(self.path),
             self._faults(),
             open(self.path, "rb") as stream,
         ):
@@ -602,7 +582,7 @@ class _Unpacked:
         """
         if start not in self._starts:
             self._starts.add(start)
-            self._left -= min(chunk.uncompressed_size, CHUNK_LIMIT_BYTES)
+            self._left -= chunk.uncompressed_size
         if self._left < 0:
             raise ValueError("its chunks stand for far more bytes than it has")
 
@@ -644,8 +624,6 @@ def _read_summary(stream: BinaryIO, path: Path) -> bytes:
         return b""
     if start > end:
         raise ValueError("the summary begins behind its end")
-    if end - start > _SUMMARY_LIMIT_BYTES:
-        raise ValueError(f"a summary of {end - start} bytes")
     stream.seek(start)
     summary = stream.read(end - start)
     # The checksum is also that of the footer up to the checksum itself.
@@ -655,18 +633,17 @@ def _read_summary(stream: BinaryIO, path: Path) -> bytes:
 
 
 def _read_record(
-    stream: BinaryIO, position: int, limit: int, what: str
+    stream: BinaryIO, position: int, what: str
 ) -> tuple[int, bytes]:
     """Returns the opcode and the content of the record at a position.
 
     Args:
         stream: the file.
         position: place of the record in the file [bytes].
-        limit: greatest size of the content [bytes].
         what: kind of the record, for error messages.
 
     Raises:
-        ValueError: there is no record, or it is too large.
+        ValueError: there is no record.
         EOFError: the record reaches beyond the end of the file.
     """
     stream.seek(position)
@@ -676,11 +653,11 @@ def _read_record(
     opcode, length = _RECORD_HEADER.unpack(header)
     if opcode == 0:
         raise ValueError("there is no record")
-    if length > limit:
-        raise ValueError(f"{what} of {length} bytes")
-    body = stream.read(length)
-    if len(body) != length:
+    start = stream.tell()
+    if length > stream.seek(0, os.SEEK_END) - start:
         raise EOFError(f"{what} ends behind the file")
+    stream.seek(start)
+    body = stream.read(length)
     return opcode, body
 
 
@@ -723,19 +700,10 @@ class _RecordContent(ReadDataStream):
 def _uncompress(chunk: Chunk) -> bytes:
     """Returns the uncompressed records of a chunk.
 
-    The uncompressed size is limited, so that a small file cannot fill the
-    memory.
-
     Raises:
-        ValueError: if the chunk is damaged, too large or of unknown
-            compression.
+        ValueError: if the chunk is damaged, or of unknown compression.
     """
-    size = chunk.uncompressed_size
-    if size > CHUNK_LIMIT_BYTES:
-        raise ValueError(f"a chunk of {size} bytes")
-    data = unpacked(chunk.data, chunk.compression, size)
-    if len(data) != size:
-        raise ValueError(f"a chunk of {len(data)} instead of {size} bytes")
+    data = unpacked(chunk.data, chunk.compression, chunk.uncompressed_size)
     if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
         raise ValueError("the checksum of a chunk is wrong")
     return data
@@ -777,9 +745,7 @@ def _locate_records(
     opcode, position = 0, len(_MAGIC)
     while opcode != Opcode.FOOTER:
         with _place_named(position):
-            opcode, content = _read_record(
-                stream, position, _RECORD_LIMIT_BYTES, "a record"
-            )
+            opcode, content = _read_record(stream, position, "a record")
             chunk = None
             if opcode == Opcode.CHUNK:
                 chunk = Chunk.read(_RecordContent(content))

@@ -9,7 +9,14 @@ import math
 from pathlib import Path
 from typing import Any
 
-from evaluation.base import Family, doing, errors_at, import_modules, listed
+from evaluation.base import (
+    Family,
+    doing,
+    errors_at,
+    import_modules,
+    listed,
+    reading,
+)
 from evaluation.base import InputError as InputError
 from evaluation.clouds import is_cloud
 from evaluation.drives.data_set import DataSet, check_interface
@@ -114,6 +121,19 @@ def open_drive(
     poses = None if poses is None else Path(poses)
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
+    with reading(path):
+        return _open_drive(path, lidar, columns, odometry, poses, pose_gap)
+
+
+def _open_drive(
+    path: Path,
+    lidar: str | None,
+    columns: int | None,
+    odometry: str | None,
+    poses: Path | None,
+    pose_gap: float | None,
+) -> Drive:
+    """Opens a recorded drive, see `open_drive`."""
     doing(f"opening {path.name}")
     fitting = find_data_sets(path)
     if len(fitting) > 1:

@@ -29,6 +29,7 @@ from evaluation.base import (
     check_regular,
     is_there,
     listed,
+    reading,
 )
 from evaluation.drives import mcap_messages, ros_messages
 from evaluation.drives.bag_index import BagIndex, Entry
@@ -117,7 +118,7 @@ class RosbagFile:
         """
         found: _Opened | None = getattr(self._local, "opened", None)
         if found is None or found.pid != os.getpid():
-            with self._faults():
+            with reading(self.path), self._faults():
                 found = _Opened.of(self._paths)
             self._local.opened = found
             # What a parent has opened stays open: closing it would remove the
@@ -214,7 +215,8 @@ class RosbagFile:
 
     def read(self, location: np.void) -> memoryview:
         """Returns the message at a location, in CDR."""
-        ((_, data),) = self.visit(np.array([location], LOCATION))
+        with reading(self.path):
+            ((_, data),) = self.visit(np.array([location], LOCATION))
         return data
 
     def visit(self, locations: np.ndarray) -> Iterator[tuple[int, memoryview]]:
@@ -272,7 +274,7 @@ class RosbagFile:
         """Turns the errors of a damaged bag into an InputError of one line."""
         try:
             yield
-        except InputError:
+        except (InputError, MemoryError):
             raise
         except Exception as error:
             # rosbags, SQLite and the compression raise errors of any class.
