@@ -147,7 +147,8 @@ def plain_gltf(content: bytes, folder: Path) -> PlainGltf:
             _count_of_mesh(top, top["meshes"][mesh]) for mesh, _ in placed
         )
     except (AttributeError, LookupError, TypeError, ValueError) as error:
-        raise ValueError(f"no valid glTF ({type(error).__name__})") from error
+        fault = f"{type(error).__name__}: {error}"
+        raise ValueError(f"no valid glTF ({fault})") from error
     for mesh in top.get("meshes", []):
         for primitive in mesh["primitives"]:
             primitive.pop("material", None)

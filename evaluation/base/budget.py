@@ -23,13 +23,18 @@ from types import FrameType
 from evaluation.base.errors import InputError
 
 # Memory [bytes] and processor time [s] for any file, and for each byte of it.
-_MEMORY = 500e6
+_MEMORY = 400e6
 _MEMORY_PER_BYTE = 100.0
 _SECONDS = 30.0
 _SECONDS_PER_BYTE = 30e-6
 # By what factor the user raises both.
 _VARIABLE = "CNS_READING_BUDGET"
-# The signal is repeated after this time: a library can swallow the first [s].
+# The system refuses memory only so far beyond the budget [bytes]: libraries in
+# C crash when it does.
+_BEYOND = 300e6
+# How often the system lets the process look at what it has taken [s].
+_INTERVAL = 0.05
+# The error is repeated after this time: a library can swallow the first [s].
 _GRACE = 1.0
 # Greatest ratio of a file's size to what it takes on a disk that compresses.
 # A file with holes has any size.
@@ -42,7 +47,7 @@ _DATA_COLUMN = 5
 
 
 class _SpentError(BaseException):
-    """The time is over; not an `Exception`, which parsers catch and go on."""
+    """The budget is spent; not an `Exception`, which parsers catch."""
 
 
 class _Budget:
@@ -50,7 +55,7 @@ class _Budget:
 
     Attributes:
         memory: greatest size of its data [bytes].
-        until: process time at which the system sends a signal [s].
+        until: greatest process time [s].
     """
 
     def __init__(self, factor: float) -> None:
@@ -60,12 +65,22 @@ class _Budget:
         self.memory = _used_memory() + factor * _MEMORY
         self.until = time.process_time() + factor * _SECONDS
         self._limits = resource.getrlimit(resource.RLIMIT_DATA)
-        self._handler = signal.signal(signal.SIGPROF, self._spend)
+        self._handler = signal.signal(signal.SIGPROF, self._look)
+        signal.siginterrupt(signal.SIGPROF, False)
+        self._next_error = 0.0
         self.start()
 
-    def _spend(self, number: int, frame: FrameType | None) -> None:
-        if not self._is_over:
-            raise _SpentError
+    def _look(self, number: int, frame: FrameType | None) -> None:
+        """Handles the timer's signal."""
+        now = time.process_time()
+        if self._is_over or now < self._next_error:
+            return
+        self._next_error = now + _GRACE
+        if now > self.until:
+            raise _SpentError("processor time")
+        if _used_memory() > self.memory:
+            raise _SpentError("memory")
+        self._next_error = 0.0
 
     def add_file(self, path: Path) -> None:
         """Adds what the size of a file allows, once for each file."""
@@ -83,10 +98,9 @@ class _Budget:
 
     def start(self) -> None:
         """Makes the system enforce the budget."""
-        left = max(self.until - time.process_time(), 1e-3)
-        signal.setitimer(signal.ITIMER_PROF, left, _GRACE)
+        signal.setitimer(signal.ITIMER_PROF, _INTERVAL, _INTERVAL)
         if _IS_KNOWN:
-            _limit(resource.RLIMIT_DATA, self.memory)
+            _limit(resource.RLIMIT_DATA, self.memory + _BEYOND)
 
     def stop(self) -> None:
         """Lets the process take what it could before."""
@@ -110,7 +124,8 @@ def reading(path: Path) -> Iterator[None]:
 
     Within another such block, the size of the file adds to what the other may
     take. Python handles signals in the main thread only, so blocks of other
-    threads have no limit of their own.
+    threads have no limit of their own. A call of a library in C ends before the
+    time is looked at.
 
     Args:
         path: the file, or a folder whose files are read in further blocks.
@@ -130,7 +145,7 @@ def reading(path: Path) -> Iterator[None]:
     except MemoryError as error:
         raise InputError(_fault(path, "memory")) from error
     except _SpentError as error:
-        raise InputError(_fault(path, "processor time")) from error
+        raise InputError(_fault(path, str(error))) from error
     finally:
         if own is not None:
             own.end()
@@ -166,7 +181,7 @@ def limit_process(path: Path) -> None:
     _limit(resource.RLIMIT_CPU, seconds)
     if _IS_KNOWN:
         memory = _factor() * (_MEMORY + _MEMORY_PER_BYTE * size)
-        _limit(resource.RLIMIT_DATA, _used_memory() + memory)
+        _limit(resource.RLIMIT_DATA, _used_memory() + memory + _BEYOND)
 
 
 def _limit(kind: int, most: float) -> None:

@@ -36,6 +36,8 @@ _FORMS = re.compile(
     re.DOTALL | re.IGNORECASE,
 )
 _WITH_FILES = re.compile(r"EXTENSION|PARAMETERFILE", re.IGNORECASE)
+# A file of heights, which no map takes from its reference system.
+_HEIGHTS = re.compile(r"\+geoidgrids=\S*")
 
 
 def projected_system(name: str) -> "pyproj.CRS":
@@ -43,13 +45,15 @@ def projected_system(name: str) -> "pyproj.CRS":
 
     Args:
         name: an EPSG code, two of them joined by `+`, the URL or URN of a code,
-            well-known text, or parameters of PROJ that name no file.
+            well-known text, or parameters of PROJ that name no file. A file
+            of heights (`+geoidgrids`) is left out.
 
     Raises:
         ValueError: the name has another form, or PROJ does not know the system.
     """
     import pyproj
 
+    name = _HEIGHTS.sub("", name)
     if not _FORMS.fullmatch(name) or _WITH_FILES.search(name):
         raise ValueError("not a code, URL, URN or text of a reference system")
     try:
