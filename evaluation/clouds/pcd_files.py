@@ -37,8 +37,11 @@ def read_pcd(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     dtype, count = _point_type(header), _num_points(header)
     encoding = header["DATA"][0].lower() if header["DATA"] else ""
     if encoding == "ascii":
-        # A point takes at least one byte, which bounds the buffer.
-        check_size(path, offset + count, exactly=False)
+        # A number takes at least one byte, which bounds the buffer.
+        numbers = sum(
+            math.prod(dtype[name].shape) for name in dtype.names or ()
+        )
+        check_size(path, offset + count * numbers, exactly=False)
         return read_text_records(path, offset, count, block, dtype, "PCD")
     if encoding == "binary":
         check_size(path, offset + count * dtype.itemsize, exactly=True)

@@ -70,7 +70,7 @@ _CHUNK_INDEX_ENTRY = struct.Struct("<HQ")
 # Greatest size of all uncompressed chunks together: for any file, and for each
 # byte of the file. Recordings compress to a tenth; a hostile file, to nothing.
 _UNPACKED_BYTES = 1 << 28
-_UNPACKED_PER_BYTE = 200
+_UNPACKED_PER_BYTE = 50
 # A message, after its record header: channel id, sequence, two times.
 _MESSAGE_HEADER = struct.Struct("<HIQQ")
 # A message index, after its record header: channel id, length of the rest.

@@ -1,7 +1,6 @@
 """MCAP files without an index whose records are damaged, or made to harm."""
 
 import struct
-import sys
 
 from helpers.mcap_bytes import write_mcap
 import lz4.frame
@@ -116,8 +115,6 @@ def test_harmful_records_are_refused_at_their_place(tmp_path, name):
     path = tmp_path / "a.mcap"
     path.write_bytes(content[:START] + HARMFUL[name] + content[START:])
     fault = rf"a\.mcap: damaged MCAP file \(byte {START}: .*mcap recover IN"
-    if name == "bomb" and sys.platform == "linux":
-        fault = r"a\.mcap: takes more memory"
     with pytest.raises(InputError, match=fault) as error:
         McapFile(path)
     assert "\n" not in str(error.value)
