@@ -29,6 +29,10 @@ from evaluation.base import (
 
 # Greatest size of the contents that are kept of a topic.
 _MOST_BYTES = 1 << 26
+# Greatest size of all that a bag unpacks to: for any bag, and for each byte of
+# it. Recordings compress to a tenth; a hostile file, to nothing.
+_UNPACKED_BYTES = 1 << 28
+_UNPACKED_PER_BYTE = 50
 # Changes whenever files of the cache get another form.
 _FORM = 1
 
@@ -79,6 +83,16 @@ class TopicIndex(NamedTuple):
         start = int(self.ends[number - 1]) if number else 0
         content = self.contents.data[start : int(self.ends[number])]
         return memoryview(content)
+
+
+def check_unpacked(total: int, size: int) -> None:
+    """Refuses a bag of `size` bytes that unpacks to `total` or more bytes.
+
+    Raises:
+        ValueError: this is implausible.
+    """
+    if total > _UNPACKED_BYTES + _UNPACKED_PER_BYTE * size:
+        raise ValueError("it stands for far more bytes than it has")
 
 
 class BagIndex:

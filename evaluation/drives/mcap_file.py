@@ -53,7 +53,7 @@ from evaluation.base import (
     user_errors,
     value_errors,
 )
-from evaluation.drives.bag_index import BagIndex, Entry
+from evaluation.drives.bag_index import BagIndex, Entry, check_unpacked
 from evaluation.drives.mcap_messages import read_stamp
 
 _MAGIC = b"\x89MCAP0\r\n"
@@ -67,10 +67,6 @@ _FOOTER = struct.Struct("<BQQQI")
 _CHUNK_INDEX = struct.Struct("<16xQ8xI")
 # An entry of this table: a channel id, and an offset.
 _CHUNK_INDEX_ENTRY = struct.Struct("<HQ")
-# Greatest size of all uncompressed chunks together: for any file, and for each
-# byte of the file. Recordings compress to a tenth; a hostile file, to nothing.
-_UNPACKED_BYTES = 1 << 28
-_UNPACKED_PER_BYTE = 50
 # A message, after its record header: channel id, sequence, two times.
 _MESSAGE_HEADER = struct.Struct("<HIQQ")
 # A message index, after its record header: channel id, length of the rest.
@@ -132,14 +128,12 @@ class McapFile:
         """
         self.path = Path(path)
         check_regular(self.path)
-        self._unpacked = _Unpacked(self.path.stat().st_size)
         with self._reading() as stream:
             summary = _read_summary(stream, self.path)
             self._contents = _Contents.of(summary)
+            check_unpacked(sum(self._contents.sizes), _size_of(stream))
             if not self._contents.is_whole():
-                self._contents = self._contents.read_through(
-                    stream, self._unpacked
-                )
+                self._contents = self._contents.read_through(stream)
         self._channels: dict[str, list[Channel]] = {}
         for _, channel in sorted(self._contents.channels.items()):
             self._channels.setdefault(channel.topic, []).append(channel)
@@ -317,9 +311,7 @@ class McapFile:
             ):
                 # Message indexes are optional, too.
                 with self._reading() as stream:
-                    self._contents = self._contents.read_through(
-                        stream, self._unpacked
-                    )
+                    self._contents = self._contents.read_through(stream)
         found = self._contents.found
         if found is not None:
             locations = np.array(
@@ -381,7 +373,9 @@ class McapFile:
             if opcode == Opcode.MESSAGE:
                 return memoryview(_RECORD_HEADER.pack(opcode, len(body)) + body)
             chunk = Chunk.read(_RecordContent(body))
-            self._unpacked.add(start, chunk)
+            sizes = self._contents.sizes
+            if sizes and chunk.uncompressed_size > sizes[number]:
+                raise ValueError("a chunk larger than the index says")
             return memoryview(_uncompress(chunk))
 
     def _message(self, chunk: memoryview, place: Any) -> memoryview:
@@ -433,6 +427,8 @@ class _Contents:
         channels: id -> channel.
         blocks: offset in the file of each chunk, or of each message outside of
             chunks, in the file's order [bytes].
+        sizes: the uncompressed size of each block, as the index states it
+            [bytes]; empty without an index.
         indexes: for each block, channel id -> offset of the message index
             [bytes].
         attachments: (name, offset in the file [bytes]) of each attachment.
@@ -445,6 +441,7 @@ class _Contents:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     blocks: list[int] = field(default_factory=list)
+    sizes: list[int] = field(default_factory=list)
     indexes: list[dict[int, int]] = field(default_factory=list)
     attachments: list[tuple[str, int]] = field(default_factory=list)
     metadata: list[tuple[str, int]] = field(default_factory=list)
@@ -459,7 +456,7 @@ class _Contents:
         reading all poses.
         """
         contents = cls()
-        chunks: list[tuple[int, dict[int, int]]] = []
+        chunks: list[tuple[int, int, dict[int, int]]] = []
         position = 0
         while position < len(summary):
             start = position + _RECORD_HEADER.size
@@ -487,8 +484,9 @@ class _Contents:
                 other = MetadataIndex.read(_RecordContent(body))
                 contents.metadata.append((other.name, other.offset))
         chunks.sort(key=lambda chunk: chunk[0])
-        contents.blocks = [start for start, _ in chunks]
-        contents.indexes = [offsets for _, offsets in chunks]
+        contents.blocks = [start for start, _, _ in chunks]
+        contents.sizes = [size for _, size, _ in chunks]
+        contents.indexes = [offsets for _, _, offsets in chunks]
         return contents
 
     def is_whole(self) -> bool:
@@ -514,7 +512,7 @@ class _Contents:
             counts.message_count,
         )
 
-    def read_through(self, stream: BinaryIO, unpacked: _Unpacked) -> _Contents:
+    def read_through(self, stream: BinaryIO) -> _Contents:
         """Returns the contents of the whole file, found without an index.
 
         Schemas, channels and statistics of the summary are taken over.
@@ -530,7 +528,7 @@ class _Contents:
         found: dict[int, list[tuple[int, int, int]]] = {}
         contents.found = found
         there = 0
-        for start, offset, record in _locate_records(stream, unpacked):
+        for start, offset, record in _locate_records(stream):
             if isinstance(record, Schema):
                 contents.schemas.setdefault(record.id, record)
             elif isinstance(record, Channel):
@@ -556,34 +554,24 @@ class _Contents:
         return contents
 
 
-class _Unpacked:
-    """The chunks of a file that were uncompressed, each counted once."""
-
-    def __init__(self, size: int):
-        """Makes the count for a file of `size` bytes."""
-        self._left = _UNPACKED_BYTES + _UNPACKED_PER_BYTE * size
-        self._starts: set[int] = set()
-
-    def add(self, start: int, chunk: Chunk) -> None:
-        """Adds a chunk, which begins at a place in the file [bytes].
-
-        Raises:
-            ValueError: the chunks are implausibly large for the file.
-        """
-        if start not in self._starts:
-            self._starts.add(start)
-            self._left -= chunk.uncompressed_size
-        if self._left < 0:
-            raise ValueError("its chunks stand for far more bytes than it has")
+def _size_of(stream: BinaryIO) -> int:
+    return os.fstat(stream.fileno()).st_size
 
 
-def _chunk_offsets(body: bytes) -> tuple[int, dict[int, int]]:
-    """Returns the offsets of a chunk, and of its message index by channel."""
+def _chunk_offsets(body: bytes) -> tuple[int, int, dict[int, int]]:
+    """Returns what a chunk's index says of it.
+
+    Returns:
+        Its offset, its uncompressed size, and the offset of its message index
+        by channel [bytes].
+    """
     start, size = _CHUNK_INDEX.unpack_from(body)
     table = body[_CHUNK_INDEX.size : _CHUNK_INDEX.size + size]
     if len(table) != size:
         raise ValueError("the index of a chunk is cut off")
-    return start, dict(_CHUNK_INDEX_ENTRY.iter_unpack(table))
+    # The uncompressed size ends the record.
+    unpacked_bytes = int.from_bytes(body[-8:], "little")
+    return start, unpacked_bytes, dict(_CHUNK_INDEX_ENTRY.iter_unpack(table))
 
 
 def _read_summary(stream: BinaryIO, path: Path) -> bytes:
@@ -715,7 +703,7 @@ _READERS = {
 
 
 def _locate_records(
-    stream: BinaryIO, unpacked: _Unpacked
+    stream: BinaryIO,
 ) -> Iterator[tuple[int, int, McapRecord]]:
     """Yields the records of an MCAP file, each with its place in the file.
 
@@ -732,14 +720,15 @@ def _locate_records(
     Raises:
         ValueError: a part of the file cannot be read.
     """
-    opcode, position = 0, len(_MAGIC)
+    opcode, position, total = 0, len(_MAGIC), 0
     while opcode != Opcode.FOOTER:
         with _place_named(position):
             opcode, content = _read_record(stream, position, "a record")
             chunk = None
             if opcode == Opcode.CHUNK:
                 chunk = Chunk.read(_RecordContent(content))
-                unpacked.add(position, chunk)
+                total += chunk.uncompressed_size
+                check_unpacked(total, _size_of(stream))
             for offset, record in _records_in(opcode, content, chunk):
                 yield position, offset, record
         position += _RECORD_HEADER.size + len(content)
@@ -760,6 +749,8 @@ def _records_in(
             header = inner.read(_RECORD_HEADER.size)
             opcode, length = _RECORD_HEADER.unpack(header)
             content = inner.read(length)
+            if opcode == 0:
+                raise ValueError("there is no record")
             if opcode in _IN_CHUNKS:
                 yield offset, _IN_CHUNKS[opcode](content)
     elif opcode in _READERS:

@@ -32,7 +32,7 @@ from evaluation.base import (
     reading,
 )
 from evaluation.drives import mcap_messages, ros_messages
-from evaluation.drives.bag_index import BagIndex, Entry
+from evaluation.drives.bag_index import BagIndex, Entry, check_unpacked
 from evaluation.drives.mcap_file import LOCATION
 
 # How to read a damaged bag of ROS 1, for error messages.
@@ -250,9 +250,13 @@ class RosbagFile:
     ) -> Iterator[Entry]:
         """Yields all messages of topics, see `BagIndex`."""
         here = self._here
+        size = sum(file.stat().st_size for file in self.files)
+        total = 0
         with self._faults():
             for connection, time_ns, data in here.messages(topics):
                 topic = connection.topic
+                total += len(data)
+                check_unpacked(total, size)
                 yield Entry(
                     topic,
                     time_ns,
