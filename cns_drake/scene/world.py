@@ -33,7 +33,7 @@ from evaluation.base import (
     errors_at,
     is_there,
     read_bytes,
-    reading,
+    reads,
     value_errors,
 )
 from worlds.shapes import (
@@ -75,6 +75,7 @@ class World:
         return anchored_frames(self.plant)
 
 
+@reads
 def load_world(
     sdf: Path | str,
     *,
@@ -114,18 +115,6 @@ def load_world(
         world = load_world("my_world.sdf")
     """
     sdf = Path(sdf)
-    with reading(sdf):
-        return _load_world(sdf, vehicle, without, model_paths, in_sight)
-
-
-def _load_world(
-    sdf: Path,
-    vehicle: Path | str | None,
-    without: Collection[str],
-    model_paths: Collection[Path | str],
-    in_sight: InSight | None,
-) -> World:
-    """Reads a world, see `load_world`."""
     scene_graph = SceneGraph()
     # The plant parses models and holds their frames. It stays out of the
     # Diagram for two reasons: a plant has no port for prescribed motion, and a

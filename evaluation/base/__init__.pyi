@@ -6,6 +6,7 @@ from . import terminal as terminal
 from .budget import limit_process as limit_process
 from .budget import not_counted as not_counted
 from .budget import reading as reading
+from .budget import reads as reads
 from .caches import cache_folder as cache_folder
 from .caches import is_own as is_own
 from .caches import mark_used as mark_used

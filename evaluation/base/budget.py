@@ -7,9 +7,11 @@ file, and no more, so that readers need not count.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 from contextvars import ContextVar
+import functools
+import inspect
 import math
 import mmap
 import os
@@ -19,9 +21,12 @@ import signal
 import threading
 import time
 from types import FrameType
+from typing import ParamSpec, TypeVar
 
 from evaluation.base.errors import InputError
 
+_Arguments = ParamSpec("_Arguments")
+_Found = TypeVar("_Found")
 # Memory [bytes] and processor time [s] for any file, and for each byte of it.
 _MEMORY = 400e6
 _MEMORY_PER_BYTE = 100.0
@@ -150,6 +155,25 @@ def reading(path: Path) -> Iterator[None]:
         if own is not None:
             own.end()
             _CURRENT.set(None)
+
+
+def reads(
+    function: Callable[_Arguments, _Found],
+) -> Callable[_Arguments, _Found]:
+    """Makes the block of `reading` of a function, whose first argument is read.
+
+    The argument is a path, also as text.
+    """
+    first = next(iter(inspect.signature(function).parameters))
+
+    @functools.wraps(function)
+    def limited(*args: _Arguments.args, **named: _Arguments.kwargs) -> _Found:
+        # Without the argument, Python says what is missing.
+        path = args[0] if args else named.get(first, "")
+        with reading(Path(str(path))):
+            return function(*args, **named)
+
+    return limited
 
 
 @contextlib.contextmanager

@@ -15,7 +15,7 @@ from evaluation.base import (
     errors_at,
     import_modules,
     listed,
-    reading,
+    reads,
 )
 from evaluation.base import InputError as InputError
 from evaluation.clouds import is_cloud
@@ -80,6 +80,7 @@ class Reading:
         return self.open(path)
 
 
+@reads
 def open_drive(
     path: Path,
     lidar: str | None = None,
@@ -121,19 +122,6 @@ def open_drive(
     poses = None if poses is None else Path(poses)
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
-    with reading(path):
-        return _open_drive(path, lidar, columns, odometry, poses, pose_gap)
-
-
-def _open_drive(
-    path: Path,
-    lidar: str | None,
-    columns: int | None,
-    odometry: str | None,
-    poses: Path | None,
-    pose_gap: float | None,
-) -> Drive:
-    """Opens a recorded drive, see `open_drive`."""
     doing(f"opening {path.name}")
     fitting = find_data_sets(path)
     if len(fitting) > 1:

@@ -13,7 +13,7 @@ from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 from threadpoolctl import threadpool_limits
 
-from evaluation.base import InputError, doing, dot, draft_folder, reading
+from evaluation.base import InputError, doing, dot, draft_folder, reads
 from worlds.imports import map_files, overview
 from worlds.imports.dressing.dressed_city import dress_city
 from worlds.imports.drives.cell_graph import CellGraph
@@ -67,6 +67,7 @@ Finish = Callable[[Path, Mapping[str, tuple[int, int]]], None]
 # One thread for linear algebra: the matrices are small and several processes
 # run, so more threads would only wait for each other.
 @threadpool_limits.wrap(limits=1)  # type: ignore[untyped-decorator]
+@reads
 def import_city(
     source: Path | str,
     output: Path | str,
@@ -97,14 +98,6 @@ def import_city(
         report = import_city("delft.city.json", "delft", ImportOptions())
     """
     source, output = Path(source), Path(output)
-    with reading(source):
-        return _import_city(source, output, options, finish)
-
-
-def _import_city(
-    source: Path, output: Path, options: ImportOptions, finish: Finish
-) -> ImportReport:
-    """Writes a map folder, see `import_city`."""
     kind = source_of(source)
     _check_options(kind, source, output, options)
     own = None if options.along is None else [drive_along(options.along)]

@@ -178,8 +178,6 @@ def _json_object(text: bytes, where: str) -> dict:
         value = parse_json(text)
     except UnicodeDecodeError as error:
         raise InputError(f"{where}: not UTF-8 ({error.reason})") from error
-    except RecursionError as error:
-        raise InputError(f"{where}: nested too deeply") from error
     except ValueError as error:
         raise InputError(f"{where}: no JSON ({error})") from error
     if not isinstance(value, dict):
