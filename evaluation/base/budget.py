@@ -70,6 +70,7 @@ class _Budget:
         self.memory = _used_memory() + factor * _MEMORY
         self.until = time.process_time() + factor * _SECONDS
         self._limits = resource.getrlimit(resource.RLIMIT_DATA)
+        self._timer = signal.getitimer(signal.ITIMER_PROF)
         self._handler = signal.signal(signal.SIGPROF, self._look)
         signal.siginterrupt(signal.SIGPROF, False)
         self._next_error = 0.0
@@ -116,7 +117,10 @@ class _Budget:
         """Leaves the process as it was."""
         self._is_over = True
         self.stop()
-        signal.signal(signal.SIGPROF, self._handler)
+        # A signal that still waits is discarded; it could end the process.
+        signal.signal(signal.SIGPROF, signal.SIG_IGN)
+        signal.signal(signal.SIGPROF, self._handler or signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_PROF, *self._timer)
 
 
 # The system limits processes, so there is one budget, of the main thread.
