@@ -1,4 +1,3 @@
-from .cloud_files import SCAN_LIMIT_BYTES as SCAN_LIMIT_BYTES
 from .cloud_files import bin_dtype as bin_dtype
 from .cloud_files import coarse_note as coarse_note
 from .cloud_files import is_cloud as is_cloud

@@ -20,6 +20,7 @@ from evaluation.base import (
     poses,
     read_text,
     read_yaml,
+    reading,
     value_errors,
     xyz,
 )
@@ -737,8 +738,8 @@ class _Topics:
         Raises:
             InputError: the message cannot be read or decoded.
         """
-        data = self.file.read(place)
-        with self.faults(topic):
+        with reading(self.file.path), self.faults(topic):
+            data = self.file.read(place)
             return mcap_messages.decode(data, self._types[topic])
 
     def first(self, topic: str) -> Any:

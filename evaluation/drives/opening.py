@@ -9,7 +9,14 @@ import math
 from pathlib import Path
 from typing import Any
 
-from evaluation.base import Family, doing, errors_at, import_modules, listed
+from evaluation.base import (
+    Family,
+    doing,
+    errors_at,
+    import_modules,
+    listed,
+    reads,
+)
 from evaluation.base import InputError as InputError
 from evaluation.clouds import is_cloud
 from evaluation.drives.data_set import DataSet, check_interface
@@ -76,6 +83,7 @@ class Reading:
         return self.open(path)
 
 
+@reads
 def open_drive(
     path: Path,
     lidar: str | None = None,

@@ -29,9 +29,10 @@ from evaluation.base import (
     check_regular,
     is_there,
     listed,
+    reading,
 )
 from evaluation.drives import mcap_messages, ros_messages
-from evaluation.drives.bag_index import BagIndex, Entry
+from evaluation.drives.bag_index import BagIndex, Entry, check_unpacked
 from evaluation.drives.mcap_file import LOCATION
 
 # How to read a damaged bag of ROS 1, for error messages.
@@ -122,7 +123,7 @@ class RosbagFile:
         """
         found: _Opened | None = getattr(self._local, "opened", None)
         if found is None or found.pid != os.getpid():
-            with self._faults():
+            with reading(self.path), self._faults():
                 found = _Opened.of(self._paths)
             self._local.opened = found
             # What a parent has opened stays open: closing it would remove the
@@ -218,7 +219,8 @@ class RosbagFile:
 
     def read(self, location: np.void) -> memoryview:
         """Returns the message at a location, in CDR."""
-        ((_, data),) = self.visit(np.array([location], LOCATION))
+        with reading(self.path):
+            ((_, data),) = self.visit(np.array([location], LOCATION))
         return data
 
     def visit(self, locations: np.ndarray) -> Iterator[tuple[int, memoryview]]:
@@ -252,9 +254,13 @@ class RosbagFile:
     ) -> Iterator[Entry]:
         """Yields all messages of topics, see `BagIndex`."""
         here = self._here
+        size = sum(file.stat().st_size for file in self.files)
+        total = 0
         with self._faults():
             for connection, time_ns, data in here.messages(topics):
                 topic = connection.topic
+                total += len(data)
+                check_unpacked(total, size)
                 yield Entry(
                     topic,
                     time_ns,
@@ -276,7 +282,7 @@ class RosbagFile:
         """Turns the errors of a damaged bag into an InputError of one line."""
         try:
             yield
-        except InputError:
+        except (InputError, MemoryError):
             raise
         except Exception as error:
             # rosbags, SQLite and the compression raise errors of any class.

@@ -16,7 +16,7 @@ from evaluation.base import (
     user_errors,
     value_errors,
 )
-from evaluation.clouds import SCAN_LIMIT_BYTES, bin_dtype
+from evaluation.clouds import bin_dtype
 from evaluation.drives.drive import Drive, as_given, poses_frame
 from evaluation.drives.drive_scenario import SCENARIO, read_scenario
 from evaluation.drives.lidar_fields import (
@@ -300,9 +300,9 @@ def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
 
     Raises:
         ValueError: if the last record is incomplete.
-        InputError: if the file cannot be read, or is too large for a scan.
+        InputError: if the file cannot be read.
     """
-    data = read_bytes(path, SCAN_LIMIT_BYTES)
+    data = read_bytes(path)
     if len(data) % dtype.itemsize:
         raise ValueError(
             f"{len(data)} bytes is no whole number of points of"

@@ -26,8 +26,6 @@ from evaluation.base import (
 _NS_PER_US = 1000
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+")
 _NANOSECONDS = re.compile(r"\d{15,}")
-# Largest table [bytes]: NCLT has some of 80 MB.
-_TABLE_LIMIT_BYTES = 1 << 29
 
 
 def read_stamped_rows(
@@ -143,7 +141,7 @@ def _parts(path: Path) -> tuple[str, str, list[str]]:
         InputError: there is no such file, or no row in it.
     """
     try:
-        text = decode_text(read_bytes(path, _TABLE_LIMIT_BYTES))
+        text = decode_text(read_bytes(path))
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not a text file") from error
     # Only \n and \r\n end a line; str.splitlines splits at more characters.

@@ -45,8 +45,6 @@ from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.network_weights import Weights, checked_weights
 from evaluation.methods.registry import register
 
-# Greatest size of a file of weights, and of its arrays together [bytes].
-_MOST_BYTES = 200_000_000
 _ADVICE = (
     "no .npz file of this network's weights; the page docs/notes/bevplace.md"
     " shows how to make one"
@@ -406,7 +404,7 @@ class BevPlaceConfig(MethodConfig):
         Two files with the same name can contain different weights; their
         digests differ.
         """
-        content = read_bytes(self.weights, _MOST_BYTES)
+        content = read_bytes(self.weights)
         return hashlib.sha256(content).hexdigest()[:16]
 
 
@@ -458,7 +456,7 @@ def _read_weights(path: Path) -> dict[str, np.ndarray]:
             shape or not finite.
     """
     try:
-        found = read_npz(path, SHAPES, _MOST_BYTES)
+        found = read_npz(path, SHAPES)
     except ValueError as error:
         raise InputError(f"{path}: {_ADVICE} ({error})") from error
     if not found:

@@ -13,7 +13,7 @@ from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 from threadpoolctl import threadpool_limits
 
-from evaluation.base import InputError, doing, dot, draft_folder
+from evaluation.base import InputError, doing, dot, draft_folder, reads
 from worlds.imports import map_files, overview
 from worlds.imports.dressing.dressed_city import dress_city
 from worlds.imports.drives.cell_graph import CellGraph
@@ -62,6 +62,7 @@ Finish = Callable[[Path, Mapping[str, tuple[int, int]]], None]
 # One thread for linear algebra: the matrices are small and several processes
 # run, so more threads would only wait for each other.
 @threadpool_limits.wrap(limits=1)  # type: ignore[untyped-decorator]
+@reads
 def import_city(
     source: Path | str,
     output: Path | str,

@@ -10,6 +10,7 @@ import numpy as np
 
 from evaluation.base import MAX_INSTANCE, InputError
 from worlds.imports.building_years import stands_today
+from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity
 from worlds.imports.former_buildings import with_former_buildings
 from worlds.imports.imported_objects import (
@@ -83,7 +84,7 @@ def stage_city(
     Raises:
         InputError: if all stages together have no structure, or too many.
     """
-    objects = _without_outliers(city)
+    objects = _without_copies(_without_outliers(city), city.faults)
     if not objects:
         raise InputError(f"{source}: no object has a surface")
     standing = {
@@ -198,6 +199,28 @@ def _without_outliers(city: ForeignCity) -> list[ImportedObject]:
             kind = f"object more than {x:g} km away or {z:g} km higher or lower"
             city.faults.add(f"{kind}, left out", imported.structure.name)
     return kept
+
+
+def _without_copies(
+    objects: Sequence[ImportedObject], faults: ImportFaults
+) -> list[ImportedObject]:
+    """Returns the objects without those whose surfaces another one has.
+
+    Those are counted as faults. What stood there at another time is no copy.
+    """
+    kept: dict[tuple[object, ...], ImportedObject] = {}
+    for imported in objects:
+        key = (
+            imported.object_type,
+            imported.year,
+            imported.until,
+            imported.is_gone,
+            imported.triangles.tobytes() or imported.structure.name,
+        )
+        if kept.setdefault(key, imported) is not imported:
+            name = imported.structure.name
+            faults.add("object equal to another one, left out", name)
+    return list(kept.values())
 
 
 def _why_never(imported: ImportedObject, options: ImportOptions) -> str:

@@ -73,7 +73,6 @@ def shaped(shape):
         (geometry_with(hdg="inf"), LANES, "geometry: hdg: 'inf'"),
         (geometry_with(length=None), LANES, "geometry: no length"),
         (geometry_with(length=-5), LANES, "geometry: length: -5"),
-        (geometry_with(length=1e7), LANES, "more than 100000 m"),
         (shaped("<bezier/>"), LANES, "neither a line nor"),
         (shaped("<arc/>"), LANES, "arc: no curvature"),
         (shaped('<arc curvature="1e6"/>'), LANES, "a curve of curvature 1e+06"),

@@ -30,8 +30,6 @@ from worlds.imports.part_tables import PartTable
 
 # Versions up to 1.8 are read.
 _LAST_MINOR = 8
-# Greatest length of a road [m].
-_LONGEST_ROAD = 100_000.0
 # A gap between two pieces of a road's course is counted if it is wider than
 # this [m].
 _WIDEST_JOINT = 0.1
@@ -60,8 +58,6 @@ _UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
 _FASTEST = 100.0
 # Greatest extent of a network along x or y; whole countries are refused [m].
 _WIDEST = 20_000.0
-# Greatest length of all roads of a network together [m].
-_MOST_TOGETHER = 2_000_000.0
 # If any road is farther from the origin than this, all are moved to it [m].
 _FAR_AWAY = 10_000.0
 # Lengths that differ by less than this are equal [m].
@@ -151,12 +147,6 @@ def _origin_of(
     Raises:
         InputError: the network is too large; the message names the file `path`.
     """
-    length = sum(road.length for road in roads)
-    if length > _MOST_TOGETHER:
-        raise InputError(
-            f"{path}: {length / 1000:.0f} km of roads; at most "
-            f"{_MOST_TOGETHER / 1000:.0f} km can be read"
-        )
     starts = np.array(
         [(piece.x, piece.y) for road in roads for piece in road.pieces]
     )
@@ -236,8 +226,6 @@ def _read_road(
     if abs(stated - length) > _ROUNDING:
         faults.add("road whose length differs from its course's, cut", name)
         length = min(stated, length)
-    if length > _LONGEST_ROAD:
-        raise ValueError(f"{length:g} m are more than {_LONGEST_ROAD:g} m")
     sections = read_sections(element, length, name, faults)
     if not sections:
         faults.add("road without lanes, left out", name, ruins=True)
@@ -299,10 +287,6 @@ def _read_course(
         if length < _SHORTEST_PIECE:
             faults.add("geometry without length, left out", name)
             continue
-        if length > _LONGEST_ROAD:
-            raise ValueError(
-                f"{where}length: {length:g} m are more than {_LONGEST_ROAD:g} m"
-            )
         try:
             shape = _read_curve(element, length)
         except ValueError as error:

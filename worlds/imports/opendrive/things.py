@@ -28,8 +28,6 @@ from worlds.shapes import (
     tree,
 )
 
-# Greatest number of repetitions of an object.
-_MOST_REPEATS = 10_000
 # A last repetition may be beyond its stretch by this share of the distance.
 _ROUNDING = 1e-9
 # Distance of trees that are repeated without a distance [m].
@@ -77,7 +75,7 @@ def read_things(
         else:
             yield thing
         for number_of_repeat, repeat in enumerate(repeats):
-            yield from _repetitions(thing, repeat, number_of_repeat, faults)
+            yield from _repetitions(thing, repeat, number_of_repeat)
 
 
 def _count_unscaled(
@@ -165,9 +163,7 @@ def _read_corners(
     return np.array(rows) if len(rows) >= 2 else None
 
 
-def _repetitions(
-    thing: Thing, repeat: Element, number: int, faults: ImportFaults
-) -> Iterator[Thing]:
+def _repetitions(thing: Thing, repeat: Element, number: int) -> Iterator[Thing]:
     """Yields the repetitions of an object, or one object without gaps.
 
     Args:
@@ -175,7 +171,6 @@ def _repetitions(
         repeat: how the object is repeated, in the file.
         number: number of `repeat` among the object's repetitions. The new names
             contain this number.
-        faults: counts objects that are left out.
 
     Raises:
         ValueError: a size is too large.
@@ -187,12 +182,6 @@ def _repetitions(
         return
     step = distance if distance > 0.0 else _TREE_SPACING
     count = max(math.floor(length / step + _ROUNDING), 0) + 1
-    if count > _MOST_REPEATS:
-        faults.add(
-            f"object repeated more than {_MOST_REPEATS} times, left out",
-            thing.name,
-        )
-        return
     for nth in range(count):
         yield _repeated(thing, repeat, nth * step)._replace(
             name=f"{thing.name}_{number}_{nth}"

@@ -13,7 +13,7 @@ import numpy as np
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from evaluation.base import InputError, check_regular, user_errors
+from evaluation.base import InputError, check_regular
 from worlds.imports.faces import is_tangled
 from worlds.imports.faults import WHOLE_FILE, ImportFaults
 from worlds.imports.openstreetmap.element_kinds import (
@@ -53,11 +53,6 @@ _Key = tuple[int, int]
 _CHUNK_SIZE = 1 << 24
 # Greatest length of a word that is searched in a file [bytes].
 _LONGEST_WORD = 8
-# Greatest ratio between what a PBF file unpacks to, and its size. Extracts of
-# cities have 2 to 6.
-_MOST_UNPACKED = 16
-# Greatest size of the header of a PBF file's block, by the format [bytes].
-_BLOB_HEADER = 1 << 16
 
 
 def read_openstreetmap(path: Path) -> OsmFeatures:
@@ -72,8 +67,6 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
 
     features = OsmFeatures()
     check_regular(path)
-    if path.suffix == ".pbf":
-        _check_unpacked(path)
     buildings: list[str] = []
     flat: set[str] = set()
     with (
@@ -118,59 +111,6 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                 _add_node(element, name, tags, features)
     _count_without_area(buildings, flat, features)
     return features
-
-
-def _check_unpacked(path: Path) -> None:
-    """Checks how much a PBF file unpacks to, without unpacking it.
-
-    Format: https://wiki.openstreetmap.org/wiki/PBF_Format
-
-    Raises:
-        InputError: it is far more than the size of the file, or the file is
-            damaged.
-    """
-    unpacked = 0
-    with user_errors(path), path.open("rb") as stream:
-        while head := stream.read(4):
-            size = int.from_bytes(head, "big")
-            # A header larger than this is no header; osmium says what is wrong.
-            if size > _BLOB_HEADER:
-                return
-            header = dict(_protobuf_fields(stream.read(size)))
-            data = stream.read(min(header.get(3, 0), _CHUNK_SIZE << 1))
-            unpacked += dict(_protobuf_fields(data)).get(2, 0)
-    if unpacked > max(_MOST_UNPACKED * path.stat().st_size, _CHUNK_SIZE):
-        raise InputError(
-            f"{path}: {unpacked} bytes, unpacked from {path.stat().st_size}:"
-            f" more than {_MOST_UNPACKED} times as many"
-        )
-
-
-def _protobuf_fields(data: bytes) -> Iterator[tuple[int, int]]:
-    """Yields the integers of a message of Protocol Buffers, with their numbers.
-
-    For a field of bytes, the integer is the number of these bytes. The message
-    ends at a field of another type, or where it is damaged.
-    """
-    at = 0
-    while at < len(data):
-        values = []
-        for _ in range(2):
-            value = shift = 0
-            while at < len(data) and shift < 64:
-                byte = data[at]
-                at += 1
-                value |= (byte & 0x7F) << shift
-                shift += 7
-                if byte < 0x80:
-                    break
-            values.append(value)
-        key, value = values
-        yield key >> 3, value
-        if key & 7 == 2:
-            at += value
-        elif key & 7:
-            return
 
 
 def _count_without_area(
