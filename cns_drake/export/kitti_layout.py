@@ -64,7 +64,7 @@ def _inner_files(drive: Drive) -> dict[str, str]:
         # Without it, readers align the drive by its scans.
         **(
             {}
-            if drive.has_own_world
+            if drive.is_local
             else {"first_pose.txt": _pose_rows(drive.X_WS[:1])}
         ),
         **imu_files(drive),

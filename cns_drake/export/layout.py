@@ -157,7 +157,7 @@ def lidar_poses(drive: Drive) -> PoseColumns:
 
 def world_notes(drive: Drive) -> Iterator[str]:
     """Yields a note if a format cannot say that a drive's world is its own."""
-    if drive.has_own_world:
+    if drive.is_local:
         yield (
             f"{drive.name}: its world frame is not that of other drives, which"
             " readers of this format will take it for"

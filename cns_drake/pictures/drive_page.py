@@ -141,7 +141,7 @@ def read_drive_page(path: Path, city: str) -> OtherPage:
     Raises:
         InputError: the file is not the page of a drive through this city.
     """
-    html = read_text(path, 2 * _MOST_BYTES)
+    html = read_text(path)
     title = re.search(r"<h1>(.*?)</h1>", html)
     there = re.search(r'<header class="panel" data-city="(.*?)">', html)
     if title is None or there is None:

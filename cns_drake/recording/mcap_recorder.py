@@ -47,6 +47,7 @@ from evaluation.drives import (
     BASE_FRAME,
     IMU_FRAME,
     MAP_FRAME,
+    LayoutName,
     check_sensor_names,
     serialize,
     to_labels,
@@ -250,7 +251,7 @@ class McapRecorder(LeafSystem):
         schedule: Schedule | None = None,
         discrete: Mapping[str, tuple[float, float, float]] | None = None,
         further: Mapping[str, RecordedSensor] | None = None,
-        layouts: Mapping[str, str] | None = None,
+        layouts: Mapping[str, LayoutName] | None = None,
         num_rings: Mapping[str, int] | None = None,
         calibrated: Mapping[str, str] | None = None,
         imu_variances: tuple[float, float] = (0.0, 0.0),
@@ -743,7 +744,7 @@ def _recorded_topics(
     X_BSs: Mapping[str, RigidTransform | None],
     cameras: Mapping[str, RecordedCamera],
     further: Mapping[str, RecordedSensor],
-    layouts: Mapping[str, str],
+    layouts: Mapping[str, LayoutName],
 ) -> tuple[Topic, ...]:
     """Returns all topics of a recording."""
     return recorded_topics.recording_topics(

@@ -14,8 +14,13 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.scene.expansion import expanded_size
-from evaluation.base import Element, read_bytes, read_elements, to_number
+from evaluation.base import (
+    Element,
+    check_expansion,
+    read_bytes,
+    read_elements,
+    to_number,
+)
 
 # Elements that show what their `url` names.
 _INSTANCES = (
@@ -59,8 +64,6 @@ _SHAPELESS = (
     "skeleton", "Name_array", "IDREF_array", "SIDREF_array", "bool_array",
     "int_array",
 )  # fmt: skip
-# Greatest number of nodes that the nodes of a file may stand for.
-_MOST_NODES = 100_000
 _CURE = "; export it with triangles and matrices, or as glTF"
 
 
@@ -166,11 +169,9 @@ def _placed_meshes(root: Element) -> Iterator[tuple[Element, np.ndarray]]:
         return [*parent.all("node"), *shown]
 
     try:
-        number = expanded_size(scene, inside)
+        check_expansion(scene, inside)
     except ValueError as error:
-        raise ValueError("has a node of COLLADA that shows itself") from error
-    if number > _MOST_NODES:
-        raise ValueError(f"shows {number} nodes, more than {_MOST_NODES}")
+        raise ValueError(f"has nodes of COLLADA: {error}") from error
     waiting = [(scene, np.eye(4))]
     sources = {
         f"#{one.get('id')}": inner.get("source", "")

@@ -5,7 +5,7 @@ import contextlib
 import logging
 
 # Besides Drake's own errors, these are errors of the C++ library, for invalid
-# or too large numbers and too long texts. A failed condition in Drake raises
+# or too large numbers. A failed condition in Drake raises
 # SystemExit.
 PARSER_ERRORS = (
     RuntimeError,
@@ -13,7 +13,6 @@ PARSER_ERRORS = (
     LookupError,
     OverflowError,
     SystemExit,
-    MemoryError,
 )
 
 

@@ -9,22 +9,19 @@ memory and time are limited by the size of the file.
 from __future__ import annotations
 
 import ctypes
-import math
 import os
 from pathlib import Path
 import pickle
 import re
-import resource
 import subprocess
 import sys
 import tempfile
-import time
 from types import ModuleType
 from typing import IO
 
 import numpy as np
 
-from evaluation.base import missing_library, start_python
+from evaluation.base import limit_process, missing_library, start_python
 
 # Open3D returns what it has read before a fault, and warns.
 _FAULT = re.compile(
@@ -32,11 +29,6 @@ _FAULT = re.compile(
 )
 # Codes with which a terminal sets the colour of text.
 _COLOUR = re.compile(r"\x1b\[[\d;]*m")
-# Memory [bytes] and CPU time [s] for any file, and more for each byte of it.
-_MEMORY = 1 << 30
-_MEMORY_PER_BYTE = 32
-_SECONDS = 20.0
-_SECONDS_PER_BYTE = 2e-6
 
 
 class ForeignMeshes:
@@ -107,33 +99,11 @@ def _serve() -> None:
             return
         messages.seek(0)
         messages.truncate()
-        _limit_costs(os.path.getsize(path))
+        limit_process(Path(path))
         surface = _read_surface(open3d, path)
         fault = _printed_fault(messages, path)
         pickle.dump(fault or surface, answers)
         answers.flush()
-
-
-def _limit_costs(size: int) -> None:
-    """Limits memory and CPU time of this process while it reads a file.
-
-    Beyond a limit, the system refuses memory or ends the process. Only Linux
-    tells how much memory the process has, so only there it is limited.
-
-    Args:
-        size: size of the file [bytes].
-    """
-    seconds = time.process_time() + _SECONDS + _SECONDS_PER_BYTE * size
-    limits = {resource.RLIMIT_CPU: math.ceil(seconds)}
-    statm = Path("/proc/self/statm")
-    if statm.exists():
-        used = int(statm.read_text().split()[0]) * resource.getpagesize()
-        limits[resource.RLIMIT_AS] = used + _MEMORY + _MEMORY_PER_BYTE * size
-    for kind, limit in limits.items():
-        _, most = resource.getrlimit(kind)
-        if most != resource.RLIM_INFINITY:
-            limit = min(limit, most)
-        resource.setrlimit(kind, (limit, most))
 
 
 def _read_surface(

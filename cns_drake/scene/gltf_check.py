@@ -15,8 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cns_drake.scene.model_finder import resolve
-from cns_drake.scene.obj_check import LARGEST_FILE
-from evaluation.base import parse_json, read_bytes
+from evaluation.base import check_expansion, parse_json, read_bytes
 
 # Prefixes of glTF extensions that do not change shapes.
 _HARMLESS = (
@@ -148,7 +147,8 @@ def plain_gltf(content: bytes, folder: Path) -> PlainGltf:
             _count_of_mesh(top, top["meshes"][mesh]) for mesh, _ in placed
         )
     except (AttributeError, LookupError, TypeError, ValueError) as error:
-        raise ValueError(f"no valid glTF ({type(error).__name__})") from error
+        fault = f"{type(error).__name__}: {error}"
+        raise ValueError(f"no valid glTF ({fault})") from error
     for mesh in top.get("meshes", []):
         for primitive in mesh["primitives"]:
             primitive.pop("material", None)
@@ -170,12 +170,13 @@ def _placed_meshes(top: Any) -> list[tuple[int, np.ndarray]]:
     """
     nodes = top.get("nodes", [])
     roots = top["scenes"][top.get("scene", 0)].get("nodes", [])
+    # A node has one parent, but files can say otherwise.
+    check_expansion(
+        -1, lambda one: roots if one < 0 else nodes[one].get("children", [])
+    )
     waiting = [(one, np.eye(4)) for one in roots]
     found = []
-    # A node has one parent, so no node is visited twice.
-    for _ in range(len(nodes)):
-        if not waiting:
-            break
+    while waiting:
         index, X = waiting.pop()
         node = nodes[index]
         X = X @ _own_place(node)
@@ -223,7 +224,7 @@ def _buffer(content: bytes, uri: str | None, folder: Path) -> bytes:
     found = resolve(uri, folder)
     if found is None or not found.is_file():
         raise ValueError(f"its buffer {uri} does not exist")
-    return read_bytes(found, LARGEST_FILE)
+    return read_bytes(found)
 
 
 def _json_chunk(content: bytes) -> bytes:

@@ -16,7 +16,7 @@ import numpy as np
 
 from cns_drake.scene.collada_check import check_collada
 from cns_drake.scene.gltf_check import check_gltf
-from cns_drake.scene.obj_check import LARGEST_FILE, check_obj, unmarked
+from cns_drake.scene.obj_check import check_obj, unmarked
 from cns_drake.scene.ply_check import check_ply
 from evaluation.base import read_bytes
 
@@ -49,7 +49,7 @@ def check_mesh_file(path: Path) -> tuple[str, ...]:
             f"is no mesh of a format that is read ({formats}); Blender or"
             " trimesh writes these"
         )
-    content = read_bytes(path, LARGEST_FILE)
+    content = read_bytes(path)
     return _CHECKS[ending](content.removeprefix(codecs.BOM_UTF8))
 
 

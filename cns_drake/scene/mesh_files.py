@@ -18,18 +18,15 @@ from cns_drake.scene.file_watch import once_a_file
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.gltf_check import plain_gltf
 from cns_drake.scene.mesh_check import GLTF, check_mesh_file, stl_corners
-from cns_drake.scene.obj_check import LARGEST_FILE, check_obj, unmarked
+from cns_drake.scene.obj_check import check_obj, unmarked
 from cns_drake.scene.ply_check import has_single_vertices
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
-from evaluation.base import InputError, note, read_bytes
+from evaluation.base import InputError, note, read_bytes, reading
 
 # Formats whose y axis points up. Drake rotates them so that z does.
 _Y_UP = (*GLTF, ".dae")
 # Greatest step of coordinates that no note mentions [m].
 _COARSE = 0.005
-# Greatest number of triangles in all copies of meshes at further scales, of
-# which a small world can declare any number.
-_MOST_COPIED = 1 << 25
 
 
 class MeshFiles:
@@ -42,20 +39,22 @@ class MeshFiles:
         self._foreign = foreign
         self._unscaled: dict[object, TriangleSurface] = {}
         self._surfaces: dict[tuple, TriangleSurface] = {}
-        self._num_copied = 0
 
     def read(self, name: str, shape: Mesh | Convex) -> TriangleSurface:
         """Returns the surface of a mesh shape in the geometry's frame G.
 
         Raises:
             InputError: the mesh is missing, cannot be read, or is too large;
-                the message names the geometry.
+                the message names the geometry or the file.
         """
         key = mesh_shape_key(shape)
         if key in self._surfaces:
             return self._surfaces[key]
+        source = shape.source()
+        place = source.path() if source.is_path() else f"geometry '{name}'"
         try:
-            with collected_errors():  # The error alone is enough.
+            # The error alone is enough.
+            with reading(Path(place)), collected_errors():
                 surface = (
                     _read_hull(shape)
                     if isinstance(shape, Convex)
@@ -65,7 +64,6 @@ class MeshFiles:
             if not np.abs(surface.p_GVset).max() <= LARGEST_SIZE:
                 raise ValueError(f"larger than {LARGEST_SIZE:g} m")
         except PARSER_ERRORS as error:
-            source = shape.source()
             fault = " ".join(str(error).split())
             file = f"{source.path()}: " if source.is_path() else ""
             raise InputError(f"{file}geometry '{name}': {fault}") from error
@@ -78,13 +76,6 @@ class MeshFiles:
         surface = self._unscaled.get(key)
         if surface is None:
             surface = self._unscaled[key] = self._read_source(source)
-        else:
-            self._num_copied += len(surface.triangles)
-            if self._num_copied > _MOST_COPIED:
-                raise ValueError(
-                    f"with this mesh, copies at other scales have more than"
-                    f" {_MOST_COPIED} triangles"
-                )
         triangles = surface.triangles
         scale = shape.scale3()
         if np.prod(scale) < 0.0:  # Mirroring turns faces inside out.
@@ -138,13 +129,12 @@ class MeshFiles:
         ending = path.suffix.lower()
         p_offset, expected, text = np.zeros(3), 0, None
         if ending in GLTF:
-            content = read_bytes(path, LARGEST_FILE)
-            text, p_offset, expected = plain_gltf(content, folder)
+            text, p_offset, expected = plain_gltf(read_bytes(path), folder)
             ending = ".gltf"
         elif ending == ".dae":
             text, p_offset = plain_collada(path)
         elif ending == ".stl":
-            p_GVset = stl_corners(read_bytes(path, LARGEST_FILE))
+            p_GVset = stl_corners(read_bytes(path))
             if p_GVset is not None:
                 corners = np.arange(len(p_GVset), dtype=np.int32)
                 return p_GVset, corners.reshape(-1, 3), 0.0

@@ -14,8 +14,6 @@ import numpy as np
 from cns_drake.scene.file_watch import once_a_file
 from evaluation.base import read_bytes, user_errors
 
-# Larger mesh files are refused [bytes].
-LARGEST_FILE = 1 << 28
 # Statements of OBJ that are read, or that show nothing.
 _READ = (
     "v", "vt", "vn", "f", "o", "g", "s", "mg", "usemtl", "mtllib", "maplib",
@@ -68,7 +66,7 @@ def unmarked(path: Path) -> Iterator[Path]:
     if not is_marked:
         yield path
         return
-    content = read_bytes(path, LARGEST_FILE)
+    content = read_bytes(path)
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / f"mesh{path.suffix.lower()}"
         copy.write_bytes(content.removeprefix(codecs.BOM_UTF8))
@@ -101,7 +99,7 @@ def check_obj(path: Path) -> ObjFaces:
         InputError: the file cannot be read.
     """
     # Drake accepts carriage returns as line ends, too.
-    content = read_bytes(path, LARGEST_FILE).replace(b"\r", b"\n")
+    content = read_bytes(path).replace(b"\r", b"\n")
     if content.startswith(codecs.BOM_UTF8):
         raise ValueError("begins with a byte order mark; save it without")
     counts = _count_ignored(content)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 import functools
 import operator
+from pathlib import Path
 import threading
 import warnings
 import weakref
@@ -37,7 +38,12 @@ from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.mesh_files import MeshFiles, mesh_shape_key
 from cns_drake.scene.structure_names import part_name, structure_name
 from cns_drake.scene.surfaces import LARGEST_SIZE, Surface, TriangleSurface
-from evaluation.base import InputError, cos, sin
+from evaluation.base import (
+    InputError,
+    cos,
+    reading,
+    sin,
+)
 
 # The corners of a unit cube, and its faces, counter-clockwise from outside.
 _CUBE_CORNERS = np.array(
@@ -359,7 +365,7 @@ def read_geometry(
         UserWarning: a deformable geometry is left out, told once.
     """
     found = []
-    with ForeignMeshes() as foreign:
+    with reading(Path("the world's meshes")), ForeignMeshes() as foreign:
         meshes = MeshFiles(foreign)
         for record in records:
             if record.is_deformable:

@@ -38,7 +38,6 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from cns_drake.scene.expansion import expanded_size
 from cns_drake.scene.mesh_files import mesh_shape_key
 from cns_drake.scene.model_check import SIZES, lacks_size, read_model
 from cns_drake.scene.model_finder import (
@@ -48,7 +47,7 @@ from cns_drake.scene.model_finder import (
 )
 from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE, MOST_COPIED_TRIANGLES
-from evaluation.base import InputError
+from evaluation.base import InputError, check_expansion, value_errors
 
 # Boxes (N, 2, 3) in the world [m], each its least and greatest coordinates ->
 # (N,) bool, whether anything in a box can be seen.
@@ -116,13 +115,9 @@ _SHAPES = {
 _GROUND = """<model name="ground_plane"><link name="link"><visual name="visual">
 <geometry><plane><normal>0 0 1</normal></plane></geometry></visual></link>
 </model>"""
-# Greatest depth of models within models.
-_DEEPEST = 20
-# Greatest numbers of elements, and of models within models, that a world may
-# stand for with all that it includes. Drake takes 1.4 MB and 4 ms for a model
-# within another one.
-_MOST_INCLUDED = 100_000
-_MOST_NESTED = 400
+# A model within another one costs as much as so many elements: Drake takes 1.4
+# MB and 4 ms.
+_NESTED_ELEMENTS = 250
 # Greatest number of visuals on a body: Drake compares the name of each with the
 # names of all others on it.
 _MOST_ON_BODY = 250
@@ -246,20 +241,17 @@ class _Expanded(NamedTuple):
         element: its element.
         folder: folder of its file.
         is_nested: whether it is a model within a model.
-        is_included: whether it comes from another file.
     """
 
     element: Element
     folder: Path
     is_nested: bool = False
-    is_included: bool = False
 
-    def num_included(self) -> int:
-        """Returns the number of its elements if it was included."""
-        if not self.is_included:
-            return 0
+    def size(self) -> int:
+        """Returns the number of its own elements."""
         inner = sum(_num_elements(m) for m in self.element.iterfind("model"))
-        return _num_elements(self.element) - inner
+        own = _num_elements(self.element) - inner
+        return own + self.is_nested * _NESTED_ELEMENTS
 
 
 def _num_elements(element: Element) -> int:
@@ -316,37 +308,11 @@ class _Reader:
         self._scan_file(root)
         self._count_saved(world)
         folder = self._path.absolute().parent
-        self._check_expansion(world, folder)
-        self._add_children(world, self._frames, folder, 0)
-
-    def _check_expansion(self, world: Element, folder: Path) -> None:
-        """Refuses a world that stands for too much.
-
-        Raises:
-            InputError: it does, or models include each other.
-        """
-        start = _Expanded(world, folder)
-        try:
-            num_nested = expanded_size(
-                start, self._parts, lambda one: one.is_nested
+        with value_errors(f"{self._path}: models that include each other"):
+            check_expansion(
+                _Expanded(world, folder), self._parts, _Expanded.size
             )
-            num_included = expanded_size(
-                start, self._parts, lambda one: one.num_included()
-            )
-        except ValueError as error:
-            raise InputError(
-                f"{self._path}: models include each other"
-            ) from error
-        if num_nested > _MOST_NESTED:
-            raise InputError(
-                f"{self._path}: stands for {num_nested} models within models,"
-                f" more than {_MOST_NESTED}; give the world models with links"
-            )
-        if num_included > _MOST_INCLUDED:
-            raise InputError(
-                f"{self._path}: its models include {num_included} elements,"
-                f" more than {_MOST_INCLUDED}"
-            )
+        self._add_children(world, self._frames, folder)
 
     def _parts(self, whole: _Expanded) -> Iterator[_Expanded]:
         """Yields the models in a world or model, also those it includes."""
@@ -361,7 +327,7 @@ class _Reader:
                 model = self._included_root(file).find("model")
                 if model is not None:
                     is_nested = not (is_world or _is_merged(one))
-                    yield _Expanded(model, file.parent, is_nested, True)
+                    yield _Expanded(model, file.parent, is_nested)
 
     def _included_file(self, include: Element, folder: Path) -> Path | None:
         uri = (include.findtext("uri") or "").strip()
@@ -516,19 +482,15 @@ class _Reader:
                 self._referred.add((element.text or "").split("::")[-1].strip())
 
     def _add_children(
-        self, source: Element, target: Element, folder: Path, depth: int
+        self, source: Element, target: Element, folder: Path
     ) -> None:
         """Adds the visible parts and the frames of a world or model."""
-        if depth > _DEEPEST:
-            raise InputError(
-                f"{self._path}: models within models, more than {_DEEPEST} deep"
-            )
         self._count_unknown(source)
         for element in source:
             if element.tag == "include":
-                self._add_included(element, target, folder, depth)
+                self._add_included(element, target, folder)
             elif element.tag == "model":
-                self._add_model(element, target, folder, depth)
+                self._add_model(element, target, folder)
             elif element.tag == "link":
                 self._add_link(element, target, folder)
             elif element.tag == "frame":
@@ -563,7 +525,7 @@ class _Reader:
                 self.skip(f"attributes {key} of <{element.tag}>")
 
     def _add_included(
-        self, include: Element, target: Element, folder: Path, depth: int
+        self, include: Element, target: Element, folder: Path
     ) -> None:
         self._count_unknown(include)
         uri = (include.findtext("uri") or "").strip()
@@ -582,9 +544,9 @@ class _Reader:
             return
         _override_model(model, include)
         if _is_merged(include):
-            self._merge(model, target, folder, depth)
+            self._merge(model, target, folder)
         else:
-            self._add_model(model, target, folder, depth)
+            self._add_model(model, target, folder)
 
     def _read_included(self, file: Path) -> Element | None:
         """Returns a file's first model, if any; counts all other content."""
@@ -600,9 +562,7 @@ class _Reader:
             self.skip("included files without a model of SDF")
         return models[0] if models else None
 
-    def _merge(
-        self, model: Element, target: Element, folder: Path, depth: int
-    ) -> None:
+    def _merge(self, model: Element, target: Element, folder: Path) -> None:
         """Adds the parts of a model to the model that includes it (merge)."""
         if model.get("placement_frame"):
             raise InputError(
@@ -627,11 +587,9 @@ class _Reader:
                     place = SubElement(part, "pose")
                 if not place.get("relative_to"):
                     place.set("relative_to", own)
-        self._add_children(model, target, folder, depth + 1)
+        self._add_children(model, target, folder)
 
-    def _add_model(
-        self, model: Element, target: Element, folder: Path, depth: int
-    ) -> None:
+    def _add_model(self, model: Element, target: Element, folder: Path) -> None:
         self._num_read["models"] += 1
         made = Element("model", name=self._names_in(target).free(model))
         if model.get("placement_frame"):
@@ -639,7 +597,7 @@ class _Reader:
         # Drake does not weld an inner model because the outer one is static.
         SubElement(made, "static").text = "true"
         self._copy_pose(model, made)
-        self._add_children(model, made, folder, depth + 1)
+        self._add_children(model, made, folder)
         if any(part.tag in ("link", "model", "frame") for part in made):
             target.append(made)
 

@@ -33,6 +33,7 @@ from evaluation.base import (
     errors_at,
     is_there,
     read_bytes,
+    reads,
     value_errors,
 )
 from worlds.shapes import STRUCTURES_NAME, StructureTable, load_structure_table
@@ -70,6 +71,7 @@ class World:
         return anchored_frames(self.plant)
 
 
+@reads
 def load_world(
     sdf: Path | str,
     *,

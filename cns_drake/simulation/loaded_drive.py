@@ -33,7 +33,7 @@ from cns_drake.simulation.scenario_traffic import (
 from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.traffic import TrafficPlan
 from evaluation.base import doing
-from evaluation.drives import BASE_FRAME
+from evaluation.drives import BASE_FRAME, LayoutName
 
 # Tolerance, in periods, for a time to count as a multiple of a period.
 _TOLERANCE = 1e-6
@@ -52,7 +52,7 @@ class _RecordingPlan:
 
     topics: tuple[Topic, ...]
     schedule: Schedule
-    layouts: Mapping[str, str]
+    layouts: Mapping[str, LayoutName]
 
 
 def _plan_recording(scenario: Scenario) -> _RecordingPlan:

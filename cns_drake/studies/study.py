@@ -91,6 +91,7 @@ def run_study(
     printed: PrintStyle | None = None,
     on_note: Callable[[str], None] = lambda text: None,
     align: When = "auto",
+    pose_gap: float | None = None,
 ) -> Path:
     """Measures all conditions of an experiment; writes tables and a page.
 
@@ -109,6 +110,7 @@ def run_study(
             study takes.
         align: when recordings are aligned, see `open_pair` of
             `evaluation.alignment`.
+        pose_gap: of recordings, see `open_drive`.
 
     Returns:
         The path of the page.
@@ -124,7 +126,7 @@ def run_study(
         cluster,
         on_note,
     )
-    pairs, cities = plan_study(study, maps, align)
+    pairs, cities = plan_study(study, maps, align, pose_gap)
     shown = [asked for one in cities for asked in one.shown()]
     results, queries = study.measure(pairs, shown)
     own = [one.name for one, _ in study.methods.values() if one.file]
@@ -179,14 +181,17 @@ def _unlike_shipped(study: Study, maps: Sequence[str]) -> str:
 
 
 def plan_study(
-    study: Study, maps: Sequence[str] = (), align: When = "auto"
+    study: Study,
+    maps: Sequence[str] = (),
+    align: When = "auto",
+    pose_gap: float | None = None,
 ) -> tuple[list[Pair], list[RecordedCity]]:
     """Chooses what is measured, and makes the cities of all drives.
 
     Args:
         study: the study.
         maps: names or folders of maps that replace the experiment's maps.
-        align: see `run_study`.
+        align, pose_gap: see `run_study`.
 
     Returns:
         The pairs of all maps; the recorded cities that the page shows.
@@ -208,7 +213,9 @@ def plan_study(
             study,
             maps,
             lambda folder: drives_by_map(
-                find_recordings(folder, study.on_note), study.on_note, align
+                find_recordings(folder, study.on_note, pose_gap=pose_gap),
+                study.on_note,
+                align,
             ),
         )
     )

@@ -25,8 +25,6 @@ _NAMES = (
     "period", "units", "kinds",
     "vehicles_start", "vehicles", "walkers_start", "walkers",
 )  # fmt: skip
-# Greatest size of a file, and of its arrays.
-_MOST_BYTES = 20_000_000
 # Number of times in the recording that are tried as the start of the drive.
 _TRIES = 8
 # Time for which traffic goes on after the drive, for a LiDAR that still turns,
@@ -42,7 +40,7 @@ def read_recorded(path: Path) -> TrafficPlan:
     """
     by_name = {kind.name: kind for kind in KINDS}
     with value_errors(f"{path}: no recorded traffic"):
-        found = read_npz(path, _NAMES, _MOST_BYTES)
+        found = read_npz(path, _NAMES)
         if missing := [name for name in _NAMES if name not in found]:
             raise ValueError(f"it has no array {missing[0]!r}")
         dt = float(found["period"].reshape(()))

@@ -10,10 +10,11 @@ from typing import Any, Literal
 import numpy as np
 
 from evaluation.alignment.align import AlignmentReport, align
-from evaluation.base import NS_PER_S, InputError, doing
+from evaluation.base import InputError, doing
 from evaluation.drives import (
     SHARED_FRAMES,
     Drive,
+    PoseSteps,
     Reading,
     check_same_map,
     check_same_world,
@@ -23,6 +24,8 @@ When = Literal["auto", "always", "never"]
 
 # A pause between two scans is told if it is longer than this [s].
 _PAUSE = 10.0
+# No vehicle is faster [m/s].
+_IN_MILLIMETRES = 1000.0
 # The mounts of two LiDARs are told if their heights differ by more [m].
 _MOUNT = 0.2
 # Drives that are nowhere closer than this have no place in common, and the
@@ -53,6 +56,13 @@ class WorldVerdict:
         if self.aligned:
             return "aligned"
         return "shared" if self.shared else "unknown"
+
+    @property
+    def doubt(self) -> str:
+        """What to do if nothing is found where its world says; or ""."""
+        if self.state != "shared":
+            return ""
+        return "; if the poses are not in one world, --align always moves them"
 
     def to_json(self) -> dict[str, Any]:
         """Returns the verdict, ready for JSON."""
@@ -105,11 +115,13 @@ def open_pair(
         The drives and paths of clouds, and the verdict.
 
     Raises:
-        InputError: something cannot be read; a drive cannot be aligned, is of
-            another map or, with `never`, of another world; or a cloud should be
-            aligned. The error says how recordings of this format get a common
-            world.
+        InputError: nothing is given, or it cannot be read; a drive cannot be
+            aligned, is of another map or, with `never`, of another world; or a
+            cloud should be aligned. The error says how recordings of this
+            format get a common world.
     """
+    if not given:
+        raise InputError("no drive and no cloud is given")
     readings = readings or Reading.each(len(given))
     found = [
         one if isinstance(one, Drive) else reading.open_source(Path(one))
@@ -219,15 +231,20 @@ def _misfits(drives: Sequence[Drive]) -> list[str]:
     """Returns notes on pauses of drives, and on mounts that do not fit."""
     notes = []
     for drive in dict.fromkeys(drives):
-        steps = np.diff(drive.stamps_ns) / NS_PER_S
-        p_WS = drive.X_WS[:, :3, 3]
-        worst = int(steps.argmax()) if len(steps) else 0
-        if len(steps) and steps[worst] > _PAUSE:
-            away = np.linalg.norm(p_WS[worst + 1] - p_WS[worst])
+        steps = PoseSteps.of(drive.stamps_ns, drive.X_WS)
+        is_anew = steps.is_jump | (steps.times > _PAUSE)
+        if steps.speed > _IN_MILLIMETRES:
             notes.append(
-                f"{drive.name}: a pause of {steps[worst]:.0f} s after scan"
-                f" {worst}, over which the poses move by {away:.1f} m; give"
-                " sessions whose poses begin anew as drives of their own"
+                f"{drive.name}: moves at {steps.speed:.0f} m/s; are the poses"
+                " in metres?"
+            )
+        elif is_anew.any():
+            worst = int(np.where(is_anew, steps.moves, -1.0).argmax())
+            notes.append(
+                f"{drive.name}: after scan {worst}, {steps.times[worst]:.2g} s"
+                " without a scan, in which the poses move by"
+                f" {steps.moves[worst]:.1f} m; give sessions whose poses begin"
+                " anew as drives of their own"
             )
     heights = [
         float(drive.X_BS[2, 3]) for drive in drives if drive.X_BS is not None

@@ -3,6 +3,10 @@ from . import poses as poses
 from . import program as program
 from . import shared_options as shared_options
 from . import terminal as terminal
+from .budget import limit_process as limit_process
+from .budget import not_counted as not_counted
+from .budget import reading as reading
+from .budget import reads as reads
 from .caches import cache_folder as cache_folder
 from .caches import is_own as is_own
 from .caches import mark_used as mark_used
@@ -46,6 +50,7 @@ from .elementary import rotated as rotated
 from .elementary import sin as sin
 from .elementary import sinc as sinc
 from .elementary import tan as tan
+from .errors import FailedJobsError as FailedJobsError
 from .errors import InputError as InputError
 from .errors import check_type as check_type
 from .errors import describe_validation_error as describe_validation_error
@@ -56,6 +61,7 @@ from .errors import no_such as no_such
 from .errors import one_line as one_line
 from .errors import validated as validated
 from .errors import value_errors as value_errors
+from .expansion import check_expansion as check_expansion
 from .field_types import check_fields as check_fields
 from .field_types import of_type as of_type
 from .field_types import types_of_fields as types_of_fields

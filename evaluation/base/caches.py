@@ -48,7 +48,8 @@ def is_own(folder: Path) -> bool:
         OSError: there is no such folder.
     """
     state = folder.stat()
-    return state.st_uid == os.geteuid() and not state.st_mode & stat.S_IWOTH
+    others = state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return state.st_uid == os.geteuid() and not others
 
 
 def mark_used(path: Path) -> None:

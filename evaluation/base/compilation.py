@@ -13,6 +13,7 @@ from typing import TypeVar
 import numba
 from numba.core.caching import FunctionCache
 
+from evaluation.base.budget import not_counted
 from evaluation.base.caches import cache_folder, is_own, remove_unused
 from evaluation.base.files import user_errors
 from evaluation.base.interrupts import uninterrupted
@@ -72,6 +73,7 @@ def compiled_callback(function: Callable) -> int:
     options = {"nopython": True}
     with (
         interlude(f"compiling {function.__name__}"),
+        not_counted(),
         uninterrupted(),
         _our_settings(),
     ):
@@ -193,7 +195,7 @@ def _compiling_once(
                 stream = stack.enter_context(file.open("a"))
                 fcntl.lockf(stream, fcntl.LOCK_EX)
             # LLVM crashes if an interrupt ends a function that it calls.
-            with _our_settings(), uninterrupted():
+            with not_counted(), _our_settings(), uninterrupted():
                 plain = tuple(map(numba.types.unliteral, types))
                 return _despite_damage(lambda: compile_for(plain), function)
 

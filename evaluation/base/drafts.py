@@ -193,11 +193,11 @@ def _values(text: str) -> dict[str, Any]:
 
 
 def check_links(path: Path) -> None:
-    """Refuses a path through a link that another user made for everybody.
+    """Refuses a path through a link of another user.
 
     Raises:
         InputError: a folder of the path is a link of another user, in a folder
-            where everybody can write.
+            where others can write.
     """
     for folder in Path(os.path.abspath(path)).parents:
         # What is not there is reported when it is used.
@@ -205,6 +205,9 @@ def check_links(path: Path) -> None:
             if (
                 folder.is_symlink()
                 and folder.lstat().st_uid not in (0, os.geteuid())
-                and folder.parent.stat().st_mode & stat.S_IWOTH
+                and folder.parent.stat().st_mode & (stat.S_IWGRP | stat.S_IWOTH)
             ):
-                raise InputError(f"{folder}: a link of another user")
+                raise InputError(
+                    f"{folder}: a link of another user; give the path to which"
+                    " it leads"
+                )

@@ -4,9 +4,12 @@ from collections.abc import Callable, Iterator
 import contextlib
 import errno
 import fcntl
+import hashlib
 import os
 from pathlib import Path
+import stat
 
+from evaluation.base.caches import own_cache
 from evaluation.base.files import make_folder, user_errors
 
 
@@ -15,29 +18,42 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
     """Locks a file, so that one process at a time runs the block.
 
     During the block, `<path>.lock` is locked, also for other machines if the
-    file system supports locks. The lock is released even if the process
-    crashes. If another process holds the lock, `on_wait` is called before
-    waiting.
+    file system supports locks. In a folder where everybody can write, others
+    could take this name, so the lock is in the user's cache. The lock is
+    released even if the process crashes. If another process holds the lock,
+    `on_wait` is called before waiting.
 
     Raises:
         InputError: if the lock cannot be written.
     """
     make_folder(path.parent)
+    lock = _lock_of(path)
     with contextlib.ExitStack() as stack:
-        with user_errors(path.with_name(f"{path.name}.lock")):
-            _lock_file(path, stack, on_wait)
+        with user_errors(lock):
+            _lock_file(lock, stack, on_wait)
         yield
 
 
 def remove_lock(path: Path) -> None:
-    """Removes the lock file `<path>.lock` that a killed process left behind.
+    """Removes the lock of `exclusive` that a killed process left behind.
 
     A lock that a running process holds stays.
     """
-    if path.with_name(f"{path.name}.lock").is_file():
-        # A file that cannot be locked is in use, or is not one of our locks.
-        with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
-            _lock_file(path, stack, _refuse_to_wait)
+    # A file that cannot be locked is in use, or is not one of our locks.
+    with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
+        lock = _lock_of(path)
+        if lock.is_file():
+            _lock_file(lock, stack, _refuse_to_wait)
+
+
+def _lock_of(path: Path) -> Path:
+    """Returns the lock of a file or folder, whose parent exists."""
+    if path.parent.stat().st_mode & stat.S_IWOTH:
+        own = own_cache("locks")
+        if own is not None:
+            name = os.fsencode(os.path.realpath(path))
+            return own / f"{hashlib.sha256(name).hexdigest()[:32]}.lock"
+    return path.with_name(f"{path.name}.lock")
 
 
 def _refuse_to_wait() -> None:
@@ -45,19 +61,18 @@ def _refuse_to_wait() -> None:
 
 
 def _lock_file(
-    path: Path, stack: contextlib.ExitStack, on_wait: Callable[[], None]
+    lock: Path, stack: contextlib.ExitStack, on_wait: Callable[[], None]
 ) -> None:
-    """Locks `<path>.lock` until a stack of contexts is closed.
+    """Locks a file until a stack of contexts is closed.
 
     Args:
-        path: file to which the lock belongs.
+        lock: the file.
         stack: stack that releases the lock when it is closed.
         on_wait: called if another process holds the lock, before waiting.
 
     Raises:
         OSError: the lock cannot be written.
     """
-    lock = path.with_name(f"{path.name}.lock")
     while True:
         descriptor = _open_plain(lock)
         stream = stack.enter_context(os.fdopen(descriptor, "wb"))

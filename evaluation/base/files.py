@@ -1,4 +1,4 @@
-"""Files that a user names: checks, order, and reading up to a size limit."""
+"""Files that a user names: checks, order, and reading."""
 
 import codecs
 from collections.abc import Iterator
@@ -9,10 +9,9 @@ from pathlib import Path
 import re
 import stat
 
+from evaluation.base.budget import reading
 from evaluation.base.errors import InputError
 
-# Files written by hand are far smaller [bytes].
-_WRITTEN_BYTES = 1 << 26
 # Some file systems allow 255; this leaves room for endings and joined names.
 _LONGEST_NAME_BYTES = 120
 # Number of characters at the beginning of a longer name that are kept.
@@ -72,35 +71,26 @@ def is_there(path: Path) -> bool:
     return True
 
 
-def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
-    """Returns the content of a file, after checking its size.
-
-    Args:
-        path: the file.
-        limit: greatest size of the file [bytes]; the default is ample for files
-            written by hand.
+def read_bytes(path: Path) -> bytes:
+    """Returns the content of a file.
 
     Raises:
-        InputError: if the file cannot be read, does not exist or is too large.
+        InputError: if the file cannot be read or does not exist.
     """
     check_regular(path)
-    with user_errors(path), open(path, "rb") as stream:
-        size = os.fstat(stream.fileno()).st_size
-        if size > limit:
-            raise InputError(f"{path}: larger than {limit} bytes")
-        return stream.read(size)
+    with reading(path), user_errors(path), open(path, "rb") as stream:
+        # What is added meanwhile may have no end.
+        return stream.read(os.fstat(stream.fileno()).st_size)
 
 
-def read_text(path: Path, limit: int = _WRITTEN_BYTES) -> str:
-    """Returns the text of a file of at most `limit` bytes.
-
-    `decode_text` describes the possible encodings.
+def read_text(path: Path) -> str:
+    """Returns the text of a file; `decode_text` describes the encodings.
 
     Raises:
         InputError: if the file cannot be read, or is not text.
     """
     try:
-        return decode_text(read_bytes(path, limit))
+        return decode_text(read_bytes(path))
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not UTF-8 text") from error
 

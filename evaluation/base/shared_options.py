@@ -83,6 +83,7 @@ COLUMNS = (
     "Number of float32 values per point in .bin files, including x, y and z. "
     "By default four, or five in files named *.pcd.bin, as those of nuScenes."
 )
+_ODOMETRY = "Topic of the poses, if a recording has several."
 Json = Annotated[
     bool, typer.Option("--json", help="Print the results as one JSON object.")
 ]
@@ -96,8 +97,11 @@ Odometry = Annotated[
     list[str] | None,
     typer.Option(
         metavar="TOPIC",
-        help=f"Topic of the poses, if a recording has several.{_EACH}",
+        help=_ODOMETRY + _EACH,
     ),
+]
+OdometryTopic = Annotated[
+    str | None, typer.Option("--odometry", metavar="TOPIC", help=_ODOMETRY)
 ]
 Poses = Annotated[
     list[Path] | None,
@@ -135,13 +139,11 @@ Columns = Annotated[
         help=COLUMNS,
     ),
 ]
-
-
 PoseGap = Annotated[
     float | None,
     typer.Option(
         metavar="SECONDS",
-        help="Greatest time between two poses of a bag that are interpolated; "
+        help="Greatest time between two recorded poses that are interpolated; "
         "by default 1.",
     ),
 ]

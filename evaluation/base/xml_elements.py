@@ -9,12 +9,11 @@ from typing import cast
 from xml.etree import ElementTree
 from xml.parsers import expat
 
+from evaluation.base.budget import reading
 from evaluation.base.errors import InputError
 from evaluation.base.files import read_bytes
 from evaluation.base.number_format import to_number
 
-# A trace of SUMO has a kilobyte for each step of ten vehicles.
-_MOST_BYTES = 1 << 30
 # Readers of elements call themselves for each level.
 _DEEPEST = 100
 # Larger than any number in a road network [m, rad, 1/m].
@@ -145,7 +144,8 @@ def read_elements(
     parser.CharacterDataHandler = builder.data
     parser.StartDoctypeDeclHandler = lambda *_: refuse("holds a document type")
     try:
-        parser.Parse(readable_xml(read_bytes(path, _MOST_BYTES)), True)
+        with reading(path):
+            parser.Parse(readable_xml(read_bytes(path)), True)
     except expat.ExpatError as error:
         raise InputError(
             f"{path}: cannot be parsed: line {error.lineno}:"

@@ -1,4 +1,4 @@
-"""Reading YAML strictly and within bounds."""
+"""Reading YAML strictly."""
 
 from pathlib import Path
 import re
@@ -6,11 +6,11 @@ from typing import Any, ClassVar
 
 import yaml
 
+from evaluation.base.budget import reading
 from evaluation.base.errors import value_errors
+from evaluation.base.expansion import check_expansion
 from evaluation.base.files import read_bytes
 
-# Files written by hand stay far below it.
-_MOST_NODES = 1_000_000
 _WHOLE = "tag:yaml.org,2002:int"
 # Numbers to the base 8 in YAML 1.1, and names to most people.
 _OCTAL = re.compile(r"([-+]?)0([0-7_]+)")
@@ -81,9 +81,8 @@ def read_yaml(path: Path) -> Any:
         InputError: the file cannot be read, is not YAML, expands to too many
             values or has a key twice.
     """
-    text = read_bytes(path)
-    with value_errors(path):
-        return parse_yaml(text)
+    with reading(path), value_errors(path):
+        return parse_yaml(read_bytes(path))
 
 
 def parse_yaml(text: str | bytes, loader: type = YamlLoader) -> Any:
@@ -114,7 +113,11 @@ def parse_yaml(text: str | bytes, loader: type = YamlLoader) -> Any:
             node = parser.get_single_node()
             if node is None:
                 return None
-            _count_nodes(node, {})
+            # The document itself may be a scalar.
+            whole: yaml.Node = yaml.SequenceNode("", [node], node.start_mark)
+            check_expansion(
+                whole, _checked_parts, lambda one: 1 + len(_values_in(one))
+            )
             return parser.construct_document(node)
         finally:
             parser.dispose()
@@ -133,31 +136,23 @@ def parse_yaml(text: str | bytes, loader: type = YamlLoader) -> Any:
         raise ValueError(f"not readable as YAML: {fault}") from error
 
 
-def _count_nodes(node: yaml.Node, sizes: dict[int, int]) -> int:
-    """Returns the number of nodes of a tree when aliases are resolved."""
-    line = node.start_mark.line + 1
-    if isinstance(node, yaml.ScalarNode):
-        _check_tag(node)
-        if not node.style:
-            _check_plain(node.value, line)
-        return 1
-    if id(node) in sizes:
-        if sizes[id(node)] == 0:
-            raise ValueError(f"line {line}: contains itself")
-        return sizes[id(node)]
-    _check_tag(node)
-    sizes[id(node)] = 0
-    children = node.value
+def _values_in(node: yaml.Node) -> list[yaml.Node]:
+    """Returns the nodes directly in a node."""
+    if isinstance(node, yaml.MappingNode):
+        return [part for pair in node.value for part in pair]
+    return [] if isinstance(node, yaml.ScalarNode) else node.value
+
+
+def _checked_parts(node: yaml.Node) -> list[yaml.Node]:
+    """Returns the collections in a node, of which all values are checked."""
     if isinstance(node, yaml.MappingNode):
         _check_keys(node)
-        children = [part for pair in node.value for part in pair]
-    size = 1 + sum(_count_nodes(child, sizes) for child in children)
-    if size > _MOST_NODES:
-        raise ValueError(
-            f"line {line}: stands for more than {_MOST_NODES} values"
-        )
-    sizes[id(node)] = size
-    return size
+    values = _values_in(node)
+    for value in values:
+        _check_tag(value)
+        if isinstance(value, yaml.ScalarNode) and not value.style:
+            _check_plain(value.value, value.start_mark.line + 1)
+    return [one for one in values if not isinstance(one, yaml.ScalarNode)]
 
 
 def _check_tag(node: yaml.Node) -> None:

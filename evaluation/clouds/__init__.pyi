@@ -1,5 +1,5 @@
-from .cloud_files import SCAN_LIMIT_BYTES as SCAN_LIMIT_BYTES
 from .cloud_files import bin_dtype as bin_dtype
+from .cloud_files import coarse_note as coarse_note
 from .cloud_files import is_cloud as is_cloud
 from .cloud_files import read_blocks as read_blocks
 from .cloud_files import read_cloud as read_cloud

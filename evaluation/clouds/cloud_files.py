@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 import functools
 from pathlib import Path
+import sys
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from evaluation.base import (
     check_range,
     check_regular,
     poses,
+    reading,
     user_errors,
     value_errors,
 )
@@ -31,8 +33,6 @@ _NUSCENES = ".pcd.bin"
 _NUSCENES_COLUMNS = 5
 # Number of points of a map that are read at a time.
 _BLOCK = 1 << 18
-# Largest file of a scan [bytes]; a revolution of a LiDAR makes a smaller one.
-SCAN_LIMIT_BYTES = 1 << 27
 
 
 def read_cloud(
@@ -56,17 +56,10 @@ def read_cloud(
         and all other fields of the file.
 
     Raises:
-        InputError: if there is no such file, its content does not match its
-            ending, or it is too large for a scan.
+        InputError: if there is no such file, or its content does not match its
+            ending.
     """
-    path = Path(path)
-    _find_reader(path)
-    with user_errors(path), value_errors(path):
-        size = path.stat().st_size
-        if size > SCAN_LIMIT_BYTES:
-            raise ValueError(f"{size} bytes is too large for a scan")
-    # One block holds the whole file.
-    (points,) = read_blocks(path, columns, on_note, block=SCAN_LIMIT_BYTES)
+    (points,) = read_blocks(path, columns, on_note, block=sys.maxsize)
     return points
 
 
@@ -99,16 +92,21 @@ def read_blocks(
         check_regular(path)
         read = 0
         is_noted = False
-        for points in reader(path, block, on_note):
+        blocks = reader(path, block, on_note)
+        while True:
+            with reading(path):
+                points = next(blocks, None)
+            if points is None:
+                return
             check_range(points, poses.FARTHEST, first=read)
             read += len(points)
-            if not is_noted and (step_note := _coarse_note(points)):
+            if not is_noted and (step_note := coarse_note(points)):
                 is_noted = True
                 on_note(f"{path}: {step_note}")
             yield points
 
 
-def _coarse_note(points: np.ndarray) -> str:
+def coarse_note(points: np.ndarray) -> str:
     """Returns a note on coordinates whose type is coarse; "" if it is not.
 
     A type is coarse if the step between its numbers is, at the farthest point.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluation.base import compiled, is_number
+from evaluation.base import is_number, unpacked
 from evaluation.clouds.notes import OnNote
 from evaluation.clouds.record_reading import (
     BYTE_ORDER_MARK,
@@ -20,10 +20,6 @@ from evaluation.clouds.record_reading import (
 _PCD_TYPES = {"F": "f", "I": "i", "U": "u"}
 _PCD_SIZES = {"f": (4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}
 _UNMOVED = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-# LZF expands three bytes to at most 264. Compressed files are unpacked in
-# memory; larger ones must not be compressed.
-_LZF_RATIO = 88
-_UNPACKED_LIMIT_BYTES = 1 << 27
 
 
 def read_pcd(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
@@ -41,8 +37,11 @@ def read_pcd(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     dtype, count = _point_type(header), _num_points(header)
     encoding = header["DATA"][0].lower() if header["DATA"] else ""
     if encoding == "ascii":
-        # A point takes at least one byte, which bounds the buffer.
-        check_size(path, offset + count, exactly=False)
+        # A number takes at least one byte, which bounds the buffer.
+        numbers = sum(
+            math.prod(dtype[name].shape) for name in dtype.names or ()
+        )
+        check_size(path, offset + count * numbers, exactly=False)
         return read_text_records(path, offset, count, block, dtype, "PCD")
     if encoding == "binary":
         check_size(path, offset + count * dtype.itemsize, exactly=True)
@@ -154,22 +153,15 @@ def _read_compressed(
         num_packed, num_plain = np.frombuffer(head, dtype="<u4").tolist()
         if num_plain != count * dtype.itemsize:
             raise ValueError("PCD: the compressed size does not fit the header")
-        if num_plain > _LZF_RATIO * num_packed:
-            raise ValueError(
-                f"PCD: {num_packed} bytes cannot hold {num_plain} of them"
-            )
-        if max(num_packed, num_plain) > _UNPACKED_LIMIT_BYTES:
-            raise ValueError(
-                f"PCD: {num_plain} bytes compressed in one piece are more than"
-                f" {_UNPACKED_LIMIT_BYTES} (save it as binary)"
-            )
         check_size(path, offset + 8 + num_packed, exactly=True)
-        packed = np.frombuffer(stream.read(num_packed), dtype=np.uint8)
-    plain = np.empty(num_plain, dtype=np.uint8)
-    if not _decompress_lzf(packed, plain):
+        packed = stream.read(num_packed)
+    try:
+        data = unpacked(packed, "lzf", num_plain)
+    except ValueError as error:
         if num_packed != num_plain:
-            raise ValueError("PCD: the compressed data is damaged")
-        plain = packed  # pypcd4 writes what does not shrink as it is.
+            raise ValueError(f"PCD: {error}") from error
+        data = packed  # pypcd4 writes what does not shrink as it is.
+    plain = np.frombuffer(data, np.uint8)
     for start in range(0, max(count, 1), block):
         yield _interleaved(plain, dtype, count, slice(start, start + block))
 
@@ -187,47 +179,3 @@ def _interleaved(
         points[name] = column.reshape(count, *scalar.shape)[part]
         start = end
     return points
-
-
-@compiled
-def _decompress_lzf(packed: np.ndarray, plain: np.ndarray) -> bool:
-    """Expands LZF data; returns whether the data are sound and fill `plain`.
-
-    Format: each sequence begins with a control byte c. If c < 32, then c + 1
-    literal bytes follow. Otherwise the sequence copies earlier bytes. The upper
-    three bits of c are the length minus two; if they are 7, the next byte is
-    added to the length. The lower five bits and one more byte are the distance
-    back minus one.
-    """
-    source = 0
-    target = 0
-    while source < len(packed):
-        control = int(packed[source])
-        source += 1
-        if control < 32:
-            length = control + 1
-            if source + length > len(packed) or target + length > len(plain):
-                return False
-            for _ in range(length):
-                plain[target] = packed[source]
-                source += 1
-                target += 1
-            continue
-        length = control >> 5
-        if length == 7:
-            if source >= len(packed):
-                return False
-            length += int(packed[source])
-            source += 1
-        if source >= len(packed):
-            return False
-        distance = ((control & 31) << 8) + int(packed[source]) + 1
-        source += 1
-        length += 2
-        if distance > target or target + length > len(plain):
-            return False
-        # Bytes are copied one by one: source and target may overlap.
-        for _ in range(length):
-            plain[target] = plain[target - distance]
-            target += 1
-    return target == len(plain)

@@ -11,13 +11,9 @@ import numpy as np
 
 from evaluation.base import parse_rows, repeated
 
-# Room for some tens of numbers with some tens of characters each.
-_LONGEST_LINE_BYTES = 1 << 16
 BYTE_ORDER_MARK = codecs.BOM_UTF8
 # The end of a header is searched up to here; a header takes some hundred bytes.
 HEADER_LIMIT_BYTES = 1 << 16
-# The longest descriptors of points have some kilobytes.
-_LARGEST_RECORD_BYTES = 1 << 16
 
 
 def read_records(
@@ -85,9 +81,7 @@ def check_size(path: Path, needed: int, exactly: bool) -> None:
 
 def content_lines(stream: BinaryIO) -> Iterator[bytes]:
     """Yields the lines that are neither blank nor comments."""
-    while line := stream.readline(_LONGEST_LINE_BYTES):
-        if len(line) == _LONGEST_LINE_BYTES:
-            raise ValueError("a line is too long for a row of numbers")
+    for line in stream:
         if line.strip() and not line.lstrip().startswith(b"#"):
             yield line
 
@@ -130,22 +124,11 @@ def record_type(fields: list[tuple], where: str) -> np.dtype:
     """Returns a type of records.
 
     Raises:
-        ValueError: a field is there twice, or a record is implausibly large.
-            A header can declare a field of billions of numbers, for which
-            memory would be reserved.
+        ValueError: a field is there twice, or larger than any.
     """
     names = [field[0] for field in fields]
     for name in repeated(names):
         raise ValueError(f"{where} {name} is there twice")
-    size = sum(
-        np.dtype(kind).itemsize * math.prod(*shape or [()])
-        for _, kind, *shape in fields
-    )
-    if size > _LARGEST_RECORD_BYTES:
-        raise ValueError(
-            f"{where.partition(':')[0]}: {size} bytes for each point, more than"
-            f" {_LARGEST_RECORD_BYTES}"
-        )
     return np.dtype(fields)
 
 

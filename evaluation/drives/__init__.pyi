@@ -66,5 +66,6 @@ from .sources import DriveSource as DriveSource
 from .sources import JoinedSource as JoinedSource
 from .sources import Placement as Placement
 from .sources import RecordingSource as RecordingSource
+from .stamped_poses import PoseSteps as PoseSteps
 from .trajectories import read_poses as read_poses
 from .utm_poses import ORIGIN as ORIGIN

@@ -22,14 +22,17 @@ from evaluation.base import (
     mark_used,
     own_cache,
     read_npz,
+    reading,
     remove_unused,
     settled_state,
 )
 
 # Greatest size of the contents that are kept of a topic.
 _MOST_BYTES = 1 << 26
-# Greatest size of a file of the cache.
-_CACHE_BYTES = 1 << 28
+# Greatest size of all that a bag unpacks to: for any bag, and for each byte of
+# it. Recordings compress to a tenth; a hostile file, to nothing.
+_UNPACKED_BYTES = 1 << 28
+_UNPACKED_PER_BYTE = 50
 # Changes whenever files of the cache get another form.
 _FORM = 1
 
@@ -82,6 +85,16 @@ class TopicIndex(NamedTuple):
         return memoryview(content)
 
 
+def check_unpacked(total: int, size: int) -> None:
+    """Refuses a bag of `size` bytes that unpacks to `total` or more bytes.
+
+    Raises:
+        ValueError: this is implausible.
+    """
+    if total > _UNPACKED_BYTES + _UNPACKED_PER_BYTE * size:
+        raise ValueError("it stands for far more bytes than it has")
+
+
 class BagIndex:
     """The topics of a bag that a drive reads, each with its `TopicIndex`."""
 
@@ -127,7 +140,9 @@ class BagIndex:
             missing = [one for one in wanted if one not in self._found]
             if missing:
                 kept = [one for one in missing if self._kept.get(one)]
-                self._found |= _collect(missing, self._read(missing, kept))
+                with reading(self._files[0]):
+                    found = _collect(missing, self._read(missing, kept))
+                self._found |= found
                 for one in missing:
                     _cache(self._files, states, one, self._found[one])
         return self._found[topic]
@@ -191,7 +206,7 @@ def _cached(
         if place is None or None in states or not place.is_file():
             return None
         names = ("of", *TopicIndex._fields)
-        columns = read_npz(place, names, _CACHE_BYTES)
+        columns = read_npz(place, names)
         of = columns.pop("of")
         found = TopicIndex(**columns)
         number = len(found.log_times_ns)

@@ -11,23 +11,18 @@ R_SW. All drives share W, whose axes point east, north and up. In the first
 releases W was the UTM grid.
 """
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from evaluation.drives.data_set import DataSet
-from evaluation.drives.drive import as_given
-from evaluation.drives.drive_scenario import (
-    SCENARIO,
-    read_scenario,
-)
 from evaluation.drives.scan_files import (
     FileDrive,
-    PosedFiles,
+    OwnPoses,
     check_below,
     list_stamped,
     posed,
-    posed_by,
     read_packed,
 )
 from evaluation.drives.text_tables import parse_microseconds
@@ -60,6 +55,7 @@ class BoreasDrive(FileDrive):
         path: Path,
         columns: int | None = None,
         poses: Path | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a drive.
 
@@ -67,6 +63,7 @@ class BoreasDrive(FileDrive):
             path: its folder.
             columns: is ignored, because the layout is fixed.
             poses: file with poses of the LiDAR, which is read instead.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
@@ -75,30 +72,29 @@ class BoreasDrive(FileDrive):
             path / _SCANS, ".bin", parse_microseconds
         )
         super().__init__(
-            name=as_given(path).name,
-            scans=(
-                posed_by(poses, files, stamps_ns)
-                if poses
-                else _posed(path / _POSES, files, stamps_ns)
+            path,
+            posed(
+                files,
+                stamps_ns,
+                partial(_own_poses, path / _POSES),
+                poses,
+                pose_gap,
             ),
-            read=_read_scan,
-            tables=[path / SCENARIO],
-            scenario=read_scenario(path),
+            _read_scan,
             unit="alpha-prime",
         )
 
 
-def _posed(path: Path, files: list[Path], stamps_ns: np.ndarray) -> PosedFiles:
-    """Gives scan files the poses of the drive, which are at `path`."""
+def _own_poses(path: Path) -> OwnPoses:
+    """Returns the poses in a table of the data set."""
     trajectory = read_angles(path, num_velocities=3)
     X_WS = trajectory.X_WB
     X_WS[:, :3, :3] = np.swapaxes(X_WS[:, :3, :3], 1, 2)
     local = is_local(X_WS)
     if not local:
         X_WS[:, :3, 3] -= _ORIGIN
-    return posed(files, stamps_ns, trajectory)._replace(
-        world_frame=f"boreas/{'enu' if local else 'utm-17n'}", tables=(path,)
-    )
+    frame = f"boreas/{'enu' if local else 'utm-17n'}"
+    return OwnPoses(trajectory, frame, (path,))
 
 
 def _read_scan(path: Path, stamp_ns: int) -> np.ndarray:

@@ -33,16 +33,13 @@ from evaluation.drives.drive import (
     IMU_DTYPE,
     as_given,
 )
-from evaluation.drives.drive_scenario import (
-    SCENARIO,
-    read_scenario,
-)
+from evaluation.drives.drive_scenario import SCENARIO
 from evaluation.drives.scan_files import (
     FileDrive,
+    OwnPoses,
     first_existing,
     list_stamped,
     posed,
-    posed_by,
 )
 from evaluation.drives.text_tables import read_stamped_rows
 from evaluation.drives.trajectories import pose_matrices, read_quaternions
@@ -84,6 +81,7 @@ class CnsFolderDrive(FileDrive):
         path: Path,
         columns: int | None = None,
         poses: Path | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a drive.
 
@@ -91,6 +89,7 @@ class CnsFolderDrive(FileDrive):
             path: its folder.
             columns: has no effect, because PCD files name their columns.
             poses: file with poses of the LiDAR, which is read instead.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
@@ -106,36 +105,30 @@ class CnsFolderDrive(FileDrive):
         self._imu_path = path / _IMU
         mount = _find_mount(path, chosen)
         place = as_given(path)
-        name = place.name
-        scenario = read_scenario(path)
+        name, scenario = place.name, None
+        has_scenario = is_there(path / SCENARIO)
         if mount is not None and mount.parent.samefile(place.parent.parent):
             name = f"{place.parent.name}_{place.name}".lower()
-            scenario = scenario or {
-                "map": place.parent.name.lower(),
-                "stage": place.name,
-            }
-        if mount is None and scenario is None:
+            scenario = {"map": place.parent.name.lower(), "stage": place.name}
+        if mount is None and not has_scenario:
             chosen.append(
                 f"{path}: no {_MOUNT} in it or up to two folders above, and no"
                 f" {SCENARIO}: the name of its map is unknown, and the LiDAR is"
                 f" taken as {_LIDAR_HEIGHT:g} m above the vehicle's origin"
             )
-        if poses:
-            scans = posed_by(poses, files, stamps_ns)
-        else:
-            table = path / _POSES
-            scans = posed(files, stamps_ns, read_quaternions(table, ","))
-            scans = scans._replace(
-                X_WS=scans.X_WS @ _read_mount(mount),
-                world_frame="map",
-                tables=(table, *([] if mount is None else [mount])),
-            )
         super().__init__(
+            path,
+            posed(
+                files,
+                stamps_ns,
+                lambda: _own_poses(path / _POSES, mount),
+                poses,
+                pose_gap,
+            ),
+            lambda path, stamp_ns: read_cloud(path),
             name=name,
-            scans=scans,
-            read=lambda path, stamp_ns: read_cloud(path),
-            tables=[self._imu_path, path / SCENARIO],
-            notes=tuple(chosen),
+            tables=[self._imu_path],
+            notes=chosen,
             scenario=scenario,
             unit="cns",
         )
@@ -159,6 +152,17 @@ class CnsFolderDrive(FileDrive):
         imu["angular_velocity"] = values[:, 4:7]
         imu["specific_force"] = values[:, 7:]
         return imu
+
+
+def _own_poses(table: Path, mount: Path | None) -> OwnPoses:
+    """Returns the poses of the vehicle in a table of the data set."""
+    X_BS = _read_mount(mount)
+    return OwnPoses(
+        read_quaternions(table, ","),
+        "map",
+        (table, *([] if mount is None else [mount])),
+        X_WS=lambda X_WB: X_WB @ X_BS,
+    )
 
 
 def holds_cns(path: Path) -> bool:

@@ -50,7 +50,8 @@ def deskewed_scan(drive: Drive, index: int) -> np.ndarray:
 def deskew(drive: Drive, index: int) -> np.ndarray:
     """Returns a scan as if all points had been measured at its time stamp.
 
-    In a recorded scan, each point was measured `t` ns after the stamp and is
+    In a recorded scan, each point was measured `t` ns after the stamp (before
+    it, if `t` is negative) and is
     expressed in the LiDAR's frame at that time. The pose at that time comes
     from cubic splines through the recorded poses around the scan: one for
     positions, and scipy's RotationSpline, with smooth angular rates, for
@@ -105,12 +106,17 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
     # Differences of int64 are exact; stamps as doubles would not be.
     stamps_ns, X_WS = drive.motion
     times_ns = stamps_ns - drive.stamps_ns[index]
-    first, end = np.searchsorted(times_ns, [0, t_ns.max(initial=0)])
-    around = slice(max(0, first - _REACH), end + _REACH + 1)
-    X_WT = _interpolate_poses(
-        times_ns[around] * 1e-9, X_WS[around], t_ns * 1e-9
+    first, at, end = np.searchsorted(
+        times_ns, [t_ns.min(initial=0), 0, t_ns.max(initial=0)]
     )
-    X_ST = poses.inverse(X_WS[first]) @ X_WT
+    around = slice(max(0, first - _REACH), end + _REACH + 1)
+    # The last one is the pose at the stamp.
+    *X_WT, X_WS0 = _interpolate_poses(
+        times_ns[around] * 1e-9, X_WS[around], np.append(t_ns, 0) * 1e-9
+    )
+    if at < len(times_ns) and times_ns[at] == 0:
+        X_WS0 = X_WS[at]
+    X_ST = poses.inverse(X_WS0) @ np.reshape(X_WT, (-1, 4, 4))
     p_T = np.stack([points[axis] for axis in "xyz"], axis=1).astype(float)
     R_ST, p_ST = X_ST[column, :3, :3], X_ST[column, :3, 3]
     p_S = np.einsum("nij,nj->ni", R_ST, p_T) + p_ST

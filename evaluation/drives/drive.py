@@ -76,10 +76,9 @@ class Drive(abc.ABC):
     Attributes:
         name: short name for tables and messages, e.g. `metropolis_04`.
         world_frame: name of W, as stated in the recording.
-        has_own_world: whether W is a frame of this drive alone, because nothing
-            says where its poses are in a frame that others share. None if the
-            name of W decides: frames other than `SHARED_FRAMES` are of one
-            drive, unless its scenario names a map.
+        has_own_world: whether W is a frame of this drive alone, which its name
+            then says. None if the name of W decides: frames other than
+            `SHARED_FRAMES` are of one drive, unless its scenario names a map.
         placing: how drives of this format get a common world frame, for errors;
             in brackets, after a space.
 
@@ -122,12 +121,18 @@ class Drive(abc.ABC):
     @property
     def world(self) -> str:
         """Name of the world W: equal for two drives only if they share it."""
-        if self.has_own_world is not None or is_shared(
-            self.world_frame, self.scenario
-        ):
+        if self.has_own_world is not None or not self.is_local:
             return self.world_frame
         home = self.files[0].resolve() if self.files else f"/{self.name}"
         return f"{self.world_frame}{home}"
+
+    @property
+    def is_local(self) -> bool:
+        """Whether the world W is a frame of this drive alone."""
+        if self.has_own_world is not None:
+            return self.has_own_world
+        has_map = (self.scenario or {}).get("map") is not None
+        return not (has_map or self.world_frame in SHARED_FRAMES)
 
     @property
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
@@ -314,16 +319,6 @@ class Drive(abc.ABC):
 
 def _opened_again(kind: type[Drive], args: tuple, kwargs: dict) -> Drive:
     return kind(*args, **kwargs)
-
-
-def is_shared(frame: str, scenario: Mapping | None) -> bool:
-    """Returns whether drives with poses in a frame of this name share it.
-
-    Args:
-        frame: name of the frame.
-        scenario: the drive's scenario, if any; it may name the map.
-    """
-    return frame in SHARED_FRAMES or (scenario or {}).get("map") is not None
 
 
 def poses_frame(path: Path) -> str:

@@ -15,18 +15,13 @@ import numpy as np
 from evaluation.base import InputError
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.drive import as_given
-from evaluation.drives.drive_scenario import (
-    SCENARIO,
-    read_scenario,
-)
 from evaluation.drives.lidar_fields import LidarField
 from evaluation.drives.scan_files import (
     FileDrive,
-    PosedFiles,
+    OwnPoses,
     check_below,
     list_stamped,
     posed,
-    posed_by,
     read_packed,
 )
 from evaluation.drives.trajectories import read_quaternions
@@ -95,6 +90,7 @@ class HeliprDrive(FileDrive):
         path: Path,
         lidar: str | None = None,
         poses: Path | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a drive.
 
@@ -103,6 +99,7 @@ class HeliprDrive(FileDrive):
             lidar: name of the LiDAR, if `path` does not contain it. By default
                 the Ouster or, in a folder without the Ouster, the only LiDAR.
             poses: file with poses of the LiDAR, which is read instead.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
@@ -118,35 +115,38 @@ class HeliprDrive(FileDrive):
             )
         files, stamps_ns = list_stamped(drive / _SCANS / lidar, ".bin")
         super().__init__(
-            name=as_given(drive).name,
-            lidar=lidar,
-            scans=(
-                posed_by(poses, files, stamps_ns)
-                if poses
-                else _posed(drive, lidar, files, stamps_ns)
+            drive,
+            posed(
+                files,
+                stamps_ns,
+                partial(_own_poses, drive, lidar),
+                poses,
+                pose_gap,
             ),
-            read=partial(_read_scan, lidar),
-            tables=[drive / SCENARIO],
-            scenario=read_scenario(drive),
+            partial(_read_scan, lidar),
+            lidar=lidar,
             notes=chosen,
             unit=_UNITS.get(lidar),
         )
 
 
-def _posed(
-    drive: Path, lidar: str, files: list[Path], stamps_ns: np.ndarray
-) -> PosedFiles:
-    """Gives scan files the poses of the drive."""
-    in_utm = (drive / _POSES / f"global_{lidar}_gt.txt").is_file()
-    poses_name = f"global_{lidar}_gt.txt" if in_utm else f"{lidar}_gt.txt"
-    poses_path = drive / _POSES / poses_name
-    found = posed(files, stamps_ns, read_quaternions(poses_path, None))
-    return found._replace(
-        X_WS=to_world(found.X_WS, poses_path) if in_utm else found.X_WS,
-        world_frame=f"helipr{f'/{DATUM}' if in_utm else drive.resolve()}",
-        tables=(poses_path,),
-        datum=DATUM if in_utm else None,
-        has_own_world=not in_utm,
+def _own_poses(drive: Path, lidar: str) -> OwnPoses:
+    """Returns the poses of a LiDAR."""
+    table = drive / _POSES / f"global_{lidar}_gt.txt"
+    if table.is_file():
+        return OwnPoses(
+            read_quaternions(table, None),
+            f"helipr/{DATUM}",
+            (table,),
+            DATUM,
+            X_WS=lambda X_US: to_world(X_US, table),
+        )
+    own = drive / _POSES / f"{lidar}_gt.txt"
+    return OwnPoses(
+        read_quaternions(own, None),
+        f"helipr{drive.resolve()}",
+        (own,),
+        has_own_world=True,
     )
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from evaluation.base import InputError
 from evaluation.drives.drive import Drive
 from evaluation.drives.same_world import check_same_world
 from evaluation.drives.sampling import sample_frames
@@ -29,9 +30,11 @@ class JoinedDrive(Drive):
             sources: functions that open the drives, from older to newer.
 
         Raises:
-            InputError: a drive cannot be opened, or drives are in different
-                worlds.
+            InputError: there is no drive, one cannot be opened, or they are
+                in different worlds.
         """
+        if not sources:
+            raise InputError("no drive is given to be joined")
         self._sources = sources
         stamps, poses = [], []
         for number in range(len(sources)):

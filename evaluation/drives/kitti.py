@@ -46,17 +46,14 @@ from evaluation.drives.drive import (
     as_given,
     index_instances,
 )
-from evaluation.drives.drive_scenario import (
-    SCENARIO,
-    read_scenario,
-)
 from evaluation.drives.scan_files import (
     BinDrive,
-    PosedFiles,
+    OwnPoses,
     first_existing,
-    posed_by,
+    posed,
     read_packed,
 )
+from evaluation.drives.stamped_poses import StampedPoses
 from evaluation.drives.text_tables import (
     check_increasing,
     parse_seconds,
@@ -103,6 +100,7 @@ class KittiDrive(BinDrive):
         path: Path,
         columns: int | None = None,
         poses: Path | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a drive.
 
@@ -111,6 +109,7 @@ class KittiDrive(BinDrive):
                 as `poses.txt` beside the scans.
             columns: number of columns of a scan, see `BinDrive`.
             poses: file with poses of the LiDAR, which is read instead.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: there is no such drive, its files do not fit together,
@@ -153,38 +152,34 @@ class KittiDrive(BinDrive):
                 f"{poses_path}: {counts[1]} rows, but {counts[0]} in"
                 f" {times_path}"
             )
-        scans = (
-            posed_by(poses, files, stamps_ns, numbers)
-            if poses
-            else PosedFiles(
-                files,
-                stamps_ns,
-                X_WS,
-                (),
-                world_frame,
-                (poses_path,),
-                has_own_world=not is_there(first_pose),
-            )
-        )
         self.X_CS = X_CS if poses is None else np.eye(4)
-        scenario = read_scenario(path)
         self._structures = path / _STRUCTURES
         labels = path / _LABELS
         self._labels = labels if labels.is_dir() else None
         super().__init__(
             columns,
-            name=as_given(path).name,
-            scans=scans,
+            path=path,
+            scans=posed(
+                files,
+                stamps_ns,
+                lambda: OwnPoses(
+                    StampedPoses(poses_path, stamps_ns, X_WS),
+                    world_frame,
+                    (poses_path,),
+                    has_own_world=not is_there(first_pose),
+                ),
+                poses,
+                pose_gap,
+                numbers,
+            ),
             tables=[
                 times_path,
                 calibration,
                 first_pose,
                 path / _FRAMES,
-                path / SCENARIO,
                 self._structures,
             ],
-            notes=tuple(notes),
-            scenario=scenario,
+            notes=notes,
             unit=unit,
         )
 

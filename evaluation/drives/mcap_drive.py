@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 import contextlib
-from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 import re
@@ -21,9 +20,11 @@ from evaluation.base import (
     poses,
     read_text,
     read_yaml,
+    reading,
     value_errors,
     xyz,
 )
+from evaluation.clouds import coarse_note
 from evaluation.drives import mcap_messages, ros_messages
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.drive import (
@@ -31,7 +32,6 @@ from evaluation.drives.drive import (
     Drive,
     as_given,
     index_instances,
-    is_shared,
     poses_frame,
 )
 from evaluation.drives.drive_scenario import SCENARIO, read_scenario
@@ -56,9 +56,10 @@ from evaluation.drives.point_cloud2 import (
 )
 from evaluation.drives.point_layouts import from_layout
 from evaluation.drives.rosbag_file import RosbagFile, check_finished
+from evaluation.drives.scan_files import are_returns
 from evaluation.drives.stamped_poses import (
-    LONGEST_GAP,
     PosedScans,
+    PoseSteps,
     StampedPoses,
 )
 from evaluation.drives.trajectories import read_trajectory
@@ -70,11 +71,8 @@ _KALIBR = "imu.yaml"
 _METADATA = "metadata.yaml"
 # rosbag2 compresses each file or message if its metadata say so.
 _PACKED = r"^\s*compression_mode: *[\"']?(file|message)"
-_GAP_ADVICE = " (--pose-gap SECONDS allows more)"
-# Files are not joined where the poses jump by more than this [m] ...
-_JUMP = 2.0
-# ... and this speed of a vehicle allow [m/s].
-_FASTEST = 50.0
+# The second scan of a simulator's clock is earlier than this [ns].
+_SIMULATED_NS = 10 * NS_PER_S
 # A function that returns the poses of the LiDAR, given the scans' stamps [ns].
 _Poses = Callable[[np.ndarray], StampedPoses]
 # `image_transport` adds this to the names of topics of depth images.
@@ -177,8 +175,7 @@ class McapDrive(Drive):
             odometry: topic of the poses.
             poses: function that returns poses of the LiDAR, which are used
                 instead of those of a topic.
-            pose_gap: greatest time between two poses that are interpolated [s];
-                by default a second.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: if there is no complete recording at `path`, or no such
@@ -193,7 +190,8 @@ class McapDrive(Drive):
             self.name = str((self.scenario or {}).get("name", self.name))
         self._lidar_topic = self._topics.choose(_CLOUDS, lidar)
         self._given = poses
-        self._longest_gap = LONGEST_GAP if pose_gap is None else pose_gap
+        self.has_own_world = None if poses is None else False
+        self._pose_gap = pose_gap
         self._pose_topic = None
         if poses is None:
             self._pose_topic = self._topics.choose(_POSES, odometry)
@@ -277,19 +275,6 @@ class McapDrive(Drive):
     def world_frame(self) -> str:  # type: ignore[override]  # Read late.
         if self._pose_topic is None:
             return poses_frame(Path(str(self._posed_by.source)))
-        frame = self._pose_frame
-        return f"{frame}{self._path.resolve()}" if self.has_own_world else frame
-
-    @property
-    def has_own_world(self) -> bool:  # type: ignore[override]  # Read late.
-        return self._pose_topic is not None and not is_shared(
-            self._pose_frame, self.scenario
-        )
-
-    @property
-    def _pose_frame(self) -> str:
-        """Name of the frame of the poses of a topic, as recorded."""
-        assert self._pose_topic is not None
         return frame_name(self._topics.first(self._pose_topic).header.frame_id)
 
     @property
@@ -302,12 +287,15 @@ class McapDrive(Drive):
                 f" {missing} scans; they are left out"
             )
         first = self._topics.first(self._lidar_topic)
-        if not self._is_livox and has_wrong_rows(first):
-            notes.append(
-                f"{self._path}: {self._lidar_topic}: row_step is not width x"
-                " point_step; the points are read one after the other, which"
-                " the length of the data shows"
-            )
+        if not self._is_livox:
+            if has_wrong_rows(first):
+                notes.append(
+                    f"{self._path}: {self._lidar_topic}: row_step is not width"
+                    " x point_step; the points are read one after the other,"
+                    " which the length of the data shows"
+                )
+            if coarse := coarse_note(to_points(first)):
+                notes.append(f"{self._path}: {self._lidar_topic}: {coarse}")
         return (*notes, *filter(None, [self.distortion_note]))
 
     @property
@@ -384,6 +372,7 @@ class McapDrive(Drive):
             points = (
                 livox_points(message) if self._is_livox else to_points(message)
             )
+            is_return = are_returns(points)
             if self._is_in_world:
                 points = points.copy()
                 X_SW = poses.inverse(self.X_WS[index])
@@ -391,7 +380,7 @@ class McapDrive(Drive):
                 for axis, values in zip("xyz", moved.T, strict=True):
                     points[axis] = values
             check_range(points, FARTHEST_RETURN)
-            return from_layout(
+            found = from_layout(
                 points,
                 self._labels(index, message),
                 # Other programs have other units.
@@ -399,7 +388,9 @@ class McapDrive(Drive):
                     self._file.library.startswith("cns-drake ")
                     and self.lidar_section.get("returns") != "calibrated"
                 ),
+                stamp_ns,
             )
+            return found if is_return.all() else found[is_return]
 
     def _labels(self, index: int, cloud: Any) -> np.ndarray | None:
         """Returns the labels of a scan from their own topic, if any."""
@@ -470,17 +461,13 @@ class McapDrive(Drive):
     @cached_property
     def _posed(self) -> PosedScans:
         """The poses of the scans."""
-        return self._posed_by.at_scans(self._all_scans[0])
+        return self._posed_by.at_scans(self._all_scans[0], self._pose_gap)
 
     @cached_property
     def _posed_by(self) -> StampedPoses:
         """The poses of the vehicle, or those of the LiDAR from a file."""
         if self._given is not None:
-            return replace(
-                self._given(self._all_scans[0]),
-                longest_gap=self._longest_gap,
-                advice=_GAP_ADVICE,
-            )
+            return self._given(self._all_scans[0])
         return self._trajectory()
 
     def _trajectory(self, *later: np.ndarray) -> StampedPoses:
@@ -491,42 +478,40 @@ class McapDrive(Drive):
         known = np.isfinite(rows["position"]).all(axis=1) & (length > 0.0)
         num_unknown = len(rows) - int(known.sum())
         rows = rows[known] if known.any() else rows
-        X_WB = checked_poses(
-            rows["position"], rows["quat_xyzw"], str(self._path)
-        )
         source = f"{self._path}: {self._pose_topic}"
+        X_WB = checked_poses(rows["position"], rows["quat_xyzw"], source)
         found = StampedPoses.of(
             source,
             rows["stamp_ns"],
             X_WB,
             num_unknown=num_unknown,
-            longest_gap=self._longest_gap,
-            advice=_GAP_ADVICE,
         )
-        self._check_joints(source, found.stamps_ns, found.X_WB[:, :3, 3])
+        self._check_joints(source, found.stamps_ns, found.X_WB)
         return found
 
     def _check_joints(
-        self, source: str, stamps_ns: np.ndarray, p_WB: np.ndarray
+        self, source: str, stamps_ns: np.ndarray, X_WB: np.ndarray
     ) -> None:
         """Refuses files that are joined where the poses begin anew.
 
         Args:
             source: file and topic of the poses, for errors.
             stamps_ns: (N,) stamps of the poses [ns].
-            p_WB: (N, 3) positions of the vehicle [m].
+            X_WB: (N, 4, 4) the poses.
         """
+        steps = PoseSteps.of(stamps_ns, X_WB)
         for joint_ns in self._file.joints_ns:
-            after = int(np.searchsorted(stamps_ns, joint_ns, side="right"))
-            if not 0 < after < len(stamps_ns):
-                continue
-            step_s = (stamps_ns[after] - stamps_ns[after - 1]) / NS_PER_S
-            jump = np.linalg.norm(p_WB[after] - p_WB[after - 1])
-            if jump > _JUMP + _FASTEST * step_s:
+            # Stamps are up to a second before or after the log's times.
+            first, last = np.searchsorted(
+                stamps_ns, [joint_ns - NS_PER_S, joint_ns + NS_PER_S]
+            )
+            near = slice(max(first - 1, 0), last)
+            if steps.is_jump[near].any():
                 raise InputError(
                     f"{source}: several recordings: the poses jump by"
-                    f" {jump:.1f} m where a file ends and the next begins; give"
-                    f" one of {' '.join(one.name for one in self._file.files)}"
+                    f" {steps.moves[near].max():.1f} m where a file ends and"
+                    " the next begins; give one of"
+                    f" {' '.join(self._file.names)}"
                 )
 
     @property
@@ -553,7 +538,7 @@ class McapDrive(Drive):
         """Whether points are in the frame of the poses, as of FAST-LIO's."""
         if self._pose_topic is None:
             return self._lidar_frame in _WORLD_FRAMES
-        return self._lidar_frame == self._pose_frame
+        return self._lidar_frame == self.world_frame
 
     @cached_property
     def _mounted(self) -> tuple[np.ndarray, list[str]]:
@@ -572,13 +557,26 @@ class McapDrive(Drive):
                 f"{where}: the points are in the frame {frame!r} of the poses;"
                 f" they are moved into the frame {base or 'of the vehicle'!r}"
             ]
-        if base is not None and frame and _TF_STATIC_TOPIC in self._topics:
-            return self._transforms.pose(base, frame), []
+        if base is not None and frame:
+            if self._transforms.has(base, frame):
+                return self._transforms.pose(base, frame), []
+            if self._has_tf:
+                # The package tf, before tf2, repeats fixed transforms there.
+                self._transforms.add_fixed(self._edges(_TF_TOPIC))
+            if self._transforms.has(base, frame):
+                return self._transforms.pose(base, frame), [
+                    f"{where}: the LiDAR is mounted as {_TF_TOPIC} says, where"
+                    f" {frame!r} does not move in {base!r}"
+                ]
+            if _TF_STATIC_TOPIC in self._topics:
+                self._transforms.pose(base, frame)  # It raises the error.
         why = (
             f"{topic} names no frame of the vehicle"
             if base is None
             else f"no {_TF_STATIC_TOPIC} says where it is in {base!r}"
         )
+        if frame in self._transforms.moving:
+            why += f", and it moves on {_TF_TOPIC}"
         return np.eye(4), [
             f"{where}: {why}; the poses on {topic} are taken as those of this"
             " LiDAR"
@@ -587,9 +585,15 @@ class McapDrive(Drive):
     @cached_property
     def _transforms(self) -> StaticTransforms:
         topic = _TF_STATIC_TOPIC
-        places = self._file.locate(topic)
-        messages = (self._topics.message(topic, place) for place in places)
-        return StaticTransforms(messages, f"{self._path}: {topic}")
+        edges = self._edges(topic) if topic in self._topics else ()
+        return StaticTransforms(edges, f"{self._path}: {topic}")
+
+    def _edges(self, topic: str) -> Iterator[Any]:
+        """Yields the transforms of a topic."""
+        for _, data in self._topics.visit(topic):
+            with self._topics.faults(topic):
+                message = mcap_messages.decode(data, ros_messages.TF)
+            yield from message.transforms
 
     @cached_property
     def _lidar_frame(self) -> str:
@@ -734,8 +738,8 @@ class _Topics:
         Raises:
             InputError: the message cannot be read or decoded.
         """
-        data = self.file.read(place)
-        with self.faults(topic):
+        with reading(self.file.path), self.faults(topic):
+            data = self.file.read(place)
             return mcap_messages.decode(data, self._types[topic])
 
     def first(self, topic: str) -> Any:
@@ -838,9 +842,11 @@ class _Topics:
         found = self.file.index.of(topic)
         stamps_ns, digests = found.stamps_ns, found.checksums
         with self.faults(topic):
-            if (stamps_ns == 0).any() and len(places) > 1:
-                raise ValueError("a message has no stamp")
             order = np.argsort(stamps_ns, kind="stable")
+            # A simulator's clock may begin at 0.
+            first, *second = stamps_ns[order[:2]].tolist()
+            if first == 0 and second and not 0 < second[0] < _SIMULATED_NS:
+                raise ValueError("a message has no stamp")
             twice = np.diff(stamps_ns[order], prepend=-1) == 0
             for k in np.flatnonzero(twice).tolist():
                 if digests[int(order[k])] != digests[int(order[k - 1])]:
@@ -921,20 +927,27 @@ class _McapImages:
 def holds_mcap(path: Path) -> bool:
     """Returns whether `path` is a bag of ROS or a folder with one."""
     if not path.is_dir():
-        return path.suffix in _ENDINGS
-    return (path / _METADATA).is_file() or any(
-        listed(path, f"*{ending}") for ending in _ENDINGS
-    )
+        return path.suffix.lower() in _ENDINGS
+    return (path / _METADATA).is_file() or any(_bags(path).values())
+
+
+def _bags(folder: Path) -> dict[str, list[Path]]:
+    """Returns ending -> the files of bags in a folder, in natural order."""
+    files = listed(folder)
+    return {
+        ending: [one for one in files if one.suffix.lower() == ending]
+        for ending in _ENDINGS
+    }
 
 
 def _open_bag(path: Path) -> McapFile | RosbagFile:
     """Opens the bag at a path, or in a folder."""
     if not path.is_dir():
-        if path.suffix in (".bag", ".db3"):
+        if path.suffix.lower() in (".bag", ".db3"):
             return RosbagFile([path])
         return McapFile(path)
-    files = {ending: listed(path, f"*{ending}") for ending in _ENDINGS}
-    mcap, sqlite, ros1 = (files[ending] for ending in _ENDINGS)
+    files = _bags(path)
+    mcap, sqlite, ros1 = files.values()
     for file in listed(path, "*.bag.active"):
         check_finished([file.with_suffix("")])
     if sum(map(bool, files.values())) > 1:
@@ -946,10 +959,10 @@ def _open_bag(path: Path) -> McapFile | RosbagFile:
         _check_listed(metadata, [*mcap, *sqlite])
     if len(mcap) == 1 and not re.search(_PACKED, told, re.I | re.M):
         return McapFile(mcap[0])
+    if len(sqlite) == 1 and not re.search(_PACKED, told, re.I | re.M):
+        return RosbagFile(sqlite)
     if told:
         return RosbagFile([path])
-    if len(sqlite) == 1:
-        return RosbagFile(sqlite)
     if ros1:
         return RosbagFile(ros1)
     number, ending = (len(mcap), ".mcap") if mcap else (len(sqlite), ".db3")

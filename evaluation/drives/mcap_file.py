@@ -10,7 +10,7 @@ the whole file is read once.
 
 The package's records are used, but not its readers: they check only the
 checksums of chunks, and reserve the sizes that a record or a chunk declares.
-Here every size is checked against the file and a limit before memory is
+Here every size of a record is checked against the file before memory is
 reserved, and every checksum is checked.
 """
 
@@ -48,19 +48,17 @@ import numpy as np
 from evaluation.base import (
     InputError,
     check_regular,
+    reading,
     unpacked,
     user_errors,
     value_errors,
 )
-from evaluation.drives.bag_index import BagIndex, Entry
+from evaluation.drives.bag_index import BagIndex, Entry, check_unpacked
 from evaluation.drives.mcap_messages import read_stamp
 
 _MAGIC = b"\x89MCAP0\r\n"
 # Opcode and length.
 _RECORD_HEADER = struct.Struct("<BQ")
-# An index has a few megabytes; as Python objects it takes a hundred times as
-# much memory.
-_SUMMARY_LIMIT_BYTES = 1 << 25
 # The last record: its header, where the summary begins, its offsets, its
 # checksum.
 _FOOTER = struct.Struct("<BQQQI")
@@ -69,18 +67,6 @@ _FOOTER = struct.Struct("<BQQQI")
 _CHUNK_INDEX = struct.Struct("<16xQ8xI")
 # An entry of this table: a channel id, and an offset.
 _CHUNK_INDEX_ENTRY = struct.Struct("<HQ")
-# A broken or hostile length must not be taken for the size of a buffer. A
-# chunk holds a few scans.
-CHUNK_LIMIT_BYTES = 1 << 26
-# A table of structures has a few megabytes, too.
-_ATTACHMENT_LIMIT_BYTES = 1 << 23
-# Size of a chunk's record without its data.
-_CHUNK_FIELDS_BYTES = 1 << 10
-# Greatest size of all uncompressed chunks together: for any file, and for each
-# byte of the file. Recordings compress to a tenth; a hostile file, to nothing.
-_UNPACKED_BYTES = 1 << 30
-_UNPACKED_PER_BYTE = 200
-_RECORD_LIMIT_BYTES = CHUNK_LIMIT_BYTES + _CHUNK_FIELDS_BYTES
 # A message, after its record header: channel id, sequence, two times.
 _MESSAGE_HEADER = struct.Struct("<HIQQ")
 # A message index, after its record header: channel id, length of the rest.
@@ -109,7 +95,6 @@ _FAULTS = (
     McapError,
     EOFError,
     StopIteration,
-    MemoryError,
     OverflowError,
     ValueError,
     RuntimeError,
@@ -128,9 +113,10 @@ class McapFile:
 
     Attributes:
         path: path of the file.
-        notes, joints_ns: as of `RosbagFile`; there is one file.
+        names, notes, joints_ns: as of `RosbagFile`; there is one file.
     """
 
+    names: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     joints_ns: tuple[int, ...] = ()
 
@@ -143,14 +129,12 @@ class McapFile:
         """
         self.path = Path(path)
         check_regular(self.path)
-        self._unpacked = _Unpacked(self.path.stat().st_size)
         with self._reading() as stream:
             summary = _read_summary(stream, self.path)
             self._contents = _Contents.of(summary)
+            check_unpacked(sum(self._contents.sizes), _size_of(stream))
             if not self._contents.is_whole():
-                self._contents = self._contents.read_through(
-                    stream, self._unpacked
-                )
+                self._contents = self._contents.read_through(stream)
         self._channels: dict[str, list[Channel]] = {}
         for _, channel in sorted(self._contents.channels.items()):
             self._channels.setdefault(channel.topic, []).append(channel)
@@ -275,8 +259,7 @@ class McapFile:
             if found != name:
                 continue
             with self._reading() as stream, _place_named(offset):
-                limit = _ATTACHMENT_LIMIT_BYTES
-                _, body = _read_record(stream, offset, limit, "an attachment")
+                _, body = _read_record(stream, offset, "an attachment")
                 data = _parse_attachment(body).data
             if content not in (None, data):
                 raise InputError(
@@ -296,12 +279,7 @@ class McapFile:
         for record_name, offset in self._contents.metadata:
             if record_name == name:
                 with self._reading() as stream, _place_named(offset):
-                    _, body = _read_record(
-                        stream,
-                        offset,
-                        _ATTACHMENT_LIMIT_BYTES,
-                        "a metadata record",
-                    )
+                    _, body = _read_record(stream, offset, "a metadata record")
                     content = Metadata.read(_RecordContent(body))
                     found.append(content.metadata)
         return found
@@ -315,9 +293,7 @@ class McapFile:
         """
         start = len(_MAGIC)
         with self._reading() as stream, _place_named(start):
-            _, body = _read_record(
-                stream, start, _ATTACHMENT_LIMIT_BYTES, "the header"
-            )
+            _, body = _read_record(stream, start, "the header")
             return Header.read(_RecordContent(body)).library
 
     def _kind(self, channel: Channel) -> str:
@@ -336,9 +312,7 @@ class McapFile:
             ):
                 # Message indexes are optional, too.
                 with self._reading() as stream:
-                    self._contents = self._contents.read_through(
-                        stream, self._unpacked
-                    )
+                    self._contents = self._contents.read_through(stream)
         found = self._contents.found
         if found is not None:
             locations = np.array(
@@ -366,15 +340,11 @@ class McapFile:
         blocks: list[int] = []
         channels: list[int] = []
         with self._reading() as stream:
-            # Many indexes at one place could claim more than the file holds.
-            left = stream.seek(0, os.SEEK_END)
             for number in numbers:
                 for block, offsets in enumerate(self._contents.indexes):
                     if number not in offsets:
                         continue
-                    part = self._read_index(stream, offsets[number], left)
-                    left -= len(part)
-                    parts.append(part)
+                    parts.append(self._read_index(stream, offsets[number]))
                     blocks.append(block)
                     channels.append(number)
         entries = np.frombuffer(b"".join(parts), _INDEX_ENTRY)
@@ -387,12 +357,10 @@ class McapFile:
         return locations
 
     @staticmethod
-    def _read_index(stream: BinaryIO, offset: int, left: int) -> bytes:
-        """Returns the entries of an index of at most `left` bytes."""
+    def _read_index(stream: BinaryIO, offset: int) -> bytes:
+        """Returns the entries of an index."""
         stream.seek(offset + _RECORD_HEADER.size)
         _, length = _INDEX_HEADER.unpack(stream.read(_INDEX_HEADER.size))
-        if length > left:
-            raise ValueError("the indexes of the chunks overlap")
         entries = stream.read(length)
         if len(entries) != length or length % _INDEX_ENTRY.itemsize:
             raise ValueError("the index of a chunk is cut off")
@@ -402,13 +370,13 @@ class McapFile:
         """Reads and uncompresses a chunk whose checksum is right."""
         start = self._contents.blocks[number]
         with self._reading() as stream, _place_named(start):
-            opcode, body = _read_record(
-                stream, start, _RECORD_LIMIT_BYTES, "a chunk"
-            )
+            opcode, body = _read_record(stream, start, "a chunk")
             if opcode == Opcode.MESSAGE:
                 return memoryview(_RECORD_HEADER.pack(opcode, len(body)) + body)
             chunk = Chunk.read(_RecordContent(body))
-            self._unpacked.add(start, chunk)
+            sizes = self._contents.sizes
+            if sizes and chunk.uncompressed_size > sizes[number]:
+                raise ValueError("a chunk larger than the index says")
             return memoryview(_uncompress(chunk))
 
     def _message(self, chunk: memoryview, place: Any) -> memoryview:
@@ -432,6 +400,7 @@ class McapFile:
     def _reading(self) -> Iterator:
         with (
             user_errors(self.path),
+            reading(self.path),
             self._faults(),
             open(self.path, "rb") as stream,
         ):
@@ -459,6 +428,8 @@ class _Contents:
         channels: id -> channel.
         blocks: offset in the file of each chunk, or of each message outside of
             chunks, in the file's order [bytes].
+        sizes: the uncompressed size of each block, as the index states it
+            [bytes]; empty without an index.
         indexes: for each block, channel id -> offset of the message index
             [bytes].
         attachments: (name, offset in the file [bytes]) of each attachment.
@@ -471,6 +442,7 @@ class _Contents:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     blocks: list[int] = field(default_factory=list)
+    sizes: list[int] = field(default_factory=list)
     indexes: list[dict[int, int]] = field(default_factory=list)
     attachments: list[tuple[str, int]] = field(default_factory=list)
     metadata: list[tuple[str, int]] = field(default_factory=list)
@@ -485,7 +457,7 @@ class _Contents:
         reading all poses.
         """
         contents = cls()
-        chunks: list[tuple[int, dict[int, int]]] = []
+        chunks: list[tuple[int, int, dict[int, int]]] = []
         position = 0
         while position < len(summary):
             start = position + _RECORD_HEADER.size
@@ -513,8 +485,9 @@ class _Contents:
                 other = MetadataIndex.read(_RecordContent(body))
                 contents.metadata.append((other.name, other.offset))
         chunks.sort(key=lambda chunk: chunk[0])
-        contents.blocks = [start for start, _ in chunks]
-        contents.indexes = [offsets for _, offsets in chunks]
+        contents.blocks = [start for start, _, _ in chunks]
+        contents.sizes = [size for _, size, _ in chunks]
+        contents.indexes = [offsets for _, _, offsets in chunks]
         return contents
 
     def is_whole(self) -> bool:
@@ -540,7 +513,7 @@ class _Contents:
             counts.message_count,
         )
 
-    def read_through(self, stream: BinaryIO, unpacked: _Unpacked) -> _Contents:
+    def read_through(self, stream: BinaryIO) -> _Contents:
         """Returns the contents of the whole file, found without an index.
 
         Schemas, channels and statistics of the summary are taken over.
@@ -556,8 +529,7 @@ class _Contents:
         found: dict[int, list[tuple[int, int, int]]] = {}
         contents.found = found
         there = 0
-        size = stream.seek(0, os.SEEK_END)
-        for start, offset, record in _locate_records(stream, unpacked):
+        for start, offset, record in _locate_records(stream):
             if isinstance(record, Schema):
                 contents.schemas.setdefault(record.id, record)
             elif isinstance(record, Channel):
@@ -573,9 +545,6 @@ class _Contents:
                     (len(contents.blocks) - 1, offset, record.log_time)
                 )
                 there += 1
-                # A few compressed bytes can hold any number of messages.
-                if there > size:
-                    raise ValueError("more messages than bytes")
         unknown = found.keys() - contents.channels.keys()
         if unknown:
             raise ValueError(f"channel {min(unknown)} is defined nowhere")
@@ -586,34 +555,24 @@ class _Contents:
         return contents
 
 
-class _Unpacked:
-    """The chunks of a file that were uncompressed, each counted once."""
-
-    def __init__(self, size: int):
-        """Makes the count for a file of `size` bytes."""
-        self._left = _UNPACKED_BYTES + _UNPACKED_PER_BYTE * size
-        self._starts: set[int] = set()
-
-    def add(self, start: int, chunk: Chunk) -> None:
-        """Adds a chunk, which begins at a place in the file [bytes].
-
-        Raises:
-            ValueError: the chunks are implausibly large for the file.
-        """
-        if start not in self._starts:
-            self._starts.add(start)
-            self._left -= min(chunk.uncompressed_size, CHUNK_LIMIT_BYTES)
-        if self._left < 0:
-            raise ValueError("its chunks stand for far more bytes than it has")
+def _size_of(stream: BinaryIO) -> int:
+    return os.fstat(stream.fileno()).st_size
 
 
-def _chunk_offsets(body: bytes) -> tuple[int, dict[int, int]]:
-    """Returns the offsets of a chunk, and of its message index by channel."""
+def _chunk_offsets(body: bytes) -> tuple[int, int, dict[int, int]]:
+    """Returns what a chunk's index says of it.
+
+    Returns:
+        Its offset, its uncompressed size, and the offset of its message index
+        by channel [bytes].
+    """
     start, size = _CHUNK_INDEX.unpack_from(body)
     table = body[_CHUNK_INDEX.size : _CHUNK_INDEX.size + size]
     if len(table) != size:
         raise ValueError("the index of a chunk is cut off")
-    return start, dict(_CHUNK_INDEX_ENTRY.iter_unpack(table))
+    # The uncompressed size ends the record.
+    unpacked_bytes = int.from_bytes(body[-8:], "little")
+    return start, unpacked_bytes, dict(_CHUNK_INDEX_ENTRY.iter_unpack(table))
 
 
 def _read_summary(stream: BinaryIO, path: Path) -> bytes:
@@ -644,8 +603,6 @@ def _read_summary(stream: BinaryIO, path: Path) -> bytes:
         return b""
     if start > end:
         raise ValueError("the summary begins behind its end")
-    if end - start > _SUMMARY_LIMIT_BYTES:
-        raise ValueError(f"a summary of {end - start} bytes")
     stream.seek(start)
     summary = stream.read(end - start)
     # The checksum is also that of the footer up to the checksum itself.
@@ -655,18 +612,17 @@ def _read_summary(stream: BinaryIO, path: Path) -> bytes:
 
 
 def _read_record(
-    stream: BinaryIO, position: int, limit: int, what: str
+    stream: BinaryIO, position: int, what: str
 ) -> tuple[int, bytes]:
     """Returns the opcode and the content of the record at a position.
 
     Args:
         stream: the file.
         position: place of the record in the file [bytes].
-        limit: greatest size of the content [bytes].
         what: kind of the record, for error messages.
 
     Raises:
-        ValueError: there is no record, or it is too large.
+        ValueError: there is no record.
         EOFError: the record reaches beyond the end of the file.
     """
     stream.seek(position)
@@ -676,11 +632,11 @@ def _read_record(
     opcode, length = _RECORD_HEADER.unpack(header)
     if opcode == 0:
         raise ValueError("there is no record")
-    if length > limit:
-        raise ValueError(f"{what} of {length} bytes")
-    body = stream.read(length)
-    if len(body) != length:
+    start = stream.tell()
+    if length > stream.seek(0, os.SEEK_END) - start:
         raise EOFError(f"{what} ends behind the file")
+    stream.seek(start)
+    body = stream.read(length)
     return opcode, body
 
 
@@ -723,19 +679,10 @@ class _RecordContent(ReadDataStream):
 def _uncompress(chunk: Chunk) -> bytes:
     """Returns the uncompressed records of a chunk.
 
-    The uncompressed size is limited, so that a small file cannot fill the
-    memory.
-
     Raises:
-        ValueError: if the chunk is damaged, too large or of unknown
-            compression.
+        ValueError: if the chunk is damaged, or of unknown compression.
     """
-    size = chunk.uncompressed_size
-    if size > CHUNK_LIMIT_BYTES:
-        raise ValueError(f"a chunk of {size} bytes")
-    data = unpacked(chunk.data, chunk.compression, size)
-    if len(data) != size:
-        raise ValueError(f"a chunk of {len(data)} instead of {size} bytes")
+    data = unpacked(chunk.data, chunk.compression, chunk.uncompressed_size)
     if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
         raise ValueError("the checksum of a chunk is wrong")
     return data
@@ -757,7 +704,7 @@ _READERS = {
 
 
 def _locate_records(
-    stream: BinaryIO, unpacked: _Unpacked
+    stream: BinaryIO,
 ) -> Iterator[tuple[int, int, McapRecord]]:
     """Yields the records of an MCAP file, each with its place in the file.
 
@@ -774,16 +721,15 @@ def _locate_records(
     Raises:
         ValueError: a part of the file cannot be read.
     """
-    opcode, position = 0, len(_MAGIC)
+    opcode, position, total = 0, len(_MAGIC), 0
     while opcode != Opcode.FOOTER:
         with _place_named(position):
-            opcode, content = _read_record(
-                stream, position, _RECORD_LIMIT_BYTES, "a record"
-            )
+            opcode, content = _read_record(stream, position, "a record")
             chunk = None
             if opcode == Opcode.CHUNK:
                 chunk = Chunk.read(_RecordContent(content))
-                unpacked.add(position, chunk)
+                total += chunk.uncompressed_size
+                check_unpacked(total, _size_of(stream))
             for offset, record in _records_in(opcode, content, chunk):
                 yield position, offset, record
         position += _RECORD_HEADER.size + len(content)
@@ -804,6 +750,8 @@ def _records_in(
             header = inner.read(_RECORD_HEADER.size)
             opcode, length = _RECORD_HEADER.unpack(header)
             content = inner.read(length)
+            if opcode == 0:
+                raise ValueError("there is no record")
             if opcode in _IN_CHUNKS:
                 yield offset, _IN_CHUNKS[opcode](content)
     elif opcode in _READERS:

@@ -9,10 +9,6 @@ import numpy as np
 from evaluation.base import NS_PER_S, InputError, poses, value_errors
 from evaluation.drives import ros_messages
 
-# A few compressed kilobytes can hold a million transforms or fields: greatest
-# length of a message of transforms [bytes], and number of fields of a cloud.
-_LONGEST_TF = 1 << 20
-_MOST_FIELDS = 256
 # The header of CDR that gives the order of bytes.
 _ENCAPSULATION_BYTES = 4
 # What compressed data begin with -> the name of the compression. No message in
@@ -32,18 +28,13 @@ def decode(data: bytes | memoryview, message_type: str) -> Any:
         message_type: type of the message, such as `nav_msgs/msg/Odometry`.
 
     Raises:
-        ValueError: the data are not a message of this type, or are longer than
-            any plausible message of this type.
+        ValueError: the data are not a message of this type.
     """
     _check_uncompressed(data)
-    if message_type == ros_messages.TF and len(data) > _LONGEST_TF:
-        raise ValueError(
-            f"a message of {len(data)} bytes, more than one of its type holds"
-        )
-    if message_type == ros_messages.POINT_CLOUD:
-        read_cloud_header(data)
     try:
         return ros_messages.deserialize(data, message_type)
+    except MemoryError:
+        raise
     except Exception as error:
         # rosbags raises any error of its generated code.
         raise ValueError(
@@ -69,22 +60,17 @@ def read_cloud_header(data: bytes | memoryview) -> tuple[int, str]:
     """Returns the stamp [ns] and frame of a PointCloud2, and nothing else.
 
     Raises:
-        ValueError: the message is cut off or compressed, or has too many
-            fields.
+        ValueError: the message is cut off or compressed.
     """
     _check_uncompressed(data)
     try:
         order = "<" if data[1] & 1 else ">"
         body = data[_ENCAPSULATION_BYTES:]
         sec, nanosec, length = struct.unpack_from(f"{order}iII", body)
-        # Strings end with a zero; numbers begin at multiples of four.
+        # Strings end with a zero.
         (text,) = struct.unpack_from(f"{length}s", body, 12)
-        behind = 12 + -(-length // 4) * 4
-        _, _, num_fields = struct.unpack_from(f"{order}III", body, behind)
     except (struct.error, IndexError) as error:
         raise ValueError("a message is cut off") from error
-    if num_fields > _MOST_FIELDS:
-        raise ValueError(f"a point cloud of {num_fields} fields")
     frame_id = text.rstrip(b"\0").decode("utf-8", "backslashreplace")
     return sec * NS_PER_S + nanosec, frame_id
 
@@ -127,41 +113,53 @@ def frame_name(name: str) -> str:
 
 
 class StaticTransforms:
-    """The frames in /tf_static: a tree with each frame's pose in its parent."""
+    """The frames in /tf_static: a tree with each frame's pose in its parent.
 
-    def __init__(self, messages: Iterable[Any], where: str):
-        """Collects the transforms of messages of /tf_static.
+    Attributes:
+        moving: frames on /tf that move in their parent.
+    """
+
+    def __init__(self, edges: Iterable[Any], where: str):
+        """Collects the transforms on /tf_static.
 
         Args:
-            messages: messages of type tf2_msgs/msg/TFMessage.
+            edges: messages of type geometry_msgs/msg/TransformStamped.
             where: file or topic, with which an error message begins.
 
         Raises:
             InputError: two messages give different poses for one frame.
         """
         self._where = where
+        self.moving: set[str] = set()
         # Frame C -> its parent P, p_PC, quat_xyzw_PC.
         self._edges: dict[str, tuple] = {}
-        for message in messages:
-            for edge in message.transforms:
-                new = (
-                    frame_name(edge.header.frame_id),
-                    xyz(edge.transform.translation),
-                    xyzw(edge.transform.rotation),
+        for edge in edges:
+            # Nodes repeat what is fixed.
+            child, new = _numbers(edge)
+            old = self._edges.setdefault(child, new)
+            if not _is_same(old, new):
+                raise InputError(
+                    f"{where}: {edge.child_frame_id}: at"
+                    f" {stamp_ns(edge.header)} ns {new}, before {old}"
                 )
-                # Nodes repeat what is fixed.
-                child = frame_name(edge.child_frame_id)
-                old = self._edges.setdefault(child, new)
-                is_same = (
-                    old[0] == new[0]
-                    and poses.same_numbers(old[1], new[1])
-                    and poses.same_turns(old[2], new[2])
-                )
-                if not is_same:
-                    raise InputError(
-                        f"{where}: {edge.child_frame_id}: at"
-                        f" {stamp_ns(edge.header)} ns {new}, before {old}"
-                    )
+
+    def add_fixed(self, edges: Iterable[Any]) -> None:
+        """Adds frames on /tf that never move in their parent."""
+        found: dict[str, tuple] = {}
+        for edge in edges:
+            child, new = _numbers(edge)
+            if not _is_same(found.setdefault(child, new), new):
+                self.moving.add(child)
+        for child in found.keys() - self.moving:
+            self._edges.setdefault(child, found[child])
+
+    def has(self, base: str, frame: str) -> bool:
+        """Returns whether transforms lead from a frame to another."""
+        return (
+            not self._in_ancestors(base)
+            .keys()
+            .isdisjoint(self._in_ancestors(frame))
+        )
 
     def pose(self, base: str, frame: str) -> np.ndarray:
         """Returns the pose (4, 4) of a frame in another frame of the tree.
@@ -205,6 +203,23 @@ class StaticTransforms:
             for child, (parent, *_) in sorted(self._edges.items())
         ]
         return f"there are: {', '.join(edges) or 'none'}"
+
+
+def _numbers(edge: Any) -> tuple[str, tuple]:
+    """Returns a frame C, and its parent P with p_PC and quat_xyzw_PC."""
+    return frame_name(edge.child_frame_id), (
+        frame_name(edge.header.frame_id),
+        xyz(edge.transform.translation),
+        xyzw(edge.transform.rotation),
+    )
+
+
+def _is_same(old: tuple, new: tuple) -> bool:
+    return (
+        old[0] == new[0]
+        and poses.same_numbers(old[1], new[1])
+        and poses.same_turns(old[2], new[2])
+    )
 
 
 def checked_poses(

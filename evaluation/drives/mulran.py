@@ -7,25 +7,22 @@ X_UB is the pose of the vehicle's base in the UTM grid, at 100 Hz; the origin of
 the base is on the ground. Times are whole nanoseconds.
 """
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from evaluation.base import InputError, poses
+from evaluation.base import InputError, is_there, poses
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.drive import as_given
-from evaluation.drives.drive_scenario import (
-    SCENARIO,
-    read_scenario,
-)
+from evaluation.drives.drive_scenario import SCENARIO
 from evaluation.drives.scan_files import (
     BinDrive,
-    PosedFiles,
+    OwnPoses,
     first_existing,
     list_stamped,
     posed,
-    posed_by,
 )
 from evaluation.drives.trajectories import read_matrices
 from evaluation.drives.utm_poses import DATUM, is_local, to_world
@@ -71,6 +68,7 @@ class MulranDrive(BinDrive):
         path: Path,
         columns: int | None = None,
         poses: Path | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a drive.
 
@@ -78,6 +76,7 @@ class MulranDrive(BinDrive):
             path: its folder, with or without a `sensor_data`.
             columns: number of columns of a scan, see `BinDrive`.
             poses: file with poses of the LiDAR, which is read instead.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.
@@ -89,20 +88,15 @@ class MulranDrive(BinDrive):
                 f"{path}: MulRan: neither {' nor '.join(_FOLDERS)} in it"
             )
         files, stamps_ns = list_stamped(folder, ".bin")
-        scenario = read_scenario(path)
         super().__init__(
             columns,
-            name=as_given(path).name,
-            scans=(
-                posed_by(poses, files, stamps_ns)
-                if poses
-                else _posed(path, files, stamps_ns)
+            path=path,
+            scans=posed(
+                files, stamps_ns, partial(_own_poses, path), poses, pose_gap
             ),
-            tables=[path / SCENARIO],
-            notes=tuple(chosen),
-            scenario=scenario,
+            notes=chosen,
             # Exports of cns-drake are of any LiDAR.
-            unit="os1-64-33" if scenario is None else None,
+            unit=None if is_there(path / SCENARIO) else "os1-64-33",
         )
 
     def _read_bin(self, path: Path, stamp_ns: int) -> np.ndarray:
@@ -136,26 +130,26 @@ DATA_SET = DataSet(
 )
 
 
-def _posed(path: Path, files: list[Path], stamps_ns: np.ndarray) -> PosedFiles:
-    """Gives scan files the poses of the drive."""
-    poses_path = path / _POSES
-    trajectory = read_matrices(poses_path)
-    found = posed(files, stamps_ns, trajectory)._replace(tables=(poses_path,))
+def _own_poses(path: Path) -> OwnPoses:
+    """Returns the poses of a drive, which are at its base."""
+    table = path / _POSES
+    trajectory = read_matrices(table)
     if is_local(trajectory.X_WB):
-        note = (
-            f"{poses_path}: no UTM coordinates; taken for those of a frame of"
-            f" {as_given(path).name} alone"
-        )
-        return found._replace(
-            X_WS=found.X_WS @ X_BS,
-            notes=(*found.notes, note),
-            world_frame=f"mulran{path.resolve()}",
+        return OwnPoses(
+            trajectory,
+            f"mulran{path.resolve()}",
+            (table,),
             has_own_world=True,
+            X_WS=lambda X_LB: X_LB @ X_BS,
+            note=f"{table}: no UTM coordinates; taken for those of a frame of"
+            f" {as_given(path).name} alone",
         )
-    return found._replace(
-        X_WS=to_world(found.X_WS, poses_path) @ X_BS,
-        world_frame=f"mulran/{DATUM}",
-        datum=DATUM,
+    return OwnPoses(
+        trajectory,
+        f"mulran/{DATUM}",
+        (table,),
+        DATUM,
+        X_WS=lambda X_UB: to_world(X_UB, table) @ X_BS,
     )
 
 

@@ -17,17 +17,13 @@ import numpy as np
 from evaluation.base import InputError, poses
 from evaluation.drives.data_set import DataSet
 from evaluation.drives.drive import as_given
-from evaluation.drives.drive_scenario import (
-    SCENARIO,
-    read_scenario,
-)
 from evaluation.drives.scan_files import (
     FileDrive,
+    OwnPoses,
     check_below,
     first_existing,
     list_stamped,
     posed,
-    posed_by,
     read_packed,
 )
 from evaluation.drives.text_tables import parse_microseconds
@@ -75,6 +71,7 @@ class NcltDrive(FileDrive):
         path: Path,
         columns: int | None = None,
         poses: Path | None = None,
+        pose_gap: float | None = None,
     ):
         """Opens a session.
 
@@ -82,6 +79,7 @@ class NcltDrive(FileDrive):
             path: its folder.
             columns: is ignored, because the layout is fixed.
             poses: file with poses of the LiDAR, which is read instead.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: there is no such session, or its poses cannot be used.
@@ -94,26 +92,30 @@ class NcltDrive(FileDrive):
         files, stamps_ns = list_stamped(
             path / _SCANS, ".bin", parse_microseconds
         )
-        name = as_given(path).name
         chosen: list[str] = []
-        if poses:
-            scans = posed_by(poses, files, stamps_ns)
-        else:
-            table = _poses_path(path, chosen)
-            scans = posed(files, stamps_ns, read_angles(table))
-            X_WS = _X_WN @ scans.X_WS @ _X_BS
-            scans = scans._replace(
-                X_WS=X_WS, world_frame="nclt", tables=(table,)
-            )
         super().__init__(
-            name=name,
-            scans=scans,
-            read=lambda path, stamp_ns: _read_scan(path),
-            tables=[path / SCENARIO],
-            scenario=read_scenario(path),
-            notes=tuple(chosen),
+            path,
+            posed(
+                files,
+                stamps_ns,
+                lambda: _own_poses(_poses_path(path, chosen)),
+                poses,
+                pose_gap,
+            ),
+            lambda path, stamp_ns: _read_scan(path),
+            notes=chosen,
             unit="hdl-32e-upside-down",
         )
+
+
+def _own_poses(table: Path) -> OwnPoses:
+    """Returns the poses in a table of the data set."""
+    return OwnPoses(
+        read_angles(table),
+        "nclt",
+        (table,),
+        X_WS=lambda X_NB: _X_WN @ X_NB @ _X_BS,
+    )
 
 
 def holds_nclt(path: Path) -> bool:

@@ -9,12 +9,22 @@ import math
 from pathlib import Path
 from typing import Any
 
-from evaluation.base import Family, doing, errors_at, import_modules, listed
+from evaluation.base import (
+    Family,
+    doing,
+    errors_at,
+    import_modules,
+    listed,
+    reads,
+)
 from evaluation.base import InputError as InputError
 from evaluation.clouds import is_cloud
 from evaluation.drives.data_set import DataSet, check_interface
 from evaluation.drives.drive import Drive
 from evaluation.drives.posed_drive import PosedDrive
+
+# Endings of packed files, of which none is a drive.
+_PACKED = (".gz", ".bz2", ".xz", ".zst", ".zstd", ".lz4", ".zip", ".7z", ".tar")
 
 
 @dataclass(frozen=True)
@@ -73,6 +83,7 @@ class Reading:
         return self.open(path)
 
 
+@reads
 def open_drive(
     path: Path,
     lidar: str | None = None,
@@ -97,7 +108,7 @@ def open_drive(
             of the recording: in the form of TUM (seconds, x y z, quaternion
             x y z w), of a table whose header names these columns, or of KITTI
             (3 x 4 matrices, one for each scan).
-        pose_gap: greatest time between two poses of a bag that are interpolated
+        pose_gap: greatest time between two recorded poses that are interpolated
             [s]; by default 1.
 
     Raises:
@@ -132,9 +143,10 @@ def open_drive(
         if pose_gap is not None:
             if not 0.0 < pose_gap < math.inf:
                 raise InputError(f"--pose-gap: {pose_gap:g} is not above 0")
-            if "pose_gap" not in arguments:
+            if "pose_gap" not in arguments and poses is None:
                 raise InputError(
-                    f"{path}: {found.title}: --pose-gap is for bags of ROS"
+                    f"{path}: {found.title}: interpolates no poses, as"
+                    " --pose-gap limits"
                 )
         named: dict[str, Any] = {
             "odometry": odometry,
@@ -148,18 +160,15 @@ def open_drive(
         else:
             drive = _open_others(found, path, given, **asked)
         if poses is not None and "poses" not in arguments:
-            drive = PosedDrive(drive, poses)
+            drive = PosedDrive(drive, poses, pose_gap)
         return drive
     if path.is_dir() and any(path.glob(".*.mcap.*.part")):
         raise InputError(
             f"{path}: the recording was not finished; simulate the drive again"
         )
-    one = [path] if ".mcap.zst" in path.name else []
-    for file in listed(path, "*.mcap.zst*") if path.is_dir() else one:
-        raise InputError(
-            f"{file}: the whole recording is compressed (rosbag2's mode"
-            " `file`); uncompress it first"
-        )
+    for file in listed(path) if path.is_dir() else [path]:
+        if file.suffix.lower().endswith(_PACKED):
+            raise InputError(f"{file}: a packed file; unpack it first")
     titles = [one.title for one in data_sets().values() if one.title != "MCAP"]
     raise InputError(
         f"{path}: not a recorded drive (a folder with an .mcap file, or"

@@ -22,9 +22,15 @@ LayoutName = Literal["cns", "ouster", "velodyne", "autoware"]
 _MM_PER_M = 1e3
 # Limit of times that are stored as uint32 [ns].
 _LONGEST_NS = 2.0**32
+# Size of a number that resolves times since 1970.
+_ABSOLUTE_BYTES = 8
 # The latest time in a scan, if it is in nanoseconds: in seconds it would be
 # later than any scan ends, and before 2001.
 _NS_OF_A_SCAN = (1e6, 1e9)
+# Names of fields with the times of points, by which is used first.
+_TIMES = ("t", "time", "time_stamp", "timestamp")
+# Units of times since 1970: nanoseconds, microseconds and seconds [ns].
+_UNITS_NS = (1, 1_000, NS_PER_S)
 # Echoes that a LiDAR reports -> Autoware's type of a beam's only return. There
 # is none for the first one, which is of the type INVALID.
 _SINGLE_TYPES = {"first": 0, "strongest": 1, "last": 2}
@@ -78,7 +84,7 @@ _LAYOUTS = {
 
 def to_layout(
     points: np.ndarray,
-    layout: str,
+    layout: LayoutName,
     num_rings: int | None = None,
     is_calibrated: bool = False,
     echoes: str = "strongest",
@@ -87,8 +93,7 @@ def to_layout(
 
     Args:
         points: (N,) with the fields x y z intensity ring t.
-        layout: a `LayoutName`; `cns` is the layout that the points
-            have.
+        layout: the layout; `cns` is that of the points.
         num_rings: number of rings of the LiDAR. If given, the layout `velodyne`
             counts rings from the lowest ring, as Velodyne's driver does.
         is_calibrated: whether the intensities are calibrated. Calibrated
@@ -171,6 +176,7 @@ def from_layout(
     points: np.ndarray,
     labels: np.ndarray | None = None,
     is_ideal: Callable[[], bool] = lambda: False,
+    stamp_ns: int | None = None,
 ) -> np.ndarray:
     """Converts points of any layout to the fields of the layout `cns`.
 
@@ -181,14 +187,17 @@ def from_layout(
         is_ideal: function that returns whether intensities of the `autoware`
             layout are 255 times ideal ones, as cns-drake records them. All
             others stay as they are.
+        stamp_ns: time of the scan [ns]; None if times of points do not count
+            from 1970.
 
     Returns:
         (N,) points; `points` itself if nothing changes. Fields that `cns` does
-        not have are kept. In `velodyne`, `time` [s] becomes `t` [ns]. In
-        `autoware`, `time_stamp` and `channel` become `t` and `ring`, and ideal
-        intensities are scaled to 0 to 1. A floating-point `t` in seconds or
-        nanoseconds becomes whole nanoseconds; a `t` whose values fit neither
-        unit stays unchanged.
+        not have are kept. In `autoware`, `channel` becomes `ring`, and ideal
+        intensities are scaled to 0 to 1. The first of the fields `t`, `time`,
+        `time_stamp` and `timestamp` becomes `t` [ns since the stamp]: whole
+        nanoseconds of 32 bits; floating-point seconds or nanoseconds; or times
+        since 1970 within a second of the stamp, as of Hesai and RoboSense. A
+        field whose values fit no unit stays unchanged.
 
     Raises:
         ValueError: the numbers of labels and points differ.
@@ -196,18 +205,20 @@ def from_layout(
     names = points.dtype.names or ()
     columns = {name: points[name] for name in names}
     if {"time_stamp", "channel", "intensity"} <= set(names):
-        columns["t"] = columns.pop("time_stamp")
+        columns.pop("t", None)
         columns["ring"] = columns.pop("channel")
         full = np.float32(_FULL if is_ideal() else 1.0)
         columns["intensity"] = points["intensity"] / full
-    elif "time_stamp" in names and "t" not in names:
-        columns["t"] = columns.pop("time_stamp")
-    else:
-        timed = next((name for name in ("t", "time") if name in names), "t")
-        t_ns = _nanoseconds(columns.get(timed))
+    timed = next((name for name in _TIMES if name in columns), None)
+    if timed is not None:
+        t_ns = _since_1970(columns[timed], stamp_ns)
+        if t_ns is None and timed == "time_stamp":
+            t_ns = columns[timed]
+        elif t_ns is None and timed != "timestamp":
+            t_ns = _nanoseconds(columns[timed])
         if t_ns is not None:
+            del columns[timed]
             columns["t"] = t_ns
-            columns.pop("time", None)
     if labels is not None:
         if len(labels) != len(points):
             raise ValueError(f"{len(points)} points, but {len(labels)} labels")
@@ -226,19 +237,39 @@ def from_layout(
     return made
 
 
-def _nanoseconds(times: np.ndarray | None) -> np.ndarray | None:
+def _since_1970(times: np.ndarray, stamp_ns: int | None) -> np.ndarray | None:
+    """Returns times since 1970 as int32 (N,) since the stamp [ns].
+
+    The result is None if they are none, or a second or more from the stamp.
+    """
+    is_exact = times.itemsize == _ABSOLUTE_BYTES and times.ndim == 1
+    if stamp_ns is None or not (is_exact and len(times)):
+        return None
+    for unit_ns in _UNITS_NS:
+        with np.errstate(invalid="ignore"):
+            away = times.astype(float) * unit_ns - stamp_ns
+        if (np.abs(away) < NS_PER_S).all():
+            # A double has too few digits for these nanoseconds.
+            whole = np.floor(times)
+            rest = np.rint((times - whole).astype(float) * unit_ns)
+            whole_ns = whole.astype(np.int64) * unit_ns - stamp_ns
+            return (whole_ns + rest).astype(np.int32)
+    return None
+
+
+def _nanoseconds(times: np.ndarray) -> np.ndarray | None:
     """Returns times as nanoseconds since the stamp, if the unit is certain.
 
-    Some drivers count backwards from the last point, or since 1970.
+    Some drivers count backwards from the last point, or since the LiDAR began.
 
     Args:
-        times: (N,) times of the points; None if the points have no such field.
+        times: (N,) times of the points.
 
     Returns:
-        (N,) uint32 [ns]; None without such a field, or if its unit is not
-        certain.
+        (N,) uint32 [ns]; None if they are no floating-point numbers, or their
+        unit is not certain.
     """
-    if times is None or times.dtype.kind != "f":
+    if times.dtype.kind != "f":
         return None
     t_ns = times.astype(float)
     if not _NS_OF_A_SCAN[0] <= t_ns.max(initial=0.0) < _NS_OF_A_SCAN[1]:

@@ -18,19 +18,22 @@ class PosedDrive(MovedDrive):
     It is for data sets of plug-ins, whose readers take no file of poses.
     """
 
-    def __init__(self, drive: Drive, path: Path):
+    def __init__(self, drive: Drive, path: Path, pose_gap: float | None = None):
         """Reads the poses.
 
         Args:
             drive: the drive.
             path: file with poses of the LiDAR, see `read_trajectory`.
+            pose_gap: see `StampedPoses.at_scans`.
 
         Raises:
             InputError: the file cannot be read, or has no pose for a scan.
         """
         path = Path(path)
         trajectory = read_trajectory(path, drive.stamps_ns)
-        self._kept, X_WS, self._told = trajectory.at_scans(drive.stamps_ns)
+        self._kept, X_WS, self._told = trajectory.at_scans(
+            drive.stamps_ns, pose_gap
+        )
         self._path = path
         super().__init__(drive, X_WS, poses_frame(path), None)
 

@@ -29,9 +29,10 @@ from evaluation.base import (
     check_regular,
     is_there,
     listed,
+    reading,
 )
 from evaluation.drives import mcap_messages, ros_messages
-from evaluation.drives.bag_index import BagIndex, Entry
+from evaluation.drives.bag_index import BagIndex, Entry, check_unpacked
 from evaluation.drives.mcap_file import LOCATION
 
 # How to read a damaged bag of ROS 1, for error messages.
@@ -69,9 +70,9 @@ class RosbagFile:
     Attributes:
         path: the bag, for messages.
         files: its files.
+        names: names of those that hold messages.
         library: name of the program that wrote it, which is unknown.
-        joints_ns: log times at which a file of ROS 1 ends and the next begins
-            [ns].
+        joints_ns: log times at which a file ends and the next begins [ns].
     """
 
     library = ""
@@ -87,10 +88,15 @@ class RosbagFile:
                 behind that is not read, or the files are not one recording.
         """
         self.path = paths[0] if len(paths) == 1 else paths[0].parent
-        self.files = (
-            tuple(listed(self.path)) if self.path.is_dir() else tuple(paths)
-        )
-        check_finished(self.files)
+        files = listed(self.path) if self.path.is_dir() else [*paths]
+        check_finished(files)
+        bags = [
+            one
+            for one in files
+            if {"bag", "db3", "mcap"} & {*one.name.lower().split(".")}
+        ]
+        self.names = [one.name for one in bags]
+        self.files = (*bags, *(one for one in files if one not in bags))
         self._paths = list(paths)
         self._local = threading.local()
         self._opened: list[_Opened] = []
@@ -117,7 +123,7 @@ class RosbagFile:
         """
         found: _Opened | None = getattr(self._local, "opened", None)
         if found is None or found.pid != os.getpid():
-            with self._faults():
+            with reading(self.path), self._faults():
                 found = _Opened.of(self._paths)
             self._local.opened = found
             # What a parent has opened stays open: closing it would remove the
@@ -137,27 +143,26 @@ class RosbagFile:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on the files that were joined."""
-        names = [
-            one.name
-            for one in self.files
-            if {".bag", ".db3", ".mcap"} & set(one.suffixes)
-        ]
-        if len(names) < 2:
+        if len(self.names) < 2:
             return ()
         return (
-            f"{self.path}: {len(names)} files are read as one recording:"
-            f" {' '.join(names)}",
+            f"{self.path}: {len(self.names)} files are read as one recording:"
+            f" {' '.join(self.names)}",
         )
 
     def _joints(self, paths: Sequence[Path]) -> list[int]:
-        """Returns where files of ROS 1 are joined; checks that they may be.
+        """Returns where files are joined; checks that those of ROS 1 may be.
 
         Raises:
-            InputError: a file does not continue the one before it.
+            InputError: a file of ROS 1 does not continue the one before it.
         """
-        readers: Any = sorted(
-            self._here.reader.readers, key=lambda one: one.start_time
-        )
+        given: Any = self._here.reader.readers
+        if self._here.reader.is2:
+            parts = getattr(given[0].storage, "storages", [given[0].storage])
+            # An empty file ends at 0.
+            ends_ns = [one.metadata.end_time for one in parts]
+            return sorted(filter(None, ends_ns))[:-1]
+        readers = sorted(given, key=lambda one: one.start_time)
         for before, after in itertools.pairwise(readers):
             gap_ns = after.start_time - before.end_time
             first, second = (
@@ -214,7 +219,8 @@ class RosbagFile:
 
     def read(self, location: np.void) -> memoryview:
         """Returns the message at a location, in CDR."""
-        ((_, data),) = self.visit(np.array([location], LOCATION))
+        with reading(self.path):
+            ((_, data),) = self.visit(np.array([location], LOCATION))
         return data
 
     def visit(self, locations: np.ndarray) -> Iterator[tuple[int, memoryview]]:
@@ -248,9 +254,13 @@ class RosbagFile:
     ) -> Iterator[Entry]:
         """Yields all messages of topics, see `BagIndex`."""
         here = self._here
+        size = sum(file.stat().st_size for file in self.files)
+        total = 0
         with self._faults():
             for connection, time_ns, data in here.messages(topics):
                 topic = connection.topic
+                total += len(data)
+                check_unpacked(total, size)
                 yield Entry(
                     topic,
                     time_ns,
@@ -272,19 +282,19 @@ class RosbagFile:
         """Turns the errors of a damaged bag into an InputError of one line."""
         try:
             yield
-        except InputError:
+        except (InputError, MemoryError):
             raise
         except Exception as error:
             # rosbags, SQLite and the compression raise errors of any class.
             raise InputError(
                 f"{self.path}: the bag cannot be read"
-                f" ({type(error).__name__}: {error}){self._advice()}"
+                f" ({type(error).__name__}: {_told(error)}){self._advice()}"
             ) from error
 
     def _advice(self) -> str:
         """Returns what helps against the error of a bag of ROS 1, if known."""
         for file in self.files:
-            if file.suffix != ".bag" or not file.is_file():
+            if file.suffix.lower() != ".bag" or not file.is_file():
                 continue
             with open(file, "rb") as stream:
                 start = stream.read(_START_BYTES)
@@ -317,8 +327,12 @@ class _Opened:
     def of(cls, paths: Sequence[Path]) -> _Opened:
         """Opens a bag."""
         link = None
-        # rosbags puts the path of a SQLite file into an address as it is.
-        if any(_IN_ADDRESSES.search(str(one)) for one in paths):
+        # rosbags puts the path of a SQLite file into an address as it is, and
+        # knows endings in lower case.
+        if any(
+            _IN_ADDRESSES.search(str(one)) or one.suffix != one.suffix.lower()
+            for one in paths
+        ):
             link = tempfile.TemporaryDirectory(prefix="cns-drake-")
             paths = [
                 _linked(Path(link.name) / str(number), one.absolute())
@@ -369,10 +383,15 @@ class _Opened:
         return int(sec * NS_PER_S + nanosec)
 
 
+def _told(error: Exception) -> str:
+    """Returns what an error of the package says, except what is to be done."""
+    return str(error).partition("; please report")[0]
+
+
 def _linked(folder: Path, path: Path) -> Path:
     """Returns the path of a link, of the same name if it is a file's."""
     folder.mkdir()
-    link = folder / (f"bag{path.suffix}" if path.is_file() else "bag")
+    link = folder / (f"bag{path.suffix.lower()}" if path.is_file() else "bag")
     link.symlink_to(path)
     return link
 

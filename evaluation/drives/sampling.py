@@ -42,6 +42,8 @@ def travelled(positions: np.ndarray) -> np.ndarray:
     the path is divided into parts whose ends lie 0.5 m apart, and a part that
     is much longer than the straight line between its ends counts as that line.
     """
+    if not len(positions):
+        return np.zeros(0)
     steps = step_lengths(positions)
     ends = _corners(positions)
     if ends[-1] < len(steps):
@@ -58,7 +60,7 @@ def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
     """Returns frames at a given spacing along a trajectory.
 
     Args:
-        positions: (N, 3) positions of the sensor [m], at least one.
+        positions: (N, 3) positions of the sensor [m].
         spacing: distance between two frames, along the path [m].
 
     Returns:

@@ -16,11 +16,9 @@ from evaluation.base import (
     user_errors,
     value_errors,
 )
-from evaluation.clouds import SCAN_LIMIT_BYTES, bin_dtype
-from evaluation.drives.drive import (
-    Drive,
-    poses_frame,
-)
+from evaluation.clouds import bin_dtype
+from evaluation.drives.drive import Drive, as_given, poses_frame
+from evaluation.drives.drive_scenario import SCENARIO, read_scenario
 from evaluation.drives.lidar_fields import (
     LidarField,
     lidar_field,
@@ -47,11 +45,32 @@ class PosedFiles(NamedTuple):
     files: list[Path]
     stamps_ns: np.ndarray
     X_WS: np.ndarray
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
     world_frame: str = ""
     tables: tuple[Path, ...] = ()
     datum: str | None = None
+    has_own_world: bool | None = None
+
+
+class OwnPoses(NamedTuple):
+    """The poses that a data set publishes with a drive.
+
+    Attributes:
+        trajectory: the poses as they are published.
+        world_frame, tables, datum, has_own_world: see `PosedFiles`; by default,
+            drives of the data set share W.
+        X_WS: function that returns poses of the LiDAR in W, both (N, 4, 4),
+            given published ones.
+        note: note for the user; "" for none.
+    """
+
+    trajectory: StampedPoses
+    world_frame: str
+    tables: tuple[Path, ...]
+    datum: str | None = None
     has_own_world: bool = False
+    X_WS: Callable[[np.ndarray], np.ndarray] = lambda X: X
+    note: str = ""
 
 
 class FileDrive(Drive):
@@ -59,11 +78,13 @@ class FileDrive(Drive):
 
     def __init__(
         self,
-        name: str,
+        path: Path,
         scans: PosedFiles,
         read: Callable[[Path, int], np.ndarray],
+        *,
+        name: str = "",
         tables: Iterable[Path] = (),
-        notes: tuple[str, ...] = (),
+        notes: Iterable[str] = (),
         scenario: Mapping | None = None,
         unit: str | LidarField | None = None,
         lidar: str = "",
@@ -71,21 +92,28 @@ class FileDrive(Drive):
         """Describes a drive of N >= 1 scans.
 
         Args:
-            name: name of the drive, unless its scenario has a `name`.
+            path: its file or folder, which may hold a `scenario.yaml`.
             scans: its scans.
             read: function that returns the points in the file of a scan,
                 unchanged. Its arguments are the file and the time of the scan
                 [ns]. It raises ValueError if the file has another format.
+            name: name of the drive, unless its scenario has a `name`; by
+                default that of `path`.
             tables: all other files that are read. A path where there is no
                 file is left out.
             notes: notes for the user on how the drive was read.
-            scenario: see `evaluation.drives.Drive.scenario`.
+            scenario: the scenario of a drive without `scenario.yaml`.
             unit: the LiDAR, if the data set has only one, as in
                 `evaluation.drives.lidar_field`.
             lidar: name of the LiDAR, if a drive can have several. It follows
                 the name of the drive.
+
+        Raises:
+            InputError: see `read_scenario`.
         """
-        self._session = str((scenario or {}).get("name", name))
+        self._scenario = read_scenario(path) or scenario
+        named = (self._scenario or {}).get("name", name or as_given(path).name)
+        self._session = str(named)
         self.name = f"{self._session}_{lidar}" if lidar else self._session
         self._lidar = lidar
         self.world_frame = scans.world_frame
@@ -94,11 +122,10 @@ class FileDrive(Drive):
         self._stamps_ns = scans.stamps_ns
         self._X_WS = scans.X_WS
         self._read = read
-        tables = (*scans.tables, *tables)
+        tables = (*scans.tables, *tables, path / SCENARIO)
         self._tables = tuple(table for table in tables if table.is_file())
         self._notes = (*notes, *scans.notes)
         self._datum = scans.datum
-        self._scenario = scenario
         self._unit = unit
 
     def __len__(self) -> int:
@@ -148,9 +175,9 @@ class FileDrive(Drive):
             raise IndexError(f"scan {index} of {len(self)}")
         path = self._files[index]
         with user_errors(path), value_errors(path):
-            return _without_no_returns(
-                self._read(path, int(self._stamps_ns[index]))
-            )
+            points = self._read(path, int(self._stamps_ns[index]))
+            check_range(points, FARTHEST_RETURN)
+            return points[are_returns(points)]
 
 
 class BinDrive(FileDrive):
@@ -226,46 +253,45 @@ def _are_alike(first: Path, second: Path) -> bool:
 
 
 def posed(
-    files: list[Path], stamps_ns: np.ndarray, trajectory: StampedPoses
+    files: list[Path],
+    stamps_ns: np.ndarray,
+    own: Callable[[], OwnPoses],
+    given: Path | None,
+    pose_gap: float | None,
+    numbers: Sequence[int] | None = None,
 ) -> PosedFiles:
-    """Gives scan files their poses.
+    """Gives scan files their poses: those that a user gives, or the drive's.
 
     Args:
-        files: files of N scans.
+        files: files of all N scans, even those without ground truth.
         stamps_ns: (N,) their stamps [ns].
-        trajectory: the poses of the drive.
+        own: function that returns the drive's own poses.
+        given: file with poses of the LiDAR, see `read_trajectory`.
+        pose_gap: see `StampedPoses.at_scans`.
+        numbers: see `read_trajectory`.
 
     Returns:
         The files between the first and the last pose, and notes, see
-        `StampedPoses.at_scans`; without a name of W.
+        `StampedPoses.at_scans`.
 
     Raises:
-        InputError: a scan has no pose.
+        InputError: poses cannot be read, or a scan has none.
     """
-    kept, X_WB, notes = trajectory.at_scans(stamps_ns)
-    return PosedFiles(files[kept], stamps_ns[kept], X_WB, notes)
-
-
-def posed_by(
-    poses: Path,
-    files: list[Path],
-    stamps_ns: np.ndarray,
-    numbers: Sequence[int] | None = None,
-) -> PosedFiles:
-    """Gives scan files the poses of the LiDAR that the user's file has.
-
-    Args:
-        poses: the file, see `read_trajectory`.
-        files: files of all N scans, even those without ground truth.
-        stamps_ns: (N,) their stamps [ns].
-        numbers: see `read_trajectory`.
-
-    Raises:
-        InputError: the file cannot be read, or has no pose for a scan.
-    """
-    trajectory = read_trajectory(poses, stamps_ns, numbers)
-    return posed(files, stamps_ns, trajectory)._replace(
-        world_frame=poses_frame(poses), tables=(poses,)
+    if given is None:
+        found = own()
+    else:
+        trajectory = read_trajectory(given, stamps_ns, numbers)
+        found = OwnPoses(trajectory, poses_frame(given), (given,))
+    kept, X, notes = found.trajectory.at_scans(stamps_ns, pose_gap)
+    return PosedFiles(
+        files[kept],
+        stamps_ns[kept],
+        found.X_WS(X),
+        (*notes, *filter(None, [found.note])),
+        found.world_frame,
+        found.tables,
+        found.datum,
+        found.has_own_world,
     )
 
 
@@ -274,9 +300,9 @@ def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
 
     Raises:
         ValueError: if the last record is incomplete.
-        InputError: if the file cannot be read, or is too large for a scan.
+        InputError: if the file cannot be read.
     """
-    data = read_bytes(path, SCAN_LIMIT_BYTES)
+    data = read_bytes(path)
     if len(data) % dtype.itemsize:
         raise ValueError(
             f"{len(data)} bytes is no whole number of points of"
@@ -303,14 +329,12 @@ def check_below(points: np.ndarray, name: str, limit: int) -> None:
         )
 
 
-def _without_no_returns(points: np.ndarray) -> np.ndarray:
-    """Returns the points except points at the origin (beams without return).
+def are_returns(points: np.ndarray) -> np.ndarray:
+    """Returns which points (N,) are not at the origin, as beams without return.
 
-    Raises:
-        ValueError: if a coordinate is too large for a point.
+    Ouster and Livox, for example, write points for all beams.
     """
-    check_range(points, FARTHEST_RETURN)
     is_return = np.zeros(len(points), dtype=bool)
     for name in "xyz":
         is_return |= points[name] != 0.0
-    return points[is_return]
+    return is_return

@@ -16,7 +16,7 @@ from evaluation.base import file_digests
 from evaluation.drives.drive import Drive
 from evaluation.drives.drive_views import MovedDrive
 from evaluation.drives.joined_drive import JoinedDrive
-from evaluation.drives.opening import open_drive
+from evaluation.drives.opening import Reading
 
 
 class DriveSource(Protocol):
@@ -75,18 +75,16 @@ class RecordingSource:
 
     Attributes:
         path: file or folder of the recording.
-        lidar: name of the LiDAR, for recordings with several LiDARs.
-        columns: number of values per point in `.bin` files, see `read_cloud`.
+        reading: how it is read.
         placement: where the drive is, if it was aligned to another.
     """
 
     path: Path
-    lidar: str | None = None
-    columns: int | None = None
+    reading: Reading = field(default_factory=Reading)
     placement: Placement | None = None
 
     def __call__(self) -> Drive:
-        drive = open_drive(self.path, self.lidar, self.columns)
+        drive = self.reading.open(self.path)
         to = self.placement
         if to is None:
             return drive
@@ -100,15 +98,15 @@ class RecordingSource:
         """
         drive = self()
         names = [file.name for file in drive.files]
-        of_poses = [self.placement.digest] if self.placement else []
+        how = {k: v for k, v in vars(self.reading).items() if v is not None}
+        if self.placement is not None:
+            how["placement"] = self.placement.digest
+        # A file of poses counts by its content, as all files.
+        how.pop("poses", None)
+        # Behind a slash, local frames name their file.
+        frame = drive.world_frame.partition("/")[0]
         return [
-            [
-                drive.name,
-                drive.world_frame,
-                self.lidar,
-                self.columns,
-                *of_poses,
-            ],
+            [drive.name, frame, how],
             *map(list, zip(names, file_digests(drive.files), strict=True)),
         ]
 

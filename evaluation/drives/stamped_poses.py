@@ -11,6 +11,12 @@ from evaluation.base import NS_PER_S, InputError, poses
 
 # Greatest time between two poses that are interpolated, by default [s].
 LONGEST_GAP = 1.0
+# Poses begin anew where they jump by more than this [m] ...
+_JUMP = 2.0
+# ... and this speed of a vehicle [m/s] ...
+_FASTEST = 50.0
+# ... or this multiple of its usual speed allow.
+_FASTER = 10.0
 # Poses with one stamp are one pose if they are within this distance [m] ...
 _SAME_PLACE = 0.05
 # ... and this angle [rad].
@@ -18,6 +24,41 @@ _SAME_TURN = np.radians(1.0)
 # A pose has a scan's stamp if they differ by no more: a double rounds
 # nanoseconds since 1970 [ns].
 _SAME_NS = 1000
+
+
+def _differences(
+    X_WA: np.ndarray, X_WB: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns distances [m] and small angles [rad] of poses (N, 4, 4)."""
+    away = np.linalg.norm((X_WB - X_WA)[:, :3, 3], axis=1)
+    # The chord of a small angle is as long as its arc.
+    chords = (X_WB - X_WA)[:, :3, :3]
+    return away, np.linalg.norm(chords, axis=(1, 2)) / np.sqrt(2.0)
+
+
+class PoseSteps(NamedTuple):
+    """The steps between N poses.
+
+    Attributes:
+        times: (N - 1,) durations [s].
+        moves: (N - 1,) distances [m].
+        speed: median speed [m/s]; 0 for less than two poses.
+        is_jump: (N - 1,) bool, at which poses begin anew.
+    """
+
+    times: np.ndarray
+    moves: np.ndarray
+    speed: float
+    is_jump: np.ndarray
+
+    @classmethod
+    def of(cls, stamps_ns: np.ndarray, X: np.ndarray) -> PoseSteps:
+        """Returns the steps of poses (N, 4, 4) at increasing stamps (N,)."""
+        times = np.diff(stamps_ns) / NS_PER_S
+        moves = np.linalg.norm(np.diff(X[:, :3, 3], axis=0), axis=1)
+        speed = float(np.median(moves / times)) if len(times) else 0.0
+        allowed = _JUMP + max(_FASTEST, _FASTER * speed) * times
+        return cls(times, moves, speed, moves > allowed)
 
 
 class PosedScans(NamedTuple):
@@ -45,18 +86,14 @@ class StampedPoses:
         X_WB: (N, 4, 4) float64 poses.
         num_unknown: number of rows or messages that were left out, because they
             have NaN or no rotation in the place of a pose.
-        longest_gap: greatest time between two poses that are interpolated [s].
         notes: notes for the user on poses that were left out or moved.
-        advice: what else may be done about a longer gap, for errors.
     """
 
     source: object
     stamps_ns: np.ndarray
     X_WB: np.ndarray
     num_unknown: int = 0
-    longest_gap: float = LONGEST_GAP
     notes: tuple[str, ...] = ()
-    advice: str = ""
 
     @classmethod
     def of(
@@ -110,10 +147,7 @@ class StampedPoses:
         twice = np.flatnonzero(np.diff(stamps) == 0) + 1
         if len(twice):
             first = np.searchsorted(stamps, stamps[twice])
-            away = np.linalg.norm((X[twice] - X[first])[:, :3, 3], axis=1)
-            # The chord of a small angle is as long as its arc.
-            chords = (X[twice] - X[first])[:, :3, :3]
-            turn = np.linalg.norm(chords, axis=(1, 2)) / np.sqrt(2.0)
+            away, turn = _differences(X[first], X[twice])
             is_far = (away > _SAME_PLACE) | (turn > _SAME_TURN)
             if is_far.any():
                 k = int(is_far.argmax())
@@ -132,7 +166,9 @@ class StampedPoses:
             stamps, X = stamps[kept], X[kept]
         return cls(source, stamps, X, notes=tuple(notes), **fields)
 
-    def at_scans(self, stamps_ns: np.ndarray) -> PosedScans:
+    def at_scans(
+        self, stamps_ns: np.ndarray, pose_gap: float | None = None
+    ) -> PosedScans:
         """Returns the poses at the stamps of scans.
 
         Rotations are interpolated by SLERP, positions linearly. A pose within a
@@ -140,10 +176,12 @@ class StampedPoses:
 
         Args:
             stamps_ns: (M,) int64 stamps, increasing [ns].
+            pose_gap: greatest time between two poses that are interpolated [s];
+                by default a second.
 
         Raises:
             InputError: no scan has a pose, or a scan lies in a gap of more than
-                `longest_gap`.
+                `pose_gap`.
         """
         own = self.stamps_ns
         spanned = np.flatnonzero(
@@ -168,14 +206,27 @@ class StampedPoses:
         off = np.flatnonzero(away > _SAME_NS)
         X_WB = self.X_WB[nearest]
         gaps = (from_before + to_after)[off]
-        if (gaps > self.longest_gap * NS_PER_S).any():
-            worst = off[gaps.argmax()]
+        longest_gap = LONGEST_GAP if pose_gap is None else pose_gap
+        is_long = gaps > longest_gap * NS_PER_S
+        moves, turns = _differences(
+            self.X_WB[before[off]], self.X_WB[after[off]]
+        )
+        # Programs such as amcl send poses only while the robot moves.
+        is_still = (moves <= _SAME_PLACE) & (turns <= _SAME_TURN)
+        if (is_long & ~is_still).any():
+            worst = int(np.where(is_still, 0, gaps).argmax())
             raise InputError(
-                f"{self.source}: no pose for the scan at {wanted[worst]} ns:"
-                f" the poses there are {gaps.max() * 1e-9:.4g} s apart, more"
-                f" than {self.longest_gap:g} s{self.advice}"
+                f"{self.source}: no pose for the scan at {wanted[off[worst]]}"
+                f" ns: the poses there are {gaps[worst] * 1e-9:.4g} s apart,"
+                f" more than {longest_gap:g} s (--pose-gap SECONDS allows more)"
             )
         notes = [*self.notes]
+        if is_long.any():
+            notes.append(
+                f"{self.source}: no pose for up to {gaps.max() * 1e-9:.4g} s at"
+                f" {np.count_nonzero(is_long)} scans, but the same before and"
+                " after; the vehicle is taken to stand there"
+            )
         if self.num_unknown:
             notes.append(
                 f"{self.source}: {self.num_unknown} poses without numbers or"

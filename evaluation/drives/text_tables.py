@@ -24,9 +24,8 @@ from evaluation.base import (
 )
 
 _NS_PER_US = 1000
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+")
 _NANOSECONDS = re.compile(r"\d{15,}")
-# Largest table [bytes]: NCLT has some of 80 MB.
-_TABLE_LIMIT_BYTES = 1 << 29
 
 
 def read_stamped_rows(
@@ -124,6 +123,9 @@ def form_of(path: Path) -> TableForm:
         InputError: see `read_numbers`.
     """
     before, header, lines = _parts(path)
+    _, *cells = re.split(r"[;\s]+", lines[0].strip())
+    if cells and all(map(_DECIMAL_COMMA.fullmatch, cells)):
+        raise InputError(f"{path}: decimal commas; write decimal points")
     separator = next((one for one in ",;" if one in lines[0]), None)
     width = len(lines[0].split(separator))
     words = _split_header(header or before, separator)
@@ -139,7 +141,7 @@ def _parts(path: Path) -> tuple[str, str, list[str]]:
         InputError: there is no such file, or no row in it.
     """
     try:
-        text = decode_text(read_bytes(path, _TABLE_LIMIT_BYTES))
+        text = decode_text(read_bytes(path))
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not a text file") from error
     # Only \n and \r\n end a line; str.splitlines splits at more characters.

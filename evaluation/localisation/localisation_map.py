@@ -189,7 +189,7 @@ class OneScan(FileDrive):
         notes: list[str] = []
         scan = read_cloud(path, columns, notes.append)
         super().__init__(
-            name=path.name,
+            path,
             scans=PosedFiles(
                 [path],
                 np.zeros(1, np.int64),

@@ -45,8 +45,6 @@ from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.network_weights import Weights, checked_weights
 from evaluation.methods.registry import register
 
-# Greatest size of a file of weights, and of its arrays together [bytes].
-_MOST_BYTES = 200_000_000
 _ADVICE = (
     "no .npz file of this network's weights; the page docs/notes/bevplace.md"
     " shows how to make one"
@@ -404,7 +402,7 @@ class BevPlaceConfig(MethodConfig):
         Two files with the same name can contain different weights; their
         digests differ.
         """
-        content = read_bytes(self.weights, _MOST_BYTES)
+        content = read_bytes(self.weights)
         return hashlib.sha256(content).hexdigest()[:16]
 
 
@@ -451,7 +449,7 @@ class BevPlace(Method[np.ndarray, np.ndarray]):
 def _read_weights(path: Path) -> dict[str, np.ndarray]:
     """Returns the weights (float32) in an .npz file, by name."""
     try:
-        found = read_npz(path, SHAPES, _MOST_BYTES)
+        found = read_npz(path, SHAPES)
     except ValueError as error:
         raise InputError(f"{path}: {_ADVICE} ({error})") from error
     if not found:

@@ -124,8 +124,6 @@ SEEN_SHARES = "seen"
 # cities; and trained with exact overlaps, on streets of no map.
 SHIPPED = Path(__file__).with_name("learned_weights.npz")
 GRADED = SHIPPED.with_name("learned_graded_weights.npz")
-# Greatest size of a file of weights [bytes].
-_MOST_BYTES = 5_000_000
 
 
 class LearnedConfig(MethodConfig):
@@ -309,14 +307,9 @@ def _load_checked(
             again.
         size: its size [bytes].
     """
-    if size > _MOST_BYTES:
-        raise InputError(
-            f"{path}: {size} bytes are too many for weights (at most "
-            f"{_MOST_BYTES})"
-        )
     shapes = _shapes_of_weights()
     try:
-        values = read_npz(path, ("version", *shapes), _MOST_BYTES)
+        values = read_npz(path, ("version", *shapes))
     except ValueError as error:
         raise InputError(f"{path}: no file of weights ({error})") from error
     version = values.get("version")

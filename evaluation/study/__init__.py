@@ -1,10 +1,9 @@
-"""A study, which measures pairs of drives by jobs: a public noun.
+"""A study, which measures pairs of drives: a public noun.
 
 An `Experiment` has conditions. A `Study` measures pairs of drives under these
 conditions, by tasks and methods, and writes `results.csv` and `queries.csv`.
-`study_recordings` is the experiment `stages` on recordings, which need not
-exist yet. No finished job runs again, because the file of each result names the
-inputs from which it was made.
+`study_recordings` is the experiment `stages` on recordings. Nothing is measured
+twice, because a store names each result by what it was made of.
 
 This module imports nothing, because the process of each job would have to wait
 for the imports.

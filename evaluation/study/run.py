@@ -13,6 +13,7 @@ from typing import TypeAlias
 
 from evaluation.base import (
     Cluster,
+    FailedJobsError,
     Job,
     Key,
     Reporter,
@@ -59,14 +60,23 @@ def measure_pairs(
         for one, data in drives.values()
         if data.store is not None
     )
-    measurements = _jobs(
-        (one.pairs[0].title, one.reading(drives)) for one in left
-    )
-    told = forecast([*readings, *measurements], cluster, space)
+    steps = [one.reading(drives) for one in left]
+    told = forecast([*readings, *_measurements(steps)], cluster, space)
     if told is not None:
         on_note(f"{told}; after an interruption, run the same command again")
-    run_jobs(readings, cluster, "drives")
-    run_jobs(measurements, cluster, "pairs")
+    faults = []
+    try:
+        run_jobs(readings, cluster, "drives")
+    except FailedJobsError as error:
+        # All other pairs are measured nevertheless.
+        faults.append(str(error))
+        steps = [one for one in steps if not one.lacks_drives()]
+    try:
+        run_jobs(_measurements(steps), cluster, "pairs")
+    except FailedJobsError as error:
+        faults.append(str(error))
+    if faults:
+        raise FailedJobsError("; ".join(faults))
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +151,13 @@ class MeasurePair(Step):
         found = {digest: drives[digest][1] for digest in own}
         return replace(self, drives=found)
 
+    def lacks_drives(self) -> bool:
+        """Returns whether a drive was to be read for it, and was not."""
+        return any(
+            one.store is not None and bool(one.missing())
+            for one in self.drives.values()
+        )
+
     def _keys(self) -> Iterator[Key]:
         for task in self.tasks:
             for pair in self.pairs:
@@ -201,6 +218,10 @@ def _drives_of(
             data = replace(data, store=None)
         found[digest] = drive, data
     return found
+
+
+def _measurements(steps: Iterable[MeasurePair]) -> list[Job]:
+    return _jobs((one.pairs[0].title, one) for one in steps)
 
 
 def _jobs(steps: Iterable[tuple[str, Step]]) -> list[Job]:

@@ -81,8 +81,7 @@ def change_between(
         odometry: topic of the poses, for recordings with several.
         poses: file with the poses of the LiDAR, see `open_drive`.
         columns: number of columns of `.bin` files.
-        pose_gap: greatest time between two poses of a bag that are interpolated
-            [s], see `open_drive`.
+        pose_gap: see `open_drive`.
         on_note: is called with notes for the user.
 
     Raises:

@@ -128,8 +128,7 @@ def localise(
         odometry: topic of the poses, for recordings with several.
         poses: file with the poses of the LiDAR, see `open_drive`.
         columns: number of columns of `.bin` files.
-        pose_gap: greatest time between two poses of a bag that are interpolated
-            [s], see `open_drive`.
+        pose_gap: see `open_drive`.
         processes: number of processes that localise single scans.
         on_note: is called with notes for the user.
 
@@ -243,6 +242,8 @@ def _with_offset(
         on_note: is called with what is added.
     """
     right = is_right(rows)
+    if not right.any() and world.doubt:
+        on_note(f"no scan is localised{world.doubt}")
     if right.mean() < _MOSTLY:
         return world
     off, turn_deg = (

@@ -156,8 +156,7 @@ def recognise(
         odometry: topic of the poses, for recordings with several.
         poses: file with the poses of the LiDAR, see `open_drive`.
         columns: number of columns of `.bin` files.
-        pose_gap: greatest time between two poses of a bag that are interpolated
-            [s], see `open_drive`.
+        pose_gap: see `open_drive`.
         exact_overlaps: file with exact overlaps; by default overlaps are
             estimated from the scans. It needs the field `overlap`.
         on_note: is called with notes for the user.
@@ -226,6 +225,8 @@ def recognise(
     check_has_match(outcome)
     for text in (*_notes(made, drives), *_easy(outcome, drives, protocol)):
         on_note(text)
+    if not outcome.outcomes.is_right.any() and (doubt := opened.world.doubt):
+        on_note(f"{outcome.query}: no answer is right{doubt}")
     if protocol.exclude_recent is None and _is_itself(database, query):
         on_note(
             f"{_named(query)}: every scan finds itself (--exclude-recent leaves"

@@ -19,6 +19,8 @@ def report(
     protocols: Mapping[str, RetrievalProtocol] | None = None,
     lidar: str | None = None,
     columns: int | None = None,
+    odometry: str | None = None,
+    pose_gap: float | None = None,
     align: When = "auto",
     cluster: Cluster | None = None,
     with_costs: bool = True,
@@ -40,6 +42,7 @@ def report(
             `random-yaw`.
         lidar: name of the LiDAR, for recordings with several LiDARs.
         columns: number of columns of `.bin` files.
+        odometry, pose_gap: see `open_drive`.
         align: whether to align the recordings of a map: `auto` (if their worlds
             differ), `always` or `never`.
         cluster: runs the jobs; by default a job for each core.
@@ -67,7 +70,14 @@ def report(
             on_note(held.pop(0))
 
     try:
-        found = find_recordings(Path(recordings), held.append, lidar, columns)
+        found = find_recordings(
+            Path(recordings),
+            held.append,
+            lidar=lidar,
+            columns=columns,
+            odometry=odometry,
+            pose_gap=pose_gap,
+        )
         for choice in chosen:
             made = choice.make()
             for text in {made.assumption(one.lidar_field) for one in found}:

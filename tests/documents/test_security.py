@@ -2,6 +2,7 @@
 
 import ast
 import pickle
+import re
 
 from helpers import documents
 import numpy as np
@@ -55,3 +56,15 @@ def test_a_page_in_the_making_is_seen_from_this_machine_alone():
             word.arg: ast.literal_eval(word.value) for word in call.keywords
         }
         assert given == {"host": "127.0.0.1", "port": 0}
+
+
+def test_each_promise_names_its_tests():
+    text = (documents.ROOT / "SECURITY.md").read_text()
+    safe, _, _ = text.partition("## Not safe")
+    known = {
+        path.name for path in (documents.ROOT / "tests").rglob("test_*.py")
+    }
+    for promise in safe.split("\n- ")[1:]:
+        named = re.findall(r"`(test_\w+\.py)`", promise)
+        assert named, promise
+        assert known.issuperset(named), named

@@ -62,7 +62,6 @@ def write_recording(
     world_frame: str = "map",
     mast: str = "mast",
     compression: CompressionType = CompressionType.ZSTD,
-    without_pose: list[int] | None = None,
     later_poses: dict[int, np.ndarray] | None = None,
     library: str = "test",
     **writing,
@@ -84,7 +83,6 @@ def write_recording(
         world_frame: of the odometry.
         mast: parent of the sensor's frame; the vehicle carries `mast`.
         compression: of the chunks.
-        without_pose: frames without a message of odometry.
         later_poses: stamp [ns] -> pose of the vehicle (4, 4), on /tf.
         library: name of the program that wrote the file.
         writing: further options of the writer.
@@ -138,13 +136,12 @@ def write_recording(
                     stamp,
                     0,
                 )
-            if i not in (without_pose or ()):
-                add(
-                    "/odometry",
-                    _odometry(X_WB, world_frame, stamp + odometry_shift_ns),
-                    stamp,
-                    i,
-                )
+            add(
+                "/odometry",
+                _odometry(X_WB, world_frame, stamp + odometry_shift_ns),
+                stamp,
+                i,
+            )
             add("/lidar/points", point_cloud(scan, stamp), stamp, i)
         for stamp, X_WB in (later_poses or {}).items():
             add("/tf", _tf(X_WB, world_frame, stamp), stamp, 0)

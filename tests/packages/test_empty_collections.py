@@ -1,8 +1,8 @@
 """Public functions take empty collections, or say in a line what is missing.
 
-The doors of worlds and of the simulator list them, and classes. Each is called
-with an empty collection for every parameter that is one; an array is empty in
-the first of its usual shapes that the function takes.
+The doors of all packages list them, and classes. Each is called with an empty
+collection for every parameter that is one; an array is empty in the first of
+its usual shapes and types that the function takes.
 """
 
 from collections import abc
@@ -16,11 +16,13 @@ import numpy as np
 import pytest
 import shapely
 
+from cns_drake.sensors import POINT_DTYPE
 from evaluation.base import InputError
+from evaluation.localisation import QUERY
 
 PACKAGES = sorted(
     ".".join(stub.parent.relative_to(ROOT).parts)
-    for house in ("worlds", "cns_drake")
+    for house in ("evaluation", "worlds", "cns_drake")
     for stub in (ROOT / house).glob("*/__init__.pyi")
 )
 COLLECTIONS = (
@@ -28,12 +30,20 @@ COLLECTIONS = (
     tuple, dict, set,
 )  # fmt: skip
 SHAPES = ((0,), (0, 2), (0, 3), (0, 3, 3), (0, 4, 4), (0, 2, 2), (0, 0))
-# Functions of three numbers, an image, an outline, elevations, and of one
-# choice at least: their sequences cannot be empty.
+# Points of a scan, and results of a localisation.
+RECORDS = [*POINT_DTYPE.descr, *QUERY.descr]
+# Functions of three numbers, an image, an outline, elevations, polygons, poses,
+# a drive, and of one choice, drive or method at least: their sequences cannot
+# be empty.
 NEVER_EMPTY = (
     "cns_drake.recording.make_compressed_image",
     "cns_drake.recording.make_image",
     "cns_drake.sensors.SpinningPattern",
+    "evaluation.base.revolved",
+    "evaluation.recognition.common_blocks",
+    "evaluation.recognition.joined_scans",
+    "evaluation.recognition.pose_error",
+    "evaluation.results.make_page_drive",
     "worlds.shapes.block",
     "worlds.shapes.cut_ears",
     "worlds.shapes.pick_key",
@@ -58,7 +68,8 @@ def empties(hint):
         found = [empties(one) for one in typing.get_args(hint)]
         return next((one for one in found if one), None)
     if hint is np.ndarray:
-        return [np.zeros(shape) for shape in SHAPES]
+        arrays = [np.zeros(shape) for shape in SHAPES]
+        return [*arrays, np.zeros(0, int), np.zeros(0, RECORDS)]
     origin = typing.get_origin(hint) or hint
     if origin is tuple and Ellipsis not in typing.get_args(hint):
         return None
@@ -75,16 +86,20 @@ def calls(function):
         hints = typing.get_type_hints(
             function.__init__ if is_class else function
         )
-    except NameError:  # Of a name for type checkers alone.
+        parameters = inspect.signature(function).parameters
+    except (NameError, ValueError):
+        # A name for type checkers alone, or a class without a signature.
         return []
     choices, has_empty = {}, False
-    for name, one in inspect.signature(function).parameters.items():
+    for name, one in parameters.items():
         if one.default is not one.empty or one.kind in (
             one.VAR_KEYWORD, one.VAR_POSITIONAL,
         ):  # fmt: skip
             continue
         found = empties(hints.get(name))
         has_empty |= found is not None
+        if typing.get_origin(hints.get(name)) is typing.Literal:
+            found = typing.get_args(hints[name])
         if found is None and hints.get(name) in VALUES:
             found = [VALUES[hints[name]]]
             if hints[name] is float:  # Limits are in ascending order.
@@ -107,6 +122,8 @@ def functions():
         for name in listed(package):
             function = getattr(door, name)
             is_one = inspect.isfunction(function) or inspect.isclass(function)
+            if inspect.isabstract(function):
+                continue
             if is_one and calls(function):
                 seen.setdefault(function, f"{package}.{name}")
     return {k: name for k, name in seen.items() if name not in NEVER_EMPTY}

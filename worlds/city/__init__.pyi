@@ -41,6 +41,7 @@ from .generation.starter import starter_plan as starter_plan
 from .generation.starter import starter_stages as starter_stages
 from .ground.coverings import TILE as TILE
 from .ground.coverings import Covering as Covering
+from .ground.elevation import Pad as Pad
 from .ground.markings import DASH as DASH
 from .ground.markings import DASH_GAP as DASH_GAP
 from .ground.streets import kerb_area as kerb_area

@@ -1,11 +1,17 @@
 """Counts of the faults that an import finds in a file."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
+
+from evaluation.base import InputError
 
 # Longer texts are cut [characters].
 _LONGEST_TEXT = 100
+# The example of a fault that concerns all of a file.
+WHOLE_FILE = "the file"
+# A file is refused if the shapes of a greater share of it cannot be read.
+_MOST_RUINED = 0.5
 # Use of a part -> how a report calls it.
 _USES = {"read": "read", "shapeless": "ignored, changes no shape"}
 
@@ -24,6 +30,26 @@ class FaultCount(NamedTuple):
     example: str
 
 
+class Share(NamedTuple):
+    """Which share of the world a kind of fault concerns.
+
+    Attributes:
+        part: the share, from 0 to 1.
+        of: the whole, in words.
+    """
+
+    part: float
+    of: str
+
+    @property
+    def percent(self) -> str:
+        """The share with two digits, such as `1.7 %`."""
+        return f"{float(f'{100 * self.part:.2g}'):g} %"
+
+    def __str__(self) -> str:
+        return f"{self.percent} of {self.of}"
+
+
 class ImportFaults:
     """Counts the repaired and omitted parts of a file, by kind of fault.
 
@@ -34,15 +60,23 @@ class ImportFaults:
         self._counts: Counter[str] = Counter()
         self._examples: dict[str, str] = {}
         self._names: dict[str, set[str]] = {}
+        self._ruins: set[str] = set()
         self._parts: dict[tuple[str, str], set[str]] = {}
 
-    def add(self, kind: str, example: str, number: int = 1) -> None:
+    def add(
+        self, kind: str, example: str, number: int = 1, *, ruins: bool = False
+    ) -> None:
         """Adds `number` faults of one kind to the counts.
 
-        `kind` describes the fault and its remedy in words. `example` is the
-        name of an object that has the fault.
+        Args:
+            kind: the fault and its remedy, in words.
+            example: name of an object that has the fault.
+            number: number of faults.
+            ruins: whether the object's shape in the file cannot be read.
         """
         kind = _printable(kind)
+        if ruins:
+            self._ruins.add(kind)
         self._counts[kind] += number
         self._examples.setdefault(kind, _printable(example))
         self._names.setdefault(kind, set()).add(example)
@@ -75,22 +109,52 @@ class ImportFaults:
             for (element, use), names in sorted(self._parts.items())
         ]
 
-    def shares(self, volumes: Mapping[str, float]) -> dict[str, float]:
-        """Returns the share of the whole volume that has each kind of fault.
+    def shares(
+        self, volumes: Mapping[str, float], num_elements: int
+    ) -> dict[str, Share]:
+        """Returns which share of the world each kind of fault concerns.
 
         Args:
-            volumes: name of an object -> its volume [m^3].
-
-        Returns:
-            Kind -> share, from 0 to 1; only kinds of these objects.
+            volumes: name of a building -> its volume [m^3].
+            num_elements: number of elements of the file, for faults that no
+                building has.
         """
         whole = sum(volumes.values()) or 1.0
-        shares = {
-            kind: sum(volumes.get(name, 0.0) for name in names) / whole
-            for kind, names in self._names.items()
-            if kind in self._counts
-        }
-        return {kind: share for kind, share in shares.items() if share > 0.0}
+        shares = {}
+        for kind in self._counts:
+            names = self._names[kind]
+            volume = sum(volumes.get(name, 0.0) for name in names)
+            number = num_elements if WHOLE_FILE in names else len(names)
+            elements = min(number / max(num_elements, 1), 1.0)
+            shares[kind] = (
+                Share(volume / whole, "the volume of all buildings")
+                if volume
+                else Share(elements, "the elements of the file")
+            )
+        return shares
+
+    def check_ruins(self, source: object, built: Iterable[str]) -> None:
+        """Checks that at least half of the objects have their shapes.
+
+        Args:
+            source: the file, named in the error.
+            built: names of the objects in the city.
+
+        Raises:
+            InputError: the shapes of more objects cannot be read.
+        """
+        ruined = set().union(*(self._names[kind] for kind in self._ruins))
+        whole = ruined.union(built)
+        share = Share(
+            len(ruined) / max(len(whole), 1), "what should be in the city"
+        )
+        if share.part > _MOST_RUINED:
+            why = "; ".join(
+                f"{one.kind}: {one.number}, such as {one.example}"
+                for one in self.rows()
+                if one.kind in self._ruins
+            )
+            raise InputError(f"{source}: {share} cannot be read: {why}")
 
     def rows(self) -> list[FaultCount]:
         """Returns the counts of all kinds of faults, most frequent first."""

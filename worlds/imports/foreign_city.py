@@ -64,3 +64,7 @@ class ForeignCity:
     small_objects: Sequence[SmallObject] = ()
     level: float | None = None
     sources: Mapping[str, str] = field(default_factory=dict)
+
+    def source_of(self, imported: ImportedObject) -> str:
+        """Returns the id of an object, or of its original, in the file."""
+        return self.sources.get(imported.draw_name, imported.draw_name)

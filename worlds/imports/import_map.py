@@ -13,7 +13,7 @@ from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 from threadpoolctl import threadpool_limits
 
-from evaluation.base import InputError, doing, dot, draft_folder
+from evaluation.base import InputError, doing, dot, draft_folder, reads
 from worlds.imports import map_files, overview
 from worlds.imports.dressing.dressed_city import dress_city
 from worlds.imports.drives.cell_graph import CellGraph
@@ -29,7 +29,7 @@ from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity
 from worlds.imports.ground import ground_of, ground_structures
 from worlds.imports.grown_city import grow
-from worlds.imports.imported_objects import ImportedObject
+from worlds.imports.imported_objects import FARTHEST, ImportedObject
 from worlds.imports.map_source import MapSource, source_of
 from worlds.imports.options import DriveOn, ImportOptions
 from worlds.imports.report import ImportReport
@@ -62,6 +62,7 @@ Finish = Callable[[Path, Mapping[str, tuple[int, int]]], None]
 # One thread for linear algebra: the matrices are small and several processes
 # run, so more threads would only wait for each other.
 @threadpool_limits.wrap(limits=1)  # type: ignore[untyped-decorator]
+@reads
 def import_city(
     source: Path | str,
     output: Path | str,
@@ -99,8 +100,9 @@ def import_city(
     if kind.read is None:
         return _import_roads(kind, source, output, options, own, finish)
     city = kind.read(source, options)
+    city.faults.check_ruins(source, map(city.source_of, city.objects))
+    _check_sizes(source, city.objects)
     staged = stage_city(source, city, options)
-    plausible = _check_sizes(staged.kept, city.faults)
     changes = None
     if options.grow is not None:
         staged, changes = grow(staged, options.grow, options.seed)
@@ -108,8 +110,7 @@ def import_city(
     ground = ground_of(staged.kept, city.level)
     space = find_free_space(staged.kept, ground)
     side = options.drive_on or ("left" if city.keeps_left else "right")
-    # The cells of a city in millimetres would be searched for minutes.
-    drives = own or (_find_drives(city, space, side) if plausible else [])
+    drives = own or _find_drives(city, space, side)
     if options.within is not None:
         staged = _cropped_city(staged, drives, options.within, city.faults)
         ground = ground_of(staged.kept, city.level)
@@ -136,7 +137,7 @@ def import_city(
             city, options, list(staged.standing), changes, dressing
         )
         map_files.write_facts(draft, source, facts, city.faults)
-        built = {city.sources.get(one.draw_name, one.draw_name) for one in bare}
+        built = set(map(city.source_of, bare))
         if dressing is not None:
             built |= dressing.sources
         report = _report_of(staged, drives, city, len(built))
@@ -150,38 +151,36 @@ def import_city(
     return report
 
 
-def _check_sizes(
-    objects: Sequence[ImportedObject], faults: ImportFaults
-) -> bool:
-    """Returns whether the sizes of the buildings are plausible.
+def _check_sizes(source: Path, objects: Sequence[ImportedObject]) -> None:
+    """Checks that the buildings have plausible heights.
 
-    If not, the buildings are counted as a fault. Each value of a file in
-    another unit is plausible, but the city is not.
+    Each value of a file in another unit is plausible, but the city is not.
+
+    Raises:
+        InputError: the median building is too small or too large.
     """
-    buildings = [
-        one for one in objects if "building" in one.object_type.lower()
+    heights = [
+        np.ptp(one.triangles[:, :, 2])
+        for one in objects
+        if "building" in one.object_type.lower()
     ]
-    if not buildings:
-        return True
-    height = float(
-        np.median([np.ptp(one.triangles[:, :, 2]) for one in buildings])
-    )
     low, high = _PLAUSIBLE_HEIGHTS
+    height = float(np.median(heights)) if heights else low
     if low <= height <= high:
-        return True
+        return
     away = {
         factor: abs(math.log(max(height, 1e-9) * factor / _USUAL_HEIGHT))
         for factor in _FACTORS
     }
-    side = "too small" if height < low else "too large"
-    faults.add(
-        f"{side}: the median building is {height:.3g} m high; multiply"
-        f" coordinates by {min(away, key=lambda one: away[one]):g}? No drive is"
-        " looked for.",
-        buildings[0].structure.name,
-        len(buildings),
+    factor = min(away, key=lambda one: away[one])
+    raise InputError(
+        f"{source}: the median building is {height:.3g} m high; "
+        + (
+            f"multiply coordinates by {factor:g}?"
+            if height
+            else "footprints are no city"
+        )
     )
-    return False
 
 
 def with_usual_growth(source: Path, options: ImportOptions) -> ImportOptions:
@@ -241,7 +240,7 @@ def _report_of(
         parts=faults.parts(),
         num_elements=city.num_elements,
         num_built=num_built,
-        shares=faults.shares(_volumes(city.objects)),
+        shares=faults.shares(_volumes(city.objects), city.num_elements),
     )
 
 
@@ -252,7 +251,8 @@ def _volumes(objects: Sequence[ImportedObject]) -> dict[str, float]:
     """
     volumes: defaultdict[str, float] = defaultdict(float)
     for one in objects:
-        if one.is_building:
+        size = np.ptp(one.triangles, axis=(0, 1))
+        if one.is_building and (size < FARTHEST).all():
             a, b, c = np.moveaxis(one.triangles, 1, 0)
             twice_area = np.cross(b - a, c - a)[:, 2]
             height = (a + b + c)[:, 2] / 3.0 - one.triangles[:, :, 2].min()

@@ -6,6 +6,7 @@ from enum import Enum
 import re
 
 import numpy as np
+from shapely.geometry.base import BaseGeometry
 
 from worlds.shapes import (
     GROUND_CLASSES,
@@ -18,6 +19,9 @@ from worlds.shapes import (
     hull_of,
 )
 
+# Greatest distance of a structure from the middle of a city along x, y and z
+# [m]. Some files have -9999 in place of an unknown height.
+FARTHEST = np.array([10_000.0, 10_000.0, 3_000.0])
 # Classes of the ground on which cars may drive.
 _GROUND_OF_CARS = GROUND_CLASSES - {"sidewalk"}
 
@@ -133,6 +137,7 @@ def make_object(
     lod: float = 0.0,
     kind: str = "",
     base: Base = Base.GROUND,
+    footprint: BaseGeometry | None = None,
 ) -> ImportedObject:
     """Returns an object whose structure is made of triangles in the world.
 
@@ -151,6 +156,7 @@ def make_object(
         kind: what the structure is, such as `church` for a Building; by default
             the object's type.
         base: where the object stands.
+        footprint: area of the structure in W [m]; by default the convex hull.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))
@@ -162,7 +168,9 @@ def make_object(
     model = Model(
         tuple(parts),
         {f"{name}_{part}": to_mesh(some) for part, some in filled.items()},
-        hull_of(triangles.reshape(-1, 3)[:, :2]),
+        hull_of(triangles.reshape(-1, 3)[:, :2])
+        if footprint is None
+        else footprint,
     )
     structure = Structure(
         name,

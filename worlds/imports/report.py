@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from worlds.imports.faults import FaultCount
+from worlds.imports.faults import FaultCount, Share
 
 # File in the map's folder that lists all counts of an import.
 REPORT_NAME = "import.txt"
@@ -26,8 +26,7 @@ class ImportReport:
             shape.
         num_elements: number of elements of the file.
         num_built: number of those of which something is in the city.
-        shares: kind of fault -> share of the volume of all buildings that the
-            buildings with this fault have, from 0 to 1.
+        shares: kind of fault -> share of the world that it concerns.
     """
 
     kinds: dict[str, int]
@@ -40,25 +39,19 @@ class ImportReport:
     parts: list[str]
     num_elements: int
     num_built: int
-    shares: Mapping[str, float] = field(default_factory=dict)
+    shares: Mapping[str, Share] = field(default_factory=dict)
 
     def told_built(self) -> str:
         """Returns how much of the file is in the city, in words."""
-        share = _percent(self.num_built / max(self.num_elements, 1))
+        share = Share(
+            self.num_built / max(self.num_elements, 1),
+            "the elements of the file",
+        )
         return (
             f"in the city: {self.num_built} of {self.num_elements} elements of"
-            f" the file ({share})"
+            f" the file ({share.percent})"
         )
 
     def told(self, fault: FaultCount) -> str:
         """Returns the number of a fault in words, with its share."""
-        share = self.shares.get(fault.kind)
-        if share is None:
-            return str(fault.number)
-        part = f"{_percent(share)} of the volume of all buildings"
-        return f"{fault.number}, {part}"
-
-
-def _percent(share: float) -> str:
-    """Returns a share, from 0 to 1, with two digits in percent."""
-    return f"{float(f'{100 * share:.2g}'):g} %"
+        return f"{fault.number}, {self.shares[fault.kind]}"

@@ -10,13 +10,15 @@ import numpy as np
 
 from evaluation.base import MAX_INSTANCE, InputError
 from worlds.imports.building_years import stands_today
+from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity
 from worlds.imports.former_buildings import with_former_buildings
-from worlds.imports.imported_objects import ImportedObject, boxes_of
+from worlds.imports.imported_objects import (
+    FARTHEST,
+    ImportedObject,
+    boxes_of,
+)
 from worlds.imports.options import ImportOptions
-
-# Greatest distance of a structure from the middle of a city [m].
-_FARTHEST = 10_000.0
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ def stage_city(
     Raises:
         InputError: if all stages together have no structure, or too many.
     """
-    objects = _without_outliers(city)
+    objects = _without_copies(_without_outliers(city), city.faults)
     if not objects:
         raise InputError(f"{source}: no object has a surface")
     standing = {
@@ -176,7 +178,7 @@ def stage_names(years: Sequence[int]) -> list[str]:
 
 
 def _without_outliers(city: ForeignCity) -> list[ImportedObject]:
-    """Returns a city's objects within 10 km of its middle.
+    """Returns a city's objects within 10 km of its middle, and 3 km in height.
 
     All other objects are counted in the city's faults.
     """
@@ -186,14 +188,39 @@ def _without_outliers(city: ForeignCity) -> list[ImportedObject]:
     middle = np.median(boxes.mean(axis=1), axis=0)
     kept = []
     for imported, reach in zip(
-        city.objects, np.abs(boxes - middle).max(axis=(1, 2)), strict=True
+        city.objects,
+        (np.abs(boxes - middle) / FARTHEST).max(axis=(1, 2)),
+        strict=True,
     ):
-        if reach <= _FARTHEST:
+        if reach <= 1.0:
             kept.append(imported)
         else:
-            kind = f"object more than {_FARTHEST / 1000:g} km away, left out"
-            city.faults.add(kind, imported.structure.name)
+            x, _, z = FARTHEST / 1000
+            kind = f"object more than {x:g} km away or {z:g} km higher or lower"
+            city.faults.add(f"{kind}, left out", imported.structure.name)
     return kept
+
+
+def _without_copies(
+    objects: Sequence[ImportedObject], faults: ImportFaults
+) -> list[ImportedObject]:
+    """Returns the objects without those whose surfaces another one has.
+
+    Those are counted as faults. What stood there at another time is no copy.
+    """
+    kept: dict[tuple[object, ...], ImportedObject] = {}
+    for imported in objects:
+        key = (
+            imported.object_type,
+            imported.year,
+            imported.until,
+            imported.is_gone,
+            imported.triangles.tobytes() or imported.structure.name,
+        )
+        if kept.setdefault(key, imported) is not imported:
+            name = imported.structure.name
+            faults.add("object equal to another one, left out", name)
+    return list(kept.values())
 
 
 def _why_never(imported: ImportedObject, options: ImportOptions) -> str:

@@ -23,7 +23,6 @@ _FLATTENING = 1.0 / 298.257223563
 # and other authorities, well-known text, and PROJ's own parameters if they are
 # numbers or words. In all others, and in the parts of well-known text that
 # `_WITH_FILES` names, PROJ can open a file, so also a device or a pipe.
-_LONGEST = 1 << 14
 _AUTHORITY = r"[A-Za-z]{2,9}"
 _FORMS = re.compile(
     rf"(?:{_AUTHORITY}:)?\d+(?:\+(?:{_AUTHORITY}:)?\d+)?"
@@ -37,6 +36,8 @@ _FORMS = re.compile(
     re.DOTALL | re.IGNORECASE,
 )
 _WITH_FILES = re.compile(r"EXTENSION|PARAMETERFILE", re.IGNORECASE)
+# A file of heights, which no map takes from its reference system.
+_HEIGHTS = re.compile(r"\+geoidgrids=\S*")
 
 
 def projected_system(name: str) -> "pyproj.CRS":
@@ -44,18 +45,16 @@ def projected_system(name: str) -> "pyproj.CRS":
 
     Args:
         name: an EPSG code, two of them joined by `+`, the URL or URN of a code,
-            well-known text, or parameters of PROJ that name no file.
+            well-known text, or parameters of PROJ that name no file. A file
+            of heights (`+geoidgrids`) is left out.
 
     Raises:
         ValueError: the name has another form, or PROJ does not know the system.
     """
     import pyproj
 
-    if (
-        len(name) > _LONGEST
-        or not _FORMS.fullmatch(name)
-        or _WITH_FILES.search(name)
-    ):
+    name = _HEIGHTS.sub("", name)
+    if not _FORMS.fullmatch(name) or _WITH_FILES.search(name):
         raise ValueError("not a code, URL, URN or text of a reference system")
     try:
         return pyproj.CRS.from_user_input(name)

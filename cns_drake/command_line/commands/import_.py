@@ -185,7 +185,7 @@ def _report_rows(
     if report.faults:
         # What concerns most of the city comes first.
         faults = sorted(
-            report.faults, key=lambda one: -report.shares.get(one.kind, 0.0)
+            report.faults, key=lambda one: -report.shares[one.kind].part
         )
         parts = [f"{fault.kind} ({report.told(fault)})" for fault in faults]
         yield "left out or repaired", _shortened(parts)

@@ -28,6 +28,7 @@ def study(
     task: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
     method: shared_options.Methods = None,
     align: Align = "auto",
+    pose_gap: shared_options.PoseGap = None,
     override: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="METHOD.NAME=VALUE|FIELD=VALUE"),
@@ -121,5 +122,6 @@ def study(
             printed=printed,
             on_note=note,
             align=align,
+            pose_gap=pose_gap,
         )
     show_results(page)

@@ -1,6 +1,6 @@
 """Reflection of surfaces near 900 nm, for the beams of a LiDAR."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +11,6 @@ from cns_drake.scene import (
     is_closed,
 )
 from worlds.shapes import (
-    Material,
     StructureEntry,
     StructureTable,
 )
@@ -85,8 +84,18 @@ def find_materials(
     """
     names = [geometry.structure for geometry in geometries]
     table = structures.completed(names)
+    closed: dict[int, bool] = {}
+
+    def encloses(surface: Surface) -> bool:
+        # Thousands of plants are copies of one mesh in other sizes, which
+        # share their triangles.
+        key = id(getattr(surface, "triangles", surface))
+        if key not in closed:
+            closed[key] = is_closed(surface)
+        return closed[key]
+
     rows = [
-        _field_values(geometry, table[name], is_wet)
+        _field_values(geometry, table[name], is_wet, encloses)
         for geometry, name in zip(geometries, names, strict=True)
     ]
     empty: list[tuple] = [()] * len(Materials._fields)
@@ -98,9 +107,15 @@ def find_materials(
 
 
 def _field_values(
-    geometry: PerceptionGeometry, entry: StructureEntry, is_wet: bool
+    geometry: PerceptionGeometry,
+    entry: StructureEntry,
+    is_wet: bool,
+    encloses: Callable[[Surface], bool],
 ) -> tuple[float, ...]:
-    """Returns the values of the fields of `Materials` for one geometry."""
+    """Returns the values of the fields of `Materials` for one geometry.
+
+    `encloses` returns whether a surface encloses a volume.
+    """
     material = entry.material(geometry.part)
     given = geometry.reflectivity
     if given is None:
@@ -110,7 +125,11 @@ def _field_values(
         reflectivity = given
         density = 0.0
     else:
-        kind = _reflector_kind(material, geometry.surface)
+        if material.kind != "leaves":
+            kind = _KINDS[material.kind]
+        else:
+            # An open surface is a sheet, which stands for leaves on a twig.
+            kind = LEAVES if encloses(geometry.surface) else SPRAYS
         dark, bright = material.reflectivity
         reflectivity = dark + (bright - dark) * _brightness(geometry.rgb)
         density = material.leaf_area_density
@@ -131,17 +150,6 @@ def _field_values(
         material.fittings,
         material.stains,
     )
-
-
-def _reflector_kind(material: Material, surface: Surface) -> int:
-    """Returns the kind of a material; leaves depend on the surface.
-
-    A closed surface of leaves is a volume of leaves. An open surface is a sheet
-    that stands for leaves on a twig.
-    """
-    if material.kind == "leaves":
-        return LEAVES if is_closed(surface) else SPRAYS
-    return _KINDS[material.kind]
 
 
 def _brightness(rgb: tuple[float, float, float] | None) -> float:

@@ -30,6 +30,7 @@ import weakref
 import numpy as np
 import zstandard
 
+from evaluation.base.budget import reading
 from evaluation.base.complete_files import completing
 from evaluation.base.errors import InputError
 from evaluation.base.files import check_regular, make_folder, user_errors
@@ -41,10 +42,6 @@ _MAGIC = b"cns-eval part 3\n"
 _LEVEL = 1
 # What compressed data begin with.
 _ZSTD = b"\x28\xb5\x2f\xfd"
-# A result takes at most this many bytes, and as many more for each byte of its
-# file; what shrinks further is stored as it is.
-_MOST_BYTES = 1 << 25
-_MOST_RATIO = 16
 # A `LongList` keeps at most this number of its last items in memory.
 _MOST_HELD = 512
 # Number of items of a `LongList` that are written and read together.
@@ -243,18 +240,12 @@ class _Stretch(_Joined):
 
 def _compressed(plain: bytes) -> bytes:
     compressor = zstandard.ZstdCompressor(level=_LEVEL, write_checksum=True)
-    data = compressor.compress(plain)
-    return data if len(plain) <= _most_bytes(data) else plain
+    return compressor.compress(plain)
 
 
 def _unpacked(data: bytes) -> bytes:
-    if not data.startswith(_ZSTD):
-        return data
-    return unpacked(data, "zstd", _most_bytes(data))
-
-
-def _most_bytes(data: bytes) -> int:
-    return _MOST_BYTES + _MOST_RATIO * len(data)
+    # Version 4 stored some results as they are.
+    return unpacked(data, "zstd" if data.startswith(_ZSTD) else "")
 
 
 @dataclass(frozen=True)
@@ -361,9 +352,10 @@ class Part:
 
 @contextlib.contextmanager
 def _damage_named(path: Path) -> Iterator[None]:
-    """Turns errors of a file that cannot be decoded into an `InputError`."""
+    """Limits reading a file; turns its errors into an `InputError`."""
     try:
-        yield
+        with reading(path):
+            yield
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from error
     except (ValueError, *_DECODING_ERRORS) as error:
@@ -444,7 +436,6 @@ _DECODING_ERRORS = (
     ImportError,
     IndexError,
     KeyError,
-    MemoryError,
     OverflowError,
     RecursionError,
     SyntaxError,

@@ -92,6 +92,7 @@ _LISTS: Mapping[str, tuple[type, ...]] = {
     "route": (dict,),
     "xyz": (int, float),
     "rpy_deg": (int, float),
+    "hidden_deg": (int, float),
 }
 
 

@@ -5,15 +5,16 @@ import itertools
 import os
 from pathlib import Path
 import re
+from typing import Any
 
 from evaluation.base import InputError, listed, natural_key, one_line
 from evaluation.drives import (
     NEXT_NS,
     SCENARIO,
+    Reading,
     RecordingSource,
     driven_way,
     find_data_sets,
-    open_drive,
 )
 from evaluation.study.recordings.map_drives import (
     RecordingInfo,
@@ -36,8 +37,7 @@ _UNKNOWN_STAGE = (
 def find_recordings(
     folder: Path,
     on_note: Callable[[str], None] = lambda text: None,
-    lidar: str | None = None,
-    columns: int | None = None,
+    **options: Any,
 ) -> list[RecordingInfo]:
     """Returns all recordings in a folder and its direct subfolders.
 
@@ -56,8 +56,7 @@ def find_recordings(
         folder: the folder.
         on_note: is called with each note on how recordings are read or left
             out.
-        lidar: name of the LiDAR, for recordings with several LiDARs.
-        columns: number of columns of `.bin` files, see `read_cloud`.
+        options: how all recordings are read: options of `open_drive`.
 
     Raises:
         InputError: if no recording has a map and a stage, or a recording cannot
@@ -66,11 +65,10 @@ def find_recordings(
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
-    paths = _find_drives(folder, on_note)
+    paths, reading = _find_drives(folder, on_note), Reading(**options)
     spans: dict[Path, tuple[int, int]] = {}
     placed = {
-        path: _recording_info(path, on_note, lidar, columns, spans)
-        for path in paths
+        path: _recording_info(path, on_note, reading, spans) for path in paths
     }
     _check_no_splits(spans)
     found = [one for one in placed.values() if one is not None]
@@ -177,19 +175,19 @@ def _check_no_splits(spans: Mapping[Path, tuple[int, int]]) -> None:
 def _recording_info(
     path: Path,
     on_note: Callable[[str], None],
-    lidar: str | None,
-    columns: int | None,
+    reading: Reading,
     spans: dict[Path, tuple[int, int]],
 ) -> RecordingInfo | None:
     """Returns a recording; None if its map or stage is unknown.
 
     Args:
         path: its file or folder.
-        on_note, lidar, columns: see `find_recordings`.
+        on_note: see `find_recordings`.
+        reading: how it is read.
         spans: file of a recording -> its first and its last stamp [ns], to
             which those of this one are added if it is a file.
     """
-    drive = open_drive(path, lidar, columns)
+    drive = reading.open(path)
     if path.is_file():
         spans[path] = int(drive.stamps_ns[0]), int(drive.stamps_ns[-1])
     for note in drive.notes:
@@ -207,16 +205,13 @@ def _recording_info(
             return None
         map_name = match["map"] or drive.world_frame.partition("/")[0]
         stage = match["stage"]
-    source = None
-    if (lidar, columns) != (None, None):
-        source = RecordingSource(path.absolute(), lidar, columns)
     return RecordingInfo(
         drive.name,
         path,
         map_name,
         stage,
         way,
-        made_by=source,
+        made_by=RecordingSource(path.absolute(), reading),
         lidar_field=drive.lidar_field,
         is_guessed=is_guessed,
         scenario=scenario_digest(scenario),

@@ -28,6 +28,8 @@ FIELDS = {
     "redraw": {"database": {"city": {"redraw": 2}}},
     "offset": {"database": {"offset": {"left": 3.0, "yaw_deg": 90}}},
     "lidars": {"both": {"lidars": {"*": {"returns": "calibrated"}}}},
+    "hidden": {"query": {"lidars": {"*": {"hidden_deg": [90, -135]}}}},
+    "tilt": {"query": {"lidars": {"*": {"rpy_deg": [2, 5, 0]}}}},
     "sessions": {
         "query": {"city": {"years": 2}},
         "database": {"city": {"years": 1}},

@@ -74,8 +74,22 @@ def test_a_pause_is_told(pause_s, is_told):
     stamps = T0_NS + np.cumsum([0, 10**8, round(pause_s * 1e9), 10**8, 10**8])
     notes = []
     open_pair([drive("a", stamps=stamps)] * 2, on_note=notes.append)
-    told = [one for one in notes if "a pause of 10 s after scan 1" in one]
+    told = [one for one in notes if "after scan 1, 10 s without a scan" in one]
     assert len(told) == is_told
+
+
+@pytest.mark.parametrize(("away", "is_told"), [(6.9, False), (7.1, True)])
+def test_poses_that_begin_anew_are_told(away, is_told):
+    """A vehicle drives 5 m in 0.1 s at most; poses are off by 2 m at most."""
+    one = drive("a")
+    one.X_WS[:, :2, 3] = 0.0
+    one.X_WS[2:, 0, 3] += away
+    notes = []
+    open_pair([one, one], on_note=notes.append)
+    assert any("poses begin anew" in text for text in notes) == is_told
+    one.X_WS[:, 0, 3] = 1000.0 * np.arange(5)
+    open_pair([one, one], on_note=notes.append)
+    assert notes[-1] == "a: moves at 10000 m/s; are the poses in metres?"
 
 
 @pytest.mark.parametrize(("height", "is_told"), [(1.79, False), (1.81, True)])
@@ -108,4 +122,6 @@ def test_states_of_a_verdict():
     assert world_of_frames("ab", ["map", "map"]).shared is True
     found = world_of_frames("ab", ["odom/x/a.bag", "odom/x/b.bag"])
     assert found.shared is False
+    assert WorldVerdict(True, False, "").doubt
+    assert not WorldVerdict(True, True, "").doubt
     assert "a in frame 'odom' of /x/a.bag; b in frame" in found.why

@@ -36,14 +36,6 @@ def test_only_files_are_read(tmp_path):
             read_bytes(tmp_path / name)
 
 
-def test_a_file_that_is_too_large(tmp_path):
-    path = tmp_path / "a"
-    path.write_bytes(b"12345")
-    assert read_bytes(path, limit=5) == b"12345"
-    with pytest.raises(InputError, match=f"^{path}: larger than 4 bytes"):
-        read_bytes(path, limit=4)
-
-
 def test_a_file_where_a_folder_is_needed(tmp_path):
     file = tmp_path / "file"
     file.touch()

@@ -71,8 +71,8 @@ def test_what_pyyaml_writes_is_read_as_it_was():
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        (_LAUGHS, "stands for more than"),
-        ("a: &a [*a]", "line 1: contains itself"),
+        (_LAUGHS, "parts stand for"),
+        ("a: &a [*a]", "contains itself"),
         ("[" * 100_000, "nesting|nested"),
         ("a: 1\nb: {c: 1,\n  c: 2}", "line 3: 'c' is there twice"),
         ("a: " + "9" * 5000, "4300 digits"),

@@ -11,13 +11,14 @@ from helpers.bags import (
     transform,
     write_bag,
 )
-from helpers.drive_files import T0_NS, yaw_pose
+from helpers.drive_files import T0_NS, write_recording, yaw_pose
 from mcap.writer import Writer
 import numpy as np
 import pytest
 
 from evaluation.base import InputError, poses, xyz
 from evaluation.drives import open_drive
+from evaluation.study import find_recordings
 
 POINTS = "sensor_msgs/msg/PointCloud2"
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -25,7 +26,8 @@ STATIC = "tf2_msgs/msg/TFMessage"
 NUM_SCANS = 12
 ID = np.eye(4)
 X_BS = yaw_pose(0.4, -0.1, 1.7, 0.3)
-p_WP = np.random.default_rng(4).uniform(-30.0, 30.0, (60, 3))
+NUM_POINTS = 60
+p_WP = np.random.default_rng(4).uniform(-30.0, 30.0, (NUM_POINTS, 3))
 
 
 def X_WB(stamp_ns):
@@ -385,26 +387,6 @@ def test_a_table_of_poses_of_no_form_names_its_cure(tmp_path):
     assert len(open_drive(path, poses=file).X_WS) == len(STAMPS)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_log_times_change_nothing(tmp_path, seed):
-    entries = [
-        *static(BASE),
-        *clouds("/lidar/points", "velodyne"),
-        *odometry("/odometry", "map", "base_link"),
-    ]
-    rng = np.random.default_rng(seed)
-    rng.shuffle(entries)
-    times = T0_NS + rng.integers(-(10**10), 10**10, len(entries))
-    path = write_bag(tmp_path / "a", entries, log_times=times)
-    drive = open_drive(path)
-    assert drive.stamps_ns.tolist() == STAMPS
-    seen = [
-        poses.transform(X, xyz(scan))
-        for X, scan in zip(drive.X_WS, drive, strict=True)
-    ]
-    np.testing.assert_allclose(seen, [p_WP] * NUM_SCANS, atol=1e-4)
-
-
 @pytest.mark.parametrize(
     ("options", "fault"),
     [
@@ -428,8 +410,10 @@ def test_poses_of_a_receiver_at_1_hz_need_an_option(tmp_path, gap):
     """Its clock jitters about a second, which is the limit."""
     times = [T0_NS, T0_NS + 1_200_000_000]
     rows = list(odometry("/odom", "map", "os", X_BS))
-    few = [(*rows[0][:2], t, {**rows[0][3], "header": header(t, "map")})
-           for t in times]  # fmt: skip
+    few = [
+        (*row[:2], t, {**row[3], "header": header(t, "map")})
+        for row, t in zip((rows[0], rows[-1]), times, strict=True)
+    ]
     path = write_bag(tmp_path / "a", [*clouds("/points", "os"), *few])
     if gap == 1.25:
         assert len(open_drive(path, pose_gap=gap)) == NUM_SCANS
@@ -437,6 +421,126 @@ def test_poses_of_a_receiver_at_1_hz_need_an_option(tmp_path, gap):
     said = r"1\.2 s apart, more than 1 s \(--pose-gap SECONDS allows more\)"
     with pytest.raises(InputError, match=said):
         _ = open_drive(path, pose_gap=gap).X_WS
+
+
+def test_recordings_are_opened_as_they_were_found(tmp_path):
+    """With the options of the command, in the processes of jobs, too."""
+    rows = [*odometry("/odom", "map", "os", X_BS)]
+    far = rows[:1] + rows[-1:]
+    other = [("/gnss", *one[1:]) for one in far]
+    write_bag(tmp_path / "town_1", [*clouds("/points", "os"), *rows, *other])
+    with pytest.raises(InputError, match="--odometry TOPIC"):
+        find_recordings(tmp_path)
+    with pytest.raises(InputError, match="--pose-gap SECONDS allows more"):
+        find_recordings(tmp_path, odometry="/gnss")
+    of_gaps = [
+        find_recordings(tmp_path, odometry="/gnss", pose_gap=gap)[0].source
+        for gap in (2.0, 3.0)
+    ]
+    assert len(of_gaps[0]()) == NUM_SCANS
+    assert of_gaps[0].identity() != of_gaps[1].identity()
+
+
+@pytest.mark.parametrize(("moved", "is_read"), [(0.04, True), (0.06, False)])
+def test_a_gap_in_which_the_robot_stands_is_none(tmp_path, moved, is_read):
+    """As of amcl, which sends no pose while the robot stands."""
+    rows = [
+        (name, kind, stamp, moved_to(fields, stamp, k * moved))
+        for k, stamp in enumerate((T0_NS, T0_NS + 2 * 10**9))
+        for name, kind, _, fields in [*odometry("/odom", "map", "os")][:1]
+    ]
+    drive = open_drive(write_bag(tmp_path / "a", [*clouds("/p", "os"), *rows]))
+    if not is_read:
+        with pytest.raises(InputError, match="2 s apart, more than 1 s"):
+            _ = drive.X_WS
+        return
+    assert np.ptp(drive.X_WS[:, 0, 3]) < moved
+    assert "the vehicle is taken to stand" in drive.notes[0]
+
+
+@pytest.mark.parametrize("is_moving", [False, True])
+def test_a_mount_on_tf_is_read_if_it_never_moves(tmp_path, is_moving):
+    """The package tf, before tf2, repeats fixed transforms on /tf."""
+    rows = [*odometry("/odom", "map", "base"), *clouds("/points", "os")]
+    for k, stamp in enumerate(STAMPS):
+        X = X_BS @ yaw_pose(0.0, 0.0, 0.0, 0.01 * k * is_moving)
+        edges = [
+            transform("map", "base", X_WB(stamp), stamp),
+            transform("base", "os", X, stamp),
+        ]
+        rows.append(("/tf", STATIC, stamp, {"transforms": edges}))
+    drive = open_drive(write_bag(tmp_path / "ride.bag", rows))
+    np.testing.assert_allclose(drive.X_BS, ID if is_moving else X_BS, atol=1e-9)
+    said = "and it moves on /tf;" if is_moving else "mounted as /tf says"
+    assert said in "; ".join(drive.notes)
+
+
+def test_beams_without_a_return_are_left_out(tmp_path):
+    """Ouster and Livox write points at the origin for them."""
+    rows = [*odometry("/odom", "map", "os", X_BS)]
+    for name, every in (
+        ("/ouster", clouds("/ouster", "os", "x y z intensity t")),
+        ("/livox", livox("/livox", "os")),
+    ):
+        for _, kind, stamp, fields in every:
+            if name == "/ouster":
+                data = fields["data"].reshape(-1, fields["point_step"]).copy()
+                data[::2] = 0
+                fields = {**fields, "data": data.ravel()}
+            else:
+                points = [dict(one) for one in fields["points"]]
+                for one in points[::2]:
+                    one |= {"x": 0.0, "y": 0.0, "z": 0.0}
+                fields = {**fields, "points": points}
+            rows.append((name, kind, stamp, fields))
+    path = write_bag(tmp_path / "a", rows)
+    for name in ("/ouster", "/livox"):
+        drive = open_drive(path, name)
+        seen = poses.transform(drive.X_WS[3], xyz(drive.scan(3)))
+        np.testing.assert_allclose(seen, p_WP[1::2], atol=1e-4)
+
+
+@pytest.mark.parametrize("second_ns", [10**8, 9 * 10**9, 11 * 10**9])
+def test_a_clock_may_begin_at_zero(tmp_path, second_ns):
+    """As Gazebo's; a zero among times since 1970 is no time."""
+    scan, stamps = points_of(ID), [0, second_ns, second_ns + 1]
+    X = [yaw_pose(1.0 * k, 0.0, 0.0, 0.0) for k in range(3)]
+    write_recording(tmp_path / "a", [scan] * 3, X, stamps_ns=stamps)
+    if second_ns < 10**10:
+        assert open_drive(tmp_path / "a").stamps_ns.tolist() == stamps
+        return
+    with pytest.raises(InputError, match="a message has no stamp"):
+        _ = open_drive(tmp_path / "a").stamps_ns
+
+
+def test_registered_clouds_far_from_the_origin_are_coarse(tmp_path):
+    """As clouds of float32 in UTM coordinates."""
+    path = write_bag(tmp_path / "a", [
+        *clouds("/points", "map", in_world=True),
+        *odometry("/odom", "map", "os", X_BS)])  # fmt: skip
+    assert not any("steps of" in one for one in open_drive(path).notes)
+    rows = []
+    for name, kind, stamp, fields in clouds("/points", "map", in_world=True):
+        data = fields["data"].view("<f4").reshape(NUM_POINTS, -1) + 4e6
+        rows.append(
+            (name, kind, stamp, {**fields, "data": data.view("u1").ravel()})
+        )
+    path = write_bag(tmp_path / "b", [
+        *rows, *odometry("/odom", "map", "os", X_BS, away=4e6)])  # fmt: skip
+    assert any(
+        "float32 has steps of 0.25 m" in x for x in open_drive(path).notes
+    )
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_single_file_is_read_whatever_version_its_list_has(tmp_path, storage):
+    entries = [*clouds("/points", "os"), *odometry("/odom", "map", "os", X_BS)]
+    path = write_bag(tmp_path / "ride", entries, storage)
+    text = (path / "metadata.yaml").read_text()
+    assert "version: 8" in text
+    text = text.replace("version: 8", "version: 10", 1)
+    (path / "metadata.yaml").write_text(text)
+    assert len(open_drive(path)) == NUM_SCANS
 
 
 @pytest.mark.parametrize("gap", [0.0, -1.0, np.inf, np.nan])
@@ -454,8 +558,16 @@ def test_a_bag_of_ros_1_that_is_cut_off_names_its_cure(tmp_path):
         open_drive(path)
 
 
-def session(path, later_s, away=0.0, topic="/points", frame="odom"):
-    """Writes a bag of ROS 1 that begins later, and elsewhere."""
+def session(
+    path,
+    later_s,
+    away=0.0,
+    topic="/points",
+    frame="odom",
+    logged_later_ns=0,
+    **options,
+):
+    """Writes a bag that begins later, and elsewhere."""
     later = int(later_s * 10**9)
     entries = [
         (name, kind, stamp + later, moved_to(fields, stamp + later, away))
@@ -464,7 +576,9 @@ def session(path, later_s, away=0.0, topic="/points", frame="odom"):
             *odometry("/odometry", frame, "os", X_BS),
         ]
     ]
-    return write_bag(path, sorted(entries, key=lambda one: one[2]))
+    entries.sort(key=lambda one: one[2])
+    log_times = [one[2] + logged_later_ns for one in entries]
+    return write_bag(path, entries, log_times=log_times, **options)
 
 
 def moved_to(fields, stamp_ns, away):
@@ -515,56 +629,33 @@ def test_files_of_several_sessions_are_no_drive(tmp_path, options, why):
     assert len(open_drive(tmp_path / "b.bag")) == NUM_SCANS
 
 
-@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
-def test_files_that_the_list_of_rosbag2_lacks_are_named(tmp_path, storage):
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3", "sqlite3-file"])
+@pytest.mark.parametrize("away", [3.75, -200.0])
+@pytest.mark.parametrize("logged_later_ns", [0, 400_000_000])
+def test_files_of_rosbag2_are_joined_unless_the_poses_jump(
+    tmp_path, storage, away, logged_later_ns
+):
+    """As after `ros2 bag reindex` of the files of two sessions."""
+    paths = [tmp_path / "ride_0", tmp_path / "ride_1"]
+    session(paths[0], 0.0, storage=storage, logged_later_ns=logged_later_ns)
+    session(paths[1], 1.25, away, storage=storage)
+    join_bags(*paths)
+    if away > 0.0:
+        assert len(open_drive(paths[0])) == 2 * NUM_SCANS
+        return
+    said = r"the poses jump by 20\d\.\d m .*; give one of ride_0\..* ride_1\."
+    with pytest.raises(InputError, match=said):
+        _ = open_drive(paths[0]).X_WS
+
+
+def test_files_that_are_not_there_are_named(tmp_path):
     entries = [*clouds("/points", "os"), *odometry("/odom", "map", "os", X_BS)]
-    path = write_bag(tmp_path / "ride", entries, storage=storage)
-    (file,) = (one for one in path.iterdir() if one.suffix != ".yaml")
-    other = file.with_stem("ride_9")
-    other.write_bytes(file.read_bytes())
-    with pytest.raises(InputError, match=rf"{other.name}: not one of the file"):
-        open_drive(path)
-    other.unlink()
+    path = write_bag(tmp_path / "ride", entries)
     text = (path / "metadata.yaml").read_text()
-    two = f"- {file.name}\n  - gone{file.suffix}"
-    (path / "metadata.yaml").write_text(text.replace(f"- {file.name}", two, 1))
-    with pytest.raises(InputError, match="that are not there: gone"):
+    two = "- ride.mcap\n  - gone.mcap"
+    (path / "metadata.yaml").write_text(text.replace("- ride.mcap", two, 1))
+    with pytest.raises(InputError, match=r"that are not there: gone\.mcap"):
         open_drive(path)
-
-
-def test_recordings_of_two_kinds_in_a_folder_are_named(tmp_path):
-    session(tmp_path / "a.bag", 0.0)
-    (tmp_path / "a.mcap").write_bytes(b"")
-    with pytest.raises(InputError, match=r"give one of a\.mcap a\.bag"):
-        open_drive(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("beside", "words"),
-    [
-        ("ride_0.db3-wal", "in this log only.*wal_checkpoint"),
-        ("ride_0.db3-journal", "undoes a half-written change"),
-    ],
-)
-def test_a_log_beside_a_bag_is_named(tmp_path, beside, words):
-    """The package rosbags ignores it, and would read a part of the drive."""
-    entries = [*clouds("/points", "os"), *odometry("/odom", "map", "os", X_BS)]
-    path = write_bag(tmp_path / "ride", entries, storage="sqlite3")
-    (file,) = path.glob("*.db3")
-    file = file.rename(path / "ride_0.db3")
-    (path / beside).write_bytes(b"")
-    assert len(open_drive(file)) == NUM_SCANS
-    (path / beside).write_bytes(b"1")
-    for one in (file, path):
-        with pytest.raises(InputError, match=rf"{beside}: .*{words}"):
-            open_drive(one)
-
-
-def test_a_recording_that_goes_on_is_named(tmp_path):
-    session(tmp_path / "a_0.bag", 0.0)
-    (tmp_path / "a_1.bag.active").write_bytes(b"#ROSBAG V2.0")
-    with pytest.raises(InputError, match=r"a_1\.bag\.active: .*not finished"):
-        open_drive(tmp_path)
 
 
 def test_what_is_no_bag_of_ros_1_is_not_reindexed(tmp_path):

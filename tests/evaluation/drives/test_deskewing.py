@@ -63,11 +63,10 @@ def test_times_that_are_certain(tmp_path, name, kind, scale):
         ("t", "<f4", SECONDS * 1e6),
         ("t", "<f4", SECONDS * 1e3),
         ("t", "<f4", SECONDS - TURN),
-        ("t", "<f8", SECONDS + T0_NS * 1e-9),
         ("t", "<f4", np.full(NUM, np.nan)),
         ("time", "<f4", SECONDS - TURN),
         ("time", "<f4", SECONDS * 1e3),
-        ("timestamp", "<f8", SECONDS + T0_NS * 1e-9),
+        ("timestamp", "<f8", SECONDS + T0_NS * 1e-9 - 10.0),
     ],
 )
 def test_times_that_are_not(tmp_path, name, kind, values):
@@ -78,6 +77,50 @@ def test_times_that_are_not(tmp_path, name, kind, values):
         InputError, match=r"^s: scan 2: (no field t|t: from|t: float)"
     ):
         deskew(drive, 2)
+
+
+@pytest.mark.parametrize("start_s", [-TURN, 0.0])
+@pytest.mark.parametrize(
+    ("name", "kind", "unit_ns"),
+    [
+        ("timestamp", "<f8", 10**9),  # Hesai, RoboSense
+        ("timestamp", "<f8", 1),  # Livox
+        ("time_stamp", "<f8", 10**9),  # Autoware's PointXYZIRADRT
+        ("t", "<f8", 10**9),
+        ("time", "<f8", 1000),
+    ],
+)
+def test_times_since_1970(tmp_path, name, kind, unit_ns, start_s):
+    """Of sensors whose stamp is at the start or at the end of a turn."""
+    since_ns = np.rint((start_s + SECONDS) * 1e9).astype(np.int64)
+    absolute_ns = T0_NS + round(2 * TURN * 1e9) + since_ns
+    values = absolute_ns if unit_ns == 1 else absolute_ns / unit_ns
+    drive = open_drive(record(tmp_path, name, kind, values))
+    scan = drive.scan(2)
+    assert name == "t" or name not in scan.dtype.names
+    # Doubles of these times are up to 256 ns apart.
+    np.testing.assert_allclose(scan["t"], since_ns, rtol=0, atol=256)
+    np.testing.assert_allclose(
+        deskew(drive, 2)["x"], 20.0 + (start_s + SECONDS) / TURN, atol=1e-5
+    )
+
+
+def test_the_pose_at_the_stamp_is_interpolated_if_none_is_there(tmp_path):
+    """Of odometry with 10 Hz whose stamps are those of no scan."""
+    poses = [yaw_pose(10.0 * k * TURN, 0.0, 0.0, 0.0) for k in range(8)]
+    scan = np.zeros(NUM, [(axis, "<f4") for axis in "xyz"] + [("t", "<u4")])
+    scan["x"], scan["t"] = 20.0, np.rint(SECONDS * 1e9)
+    stamps = [T0_NS + round(k * TURN * 1e9) for k in range(8)]
+    path = write_recording(
+        tmp_path / "s",
+        [scan] * 8,
+        poses,
+        stamps_ns=stamps,
+        odometry_shift_ns=-round(0.4 * TURN * 1e9),
+    )
+    np.testing.assert_allclose(
+        deskew(open_drive(path), 3)["x"], 20.0 + SECONDS / TURN, atol=1e-5
+    )
 
 
 def test_points_measured_at_once(tmp_path):
@@ -117,7 +160,7 @@ def test_times_that_lie_outside_of_the_scan_are_refused(
     ("name", "values", "why"),
     [
         ("time", SECONDS - TURN, "times before the stamp"),
-        ("timestamp", 1.7e9 + SECONDS, "times since 1970"),
+        ("timestamp", 1.6e9 + SECONDS, "times since 1970"),
         ("timestamp", 0.0 * SECONDS, "the same for all points"),
         ("time_offset", SECONDS, "of an unknown unit"),
     ],

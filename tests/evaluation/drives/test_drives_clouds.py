@@ -414,27 +414,11 @@ def test_plain_points_in_a_compressed_file(tmp_path):
     np.testing.assert_array_equal(xyz(read_cloud(path)), points)
 
 
-def test_what_a_compressed_file_cannot_hold(tmp_path):
-    path = tmp_path / "a.pcd"
-    claimed = (1 << 32) - 16
-    header = HEADER | {"DATA": "binary_compressed"}
-    for name in ("WIDTH", "POINTS"):
-        header[name] = claimed // 12
-    sizes = np.array([100, claimed // 12 * 12], "<u4").tobytes()
-    write_pcd(path, header, sizes + bytes(100))
-    with pytest.raises(InputError, match="100 bytes cannot hold 4294967280"):
-        read_cloud(path)
-    sizes = np.array([1 << 30, claimed // 12 * 12], "<u4").tobytes()
-    write_pcd(path, header, sizes + bytes(100))
-    with pytest.raises(InputError, match="save it as binary"):
-        read_cloud(path)
-
-
 def test_a_scan_of_many_gigabytes(tmp_path):
     path = tmp_path / "a.bin"
     path.touch()
     os.truncate(path, 16 << 32)
-    with pytest.raises(InputError, match="too large for a scan"):
+    with pytest.raises(InputError, match="takes more memory"):
         read_cloud(path)
     assert len(next(read_blocks(path))) < 1_000_000
 
@@ -447,13 +431,6 @@ def test_files_that_are_none(tmp_path):
     (tmp_path / "b.bin").symlink_to("/dev/zero")
     with pytest.raises(InputError, match="not a regular file"):
         list(read_blocks(tmp_path / "b.bin"))
-
-
-def test_a_line_without_an_end(tmp_path):
-    path = tmp_path / "a.pcd"
-    write_pcd(path, HEADER | {"DATA": "ascii"}, b"1 2 " * 100_000)
-    with pytest.raises(InputError, match="a line is too long"):
-        read_cloud(path)
 
 
 def test_odd_floats_without_a_word(tmp_path):

@@ -155,16 +155,6 @@ def test_notations_of_the_time(tmp_path, names, times):
     np.testing.assert_allclose(np.diff(drive.stamps_ns), 50_000_000, atol=300)
 
 
-def test_a_scan_between_two_poses(tmp_path):
-    folder, _ = write_drive(tmp_path)
-    write_pcd(folder / "pcd" / f"{T0_NS + 125_000_000}.pcd", make_points(3))
-    drive = open_drive(folder)
-    p_WS = drive.X_WS[:, :3, 3]
-    np.testing.assert_allclose(p_WS[3], (p_WS[2] + p_WS[4]) / 2, atol=1e-4)
-    (note,) = drive.notes
-    assert note.endswith("at 1 of 6 scans, up to 25 ms from the nearest pose")
-
-
 def test_scans_that_cannot_be_used(tmp_path):
     drive, _ = write_drive(tmp_path)
     path = drive / "pcd" / f"{T0_NS}.pcd"

@@ -3,9 +3,7 @@ import struct
 from helpers.dataset_folders import (
     SCAN_PERIOD_NS,
     UTM,
-    interpolated,
     make_points,
-    make_poses,
     stored,
     write_bytes,
 )
@@ -109,24 +107,6 @@ def test_local_poses_where_there_are_no_global_ones(tmp_path):
     assert drive.datum is None
 
 
-def test_scans_without_a_pose(tmp_path):
-    stamps_ns = stamps()
-    write_drive(tmp_path / "ends", ("Avia",), poses_stamps_ns=stamps_ns[1:3])
-    drive = open_drive(tmp_path / "ends")
-    assert drive.stamps_ns.tolist() == stamps_ns[1:3]
-    np.testing.assert_array_equal(
-        stored(drive.scan(0), "x", "y", "z"), make_points(120, seed=1)
-    )
-    assert "no pose for 2 of 4 scans" in drive.notes[0]
-    inner = [stamps_ns[i] for i in (0, 2, 3)]
-    write_drive(tmp_path / "inner", ("Avia",), poses_stamps_ns=inner)
-    drive = open_drive(tmp_path / "inner")
-    X_LS = make_poses(3)
-    expected = interpolated(inner, X_LS, stamps_ns[1])
-    expected[:3, 3] += UTM - ORIGIN
-    np.testing.assert_allclose(drive.X_WS[1], expected, atol=5e-7)
-
-
 def test_a_file_of_another_lidar(tmp_path):
     write_drive(tmp_path / "s")
     folder = tmp_path / "s" / "LiDAR"
@@ -166,18 +146,6 @@ def test_the_last_point(tmp_path, lidar):
         write_bytes(path, whole[:-cut])
         with pytest.raises(InputError, match=f"^{path}: .* no whole number"):
             open_drive(folder).scan(0)
-
-
-def test_points_without_a_return_are_left_out(tmp_path):
-    write_drive(tmp_path / "s", ("Avia",))
-    path = tmp_path / "s" / "LiDAR" / "Avia" / f"{stamps()[0]}.bin"
-    points = make_points(9)
-    points[[0, 4]] = 0.0
-    write_bytes(path, records(FORMATS["Avia"], points)[0])
-    scan = open_drive(tmp_path / "s").scan(0)
-    np.testing.assert_array_equal(
-        scan["line"], [i % 6 for i in range(9) if i not in (0, 4)]
-    )
 
 
 def edit_poses(folder, change):

@@ -145,18 +145,3 @@ def test_a_recording_that_was_cut_off(tmp_path, use_chunking):
         ) as error:
             open_drive(cut)
         assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("shifted", "kept"), [([5], [0, 1, 2, 3, 4]), ([0, 4, 5], [1, 2, 3])]
-)
-def test_scans_without_a_pose_at_the_ends(tmp_path, shifted, kept):
-    whole = open_drive(record(tmp_path / "whole"))
-    path = record(tmp_path / "ends", without_pose=shifted)
-    drive = open_drive(path)
-    assert len(drive) == len(kept)
-    np.testing.assert_array_equal(drive.X_WS, whole.X_WS[kept])
-    np.testing.assert_array_equal(drive.stamps_ns, whole.stamps_ns[kept])
-    for k, frame in enumerate(kept):
-        np.testing.assert_array_equal(drive.scan(k), whole.scan(frame))
-    assert f"for {len(shifted)} of 6 scans" in drive.notes[0]

@@ -1,8 +1,5 @@
 """The learned descriptor: images, network, scores, files of weights."""
 
-import os
-import tracemalloc
-
 from helpers.learned_weights import weight_values
 import numpy as np
 import pytest
@@ -108,7 +105,6 @@ def test_a_narrow_sensor_is_noted_once(method, capsys):
         ({"kernel_1": np.zeros((9, 4))}, "kernel_1: size (9, 4) instead"),
         ({"bias_2": None}, "bias_2 is missing"),
         ({"bias_2": np.full(LAYERS[2][1], np.nan)}, "not all are finite"),
-        ({"more": np.zeros(700_000)}, "bytes are too many"),
     ],
 )
 def test_faulty_weights(tmp_path, changes, fault):
@@ -146,23 +142,3 @@ def test_weights_that_are_no_numbers_in_single_precision(tmp_path):
         path = write(tmp_path / "w.npz", kernel_0=np.full(shape, value))
         with pytest.raises(InputError, match=r"w\.npz: kernel_0: not all are"):
             make_method("learned", {"weights": path})
-
-
-@pytest.mark.slow
-def test_weights_neither_fill_the_memory_nor_wait(tmp_path):
-    path = tmp_path / "w.npz"
-    np.savez_compressed(
-        path, **weight_values(), **{f"z{k}": np.zeros(10**7) for k in range(3)}
-    )
-    tracemalloc.start()
-    make_method("learned", {"weights": path})
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 20e6
-    np.savez_compressed(path, **{**weight_values(), "seen": np.zeros(10**7)})
-    with pytest.raises(InputError, match=r"no file of weights .*seen"):
-        make_method("learned", {"weights": path})
-    path.unlink()
-    os.mkfifo(path)
-    with pytest.raises(InputError, match=r"w\.npz: not a regular file"):
-        make_method("learned", {"weights": path})

@@ -17,6 +17,7 @@ from evaluation import (
     update_map,
 )
 from evaluation.base import InputError, json_values
+from evaluation.drives import MovedDrive
 from evaluation.recognition import METRICS, RetrievalProtocol
 from evaluation.results import QueryRows, Results, compare_tables, draw_chart
 
@@ -101,6 +102,18 @@ def test_a_path_and_an_object_give_the_same(towns, tmp_path):
     for mine, theirs in zip(first.queries, read, strict=True):
         assert mine["query_frame"] == theirs["query_frame"]
         assert mine["methods.solid.ranges"] == 20
+
+
+def test_a_world_that_nothing_confirms_is_doubted(towns):
+    """As of two maps by SLAM, each of which calls its own origin `map`."""
+    first, second = map(open_drive, both(towns))
+    X_WS = np.roll(second.X_WS, len(second) // 2, axis=0)
+    moved = MovedDrive(second, X_WS, "map", None)
+    for query, is_told in ((second, False), (moved, True)):
+        notes = []
+        recognise(first, query, "solid", on_note=notes.append)
+        said = "town_02: no answer is right; if the poses are not in one world"
+        assert any(one.startswith(said) for one in notes) == is_told
 
 
 def test_what_cannot_be_recognised(towns):

@@ -371,7 +371,7 @@ def _(folder):
 
 @way(
     "csv: an instance", "x.csv", *TABLES,
-    use=at_door("cns_drake.scene", "load_structure_table", "x.csv"),
+    use=at_door("worlds.shapes", "load_structure_table", "x.csv"),
 )  # fmt: skip
 def _(folder):
     text = f"instance,name,class\n{10**17},a,building\n"
@@ -1057,8 +1057,11 @@ def _(folder):
 def xodr(folder):
     from helpers.internal.opendrive_fuzzing import read_opendrive
 
+    from evaluation.base import reading
+
     (folder / "x.xodr").rename(folder / "town.xodr")
-    return read_opendrive(folder)
+    with reading(folder / "town.xodr"):  # As `import_city` does.
+        return read_opendrive(folder)
 
 
 REPEAT = (
@@ -1236,14 +1239,14 @@ HOUSES = ("cns_drake", "evaluation", "worlds")
 NO_FILES = {
     "evaluation.base.decode_text": "bytes that are in memory",
     "evaluation.base.import_modules": "modules of this project",
-    "evaluation.base.read_bytes": "bounded by its limit",
-    "evaluation.base.read_text": "bounded by its limit",
+    "evaluation.base.read_bytes": "takes what the file has",
+    "evaluation.base.read_text": "takes what the file has",
     "evaluation.base.read_only": "an array",
     "evaluation.base.start_python": "modules of this project",
     "worlds.city.start_city": "reads by load_road_network",
     "worlds.shapes.find_u_turn": "a place",
     "cns_drake.motion.load_car_masses": "a shipped model",
-    "cns_drake.pictures.read_drive_page": "bounded by the limit of a page",
+    "cns_drake.pictures.read_drive_page": "takes what the file has",
     "cns_drake.scene.find_bus": "an object",
     "cns_drake.simulation.load_drive": "reads by load_world",
     "cns_drake.simulation.load_stage": "reads by load_world",

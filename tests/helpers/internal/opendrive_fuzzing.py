@@ -14,11 +14,11 @@ from helpers.small_opendrive import (
 from worlds.imports.drives.search import find_drives
 from worlds.imports.faults import ImportFaults
 from worlds.imports.opendrive.band_graph import BandGraph
+from worlds.imports.opendrive.bridges import split_levels
 from worlds.imports.opendrive.imported_streets import ImportedStreets
 from worlds.imports.opendrive.lanes import lane_bands
 from worlds.imports.opendrive.road_reader import read_roads
 from worlds.imports.opendrive.things import thing_structures
-from worlds.imports.opendrive.town import split_levels
 
 
 def write_opendrive(folder: Path) -> None:
@@ -54,7 +54,7 @@ def read_opendrive(folder: Path) -> None:
         bands = [band for one in roads for band in lane_bands(one)]
     except ValueError as error:
         raise InputError(str(error)) from error
-    streets = ImportedStreets(split_levels(bands)[0])
+    streets = ImportedStreets(split_levels(bands, faults)[0])
     find_drives(BandGraph(bands))
     for one in roads:
         list(thing_structures(one, streets.areas.lane_area, faults))

@@ -324,23 +324,6 @@ def test_parents_in_a_circle(tmp_path):
     assert sum(volume(one) for one in found.values()) == pytest.approx(16.0)
 
 
-def test_bridges_and_tunnels_stay_where_they_are(tmp_path):
-    city = CityWriter()
-    city.box("house", 10.0, 10.0, (10.0, 10.0, 9.0), z=1.0)
-    deck = city.box_faces(-5, -30, 7.0, (10, 60, 1))
-    tube = city.box_faces(-60, -2, -9.0, (120, 4, 3))
-    for name, kind, faces in (
-        ("deck", "Bridge", deck), ("tube", "Tunnel", tube)
-    ):  # fmt: skip
-        solid = {"type": "Solid", "lod": 2, "boundaries": [faces]}
-        city.add(name, kind, solid)
-    _, found = structures(city.write(tmp_path / "city.json"))
-    for name, low, high in (("deck", 7.0, 8.0), ("tube", -9.0, -6.0)):
-        z = found[name].triangles[..., 2]
-        assert (z.min(), z.max()) == pytest.approx((low, high))
-        assert found[name].structure.semantic_class == "other-structure"
-
-
 def solid(city, lod, *box):
     faces = city.box_faces(*box)
     return {"type": "Solid", "lod": lod, "boundaries": [faces]}

@@ -1,7 +1,9 @@
 """What a refused import asks for is enough."""
 
 from dataclasses import replace
+import re
 
+from helpers.small_cityjson import CityWriter
 from helpers.small_osm import OsmWriter
 import pytest
 
@@ -46,3 +48,45 @@ def test_a_piece_of_a_file_that_is_too_wide_is_read(tmp_path):
     with pytest.raises(InputError, match=said):
         import_city(houses(tmp_path, 0, 25_000), tmp_path / "map", PLAIN)
     import_city(houses(tmp_path, 0), tmp_path / "map", PLAIN)
+
+
+@pytest.mark.parametrize("scale", [1, 1e-3, 0.01, 100, 1 / 0.0254])
+def test_the_factor_that_is_named_cures_the_city(tmp_path, scale):
+    def try_out(name, scale):
+        city = CityWriter()
+        for k, size in enumerate([(12, 9, 8), (10, 10, 15), (20, 8, 6)]):
+            size = [scale * side for side in size]
+            city.box(f"house_{k}", 40 * scale * k, 0, size)
+        path = city.write(tmp_path / f"{name}.city.json")
+        import_city(path, tmp_path / name, PLAIN)
+
+    if scale != 1:
+        with pytest.raises(InputError, match="multiply coordinates by") as told:
+            try_out("as_given", scale)
+        (factor,) = re.findall(r"by (\S+)\?", str(told.value))
+        assert float(factor) == pytest.approx(1 / scale)
+        scale *= float(factor)
+    try_out("cured", scale)
+
+
+@pytest.mark.parametrize(
+    ("tag", "is_refused"),
+    [
+        ("height", True),
+        ("building__levels", True),
+        ("roof__direction", False),
+        ("start_date", False),
+    ],
+)
+def test_only_sizes_that_most_things_lack_ruin_a_city(
+    tmp_path, tag, is_refused
+):
+    osm = OsmWriter()
+    for k in range(5):
+        osm.box(30 * k, 0, 9, 9, building="yes", **{tag: "some"})
+    path = osm.write(tmp_path / "a.osm")
+    if not is_refused:
+        import_city(path, tmp_path / "map", PLAIN)
+        return
+    with pytest.raises(InputError, match=rf"read: {tag.replace('__', ':')} "):
+        import_city(path, tmp_path / "map", PLAIN)

@@ -148,4 +148,4 @@ def test_a_remark_of_overpass_is_named(tmp_path):
     path.write_text(path.read_text().replace("</osm>", remark))
     city, _ = import_osm(path)
     kind = "the file may be cut off: runtime error: Query timed out"
-    assert city.faults.rows() == [(kind, 1, "its remark")]
+    assert city.faults.rows() == [(kind, 1, "the file")]

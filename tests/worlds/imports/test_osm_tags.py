@@ -324,10 +324,10 @@ def test_what_is_flattened_is_told_by_its_share_of_the_volume(tmp_path):
     report = import_city(path, tmp_path / "map", ImportOptions(dressed=False))
     flat = 9 * shapely.Polygon(L_SHAPE).area
     (share,) = report.shares.values()
-    assert share == pytest.approx(flat / (flat + 100 * 8), rel=1e-3)
+    assert share.part == pytest.approx(flat / (flat + 100 * 8), rel=1e-3)
     assert (
-        f"roof of shape gabled, made flat: 1, {100 * share:.2g} % of the volume"
-        f" of all buildings, such as w{name}\n"
+        f"roof of shape gabled, made flat: 1, {100 * share.part:.2g} % of the"
+        f" volume of all buildings, such as w{name}\n"
     ) in (tmp_path / "map" / "import.txt").read_text()
 
 

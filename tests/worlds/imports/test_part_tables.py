@@ -8,15 +8,18 @@ changes no shape.
 import json
 from pathlib import Path
 import re
+from xml.etree import ElementTree
 
 from helpers.imported_cities import import_osm, read_city, volume
-from helpers.small_cityjson import house
+from helpers.small_cityjson import CityWriter, house
+from helpers.small_opendrive import straight, write_roads
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
 
 from evaluation.base import parse_yaml
 from worlds import imports
+from worlds.imports import ImportOptions, import_city
 
 # The most used keys on ways and nodes that can describe a thing, by taginfo,
 # with a usual value.
@@ -227,27 +230,6 @@ def test_parts_of_another_year_are_buildings(tmp_path, date, buildings):
     assert ("date in start_date that is not understood" in kinds) == is_unclear
 
 
-@pytest.mark.parametrize(
-    ("attribute", "value", "is_counted"),
-    [
-        ("measuredHeight", 12.5, True),
-        ("roofType", "1000", True),
-        ("identificatie", "a", False),
-        ("yearOfConstruction", 1950, False),
-        ("b3_h_max", 5.0, False),
-    ],
-)
-def test_attributes_of_cityjson_are_accounted_for(
-    tmp_path, attribute, value, is_counted
-):
-    path = tmp_path / "a.json"
-    path.write_text(json.dumps(house({attribute: value})))
-    city = read_city(path)
-    kinds = [fault.kind for fault in city.faults.rows()]
-    assert (f"{attribute} of attributes, not read" in kinds) == is_counted
-    assert is_counted or attribute in " ".join(city.faults.parts()).split()
-
-
 def test_a_demolished_house_of_cityjson_has_an_end(tmp_path):
     path = tmp_path / "a.json"
     dates = {"yearOfConstruction": 1900, "yearOfDemolition": "1950-05-01"}
@@ -297,26 +279,38 @@ ELEMENTS = {
     "building": [
         {"building": "yes"}, {"building": "house"}, {"building:part": "yes"},
         {"building": "roof"}, {"man_made": "tower"},
+        {"building": "yes", "min_height": "4", "height": "9",
+         "roof:shape": "hipped"},
     ],
     "street": [
         {"highway": "residential"}, {"highway": "primary"},
         {"highway": "service"},
+        {"highway": "tertiary", "width": "7.33", "oneway": "yes",
+         "sidewalk": "left", "parking:both": "lane", "bridge": "yes"},
     ],
-    "path": [{"highway": "footway"}, {"highway": "steps"}],
+    "path": [
+        {"highway": "footway"}, {"highway": "steps"},
+        {"highway": "cycleway", "width": "3", "covered": "yes"},
+    ],
     "ground": [
         {"landuse": "grass"}, {"natural": "water"}, {"amenity": "parking"},
         {"leisure": "pitch"},
+        {"amenity": "parking", "parking": "surface", "surface": "asphalt"},
     ],
-    "barrier": [{"barrier": "hedge"}, {"barrier": "wall"}],
-    "tree": [{"natural": "tree"}],
+    "barrier": [
+        {"barrier": "hedge"},
+        {"barrier": "wall", "height": "3", "min_height": "1", "width": "1"},
+    ],
+    "tree": [{"natural": "tree", "height": "9"}],
     "tree row": [{"natural": "tree_row"}],
     "small object": [{"highway": "street_lamp"}, {"amenity": "bench"}],
 }  # fmt: skip
 VALUES = ("yes", "2", "underground")
-TABLE = parse_yaml(
-    (
-        Path(imports.__file__).with_name("openstreetmap") / "parts.yaml"
-    ).read_bytes()
+TABLE, CITYJSON, OPENDRIVE = (
+    parse_yaml(
+        (Path(imports.__file__).with_name(name) / "parts.yaml").read_bytes()
+    )
+    for name in ("openstreetmap", "cityjson", "opendrive")
 )
 
 
@@ -342,10 +336,11 @@ def shapes(city):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dressed", [False, True])
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_tags_that_change_no_shape_change_none(tmp_path, element, dressed):
-    """Each alone, with three values, on several things of its kind."""
+    """Each with three values, on things with and without what goes with it."""
     lists = TABLE["elements"][element]["shapeless"] + TABLE["shapeless"]
     keys = sorted({key.replace("*", "x") for key in " ".join(lists).split()})
     for number, own in enumerate(ELEMENTS[element]):
@@ -370,3 +365,46 @@ def test_tags_that_change_no_shape_change_none(tmp_path, element, dressed):
         assert found.get(first) or (element == "tree row" and not dressed)
         changed = [ids[k] for k in others if found.get(k) != found.get(first)]
         assert changed == []
+
+
+@pytest.mark.parametrize("value", VALUES)
+def test_attributes_of_cityjson_that_change_no_shape_change_none(
+    tmp_path, value
+):
+    names = CITYJSON["elements"]["attributes"]["shapeless"]
+    city = CityWriter()
+    for k, name in enumerate(["", *" ".join(names).replace("*", "x").split()]):
+        tags = {name: value} if name else {}
+        city.box(f"house_{k}", 20 * k, 0, (9, 8, 7), attributes=tags)
+    read = read_city(city.write(tmp_path / "a.city.json"))
+    assert len({str(np.ptp(one.triangles, 1)) for one in read.objects}) == 1
+    assert len({(one.base, one.year, one.lod) for one in read.objects}) == 1
+
+
+@pytest.mark.parametrize("value", ["1", "-2.5", "yes"])
+def test_attributes_of_opendrive_that_change_no_shape_change_none(
+    tmp_path, value
+):
+    elements = OPENDRIVE["elements"]
+    things = (
+        '<objects><object id="1" type="pole" s="30" t="9" height="3"'
+        ' radius="1"/><bridge id="2" s="60" length="20"/><tunnel id="3"'
+        ' s="90" length="9"/></objects><signals><signal id="4" s="20" t="9"'
+        ' type="274"/></signals>'
+    )
+    path = write_roads(
+        tmp_path / "a.xodr", straight("r", 0, 0, 110, 0, more=things)
+    )
+    found = []
+    for _ in range(2):
+        city = tmp_path / str(len(found))
+        import_city(path, city, ImportOptions(dressed=False))
+        names = sorted((city / "meshes").iterdir())
+        found.append([(one.name, one.read_bytes()) for one in names])
+        tree = ElementTree.parse(path)
+        for one in tree.iter():
+            own = elements.get(one.tag, {}).get("shapeless", ())
+            for name in set(" ".join(own).split()) - {"id"}:
+                one.set(name, value)
+        tree.write(path)
+    assert found[0] == found[1]

@@ -70,6 +70,7 @@ class CityStreets(NamedTuple):
         park: function that parks cars in the streets. It is called last.
         kerbs: height of the kerb by place; None if the height is `kerb_height`
             everywhere.
+        pads: level ground outside of the streets, such as below bridges.
     """
 
     areas: Areas
@@ -82,6 +83,7 @@ class CityStreets(NamedTuple):
     furnish: Callable[[Draft], None]
     park: Callable[[Draft], None]
     kerbs: KerbMap | None = None
+    pads: Sequence[Pad] = ()
 
 
 def make_city(world: Path) -> City:
@@ -157,6 +159,7 @@ def build_along(streets: CityStreets, plan: CityPlan, source: str) -> City:
         )
 
     terraces = [pad for district in districts for pad in district.terraces]
+    terraces += streets.pads
     draft.base = ground_with(terraces)
     for district in districts:
         place_buildings(draft, district)

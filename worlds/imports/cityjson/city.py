@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+import itertools
 from pathlib import Path
 import re
 
 import numpy as np
+from scipy.spatial import cKDTree
 import shapely
 from shapely.geometry.base import BaseGeometry
 
@@ -62,11 +64,17 @@ _CLASSES: dict[str, tuple[str, Finish | None]] = {
 }
 # Beginning of a type -> where its objects are.
 _BASES = {"Bridge": Base.DECK, "Tunnel": Base.UNDERGROUND}
-# An object stands above the terrain if its lowest corner is this far above it,
-# as a canopy is [m].
+# An object stands above the ground if its lowest corner is this far above it,
+# as a canopy is; structures with a room are higher [m].
 _LEAST_ROOM = 2.0
+# A surface that is at most this far above or below a roof lies on it [m].
+_ON_ROOF = 0.3
+# Number of neighbours with which what may be raised is compared.
+_NEIGHBOURS = 8
 # The corners of a level face differ in height by at most this [m].
 _LEVEL = 0.05
+# Type of a group of objects, which has no shape of its own.
+_GROUP = "CityObjectGroup"
 # Names are cut to this length.
 _LONGEST_NAME = 80
 
@@ -123,9 +131,11 @@ def import_objects(
         surfaces = _triangles_by_part(chosen, root, city.faults, origin)
         if not any(map(len, surfaces.values())):
             kind = "object without a surface"
+            ruins = city.objects[root].object_type != _GROUP
             if not chosen and any(member.geometries for member in members):
                 kind = f"object without level of detail {lod:g}"
-            city.faults.add(f"{kind}, left out", root)
+                ruins = False
+            city.faults.add(f"{kind}, left out", root, ruins=ruins)
             continue
         object_type = city.objects[root].object_type
         semantic_class, finish = _class_of(object_type)
@@ -158,8 +168,8 @@ def _base_of(
     """Returns where an object stands, by its type and its semantic surfaces.
 
     A structure whose lowest face is level and known to be no ground, such as
-    an OuterCeilingSurface, is open below. Without semantics it stands on the
-    ground.
+    an OuterCeilingSurface, is open below. Without semantics, the ground around
+    it decides.
     """
     for beginning, base in _BASES.items():
         if object_type.startswith(beginning):
@@ -178,28 +188,68 @@ def _base_of(
 
 
 def _on_terrain(objects: Sequence[ImportedObject]) -> Iterator[ImportedObject]:
-    """Yields objects, with the base that the file's terrain shows."""
+    """Yields objects, with the base that the ground around them shows.
+
+    The ground is the file's terrain. Without terrain, what may be a canopy or
+    a roof terrace is compared with the feet of its neighbours.
+    """
     is_terrain = [one.object_type == "TINRelief" for one in objects]
-    terrain = UpperSides(
-        turned_up(
-            joined_triangles(
-                one.triangles
-                for one, is_it in zip(objects, is_terrain, strict=True)
-                if is_it
-            )
-        )
-    )
-    for one, is_it in zip(objects, is_terrain, strict=True):
+    terrain = _upper_sides(itertools.compress(objects, is_terrain))
+    may_be_raised = [False] * len(objects)
+    if not any(is_terrain):
+        rooms = [
+            one for one in objects if not _is_flat(one) and not _is_surface(one)
+        ]
+        roofs = _upper_sides(rooms)
+        may_be_raised = [_is_flat(one) or _is_on(roofs, one) for one in objects]
+    feet = [
+        one.foot
+        for one, may_be in zip(objects, may_be_raised, strict=True)
+        if one.base is Base.GROUND and not may_be
+    ]
+    tree = cKDTree(np.reshape(feet, (-1, 3))[:, :2])
+    for one, is_it, may_be in zip(
+        objects, is_terrain, may_be_raised, strict=True
+    ):
         if one.base is Base.GROUND and not is_it:
             corners = one.triangles.reshape(-1, 3)
             above = corners[:, 2] - terrain.heights(corners[:, :2])
             # Where there is no terrain, nothing is known.
             above = above[np.isfinite(above)]
+            if may_be and feet:
+                count = min(_NEIGHBOURS, len(feet))
+                _, near = tree.query(one.foot[:2], range(1, count + 1))
+                low = np.median([feet[k][2] for k in near])
+                above = one.foot[2:] - low
             if len(above) and above.min() > _LEAST_ROOM:
                 one = replace(one, base=Base.RAISED)
             elif len(above) and above.max() < -_LEAST_ROOM:
                 one = replace(one, base=Base.UNDERGROUND)
         yield one
+
+
+def _upper_sides(objects: Iterable[ImportedObject]) -> UpperSides:
+    """Returns the upper sides of objects."""
+    triangles = joined_triangles(one.triangles for one in objects)
+    return UpperSides(turned_up(triangles))
+
+
+def _is_surface(one: ImportedObject) -> bool:
+    """Returns whether an object is a surface, such as a road."""
+    return one.structure.semantic_class in GROUND_CLASSES
+
+
+def _is_flat(one: ImportedObject) -> bool:
+    """Returns whether a structure is too flat to contain a room."""
+    height = np.ptp(one.triangles[..., 2])
+    return not _is_surface(one) and bool(height < _LEAST_ROOM)
+
+
+def _is_on(roofs: UpperSides, one: ImportedObject) -> bool:
+    """Returns whether an object is a surface that lies on roofs."""
+    middles = one.triangles.mean(axis=1)
+    away = np.abs(roofs.heights(middles[:, :2]) - middles[:, 2])
+    return _is_surface(one) and bool((away < _ON_ROOF).all())
 
 
 def _first_year(
@@ -240,7 +290,7 @@ def _families(city: CityFile) -> dict[str, list[CityObject]]:
                 for parent in city.objects[root].parents
                 if parent in city.objects
                 # A group is not one structure: it may contain half a city.
-                and city.objects[parent].object_type != "CityObjectGroup"
+                and city.objects[parent].object_type != _GROUP
             ]
             if not parents or parents[0] in seen:
                 break

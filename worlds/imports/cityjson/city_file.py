@@ -8,6 +8,7 @@ import numpy as np
 
 from worlds.imports.cityjson.reference_systems import ReferenceSystem
 from worlds.imports.faults import ImportFaults
+from worlds.imports.imported_objects import FARTHEST
 
 # A face: the corners (N, 3) of its outer ring, then those of its holes.
 Face = list[np.ndarray]
@@ -67,11 +68,15 @@ class CityFile:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns the least and the greatest coordinates, (3,) each [m].
 
-        At least one object must have at least one face.
+        Corners far from the others, such as -9999 in place of an unknown
+        height, do not count. At least one object must have at least one face.
         """
         points = np.concatenate(
             [ring for face in self.faces() for ring in face]
         )
+        away = np.abs(points - np.median(points, axis=0)) / FARTHEST
+        far = away.max(axis=1)
+        points = points[far <= max(1.0, far.min())]
         return points.min(axis=0), points.max(axis=0)
 
     def faces(self) -> Iterator[Face]:

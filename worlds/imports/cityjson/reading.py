@@ -7,6 +7,7 @@ order, direction and units of the axes of the file's reference system.
 """
 
 from collections.abc import Iterator, Sequence
+import contextlib
 from dataclasses import dataclass, field
 import itertools
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 
 from evaluation.base import (
     InputError,
+    check_expansion,
     check_regular,
     dot,
     errors_at,
@@ -24,6 +26,7 @@ from evaluation.base import (
     product,
     rotated,
     user_errors,
+    value_errors,
 )
 from worlds.imports.cityjson.city_file import (
     CityFile,
@@ -36,7 +39,7 @@ from worlds.imports.cityjson.reference_systems import (
     check_lengths,
     reference_system,
 )
-from worlds.imports.faults import ImportFaults
+from worlds.imports.faults import WHOLE_FILE, ImportFaults
 from worlds.imports.part_tables import PartTable
 
 # Every city is wider than 1 m, and narrower than 1 deg (about 100 km).
@@ -63,11 +66,10 @@ _NESTING = {
     "MultiSolid": 2,
     "CompositeSolid": 2,
 }
+# Versions that are read, with a patch of the format.
+_VERSION = re.compile(r"(1\.[01]|2\.0)(\.\d+)?")
 # No place on Earth is farther than this from the origin of a survey grid [m].
 _FARTHEST = 1e8
-# Greatest number of faces in all places of templates together. A short file can
-# place a template with many faces any number of times.
-_MOST_PLACED = 1_000_000
 
 
 def read_cityjson(path: Path) -> CityFile:
@@ -143,7 +145,7 @@ def _read_documents(path: Path) -> CityFile:
 
 def _check_version(document: dict, where: str) -> None:
     version = str(document.get("version", ""))
-    if not re.match(r"[12]\.", version):
+    if not _VERSION.fullmatch(version):
         raise InputError(
             f"{where}: CityJSON of version {version!r}, not 1.0 to 2.0"
         )
@@ -178,8 +180,6 @@ def _json_object(text: bytes, where: str) -> dict:
         value = parse_json(text)
     except UnicodeDecodeError as error:
         raise InputError(f"{where}: not UTF-8 ({error.reason})") from error
-    except RecursionError as error:
-        raise InputError(f"{where}: nested too deeply") from error
     except ValueError as error:
         raise InputError(f"{where}: no JSON ({error})") from error
     if not isinstance(value, dict):
@@ -205,25 +205,37 @@ class _Templates:
     Attributes:
         geometries: the templates, as in the file.
         points: (N, 3) vertices of all templates, in coordinates of the file.
-        num_placed: number of faces of all instances that were read.
     """
 
     geometries: Sequence[Any] = ()
     points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    num_placed: int = 0
 
-    def place(self, number: int) -> None:
-        """Counts the faces of an instance.
+    def check_places(self, objects: dict) -> None:
+        """Refuses objects that place templates far too often.
 
         Raises:
-            InputError: all instances together have too many.
+            ValueError: they do.
         """
-        self.num_placed += number
-        if self.num_placed > _MOST_PLACED:
-            raise InputError(
-                f"geometry-templates: more than {_MOST_PLACED} faces in all"
-                " places"
-            )
+        placed = [
+            geometry.get("template")
+            for value in objects.values()
+            if isinstance(value, dict)
+            and isinstance(value.get("geometry"), list)
+            for geometry in value["geometry"]
+            if isinstance(geometry, dict)
+        ]
+        used = [one for one in placed if isinstance(one, int)]
+        check_expansion(
+            -1, lambda one: used if one == -1 else (), self._num_faces
+        )
+
+    def _num_faces(self, index: int) -> int:
+        """Returns the number of faces of a template; 0 if it is faulty."""
+        with contextlib.suppress(LookupError, TypeError, ValueError):
+            geometry = self.geometries[index] if index >= 0 else {}
+            nesting = _NESTING[geometry["type"]]
+            return len(_flat(None, geometry["boundaries"], nesting))
+        return 0
 
 
 def _read_templates(document: dict, where: str) -> _Templates:
@@ -297,14 +309,12 @@ def _read_geometry(
         faults: counts geometries and faces that are left out.
     """
     vertices = source.vertices
-    is_instance = False
     if isinstance(geometry, dict):
         _PARTS.account(["geometry"], geometry, name, faults)
     try:
         lod = _level_of_detail(geometry.get("lod"))
         kind = geometry["type"]
-        is_instance = kind == "GeometryInstance"
-        if is_instance:
+        if kind == "GeometryInstance":
             geometry, vertices = source.instance(geometry)
             kind = geometry["type"]
             lod = lod or _level_of_detail(geometry.get("lod"))
@@ -316,15 +326,13 @@ def _read_geometry(
             boundaries = [face for group in boundaries for face in group]
         kinds = _surface_kinds(geometry, name, faults)
     except (LookupError, TypeError, ValueError, AttributeError):
-        faults.add("geometry that is not an object, left out", name)
+        faults.add("geometry that is not an object, left out", name, ruins=True)
         return None
-    if is_instance:
-        source.templates.place(len(boundaries))
     faces, kinds_of_faces = [], []
     for boundary, kind_of_face in zip(boundaries, kinds, strict=True):
         face = _face_of_boundary(boundary, vertices)
         if face is None:
-            faults.add("face with unknown vertices, left out", name)
+            faults.add("face with unknown vertices, left out", name, ruins=True)
         else:
             faces.append(face)
             kinds_of_faces.append(kind_of_face)
@@ -445,6 +453,8 @@ def _read_objects(
         _count_assumptions(city)
         _settle_axes(city, vertices)
     vertices = city.system.to_metres(vertices)
+    with value_errors(f"{where}: geometry-templates"):
+        templates.check_places(objects)
     source = _GeometrySource(vertices, templates, city.system)
     for name, value in objects.items():
         if not isinstance(value, dict) or not isinstance(
@@ -464,13 +474,13 @@ def _count_assumptions(city: CityFile) -> None:
     system = city.system
     if not system.name:
         city.faults.add(
-            "no reference system; metres east, north and up assumed", "the file"
+            "no reference system; metres east, north and up assumed", WHOLE_FILE
         )
     elif system.heights_assumed and not system.is_plain:
         city.faults.add(
             "reference system without heights; its horizontal unit taken for "
             "them",
-            system.name,
+            WHOLE_FILE,
         )
 
 
@@ -540,7 +550,7 @@ def _settle_axes(city: CityFile, vertices: np.ndarray) -> None:
         city.order_is_open = False
         _exchange_axes(city)
     elif not is_there:
-        city.faults.add(_BEYOND, defined.name)
+        city.faults.add(_BEYOND, WHOLE_FILE)
 
 
 def _exchange_axes(city: CityFile) -> None:
@@ -554,7 +564,7 @@ def _exchange_axes(city: CityFile) -> None:
     city.faults.add(
         f"reference system with {order[0]} first, but coordinates with"
         f" {order[1]} first; read as {order[1]} first",
-        defined.name,
+        WHOLE_FILE,
     )
 
 
@@ -573,7 +583,7 @@ def _exchange_mirrored_axes(city: CityFile) -> None:
     if not outwards:
         if city.system.is_north_first:
             kind = "order of axes that no face shows, taken as defined"
-            city.faults.add(kind, city.system.name)
+            city.faults.add(kind, WHOLE_FILE)
     elif sum(outwards) < _MIRRORED_SHARE * len(outwards):
         if city.order_is_open:
             _exchange_axes(city)
@@ -582,7 +592,7 @@ def _exchange_mirrored_axes(city: CityFile) -> None:
         elif len(outwards) > 1:
             city.faults.add(
                 "all inside out: the city may be mirrored (north first?)",
-                "the file",
+                WHOLE_FILE,
             )
 
 

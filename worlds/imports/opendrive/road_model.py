@@ -243,6 +243,19 @@ class LaneSection:
     middle_marks: tuple[RoadMark, ...] = ()
 
 
+class Span(NamedTuple):
+    """A stretch of a road that is a bridge or a tunnel.
+
+    Attributes:
+        kind: `bridge` or `tunnel`.
+        start, end: distances along the road [m].
+    """
+
+    kind: str
+    start: float
+    end: float
+
+
 class Thing(NamedTuple):
     """A signal, or an object beside the road.
 
@@ -304,7 +317,7 @@ class ImportedRoad:
         keeps_left: whether traffic keeps left.
         limits: speed limit [m/s]; 0 where it is unknown.
         things: signals and objects.
-        spans: `bridge` or `tunnel`, for each bridge or tunnel on the road.
+        spans: bridges and tunnels on the road.
     """
 
     name: str
@@ -318,7 +331,7 @@ class ImportedRoad:
     keeps_left: bool = False
     limits: Cubics = ZERO
     things: tuple[Thing, ...] = ()
-    spans: tuple[str, ...] = ()
+    spans: tuple[Span, ...] = ()
 
     def reference(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
         """Returns x, y, z [m], heading and roll [rad] of the reference line.
@@ -374,8 +387,10 @@ class RoadMap:
         roads: the roads.
         reference_system: name of the reference system in the file.
         origin: origin of W in coordinates of this system [m].
+        num_roads: number of roads in the file, with those that are left out.
     """
 
     roads: tuple[ImportedRoad, ...]
     reference_system: str
     origin: tuple[float, float, float]
+    num_roads: int

@@ -1,11 +1,10 @@
 """Reads roads from an OpenDRIVE file.
 
 The import joins lanes whose ends meet, and does not use the links between
-roads, lanes and junctions. The import only reports, as faults, links to things
-that are not in the file.
+roads, lanes and junctions.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 import contextlib
 from dataclasses import replace
@@ -24,13 +23,13 @@ from evaluation.base import (
     read_elements,
     value_errors,
 )
-from worlds.imports.faults import ImportFaults
+from worlds.imports.faults import WHOLE_FILE, ImportFaults
 from worlds.imports.opendrive import curves, road_model
 from worlds.imports.opendrive.things import read_things
 from worlds.imports.part_tables import PartTable
 
-# Greatest length of a road [m].
-_LONGEST_ROAD = 100_000.0
+# Versions up to 1.8 are read.
+_LAST_MINOR = 8
 # A gap between two pieces of a road's course is counted if it is wider than
 # this [m].
 _WIDEST_JOINT = 0.1
@@ -59,8 +58,6 @@ _UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
 _FASTEST = 100.0
 # Greatest extent of a network along x or y; whole countries are refused [m].
 _WIDEST = 20_000.0
-# Greatest length of all roads of a network together [m].
-_MOST_TOGETHER = 2_000_000.0
 # If any road is farther from the origin than this, all are moved to it [m].
 _FAR_AWAY = 10_000.0
 # Lengths that differ by less than this are equal [m].
@@ -69,8 +66,6 @@ _ROUNDING = 0.01
 _MOST_ROLL = math.radians(50.0)
 # Names are cut to this length where they become part of other names.
 _LONGEST_NAME = 60
-# Elements of links at the two ends of a road or lane.
-_ENDS = ("predecessor", "successor")
 _TABLE_FILE = Path(__file__).with_name("parts.yaml")
 _PARTS = PartTable(_TABLE_FILE)
 _WHOLE = parse_yaml(_TABLE_FILE.read_bytes())["whole"].split()
@@ -84,6 +79,7 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
             The message names the file, the road, the line and the fault.
     """
     top = read_elements(path, "OpenDRIVE")
+    _check_version(top, path)
     roads: list[road_model.ImportedRoad] = []
     names: set[str] = set()
     for kind in ("road", "junction"):
@@ -98,8 +94,8 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
             roads.append(road)
     if not roads:
         raise InputError(f"{path}: the file has no roads")
-    _count_dangling_links(top, faults)
-    _count_unread(top, faults, "the file")
+    faults.check_ruins(path, (road.name for road in roads))
+    _count_unread(top, faults, WHOLE_FILE)
     x, y = _origin_of(path, roads)
     reference = top.first("header", "geoReference")
     system = "" if reference is None else reference.text or ""
@@ -109,7 +105,23 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
         tuple(_moved(road, x, y) for road in roads),
         " ".join(system.split()),
         (x + east, y + north, up),
+        len(list(top.all("road"))),
     )
+
+
+def _check_version(top: Element, path: Path) -> None:
+    """Raises an InputError if the file has a version that is not read."""
+    header = top.first("header")
+    with value_errors(path):
+        version = [
+            1 if header is None else int(header.number(part, 1.0))
+            for part in ("revMajor", "revMinor")
+        ]
+    if version[0] != 1 or version[1] > _LAST_MINOR:
+        raise InputError(
+            f"{path}: OpenDRIVE {version[0]}.{version[1]}; versions up to"
+            f" 1.{_LAST_MINOR} are read"
+        )
 
 
 def _offset_of(top: Element) -> tuple[float, float, float]:
@@ -135,12 +147,6 @@ def _origin_of(
     Raises:
         InputError: the network is too large; the message names the file `path`.
     """
-    length = sum(road.length for road in roads)
-    if length > _MOST_TOGETHER:
-        raise InputError(
-            f"{path}: {length / 1000:.0f} km of roads; at most "
-            f"{_MOST_TOGETHER / 1000:.0f} km can be read"
-        )
     starts = np.array(
         [(piece.x, piece.y) for road in roads for piece in road.pieces]
     )
@@ -213,18 +219,16 @@ def _read_road(
     """
     pieces = _read_course(element.all("planView", "geometry"), name, faults)
     if not pieces:
-        faults.add("road without a course, left out", name)
+        faults.add("road without a course, left out", name, ruins=True)
         return None
     stated = element.number("length")
     length = pieces[-1].s + pieces[-1].length
     if abs(stated - length) > _ROUNDING:
         faults.add("road whose length differs from its course's, cut", name)
         length = min(stated, length)
-    if length > _LONGEST_ROAD:
-        raise ValueError(f"{length:g} m are more than {_LONGEST_ROAD:g} m")
     sections = read_sections(element, length, name, faults)
     if not sections:
-        faults.add("road without lanes, left out", name)
+        faults.add("road without lanes, left out", name, ruins=True)
         return None
     if max(pieces[0].s, sections[0].start) > _WIDEST_JOINT:
         faults.add("road whose course or lanes begin after its start", name)
@@ -252,9 +256,10 @@ def _read_road(
         limits=step_function(_speed_limits(element, name, faults)),
         things=tuple(read_things(element, name, faults)),
         spans=tuple(
-            span.tag
+            road_model.Span(tag, s, s + span.number("length"))
             for tag in ("bridge", "tunnel")
             for span in element.all("objects", tag)
+            for s in (span.number("s"),)
         ),
     )
 
@@ -282,10 +287,6 @@ def _read_course(
         if length < _SHORTEST_PIECE:
             faults.add("geometry without length, left out", name)
             continue
-        if length > _LONGEST_ROAD:
-            raise ValueError(
-                f"{where}length: {length:g} m are more than {_LONGEST_ROAD:g} m"
-            )
         try:
             shape = _read_curve(element, length)
         except ValueError as error:
@@ -360,119 +361,6 @@ def _speed_limits(
                 faults.add(kind, name)
                 limit = 0.0
         yield road_type.number("s", 0.0), limit
-
-
-def _count_dangling_links(top: Element, faults: ImportFaults) -> None:
-    """Counts links to objects that are not in the file, as faults.
-
-    Objects are roads, lanes and junctions. `top` is the root element of the
-    file.
-    """
-    roads = {road.attrib.get("id", ""): road for road in top.all("road")}
-    junctions = {
-        junction.attrib.get("id", "") for junction in top.all("junction")
-    }
-    for name, road in roads.items():
-        own = road.attrib.get("junction", "-1")
-        if own not in ("-1", "") and own not in junctions:
-            faults.add("road of a junction that is not in the file", name)
-        for end in _ENDS:
-            kind, linked = _link_at(road, end)
-            known = junctions if kind == "junction" else roads
-            if linked is not None and linked not in known:
-                faults.add(f"link to a {kind} that is not in the file", name)
-        for _ in _dangling_lane_links(road, roads):
-            faults.add("link to a lane that is not in the file", name)
-    for junction in top.all("junction"):
-        name = junction.attrib.get("id", "")
-        for connection in junction.all("connection"):
-            for key in ("incomingRoad", "connectingRoad", "linkedRoad"):
-                linked = connection.attrib.get(key)
-                if linked is not None and linked not in roads:
-                    faults.add(
-                        "connection of a junction with a road that is not in"
-                        " the file",
-                        f"junction {name}",
-                    )
-
-
-def _link_at(road: Element, end: str) -> tuple[str, str | None]:
-    """Returns kind and id of the link at a road's end; None without a link."""
-    link = road.first("link", end)
-    if link is None:
-        return "road", None
-    kind = link.attrib.get("elementType", "road")
-    return kind, link.attrib.get("elementId")
-
-
-def _dangling_lane_links(
-    road: Element, roads: Mapping[str, Element]
-) -> Iterator[Element]:
-    """Yields the links of a road's lanes to lanes that do not exist."""
-    sections = _lane_sections(road)
-    for number, section in enumerate(sections):
-        for end in _ENDS:
-            beyond = _lanes_beyond(road, sections, number, end, roads)
-            if beyond is None:
-                continue
-            for lane in _section_lanes(section):
-                for link in lane.all("link", end):
-                    if link.attrib.get("id") not in beyond:
-                        yield link
-
-
-def _lanes_beyond(
-    road: Element,
-    sections: Sequence[Element],
-    number: int,
-    end: str,
-    roads: Mapping[str, Element],
-) -> set[str | None] | None:
-    """Returns the numbers of the lanes beyond one end of a road's section.
-
-    Args:
-        road: the road.
-        sections: the road's lane sections, in their order along the road.
-        number: index of the section.
-        end: `predecessor` or `successor`.
-        roads: name of a road -> the road.
-
-    Returns:
-        The numbers as in the file. None beyond an end of the road that no
-        known road follows.
-    """
-    step = 1 if end == "successor" else -1
-    at = number + step
-    if 0 <= at < len(sections):
-        beside = [sections[at]]
-        # One side of a road may continue through sections of the other side.
-        while is_single_sided(sections[at]) and 0 < at < len(sections) - 1:
-            at += step
-            beside.append(sections[at])
-    else:
-        kind, linked = _link_at(road, end)
-        if kind != "road" or linked is None or linked not in roads:
-            return None
-        # The link names the end of the other road; some files omit it.
-        others = _lane_sections(roads[linked])
-        beside = others[:1] + others[-1:]
-    return {
-        lane.attrib.get("id")
-        for section in beside
-        for lane in _section_lanes(section)
-    }
-
-
-def _lane_sections(road: Element) -> list[Element]:
-    """Returns the sections of a road's lanes, sorted along the road."""
-    sections = road.all("lanes", "laneSection")
-    return sorted(sections, key=lambda section: section.number("s", 0.0))
-
-
-def _section_lanes(section: Element) -> Iterator[Element]:
-    """Yields the lanes of a section."""
-    for side in ("left", "center", "right"):
-        yield from section.all(side, "lane")
 
 
 def _count_unread(element: Element, faults: ImportFaults, name: str) -> None:

@@ -28,8 +28,6 @@ from worlds.shapes import (
     tree,
 )
 
-# Greatest number of repetitions of an object.
-_MOST_REPEATS = 10_000
 # A last repetition may be beyond its stretch by this share of the distance.
 _ROUNDING = 1e-9
 # Distance of trees that are repeated without a distance [m].
@@ -77,7 +75,7 @@ def read_things(
         else:
             yield thing
         for number_of_repeat, repeat in enumerate(repeats):
-            yield from _repetitions(thing, repeat, number_of_repeat, faults)
+            yield from _repetitions(thing, repeat, number_of_repeat)
 
 
 def _count_unscaled(
@@ -165,9 +163,7 @@ def _read_corners(
     return np.array(rows) if len(rows) >= 2 else None
 
 
-def _repetitions(
-    thing: Thing, repeat: Element, number: int, faults: ImportFaults
-) -> Iterator[Thing]:
+def _repetitions(thing: Thing, repeat: Element, number: int) -> Iterator[Thing]:
     """Yields the repetitions of an object, or one object without gaps.
 
     Args:
@@ -175,7 +171,6 @@ def _repetitions(
         repeat: how the object is repeated, in the file.
         number: number of `repeat` among the object's repetitions. The new names
             contain this number.
-        faults: counts objects that are left out.
 
     Raises:
         ValueError: a size is too large.
@@ -187,12 +182,6 @@ def _repetitions(
         return
     step = distance if distance > 0.0 else _TREE_SPACING
     count = max(math.floor(length / step + _ROUNDING), 0) + 1
-    if count > _MOST_REPEATS:
-        faults.add(
-            f"object repeated more than {_MOST_REPEATS} times, left out",
-            thing.name,
-        )
-        return
     for nth in range(count):
         yield _repeated(thing, repeat, nth * step)._replace(
             name=f"{thing.name}_{number}_{nth}"
@@ -537,11 +526,11 @@ def _swept_object(
     below = np.concatenate([before[:, [0, 3]], after[:, [3, 0]]], axis=1)
     area = shapely.make_valid(shapely.polygons(below[..., :2]))
     return _object_structure(
-        thing, _swept_surface(sections), shapely.union_all(area)
+        thing, swept_surface(sections), shapely.union_all(area)
     )
 
 
-def _swept_surface(sections: np.ndarray) -> np.ndarray:
+def swept_surface(sections: np.ndarray) -> np.ndarray:
     """Returns the surface through cross-sections, as triangles (M, 3, 3) [m].
 
     `sections` (N, 4, 3) are the corners of each cross-section [m], counted
@@ -588,9 +577,9 @@ def _object_structure(
         {"body": triangles},
         {},
         kind=thing.kind,
+        footprint=footprint,
     ).structure
-    model = replace(structure.model, footprint=footprint)
-    return replace(structure, model=model, tags=("object",))
+    return replace(structure, tags=("object",))
 
 
 def _generator_of(name: str) -> np.random.Generator:

@@ -1,16 +1,15 @@
 """Builds a town on an imported road network, and writes its files."""
 
-from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, replace
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 import shapely
 from shapely import GEOSException
-from shapely.geometry import LineString, MultiLineString
+from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 
 from evaluation.base import InputError, distances_along, doing, value_errors
@@ -31,15 +30,20 @@ from worlds.imports import map_files, overview
 from worlds.imports.drives import search, steerable_drives
 from worlds.imports.drives.steerable_drives import WaypointRoute
 from worlds.imports.faults import ImportFaults
-from worlds.imports.imported_objects import ImportedObject, make_object
+from worlds.imports.imported_objects import ImportedObject
 from worlds.imports.opendrive.band_graph import BandGraph
+from worlds.imports.opendrive.bridges import (
+    bridge_decks,
+    bridge_ends,
+    grounds_below,
+    split_levels,
+    tunnel_shells,
+)
 from worlds.imports.opendrive.imported_streets import ImportedStreets
 from worlds.imports.opendrive.lanes import (
-    LEAST_WIDTH,
     LaneBand,
     is_raised,
     lane_bands,
-    lane_class,
     lane_polygon,
 )
 from worlds.imports.opendrive.road_heights import KerbHeights, RoadHeights
@@ -70,19 +74,6 @@ _BAY_LENGTHS = (5.8, 7.4)
 _TAKEN_SHARE = 0.6
 # Least width of a parking lane [m].
 _LEAST_PARKING = 1.9
-# The underside of a bridge is this far below its upper side [m].
-_DECK_DEPTH = np.array([0.0, 0.0, 0.8])
-# Triangles are dropped if twice their area is not greater than this [m^2].
-_LEAST_TWICE_AREA = 1e-6
-# How far the end of a bridge extends to both sides: wider than a kerb [m].
-_END_REACH = 0.2
-# A road at least this far above another one is a bridge [m].
-_HEADROOM = 3.0
-# Places are above one another if they are at most this far apart, as seen from
-# above [m].
-_ABOVE_WITHIN = 2.5
-# A bridge extends this far to both sides of the road that it crosses [m].
-_BRIDGE_REACH = 8.0
 # About the radius of a tree's crown, in pictures [m].
 _CROWN_RADIUS = 1.5
 # Side of the squares into which footprints are divided, in pictures [m].
@@ -98,10 +89,6 @@ _SHOWN_CLASSES = (
     "building",
     "vegetation",
 )
-# The arrays of a band, with one row for each place along the road.
-_ARRAYS = (
-    "inner", "outer", "middle", "heading", "roll", "grade", "rise", "s",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -193,68 +180,6 @@ def _build(
     )
 
 
-def _bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
-    """Yields the structures of bridges: their upper sides and undersides.
-
-    `bands` contains the lanes on bridges.
-    """
-    of_road: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
-    for band in bands:
-        # The sides of parts without a lane are closed as well.
-        semantic_class = lane_class(band.kind) or "other-ground"
-        left, right = band.inner, band.outer
-        if band.lane.number > 0:
-            left, right = right, left
-        upper = _triangles_between(right, left)
-        of_road[band.road.name, semantic_class].append(upper)
-        low_left, low_right = left - _DECK_DEPTH, right - _DECK_DEPTH
-        of_road[band.road.name, "other-structure"] += [
-            _triangles_between(low_left, low_right),
-            _triangles_between(low_right, right),
-            _triangles_between(left, low_left),
-        ]
-    for (road, semantic_class), pieces in of_road.items():
-        triangles = np.concatenate(pieces)
-        edges = np.cross(
-            triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-        )
-        triangles = triangles[np.linalg.norm(edges, axis=1) > _LEAST_TWICE_AREA]
-        if len(triangles):
-            yield make_object(
-                f"bridge_{road}_{semantic_class}",
-                semantic_class,
-                "Bridge",
-                {"deck": triangles},
-                {},
-            ).structure
-
-
-def bridge_ends(bands: Sequence[LaneBand]) -> BaseGeometry:
-    """Returns narrow strips across the lanes at both ends of bridges, in W [m].
-
-    `bands` contains the lanes on bridges.
-    """
-    lines = [
-        LineString([band.inner[k, :2], band.outer[k, :2]])
-        for band in bands
-        for k in (0, -1)
-    ]
-    return shapely.union_all(lines).buffer(_END_REACH, cap_style="flat")
-
-
-def _triangles_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Returns triangles between two lines (N, 3).
-
-    The triangles look upwards if line `b` is to the left of line `a`.
-    """
-    return np.concatenate(
-        [
-            np.stack([a[:-1], a[1:], b[1:]], axis=1),
-            np.stack([a[:-1], b[1:], b[:-1]], axis=1),
-        ]
-    )
-
-
 class _TownStreets(NamedTuple):
     """The streets of a town, as the file determines them.
 
@@ -292,7 +217,7 @@ def _read_streets(
         if band.is_inverted:
             kind = "lane of negative width, without width there"
             faults.add(kind, band.road.name)
-    ground, raised = split_levels(bands)
+    ground, raised = split_levels(bands, faults)
     _count_raised_kerbs(raised, faults)
     ends = bridge_ends(raised)
     on_ground = ImportedStreets(ground, ends)
@@ -351,14 +276,14 @@ def _structures_of_file(
         for road in roads.roads
         for one in thing_structures(road, areas.lane_area, faults)
     ]
+    things += tunnel_shells(streets.bands, raised)
     marks: list[Structure] = []
     if dressed:
-        _count_spans(roads, {band.road.name for band in raised}, faults)
         marks += road_marks(
             "marks", streets.ground, streets.surface.heights, areas.carriageway
         )
         marks += road_marks("bridge_marks", raised)
-    return _StructuresOfFile(list(_bridge_decks(raised)), things, marks)
+    return _StructuresOfFile(list(bridge_decks(raised)), things, marks)
 
 
 def _city_along(
@@ -405,6 +330,7 @@ def _city_along(
             ),
             furnish=lambda draft: None,
             park=lambda draft: _park_cars(draft, streets.ground, plan.cars),
+            pads=grounds_below(streets.raised, streets.ground),
         ),
         plan,
         str(source),
@@ -468,23 +394,6 @@ def _count_raised_kerbs(
             faults.add("kerb on a bridge, level with its road", band.road.name)
 
 
-def _count_spans(
-    roads: RoadMap, raised: Set[str], faults: ImportFaults
-) -> None:
-    """Counts the bridges and tunnels of a file that the town lacks.
-
-    `raised` contains the roads that pass over others. The town has the decks of
-    these roads.
-    """
-    for road in roads.roads:
-        for span in road.spans:
-            if span == "tunnel":
-                faults.add("tunnel, its road left open", road.name)
-            elif road.name not in raised:
-                kind = "bridge over no other road, laid on the ground"
-                faults.add(kind, road.name)
-
-
 def _median_kerb_height(bands: Sequence[LaneBand]) -> float:
     """Returns the height of sidewalks above the road [m].
 
@@ -541,84 +450,12 @@ def _counts_by_kind(
         "signals": sum("signal" in one.tags for one in of_file.things),
         "objects": sum("object" in one.tags for one in of_file.things),
         "bridges": sum(one.semantic_class == "road" for one in of_file.decks),
+        "tunnels": sum(one.kind == "tunnel" for one in of_file.things),
         "roads with marks": len(of_file.marks),
         "buildings, sampled at random": drawn["building"],
         "plants, sampled at random": drawn["vegetation"],
     }
     return {kind: number for kind, number in kinds.items() if number}
-
-
-def split_levels(
-    bands: Sequence[LaneBand],
-) -> tuple[list[LaneBand], list[LaneBand]]:
-    """Returns the lanes on the ground and the lanes on bridges.
-
-    A lane that leads onto a bridge is cut at the bridge's end.
-    """
-    raised = _raised_places(bands)
-    ground: list[LaneBand] = []
-    bridges: list[LaneBand] = []
-    for band in bands:
-        above = raised.get(band.road.name)
-        if above is None:
-            ground.append(band)
-            continue
-        low, high = np.searchsorted(
-            above, [band.s - _BRIDGE_REACH, band.s + _BRIDGE_REACH]
-        )
-        is_bridge = high > low
-        for run, carried in _stretches_of_one_level(is_bridge):
-            parts = {name: getattr(band, name)[run] for name in _ARRAYS}
-            level = bridges if carried else ground
-            level.append(replace(band, **parts))
-    return ground, bridges
-
-
-def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
-    """Returns where each road passes over another road.
-
-    The result maps the name of a road to increasing distances along it [m].
-    """
-    # Roads are numbered by one of their bands.
-    number_of = {band.road.name: number for number, band in enumerate(bands)}
-    rows = [np.zeros((0, 5))]
-    for band in bands:
-        wide = band.width > LEAST_WIDTH
-        for edge in (band.inner, band.middle, band.outer):
-            numbers = np.full(len(band.s), number_of[band.road.name])
-            rows.append(np.column_stack([edge, band.s, numbers])[wide])
-    places = np.concatenate(rows)
-    xy = places[:, :2]
-    z, s, number = places[:, 2:].T
-    if len(places) == 0:
-        return {}
-    tree = cKDTree(xy)
-    raised: dict[str, list[float]] = {}
-    high = np.flatnonzero((z - z.min()).round(6) >= _HEADROOM)
-    for place, near in zip(
-        high, tree.query_ball_point(xy[high], _ABOVE_WITHIN), strict=True
-    ):
-        # Rounded, so that exactly this headroom is enough.
-        is_below = (z[place] - z[near]).round(6) >= _HEADROOM
-        if (is_below & (number[near] != number[place])).any():
-            road = bands[int(number[place])].road.name
-            raised.setdefault(road, []).append(float(s[place]))
-    return {road: np.unique(along) for road, along in raised.items()}
-
-
-def _stretches_of_one_level(
-    is_bridge: np.ndarray,
-) -> Iterator[tuple[slice, bool]]:
-    """Yields stretches of a lane with one level, and whether it is a bridge.
-
-    `is_bridge` (N,) says which places along the lane are on a bridge.
-    Neighbouring stretches share a place.
-    """
-    starts = np.flatnonzero(np.diff(is_bridge.astype(int), prepend=-1))
-    for a, b in zip(starts, [*starts[1:], len(is_bridge)], strict=True):
-        last = min(b + 1, len(is_bridge))
-        if last - a > 1:
-            yield slice(int(a), int(last)), bool(is_bridge[a])
 
 
 def write_town(
@@ -690,6 +527,8 @@ def _report_of(
 ) -> ImportReport:
     roads = town.roads.roads
     of_file = ("roads", "roads in junctions", "signals", "objects")
+    num_elements = town.roads.num_roads
+    num_elements += sum(len(road.things) for road in roads)
     return ImportReport(
         kinds=town.kinds,
         triangles=sum(
@@ -701,8 +540,9 @@ def _report_of(
         drives=tuple(drive.length for drive in town.drives),
         faults=town.faults.rows(),
         parts=town.faults.parts(),
-        num_elements=len(roads) + sum(len(road.things) for road in roads),
+        num_elements=num_elements,
         num_built=sum(town.kinds.get(kind, 0) for kind in of_file),
+        shares=town.faults.shares({}, num_elements),
     )
 
 

@@ -13,9 +13,9 @@ import numpy as np
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from evaluation.base import InputError, check_regular, user_errors
+from evaluation.base import InputError, check_regular
 from worlds.imports.faces import is_tangled
-from worlds.imports.faults import ImportFaults
+from worlds.imports.faults import WHOLE_FILE, ImportFaults
 from worlds.imports.openstreetmap.element_kinds import (
     element_kind,
     is_building,
@@ -53,11 +53,6 @@ _Key = tuple[int, int]
 _CHUNK_SIZE = 1 << 24
 # Greatest length of a word that is searched in a file [bytes].
 _LONGEST_WORD = 8
-# Greatest ratio between what a PBF file unpacks to, and its size. Extracts of
-# cities have 2 to 6.
-_MOST_UNPACKED = 16
-# Greatest size of the header of a PBF file's block, by the format [bytes].
-_BLOB_HEADER = 1 << 16
 
 
 def read_openstreetmap(path: Path) -> OsmFeatures:
@@ -72,8 +67,6 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
 
     features = OsmFeatures()
     check_regular(path)
-    if path.suffix == ".pbf":
-        _check_unpacked(path)
     buildings: list[str] = []
     flat: set[str] = set()
     with (
@@ -120,59 +113,6 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
     return features
 
 
-def _check_unpacked(path: Path) -> None:
-    """Checks how much a PBF file unpacks to, without unpacking it.
-
-    Format: https://wiki.openstreetmap.org/wiki/PBF_Format
-
-    Raises:
-        InputError: it is far more than the size of the file, or the file is
-            damaged.
-    """
-    unpacked = 0
-    with user_errors(path), path.open("rb") as stream:
-        while head := stream.read(4):
-            size = int.from_bytes(head, "big")
-            # A header larger than this is no header; osmium says what is wrong.
-            if size > _BLOB_HEADER:
-                return
-            header = dict(_protobuf_fields(stream.read(size)))
-            data = stream.read(min(header.get(3, 0), _CHUNK_SIZE << 1))
-            unpacked += dict(_protobuf_fields(data)).get(2, 0)
-    if unpacked > max(_MOST_UNPACKED * path.stat().st_size, _CHUNK_SIZE):
-        raise InputError(
-            f"{path}: {unpacked} bytes, unpacked from {path.stat().st_size}:"
-            f" more than {_MOST_UNPACKED} times as many"
-        )
-
-
-def _protobuf_fields(data: bytes) -> Iterator[tuple[int, int]]:
-    """Yields the integers of a message of Protocol Buffers, with their numbers.
-
-    For a field of bytes, the integer is the number of these bytes. The message
-    ends at a field of another type, or where it is damaged.
-    """
-    at = 0
-    while at < len(data):
-        values = []
-        for _ in range(2):
-            value = shift = 0
-            while at < len(data) and shift < 64:
-                byte = data[at]
-                at += 1
-                value |= (byte & 0x7F) << shift
-                shift += 7
-                if byte < 0x80:
-                    break
-            values.append(value)
-        key, value = values
-        yield key >> 3, value
-        if key & 7 == 2:
-            at += value
-        elif key & 7:
-            return
-
-
 def _count_without_area(
     buildings: Iterable[str], flat: AbstractSet[str], features: OsmFeatures
 ) -> None:
@@ -188,7 +128,8 @@ def _count_without_area(
             fault = (
                 _WITHOUT_AREA if name in flat else _why_no_area(ways.get(name))
             )
-            features.faults.add(f"building {fault}, left out", name)
+            kind = f"building {fault}, left out"
+            features.faults.add(kind, name, ruins=True)
 
 
 def _area_of(area: Any, tags: Tags) -> OsmArea:
@@ -215,14 +156,15 @@ def _way_of(
         )
         for is_absent, number in others.items():
             gap = "that is not in the file" if is_absent else "off the globe"
-            faults.add(f"place of a way {gap}, left out", name, number)
+            kind = f"place of a way {gap}, left out"
+            faults.add(kind, name, number, ruins=len(nodes) < 2)
     if len(nodes) < 2:
         return None
     line = np.array([(node.lon, node.lat) for node in nodes])
     if len(line) > _MANY_NODES and (
         is_tangled(line) or is_tangled(line, reach=_NEAR)
     ):
-        faults.add("way with a tangle of nodes, left out", name)
+        faults.add("way with a tangle of nodes, left out", name, ruins=True)
         return None
     return OsmWay(name, tags, line, tuple(node.ref for node in nodes))
 
@@ -491,7 +433,7 @@ def _report_remark(path: Path, faults: ImportFaults) -> None:
     parser.CharacterDataHandler = text
     if _is_parsed(path, parser, b"<remark") and remark:
         words = " ".join("".join(remark).split())
-        faults.add(f"the file may be cut off: {words}", "its remark")
+        faults.add(f"the file may be cut off: {words}", WHOLE_FILE)
 
 
 def _is_parsed(path: Path, parser: expat.XMLParserType, word: bytes) -> bool:

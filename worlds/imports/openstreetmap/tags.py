@@ -16,6 +16,8 @@ TABLES = parse_yaml(Path(__file__).with_name("tags.yaml").read_bytes())
 LEAST = 0.01
 # OpenStreetMap allows no longer values of tags [characters].
 _LONGEST_VALUE = 255
+# Tags without which a thing has not the size that it has in the file.
+_SIZES = ("height", "building:height", "building:levels", "width", "diameter")
 _FOOT = 0.3048  # [m]
 _NUMBER = r"(\d+(?:[.,]\d+)?|[.,]\d+)"
 _LENGTH = re.compile(rf"{_NUMBER}\s*([a-z]*|'|\")")
@@ -129,7 +131,7 @@ def tag_value(
     if where is not None:
         name, faults = where
         kind = f"{key} unreadable or implausible, the usual one taken"
-        faults.add(kind, name)
+        faults.add(kind, name, ruins=key in _SIZES)
     return None
 
 

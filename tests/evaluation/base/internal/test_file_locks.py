@@ -1,5 +1,6 @@
 """Locks that are no plain files are refused."""
 
+import fcntl
 import os
 
 import pytest
@@ -21,3 +22,17 @@ def test_a_lock_that_is_a_link_a_pipe_or_a_text_is_refused(tmp_path):
         ):
             raise AssertionError("locked")
     assert mine.read_text() == (tmp_path / "c.lock").read_text() == "mine"
+
+
+def test_nobody_can_take_a_lock_in_a_shared_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    shared.chmod(0o1777)
+    (shared / "out.lock").write_text("of somebody else")
+    with exclusive(shared / "out", lambda: None):
+        assert [one.name for one in shared.iterdir()] == ["out.lock"]
+        (lock,) = (tmp_path / "cache").rglob("*.lock")
+        with lock.open() as stream, pytest.raises(BlockingIOError):
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    assert not lock.exists()

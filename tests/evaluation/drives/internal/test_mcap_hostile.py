@@ -1,9 +1,6 @@
 """MCAP files without an index whose records are damaged, or made to harm."""
 
-import contextlib
-import resource
 import struct
-import sys
 
 from helpers.mcap_bytes import write_mcap
 import lz4.frame
@@ -14,7 +11,7 @@ import pytest
 import zstandard
 
 from evaluation.base import InputError
-from evaluation.drives.mcap_file import CHUNK_LIMIT_BYTES, McapFile
+from evaluation.drives.mcap_file import McapFile
 
 # Behind the magic bytes and the header.
 START = len(MCAP0_MAGIC) + 9 + 4 + 4 + len("test")
@@ -78,7 +75,8 @@ def make_bomb(size):
 
 
 HUGE = 2**63 + 1
-BOMB = make_bomb(2 * CHUNK_LIMIT_BYTES)
+GIGABYTE = 1 << 30
+BOMB = make_bomb(GIGABYTE)
 LZ4_BOMB = lz4.frame.compress(bytes(64 * 2**20), store_size=False)
 HARMFUL = {
     "huge record": record_of(Opcode.METADATA, b"abc", HUGE),
@@ -91,7 +89,7 @@ HARMFUL = {
     "huge chunk content": record_of(
         Opcode.CHUNK, chunk_of(b"", size=0, length=HUGE)
     ),
-    "bomb": record_of(Opcode.CHUNK, chunk_of(BOMB, size=2 * CHUNK_LIMIT_BYTES)),
+    "bomb": record_of(Opcode.CHUNK, chunk_of(BOMB, size=GIGABYTE)),
     "bomb of a wrong size": record_of(Opcode.CHUNK, chunk_of(BOMB, size=1000)),
     "lz4 bomb of a wrong size": record_of(
         Opcode.CHUNK, chunk_of(LZ4_BOMB, size=1000, compression=b"lz4")
@@ -116,32 +114,10 @@ def test_harmful_records_are_refused_at_their_place(tmp_path, name):
     content = bare()
     path = tmp_path / "a.mcap"
     path.write_bytes(content[:START] + HARMFUL[name] + content[START:])
-    with (
-        little_memory(),
-        pytest.raises(
-            InputError, match=rf"a\.mcap: damaged MCAP file \(byte {START}: "
-        ) as error,
-    ):
+    fault = rf"a\.mcap: damaged MCAP file \(byte {START}: .*mcap recover IN"
+    with pytest.raises(InputError, match=fault) as error:
         McapFile(path)
     assert "\n" not in str(error.value)
-    assert "mcap recover IN -o OUT" in str(error.value)
-
-
-@contextlib.contextmanager
-def little_memory():
-    """Limits this process to little more than it has, where Linux can."""
-    if sys.platform != "linux":
-        yield
-        return
-    with open("/proc/self/statm", encoding="ascii") as file:
-        has = int(file.read().split()[0]) * resource.getpagesize()
-    limits = resource.getrlimit(resource.RLIMIT_AS)
-    most = has + 6 * CHUNK_LIMIT_BYTES
-    resource.setrlimit(resource.RLIMIT_AS, (most, limits[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, limits)
 
 
 @pytest.mark.parametrize(
@@ -153,12 +129,3 @@ def test_files_without_anything_readable(tmp_path, content):
     with pytest.raises(InputError, match=r"file\.mcap: .*MCAP") as error:
         McapFile(path)
     assert "\n" not in str(error.value)
-
-
-def test_a_small_cut_file_is_not_unpacked(tmp_path):
-    path = tmp_path / "file.mcap"
-    chunk = record_of(Opcode.CHUNK, chunk_of(BOMB, size=2 * CHUNK_LIMIT_BYTES))
-    path.write_bytes(MCAP0_MAGIC + 3 * chunk + b"\x06")
-    end = len(MCAP0_MAGIC) + 3 * len(chunk)
-    with pytest.raises(InputError, match=f"byte {end} of {end + 1}"):
-        McapFile(path)

@@ -4,7 +4,6 @@ import io
 import itertools
 import math
 import pickle
-import tracemalloc
 import zipfile
 
 import numpy as np
@@ -325,23 +324,13 @@ def test_files_of_pytorch_are_refused(tmp_path, content, name):
 
 
 @pytest.mark.slow
-def test_weights_can_neither_run_code_nor_fill_the_memory(tmp_path):
+def test_weights_can_run_no_code(tmp_path):
     path = tmp_path / "w.npz"
     name = "netvlad.centroids"
     np.savez(path, **random_weights() | {name: np.array([Ran()], object)})
     with pytest.raises(InputError, match=r"w\.npz: .*pickle"):
         make_method("bevplace", {"weights": path})
     assert not Ran.ran
-    np.savez_compressed(path, **{name: np.zeros(80_000_000, np.float32)})
-    assert path.stat().st_size < 1_000_000
-    tracemalloc.start()
-    try:
-        with pytest.raises(InputError, match=rf"w\.npz: .*{name}: more than"):
-            make_method("bevplace", {"weights": path})
-        _, most = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert most < 300_000_000
 
 
 def test_weights_must_be_given(tmp_path):

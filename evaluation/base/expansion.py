@@ -7,9 +7,11 @@ from collections.abc import Callable, Hashable, Iterable
 from typing import TypeVar
 
 _Node = TypeVar("_Node", bound=Hashable)
+# Greatest number of parts that repetitions may add to those of a file.
+_MOST_REPEATED = 100_000
 
 
-def expanded_size(
+def check_expansion(
     root: _Node,
     parts: Callable[[_Node], Iterable[_Node]],
     size: Callable[[_Node], int] = lambda node: 1,
@@ -24,22 +26,31 @@ def expanded_size(
         size: returns the size of a node without its parts; by default one.
 
     Raises:
-        ValueError: a node contains itself.
+        ValueError: a node contains itself, or the graph stands for far more
+            than its nodes.
     """
     inside: dict[_Node, list[_Node]] = {}
     sizes: dict[_Node, int] = {}
+    written = 0
     waiting = [root]
     while waiting:
         node = waiting[-1]
         if node not in inside:
             inside[node] = [*parts(node)]
-            for part in {*inside[node]} - sizes.keys():
-                if part in inside:
-                    raise ValueError("contains itself")
-                waiting.append(part)
+            for part in reversed(inside[node]):
+                if part not in sizes:
+                    if part in inside:
+                        raise ValueError("contains itself")
+                    waiting.append(part)
         else:
             waiting.pop()
             if node not in sizes:
-                within = sum(sizes[part] for part in inside[node])
-                sizes[node] = size(node) + within
+                own = size(node)
+                written += own
+                sizes[node] = own + sum(sizes[part] for part in inside[node])
+    if sizes[root] > written + _MOST_REPEATED:
+        raise ValueError(
+            f"its {written} parts stand for {sizes[root]}, because they name"
+            " each other many times"
+        )
     return sizes[root]
