@@ -228,9 +228,6 @@ def _search_from_a_guess(
     Returns three values: the search, which contains these loops; where the
     guess comes from, in words; and the number of candidate pairs, or None if no
     place had to be recognised.
-
-    Raises:
-        InputError: no guess fits.
     """
     known = _common_coordinates(source.drive, target.drive)
     if known is not None:
@@ -291,7 +288,6 @@ def _probe(
     """Registers some keyframes from a guess, to test the guess.
 
     Args:
-        source, target: the two drives.
         X_TS: (4, 4) the guess.
         keyframes: (M,) keyframes of the source from which the tested ones are
             chosen; by default all that are near the target.
@@ -336,12 +332,8 @@ def _numbers_of_loops(search: LoopSearch, X_TK: np.ndarray) -> dict:
     """Returns the fields of the report on loops, from `attempts` on.
 
     Args:
-        search: the loops.
         X_TK: (K, 4, 4) poses of the source's keyframes that were fitted to
             them.
-
-    Raises:
-        InputError: too few loops agree with these poses.
     """
     loops = list(search.loops.values())
     is_inlier = agreeing(loops, search.target.X_WK, X_TK)
@@ -361,15 +353,7 @@ def _numbers_of_loops(search: LoopSearch, X_TK: np.ndarray) -> dict:
 
 
 def _check_agreement(search: LoopSearch, num_agreeing: int) -> None:
-    """Checks that enough of the loops agree.
-
-    Args:
-        search: the loops.
-        num_agreeing: number of loops that agree with the fitted poses.
-
-    Raises:
-        InputError: too few loops agree.
-    """
+    """Checks that enough of the loops agree."""
     num_loops, num_tried = len(search.loops), len(search.tried)
     needed = max(
         _FEWEST_LOOPS, _AGREEING_SHARE * num_loops, _LEAST_YIELD * num_tried
@@ -404,7 +388,6 @@ def _lowered(
     """Returns a drive at given poses, lowered by the height of its ground.
 
     Args:
-        drive: the drive.
         X_WS: (N, 4, 4) its poses.
         ground: height of the ground [m].
         world_frame, datum: names of the frame and the datum of these poses.
@@ -444,9 +427,6 @@ def _without_drift(drive: Drive) -> tuple[Submaps, float]:
         The submaps, and the upper quartile of the position errors at such
         places [m]. The correction takes several rounds; of the quartiles before
         each round, the greatest is returned. It is 0 without a correction.
-
-    Raises:
-        InputError: if a scan cannot be read.
     """
     submaps = Submaps(drive)
     worst = 0.0

@@ -215,10 +215,6 @@ class LoopSearch:
     def _moved_with(self, registered: int, k: int) -> np.ndarray:
         """Returns the pose of a keyframe, moved with a registered keyframe.
 
-        Args:
-            registered: number of a keyframe with a loop.
-            k: number of the keyframe.
-
         Returns:
             (4, 4) X_TK of keyframe k, if the drive's own motion between the two
             is right.

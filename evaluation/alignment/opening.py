@@ -1,7 +1,5 @@
 """Opening what is compared: which drives, and in which world they are."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

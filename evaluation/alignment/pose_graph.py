@@ -142,7 +142,6 @@ def _block_matrix(
     Args:
         blocks: (M, 6, 6) the blocks, from the first row of blocks on.
         columns: (M,) column of blocks in which each block is.
-        number: number of columns of blocks.
     """
     starts = np.arange(len(blocks) + 1)
     shape = 6 * len(blocks), 6 * number

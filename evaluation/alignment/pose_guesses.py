@@ -173,7 +173,6 @@ def _refine(
     """Fits a pose to pairs, and then to all pairs that agree with it.
 
     Args:
-        candidates: the M pairs.
         pairs: (M,) bool, the pairs to which the pose is fitted first.
 
     Returns:
@@ -235,7 +234,6 @@ def _fit_turn_and_move(candidates: Candidates, pairs: np.ndarray) -> _Trial:
     """Returns turn and move by least squares (Umeyama 1991, in 2-D).
 
     Args:
-        candidates: the M pairs.
         pairs: (M,) bool, the pairs to which they are fitted.
     """
     p_S, p_T = candidates.p_S[pairs, :2], candidates.p_T[pairs, :2]
@@ -252,7 +250,6 @@ def _mean_move(
     """Returns the translation (3,) that fits pairs after a turn [m].
 
     Args:
-        candidates: the M pairs.
         pairs: the pairs that count, as indices or as a mask (M,).
         turn: angle of the turn [rad].
     """

@@ -178,8 +178,6 @@ def _nearest_pairs(
     """Pairs a sample of the points with the nearest points of the target.
 
     Args:
-        source: the cloud S.
-        target: the cloud T.
         X_TS: (4, 4) pose of S in T.
     """
     sample = source.sample()
@@ -224,8 +222,6 @@ def _covariance(source: Surface, target: Surface, pairs: _Pairs) -> np.ndarray:
     """Returns the covariance (6, 6) of a registration; see `Registration`.
 
     Args:
-        source: the cloud S.
-        target: the cloud T.
         pairs: points of S, paired with those of T.
     """
     n_T = target.normals[pairs.nearest[pairs.is_paired]]

@@ -5,8 +5,6 @@ the process gets memory and processor time in proportion to the size of the
 file, and no more, so that readers need not count.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import contextlib
 from contextvars import ContextVar
@@ -235,11 +233,7 @@ def _size(status: os.stat_result) -> int:
 
 
 def _factor() -> float:
-    """Returns the factor that the user has set.
-
-    Raises:
-        InputError: it is no positive number.
-    """
+    """Returns the factor that the user has set."""
     text = os.environ.get(_VARIABLE) or "1"
     try:
         factor = float(text)

@@ -66,7 +66,6 @@ def _lock_file(
     """Locks a file until a stack of contexts is closed.
 
     Args:
-        lock: the file.
         stack: stack that releases the lock when it is closed.
         on_wait: called if another process holds the lock, before waiting.
 

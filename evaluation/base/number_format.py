@@ -101,15 +101,6 @@ def other_separator(line: str, expected: str | None) -> str:
     return ""
 
 
-def is_real(value: object) -> bool:
-    """Returns whether a value is a finite real number, and no bool."""
-    return (
-        isinstance(value, numbers.Real)
-        and not isinstance(value, bool)
-        and math.isfinite(value)
-    )
-
-
 def is_number(word: str) -> bool:
     """Returns whether a word is a decimal number, NaN or infinity."""
     try:

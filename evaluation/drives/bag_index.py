@@ -5,8 +5,6 @@ ones, such as poses. They are kept in the cache of the user, for the next time
 that the same files are opened.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Sequence
 import contextlib
 import hashlib

@@ -1,7 +1,5 @@
 """The interface of every recorded drive, in any format."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Iterator, Mapping
 import os

@@ -155,13 +155,11 @@ def _read_scan(lidar: str, path: Path, stamp_ns: int) -> np.ndarray:
 
     Args:
         lidar: name of the LiDAR: `Ouster`, `Velodyne`, `Avia` or `Aeva`.
-        path: the file.
         stamp_ns: time of the scan [ns], on which the format of the Aeva
             depends.
 
     Raises:
         ValueError: if the file does not have the format of that LiDAR.
-        InputError: if the file cannot be read.
     """
     dtype = _RECORDS[lidar]
     if lidar == "Aeva" and stamp_ns <= _AEVA_CHANGE_NS:

@@ -330,9 +330,6 @@ def _calibrated(path: Path) -> tuple[np.ndarray, str | None]:
     Returns:
         X_CS (4, 4), the pose of the LiDAR in the camera's frame; and the model
         of the LiDAR, None if it is unknown.
-
-    Raises:
-        InputError: the file cannot be read.
     """
     rows = _read_calibration(path)
     is_kitti = "P0" in rows and rows["P0"][0, 0] > _KITTIS_FOCAL_LENGTH
@@ -343,9 +340,6 @@ def _read_calibration(path: Path) -> dict[str, np.ndarray]:
     """Returns the row Tr of `calib.txt`, and the row P0 if present, (1, 12).
 
     Tr is the upper 3 x 4 of X_CS, the pose of the LiDAR in the camera's frame.
-
-    Raises:
-        InputError: Tr is missing, or a row is not twelve numbers.
     """
     rows = {}
     for line in read_text(path).splitlines():

@@ -614,11 +614,7 @@ class _Topics:
     """
 
     def __init__(self, path: Path):
-        """Opens a bag; no topic is read yet.
-
-        Raises:
-            InputError: there is no complete bag.
-        """
+        """Opens a bag; no topic is read yet."""
         self.file = _open_bag(path)
         self.path = self.file.path
         self._types: dict[str, str] = {}
@@ -635,9 +631,6 @@ class _Topics:
             stream: what the topic has.
             wanted: its name, with or without a slash; None for the usual topic
                 or, without it, the only one.
-
-        Raises:
-            InputError: there is no such topic, or there are several.
         """
         found = [stream.usual] if stream.usual in self.file.topics else []
         usual = stream.usual
@@ -702,11 +695,7 @@ class _Topics:
         return self._types[topic]
 
     def require(self, topic: str, message_type: str) -> None:
-        """Checks that all messages of a topic are of one type in CDR.
-
-        Raises:
-            InputError: the topic has messages of other types.
-        """
+        """Checks that all messages of a topic are of one type in CDR."""
         found = self.file.topics[topic]
         if found != [message_type]:
             raise InputError(
@@ -734,9 +723,6 @@ class _Topics:
         Args:
             topic: topic of the message.
             place: the location, a row of `McapFile.locate`.
-
-        Raises:
-            InputError: the message cannot be read or decoded.
         """
         with reading(self.file.path), self.faults(topic):
             data = self.file.read(place)
@@ -751,10 +737,6 @@ class _Topics:
 
         Returns:
             (N,) rows, by stamp, of `ODOMETRY_DTYPE` or `IMU_DTYPE`.
-
-        Raises:
-            InputError: a message cannot be read, or two different messages have
-                the same stamp.
         """
         kind = self._types[topic]
         with self.faults(topic):
@@ -802,10 +784,6 @@ class _Topics:
         """Returns the stamps (N,) [ns] and locations (N,) of a topic, sorted.
 
         A message that is there twice counts once.
-
-        Raises:
-            InputError: a message has no stamp, or two messages with one stamp
-                differ.
         """
         if topic not in self._by_stamp:
             self._by_stamp[topic] = self._sorted(topic)
@@ -877,11 +855,7 @@ class _Topics:
         return places["log_time_ns"].astype(np.int64)
 
     def json(self, name: str) -> Any:
-        """Returns the value of a JSON attachment; None if the file lacks it.
-
-        Raises:
-            InputError: the attachment cannot be read, or is not JSON.
-        """
+        """Returns the value of a JSON attachment; None if the file lacks it."""
         data = self.file.attachment(name)
         with self.faults(f"attachment {name}"):
             return None if data is None else parse_json(data)
@@ -902,11 +876,7 @@ class _McapImages:
 
     @property
     def stamps_ns(self) -> np.ndarray:
-        """(M,) int64 stamp of each image, sorted [ns].
-
-        Raises:
-            InputError: an image has no stamp.
-        """
+        """(M,) int64 stamp of each image, sorted [ns]."""
         return self._sorted[0]
 
     def image(self, index: int) -> bytes:
@@ -973,11 +943,7 @@ def _open_bag(path: Path) -> McapFile | RosbagFile:
 
 
 def _check_listed(metadata: Path, files: Sequence[Path]) -> None:
-    """Refuses a bag of which rosbag2's list names fewer or more files.
-
-    Raises:
-        InputError: the list is no list, or other files are there.
-    """
+    """Refuses a bag of which rosbag2's list names fewer or more files."""
     content = read_yaml(metadata)
     try:
         told = content["rosbag2_bagfile_information"]["relative_file_paths"]

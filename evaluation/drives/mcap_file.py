@@ -582,7 +582,6 @@ def _read_summary(stream: BinaryIO, path: Path) -> bytes:
         The records of the section; empty for a file without this section.
 
     Raises:
-        InputError: the file is not MCAP, or is cut off.
         ValueError: the summary is damaged.
     """
     if stream.read(len(_MAGIC)) != _MAGIC:
@@ -617,7 +616,6 @@ def _read_record(
     """Returns the opcode and the content of the record at a position.
 
     Args:
-        stream: the file.
         position: place of the record in the file [bytes].
         what: kind of the record, for error messages.
 

@@ -140,7 +140,6 @@ def _read_scan(path: Path) -> np.ndarray:
 
     Raises:
         ValueError: if the file does not have NCLT's format.
-        InputError: if the file cannot be read.
     """
     stored = read_packed(path, _STORED)
     check_below(stored, "laser", _NUM_LASERS)

@@ -151,11 +151,7 @@ class RosbagFile:
         )
 
     def _joints(self, paths: Sequence[Path]) -> list[int]:
-        """Returns where files are joined; checks that those of ROS 1 may be.
-
-        Raises:
-            InputError: a file of ROS 1 does not continue the one before it.
-        """
+        """Returns where files are joined; checks that those of ROS 1 may be."""
         given: Any = self._here.reader.readers
         if self._here.reader.is2:
             parts = getattr(given[0].storage, "storages", [given[0].storage])

@@ -1,7 +1,5 @@
 """Whether the poses of two drives are in the same world."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from evaluation.base import InputError

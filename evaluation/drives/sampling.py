@@ -4,8 +4,6 @@ Places are d metres apart along the path: a frame is a place if it is the first
 frame at or beyond a multiple of d. The first frame of a drive is a place.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

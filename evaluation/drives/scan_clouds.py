@@ -114,11 +114,8 @@ def cropped_with_fields(
     """Returns the same points as `cropped`, with further fields.
 
     Args:
-        scan: structured array (N,) in the frame S of a sensor.
-        half_extent: greatest absolute x, y and z of a point in F [m].
+        scan, half_extent, X_FS: see `cropped`.
         fields: names of further fields of the points, besides x, y and z.
-        X_FS: (4, 4) pose of the sensor in the frame F of the result; by default
-            F is S.
         source: name of the drive or file, for error messages.
 
     Returns:

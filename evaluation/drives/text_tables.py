@@ -136,9 +136,6 @@ def _parts(path: Path) -> tuple[str, str, list[str]]:
     """Returns the remark above a table, its header, and its rows.
 
     Remark and header are "" if there is none.
-
-    Raises:
-        InputError: there is no such file, or no row in it.
     """
     try:
         text = decode_text(read_bytes(path))
@@ -168,7 +165,6 @@ def _places(
     Args:
         header: line above the first row, which need not be a header; "" if
             there is no such line.
-        row: the first row.
         separator: text between columns; None for white space.
         names: see `read_numbers`.
 
@@ -310,7 +306,6 @@ def _pick_columns(
     Args:
         lines: N rows.
         places: place of each wanted column, from 0.
-        width: number of columns of a row.
         separator: text between columns; None for white space.
         clock: columns whose sum is the first wanted column, with their units
             [ns]; empty if this column is taken as it is.

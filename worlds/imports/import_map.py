@@ -155,9 +155,6 @@ def _check_sizes(source: Path, objects: Sequence[ImportedObject]) -> None:
     """Checks that the buildings have plausible heights.
 
     Each value of a file in another unit is plausible, but the city is not.
-
-    Raises:
-        InputError: the median building is too small or too large.
     """
     heights = [
         np.ptp(one.triangles[:, :, 2])
@@ -275,11 +272,7 @@ def _name_in_faults(imported: ImportedObject) -> str:
 def _check_options(
     kind: MapSource, source: Path, output: Path, options: ImportOptions
 ) -> None:
-    """Checks the options before the file is read.
-
-    Raises:
-        InputError: an option cannot be used; the message names the option.
-    """
+    """Checks the options before the file is read."""
     kind.check_options(source, options)
     if options.grow is not None and options.years:
         raise InputError(
@@ -342,9 +335,6 @@ def _cropped_city(
     A structure is kept if its bounding box is within `distance` [m] of a drive;
     all other structures are counted in `faults`. Terrain is cut to the part
     near the drives.
-
-    Raises:
-        InputError: no structure is near a drive, or there is no drive.
     """
     if not drives:
         raise InputError("--within: no drive was found; give one with --along")

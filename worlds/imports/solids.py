@@ -126,7 +126,6 @@ def _slopes_and_gables(
 
     Args:
         roof: shape of the roof, as for `extruded`.
-        polygon: the footprint.
         corners: (N, 3) outline of the footprint at the height of the eaves [m].
         high: height of the highest point [m].
         roof_height: height of the roof above the eaves [m].
@@ -171,7 +170,6 @@ def _rising_rings(
 
     Args:
         corners: (N, 3) outline at the eaves [m].
-        polygon: the footprint.
         roof_height: height of the roof [m].
         profile: see `_PROFILES`.
     """

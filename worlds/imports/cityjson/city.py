@@ -1,7 +1,5 @@
 """Imports a city from a CityJSON file."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace

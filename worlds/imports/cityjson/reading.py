@@ -112,11 +112,7 @@ def _look_like_degrees(low: np.ndarray, high: np.ndarray) -> bool:
 
 
 def _read_documents(path: Path) -> CityFile:
-    """Returns the content of a file: the objects of all its documents.
-
-    Raises:
-        InputError: a document cannot be read, or is not CityJSON.
-    """
+    """Returns the content of a file: the objects of all its documents."""
     city = CityFile()
     # The last document of type CityJSON, and the name of its reference system.
     whole: dict = {}
@@ -171,11 +167,7 @@ def _documents(path: Path) -> Iterator[tuple[int, dict]]:
 
 
 def _json_object(text: bytes, where: str) -> dict:
-    """Returns the JSON object in a text.
-
-    Raises:
-        InputError: there is no such object; the message begins with `where`.
-    """
+    """Returns the JSON object in a text."""
     try:
         value = parse_json(text)
     except UnicodeDecodeError as error:
@@ -242,9 +234,6 @@ def _read_templates(document: dict, where: str) -> _Templates:
     """Returns the templates in a document of type CityJSON.
 
     `where` names the file and the line of the document in error messages.
-
-    Raises:
-        InputError: the vertices of the templates cannot be used.
     """
     templates = document.get("geometry-templates")
     templates = templates if isinstance(templates, dict) else {}
@@ -435,9 +424,6 @@ def _read_objects(
         templates: the templates of `whole`.
         where: place of the document, for error messages.
         city: the city, which gets the objects.
-
-    Raises:
-        InputError: the objects, the vertices or the transform cannot be used.
     """
     _PARTS.account(["file"], document, where, city.faults)
     objects = document.get("CityObjects", {})
@@ -632,9 +618,6 @@ def _read_vertices(document: dict, transform: object, where: str) -> np.ndarray:
         transform: the transform of the document, a JSON object with scale and
             translation; None if the vertices are coordinates.
         where: place of the document, for error messages.
-
-    Raises:
-        InputError: vertices or transform cannot be used.
     """
     points = to_triples(document.get("vertices", []), f"{where}: vertices")
     if transform is not None and not isinstance(transform, dict):

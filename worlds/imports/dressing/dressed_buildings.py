@@ -1,7 +1,5 @@
 """Dresses imported buildings: adds details to their walls and roofs."""
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
@@ -194,9 +192,7 @@ def _split_buildings(
     the style of the original.
 
     Args:
-        buildings: the buildings.
         ground: the ground on which they stand.
-        seed: seed of the random styles.
     """
     split = []
     styles: dict[str, Style] = {}
@@ -256,10 +252,8 @@ def _dress_building(
     """Returns the model of a dressed building, and counts of random details.
 
     Args:
-        building: the building.
         plans: plans of the walls that get details; all other walls stay bare.
         paths: paths of the drives in W [m].
-        seed: seed of the random draws.
     """
     imported, style = building.imported, building.style
     footprint = imported.structure.model.footprint
@@ -416,8 +410,6 @@ def _plan_facades(
     """Returns the plans of the walls to dress, by the building's number.
 
     Args:
-        bare: the buildings.
-        drives: the drives.
         streets: the streets, on which doors and shops are.
         ground: the ground on which buildings stand.
         views: viewpoints on the drives, from which walls are visible.

@@ -191,7 +191,6 @@ def _facts(
     """Returns counts of details: from the file, random, and without room.
 
     Args:
-        buildings: the dressed buildings.
         added: random objects, except small objects along streets.
         placed: the small objects along streets.
     """
@@ -249,7 +248,6 @@ def _laid_paving(
         kept: structures of the city.
         streets: streets of the city.
         drives: drives; without drives, nothing is laid.
-        ground: the ground.
         is_paved: whether ground of unknown kind is paved.
     """
     laid: list[ImportedObject] = []

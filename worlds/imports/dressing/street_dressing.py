@@ -170,9 +170,7 @@ def _park_along(
 
     Args:
         room: the city, which places cars where there is room.
-        row: the street.
         lines: middle lines of all streets, near whose crossings no car parks.
-        rng: random generator for places and kinds of cars.
     """
     line = row.line
     others = lines.difference(line.buffer(_SAME_LINE))
@@ -203,8 +201,6 @@ def _fill_car_park(
 
     Args:
         room: the city, which places cars where there is room.
-        car_park: the car park.
-        seed: seed of the random draws.
     """
     outline = MultiPoint(car_park.triangles.reshape(-1, 3)[:, :2])
     box = np.array(outline.minimum_rotated_rectangle.boundary.coords)
@@ -275,7 +271,6 @@ def _off_carriageway(
 
     Args:
         room: the city, which places objects where there is room.
-        tree: the tree.
         streets: the streets near drives.
         courses: middle line of each of these streets.
     """
@@ -308,12 +303,7 @@ def _place_from_file(
     """Places a small object of the file, moved off the carriageway.
 
     Args:
-        room: the city, which places objects where there is room.
-        small: the small object.
-        number: number of the object among all small objects.
-        streets: the streets near drives.
-        courses: middle line of each of these streets.
-        seed: seed of the random draws.
+        room, streets, courses: see `_off_carriageway`.
     """
     name = f"{small.kind}_{small.source}"
     if small.source.startswith("w"):
@@ -389,7 +379,6 @@ def _beside_street(
 
     Args:
         xy: (2,) the place in W [m].
-        streets: the streets.
         courses: middle line of each street [m].
     """
     point = Point(xy)

@@ -229,8 +229,6 @@ def _check_place(road: ImportedRoad, lane: int, edge: np.ndarray) -> None:
     """Checks that a lane is near the origin of W.
 
     Args:
-        road: the road.
-        lane: number of the lane.
         edge: (N, 3) outer edge of the lane in W [m].
 
     Raises:

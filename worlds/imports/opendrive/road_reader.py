@@ -143,9 +143,6 @@ def _origin_of(
 
     The origin is that of the file, or the middle of the network if the network
     is far from the origin of the file.
-
-    Raises:
-        InputError: the network is too large; the message names the file `path`.
     """
     starts = np.array(
         [(piece.x, piece.y) for road in roads for piece in road.pieces]
@@ -567,7 +564,6 @@ def _read_marks(
     Args:
         lane: the lane in the file.
         start: distance along the road at which the lane's section begins [m].
-        road: name of the road.
         faults: counts the marks that were changed.
 
     Raises:

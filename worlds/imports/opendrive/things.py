@@ -167,7 +167,6 @@ def _repetitions(thing: Thing, repeat: Element, number: int) -> Iterator[Thing]:
     """Yields the repetitions of an object, or one object without gaps.
 
     Args:
-        thing: the object.
         repeat: how the object is repeated, in the file.
         number: number of `repeat` among the object's repetitions. The new names
             contain this number.

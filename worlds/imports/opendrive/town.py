@@ -205,12 +205,7 @@ class _TownStreets(NamedTuple):
 def _read_streets(
     source: Path, roads: RoadMap, faults: ImportFaults
 ) -> _TownStreets:
-    """Returns the streets of a town.
-
-    Raises:
-        InputError: a lane cannot be used, or the lanes on the ground have no
-            area or are too far apart.
-    """
+    """Returns the streets of a town."""
     with value_errors(source):
         bands = [band for road in roads.roads for band in lane_bands(road)]
     for band in bands:
@@ -293,10 +288,8 @@ def _city_along(
 
     Args:
         source: the file, named in error messages.
-        streets: the streets.
         of_file: the structures that the file determines, which the city also
             contains.
-        seed: seed of the city.
     """
     on_ground, kerbs = streets.on_ground, streets.kerbs
     plan = CityPlan.model_validate(starter_plan(on_ground.areas, seed))
@@ -338,11 +331,7 @@ def _city_along(
 
 
 def _check_extent(source: Path, carriageway: BaseGeometry) -> None:
-    """Checks that an area is not too large to be filled with a town.
-
-    Raises:
-        InputError: `carriageway` is empty or too large.
-    """
+    """Checks that an area is not too large to be filled with a town."""
     if carriageway.is_empty:
         raise InputError(f"{source}: no lane in it has an area")
     x0, y0, x1, y1 = carriageway.bounds
@@ -364,9 +353,6 @@ def _near_drives(
     """Returns a city without structures farther than `distance` from drives.
 
     The ground is kept.
-
-    Raises:
-        InputError: there is no drive.
     """
     if not drives:
         raise InputError("--within: no drive was found; give one with --along")

@@ -4,8 +4,6 @@ OpenStreetMap has no heights above sea level, so the ground is level.
 https://wiki.openstreetmap.org/wiki/Simple_3D_Buildings
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 import math
