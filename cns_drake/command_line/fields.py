@@ -36,7 +36,6 @@ class _Option(NamedTuple):
         kind: type of the value.
         change: a field; or a function of a scenario and the value, which
             returns the changed scenario.
-        help: the option's help.
         metavar: name of the value in the help; by default the type's.
     """
 

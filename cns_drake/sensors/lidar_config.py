@@ -3,7 +3,7 @@
 Scenarios are read with this module, and thus without Drake.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
@@ -101,6 +101,9 @@ class LidarDescription:
             sheet's.
         max_range: largest range that is measured [m]; by default the data
             sheet's.
+        hidden_deg: first and last azimuth, counterclockwise, of a sector that
+            something beside the LiDAR hides, from -180 to 180 [deg]; by
+            default nothing is hidden.
         resolution: step to which coordinates are rounded [m]. 0 gives exact
             values.
         range_noise: standard deviation of a Gaussian error of the range [m].
@@ -132,6 +135,10 @@ class LidarDescription:
     columns: Annotated[int | None, Field(ge=4, le=8192)] = None
     min_range: Annotated[float | None, Field(ge=0.0)] = None
     max_range: Annotated[float | None, Field(gt=0.0, le=1000.0)] = None
+    hidden_deg: Annotated[
+        list[float] | None,
+        field_off_by_default(None, min_length=2, max_length=2),
+    ] = None
     resolution: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     range_noise: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
     dropout: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
@@ -169,9 +176,6 @@ class LidarSection(LidarDescription, Mount):
             the data sheet, instead of a preset.
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
-        hidden_deg: first and last azimuth, counterclockwise, of a sector that
-            something beside the LiDAR hides, from -180 to 180 [deg]; by
-            default nothing is hidden.
         resolution: step to which recorded coordinates are rounded [m]; the
             default is 2^-10 m, about 1 mm. 0 records exact values.
         rate: revolutions per second [Hz]. The rate of the fastest LiDAR of the
@@ -182,7 +186,6 @@ class LidarSection(LidarDescription, Mount):
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)
-    hidden_deg: tuple[float, float] | None = field_off_by_default(None)
     # The content of the file, so that a recording states all of it.
     unit: Annotated[
         LidarSheet | None,
@@ -522,7 +525,7 @@ class LidarModel(NamedTuple):
 
 
 def _without_hidden(
-    pattern: BeamPattern, hidden_deg: tuple[float, float] | None
+    pattern: BeamPattern, hidden_deg: Sequence[float] | None
 ) -> BeamPattern:
     """Returns a pattern without the beams of a hidden sector."""
     if hidden_deg is None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 import math
-import numbers
 import re
 import warnings
 

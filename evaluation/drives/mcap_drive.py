@@ -609,7 +609,6 @@ class _Topics:
     """Reads and decodes messages of a bag; errors name file and topic.
 
     Attributes:
-        file: the file.
         path: path of the file.
     """
 

@@ -308,8 +308,6 @@ class _Opened:
     """A bag that a thread of a process has opened.
 
     Attributes:
-        pid: number of the process.
-        reader: the package's reader.
         connections: topic -> its connections.
         link: folder with links by which the bag was opened, if any.
     """

@@ -202,7 +202,6 @@ class _TriangleTable:
     the resolution.
 
     Attributes:
-        triangles: the T triangles.
         clouds: (T,) number of each triangle's cloud.
         resolution: step to which the sides are rounded [m].
         tree: search tree over the sides [m].

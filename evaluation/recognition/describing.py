@@ -44,7 +44,6 @@ class _CloudKind(NamedTuple):
     """How a cloud is made of a drive's scans.
 
     Attributes:
-        num_scans: number of consecutive scans that are merged.
         num_before: how many of these come before the frame of the cloud.
         fields: names of the fields of the points, besides x, y and z.
     """

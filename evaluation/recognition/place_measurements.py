@@ -41,7 +41,6 @@ class _Searched(NamedTuple):
     """A database that is searched: places of one drive or of several.
 
     Attributes:
-        described: the described places.
         drives: name of each place's drive.
         drive_of: (D,) number of each place's drive.
         num_here: number of places in the query's own world; they come first.
@@ -171,9 +170,6 @@ class _ShownOverlaps:
 
     Matches follow from the positions of the scans and not from a method, so
     that overlaps are computed once.
-
-    Attributes:
-        compared: the comparison.
     """
 
     compared: PlaceComparison

@@ -127,11 +127,7 @@ def _first_of_each_kind(on_note: OnNote) -> OnNote:
 
 
 class _CloudReader:
-    """Reads clouds for a method, and counts the points that are not finite.
-
-    Attributes:
-        num_ignored: number of points so far that are not finite.
-    """
+    """Reads clouds for a method, and counts the points that are not finite."""
 
     def __init__(self, method: Method, on_note: OnNote):
         """Starts without a cloud.

@@ -27,8 +27,6 @@ class RecordedMessage:
 
     Attributes:
         topic: of its channel.
-        kind: its type.
-        body: the message.
         log_time: of the message [ns].
         channel: distinguishes channels of one topic.
         encoding: named by its channel.

@@ -15,7 +15,6 @@ class DaskProcesses:
 
     Attributes:
         address: of the scheduler.
-        scheduler: its process.
         workers: the processes, one thread each, which are not restarted.
     """
 

@@ -38,7 +38,6 @@ class Page:
 
     Attributes:
         name: its path from the root of the project.
-        text: its Markdown.
     """
 
     name: str

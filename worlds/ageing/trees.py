@@ -40,7 +40,6 @@ class _Tree:
     """A tree that stands or was felled.
 
     Attributes:
-        name: its present name.
         whole: the first tree at this place, with its name, at the height `full`
             [m].
         full: height of `whole` [m].

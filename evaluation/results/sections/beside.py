@@ -135,7 +135,6 @@ class _Against(NamedTuple):
 
     Attributes:
         difference: mean difference of the metric.
-        ahead: number of conditions in which the method is better.
         better, worse: in how many of them it is better and worse, and the 95 %
             intervals of the two results do not overlap.
     """

@@ -19,7 +19,6 @@ class _Found(NamedTuple):
 
     Attributes:
         found, number: in all pairs of drives.
-        name: name of the method.
         of_pairs: found and number in each pair.
     """
 

@@ -230,7 +230,6 @@ class _Measured(NamedTuple):
     """What charts can show: factors, their values, and tasks.
 
     Attributes:
-        factors: names of the factors.
         values: column -> the values that rows can have there. Columns whose
             values are known only after the study are left out.
     """

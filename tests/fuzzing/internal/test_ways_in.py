@@ -45,7 +45,6 @@ class Way:
     """A way in.
 
     Attributes:
-        name: name of the row.
         readers: names of the readers that get the file.
         make: writes the file into a folder.
         use: reads it.

@@ -53,7 +53,6 @@ class Drawn:
     """What the generator makes of the inputs of a map.
 
     Attributes:
-        city: the whole city.
         structures: all there ever are, in the order of instance ids.
         standing: stage -> structures; what stays has the same model.
         texts: relative path -> text of a file.

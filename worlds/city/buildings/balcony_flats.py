@@ -338,10 +338,7 @@ class _Front:
     """The front wall of a section, with the bays of stair and balconies.
 
     Attributes:
-        edge: number of the wall's edge in the outline of all sections.
-        wall: the wall.
         cells: start and end of each bay along the wall [m].
-        middle: number of the stair's bay.
         spots: numbers of the bays with balconies.
     """
 

@@ -40,7 +40,6 @@ class _House:
     """A building to be built.
 
     Attributes:
-        archetype: name of the archetype.
         footprint: ground of the building, in its frame S [m].
         xy: position of S in W [m].
         yaw: heading of S in W [rad].

@@ -170,7 +170,6 @@ class _BareBuilding:
         base: height of the lowest floor in W [m].
         style: appearance of the building.
         is_flat: whether the roof is flat.
-        rng: random generator for the details.
     """
 
     imported: ImportedObject

@@ -120,7 +120,6 @@ class _FittedPlan(NamedTuple):
     """The plan of a wall, whose openings are all inside the wall's outline.
 
     Attributes:
-        plan: the plan.
         reliefs: reliefs of the openings, and the materials of their fronts.
         area: area that contains the reliefs.
     """

@@ -148,7 +148,6 @@ class _DressedStreet(NamedTuple):
     """A street along which objects are placed, and cars may park.
 
     Attributes:
-        name: name of the street.
         line: middle line of the street [m].
         half: half the width of the carriageway [m].
         may_park: whether cars may park on the right, and on the left.

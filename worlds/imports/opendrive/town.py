@@ -184,7 +184,6 @@ class _TownStreets(NamedTuple):
     """The streets of a town, as the file determines them.
 
     Attributes:
-        bands: all lanes.
         ground: the lanes on the ground.
         raised: the lanes on bridges.
         bridge_ends: strips across the lanes at both ends of bridges, in W.

@@ -88,7 +88,6 @@ class _UsualBarrier(NamedTuple):
     Attributes:
         width: width without a tag for it [m].
         height: height without a tag for it [m].
-        semantic_class: its class.
     """
 
     width: float

@@ -240,7 +240,6 @@ class _Version(NamedTuple):
     """One version of an object.
 
     Attributes:
-        version: number of the version.
         is_there: whether the object exists in this version.
         tags: tags of the object.
         content: longitude and latitude of a node [deg], ids of the nodes of a
