@@ -110,7 +110,6 @@ from .json_text import json_values as json_values
 from .json_text import parse_json as parse_json
 from .launch import start as start
 from .number_format import is_number as is_number
-from .number_format import is_real as is_real
 from .number_format import other_separator as other_separator
 from .number_format import parse_rows as parse_rows
 from .number_format import to_number as to_number
