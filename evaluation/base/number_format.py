@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 import math
-import numbers
 import re
 import warnings
 
@@ -100,14 +99,6 @@ def other_separator(line: str, expected: str | None) -> str:
             )
     return ""
 
-
-def is_real(value: object) -> bool:
-    """Returns whether a value is a finite real number, and no bool."""
-    return (
-        isinstance(value, numbers.Real)
-        and not isinstance(value, bool)
-        and math.isfinite(value)
-    )
 
 
 def is_number(word: str) -> bool:
