@@ -11,7 +11,6 @@ from .lowering import lowered as lowered
 from .lowering import top_of as top_of
 from .materials import MATERIALS as MATERIALS
 from .materials import USUAL_MATERIALS as USUAL_MATERIALS
-from .materials import Material as Material
 from .mesh import Mesh as Mesh
 from .mesh import box_mesh as box_mesh
 from .mesh import merge_meshes as merge_meshes
