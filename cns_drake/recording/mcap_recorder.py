@@ -746,7 +746,6 @@ def _recorded_topics(
     further: Mapping[str, RecordedSensor],
     layouts: Mapping[str, LayoutName],
 ) -> tuple[Topic, ...]:
-    """Returns all topics of a recording."""
     return recorded_topics.recording_topics(
         X_BSs,
         camera_names=cameras,

@@ -139,7 +139,6 @@ def make_tf(
 
 
 def _pose_fields(X: RigidTransform) -> tuple[np.ndarray, tuple[float, ...]]:
-    """Returns the fields of a Pose, or of a Transform."""
     return X.translation(), to_quat_xyzw(X.rotation())
 
 

@@ -166,7 +166,6 @@ def _add_vehicle_motion(
 def _add_traffic(
     builder: DiagramBuilder, drive: LoadedDrive
 ) -> TrafficMotion | None:
-    """Adds the traffic of a drive, if it has any."""
     if drive.traffic is None:
         return None
     return add_traffic(
@@ -310,7 +309,6 @@ def _add_cameras(
 def _copy_for_cameras(
     drive: LoadedDrive, *, classes: bool, with_vehicle: bool
 ) -> CameraScene:
-    """Copies the scene for the cameras on the vehicle."""
     world = drive.world
     plant = world.plant
     context = plant.CreateDefaultContext()

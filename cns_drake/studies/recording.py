@@ -189,7 +189,6 @@ class Record(Step):
         )
 
     def _page_inputs(self) -> dict[str, object]:
-        """Returns all inputs of the page."""
         beside, *_ = other_stage(self.scenario)
         return self.made_of(
             {

@@ -318,7 +318,6 @@ class SceneEditing:
         shape: geometry.Shape,
         look: SurfaceLook,
     ) -> None:
-        """Adds a part with a new look to a structure."""
         self._register(structure, part, X_WG, shape, _look_properties(look))
         if look.material is not None:
             self._table.set_material(structure, part, look.material)

@@ -77,7 +77,6 @@ def _is_moved(viewpoint: list[str]) -> bool:
 
 
 def _point_type(header: dict[str, list[str]]) -> np.dtype:
-    """Returns the type of a point."""
     if "FIELDS" not in header:
         raise ValueError("PCD header: FIELDS is missing or wrong")
     names = header["FIELDS"]

@@ -644,7 +644,6 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     def _score(
         self, query: LayeredScan, place: LayeredScan, found: _FinePose
     ) -> float:
-        """Returns the score of two scans."""
         config = self.config
         weights = np.array(config.weights)
         common = int(weights @ found.common)

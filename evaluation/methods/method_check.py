@@ -283,7 +283,6 @@ def _fault(method: Method, text: str) -> InputError:
 def _call(
     method: Method, function: str, *arguments: Any, **options: Any
 ) -> Any:
-    """Returns what a function of a method returns."""
     call: Callable = getattr(method, function)
     try:
         return call(*arguments, **options)

@@ -78,7 +78,6 @@ def load_method(path: Path) -> type[Method]:
 
 
 def _registered_method(module: ModuleType, path: Path) -> type[Method]:
-    """Returns the one method that a module registers."""
     found = [
         value
         for value in vars(module).values()

@@ -259,7 +259,6 @@ class _DriveDescriber:
 
     @property
     def frames(self) -> set[int]:
-        """All frames that are described."""
         return set().union(*self._members.values())
 
     @property

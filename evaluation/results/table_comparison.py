@@ -740,7 +740,6 @@ def _notes_on_left_out(
     tables: Sequence[MetricTable],
     common: Iterable[Condition],
 ) -> list[str]:
-    """Returns notes on the conditions that only some of the tables have."""
     kept = set(common)
     notes: Counter[str] = Counter()
     for table in own:
@@ -815,7 +814,6 @@ def _why_nothing_is_common(table: MetricTable, other: MetricTable) -> str:
 
 
 def _reduced_to(table: MetricTable, common: Iterable[Condition]) -> MetricTable:
-    """Returns a table reduced to some of its conditions."""
     kept = set(common)
     rows = {key: row for key, row in table.rows.items() if key[1] in kept}
     return replace(table, rows=rows)

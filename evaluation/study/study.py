@@ -242,7 +242,6 @@ class Study(ExperimentRun):
         return tables
 
     def _measured(self, pairs: Iterable[Pair]) -> dict[Pair, list[Task]]:
-        """Returns the tasks that measure each pair."""
         found: dict[Pair, list[Task]] = {one: [] for one in pairs}
         for task in self.tasks.values():
             seen: set[tuple[str, str]] = set()

@@ -108,7 +108,6 @@ def check_derivatives(trajectory, times, *, velocity_atol, acceleration_atol):
 
 
 def shipped_drive(name) -> tuple[Scenario, LanePath, Trajectory]:
-    """Returns a shipped drive with its lane path and trajectory."""
     values = yaml.safe_load(recordable_drives()[name].read_text())
     scenario = Scenario.model_validate({"name": name, **values})
     network = load_road_network(scenario.folder.roads)

@@ -403,5 +403,4 @@ TARGETS = (
 
 
 def find_target(name: str) -> Target:
-    """Returns the target of a name."""
     return next(target for target in TARGETS if target.name == name)

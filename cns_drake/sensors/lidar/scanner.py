@@ -211,7 +211,6 @@ class Scanner:
     def _models(
         self, draw: int
     ) -> tuple[MeasurementModel, CalibratedReturns | None]:
-        """Returns the models of measurements and of returns of a draw."""
         # Read once: threads share the scanner.
         latest, measurement, returns = self._drawn
         if latest != draw:

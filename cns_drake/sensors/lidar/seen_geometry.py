@@ -235,7 +235,6 @@ class SeenGeometry:
         return self._materials
 
     def _read_geometry(self, records: GeometryList, world: FrameId) -> None:
-        """Reads the geometry that is seen, from a list of all geometry."""
         unseen = {self._parent_frame_id} - {world}
         if self._view.unseen is not None:
             unseen = set(self._view.unseen)

@@ -87,7 +87,6 @@ def test_a_driver_follows_from_seed_or_name_alone(small_map):
 
 @pytest.mark.slow
 def real_driver(scenario, seed):
-    """The scenario with a real driver."""
     seeded = scenario.with_fields({"driver": {"seed": seed}}, "test")
     return seeded.with_driver("real")
 
