@@ -100,7 +100,6 @@ def other_separator(line: str, expected: str | None) -> str:
     return ""
 
 
-
 def is_number(word: str) -> bool:
     """Returns whether a word is a decimal number, NaN or infinity."""
     try:
