@@ -487,28 +487,35 @@ def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
 def _metrics_page() -> str:
     arrows = {"more": " ↑", "less": " ↓"}
 
-    def explained(metric: Metric) -> str:
-        values = metric.range_text.removeprefix("a number ")
-        text = f"{metric.over_queries}; {values}{arrows.get(metric.better, '')}"
+    def values(metric: Metric) -> str:
+        text = metric.range_text.removeprefix("a number ")
+        text = f"{text[0].upper()}{text[1:]}{arrows.get(metric.better, '')}"
         without = f", undefined if {metric.undefined}"
         return text + without * bool(metric.undefined)
 
-    # Metrics of which the same is said stand together.
-    lines = [
-        f"- {', '.join(f'`{one.name}` ({one.label})' for one in alike)}: {text}"
-        for text, alike in itertools.groupby(METRICS.values(), explained)
-    ]
-    parts = (
+    by_values: dict[str, list[Metric]] = {}
+    for metric in METRICS.values():
+        by_values.setdefault(values(metric), []).append(metric)
+    parts = [
         _heading("Metrics"),
         "The values of the column `metric` in [results.csv]"
-        "(../studies.md#the-table-of-results). ↑: more is better; ↓: less is."
-        " Over conditions, a metric is averaged by the arithmetic mean of its"
-        " defined values; an undefined value is an empty cell, and is left out"
-        " with a note. [A metric of your own]"
+        "(../studies.md#the-table-of-results), in groups with the same range."
+        " ↑: more is better; ↓: less is. Over conditions, a metric is averaged"
+        " by the arithmetic mean of its defined values; an undefined value is"
+        " an empty cell, and is left out with a note. [A metric of your own]"
         "(../how-to/own_method.md#a-metric-of-your-own) is a function in a"
         " file. Brackets have the titles of metrics.",
-        "\n".join(lines),
-    )
+    ]
+    for text, metrics in by_values.items():
+        # Metrics of which the same is said stand together.
+        lines = [
+            f"- {', '.join(f'`{one.name}` ({one.label})' for one in alike)}: "
+            + over
+            for over, alike in itertools.groupby(
+                metrics, lambda one: one.over_queries
+            )
+        ]
+        parts += [f"{text}:", "\n".join(lines)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -543,9 +550,15 @@ def _commands_page() -> str:
         "`--traceback` to any command to see where in the code an error comes "
         "from. Brackets have what is required, and defaults.",
     ]
+    # Of two options with one name, what stands for the value follows, too.
+    same = Counter(_name(row) for row in shared)
     for name, command in commands.items():
         own = [row for row in rows[name] if row not in shared]
-        others = [row[0] for row in rows[name] if row in shared]
+        others = [
+            row[0] if same[_name(row)] > 1 else _name(row)
+            for row in rows[name]
+            if row in shared
+        ]
         parts += [
             f"## {name}",
             _prose(command.help or ""),
@@ -558,6 +571,10 @@ def _commands_page() -> str:
             )
     parts += ["## Options of many commands", _options(shared)]
     return "\n\n".join(parts) + "\n"
+
+
+def _name(row: tuple[str, ...]) -> str:
+    return f"`{row[0].strip('`').split()[0]}`"
 
 
 def _options(rows: list[tuple[str, ...]]) -> str:

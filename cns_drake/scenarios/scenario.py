@@ -158,8 +158,8 @@ class DriverConfig(Section):
         lane_changes: average number of lane changes per kilometre [1/km], where
             there is a neighbouring lane. The car returns to its lane after 15
             to 270 m.
-        seed: seed of all random choices of the driver: a number or a text. By
-            default the name of the drive.
+        seed: seed of all random choices of the driver; by default the name of
+            the drive.
     """
 
     wander: float = Field(default=0.0, ge=0.0, le=1.0)
@@ -251,18 +251,15 @@ class TransientConfig(Section):
     """Changes to a city that no stage contains, such as snow.
 
     Most of these changes are temporary; `height_limit` shows the city before it
-    grew.
-
-    `roadsides` is applied first, so all other switches also change the objects
-    that `roadsides` adds. Apart from that, the switches are independent: the
-    effect of each switch depends only on the seed and on the names of
+    grew. `roadsides` is applied first, and the others also change what it adds.
+    Else, the effect of each depends only on the seed and on the names of
     structures.
 
     Attributes:
         seed: seed of all random numbers.
-        parked_cars: share of the parked cars that are changed. Of the changed
-            cars, 30 % have left, 20 % stand elsewhere in their bay, and all
-            others are replaced by another car.
+        parked_cars: share of the parked cars that are changed: of these, 30 %
+            have left, 20 % stand elsewhere in their bay, and all others are
+            replaced.
         leaves: share of the leaves and needles that remain on plants; 0 is
             winter. Wood stays. A shrub that has only leaves keeps a tenth of
             them, as twigs.
@@ -281,8 +278,8 @@ class TransientConfig(Section):
             or parked cars; each 1 above 1 adds plants once more. Only the cars
             depend on the seed.
         height_limit: greatest height of buildings and plants above their lowest
-            point [m]. Higher buildings are cut off, with a flat roof; higher
-            plants are scaled down. By default no limit.
+            point [m]: higher buildings are cut off, with a flat roof, and
+            higher plants scaled down.
     """
 
     seed: int = Field(default=1, ge=0)
@@ -311,18 +308,15 @@ class CityConfig(Section):
     """How the city of a drive differs from its stage.
 
     Attributes:
-        missing: share of the buildings and plants to remove, from 0 to 1. The
-            seed selects a place, and the structures nearest to this place are
-            removed.
+        missing: share of the buildings and plants to remove: those nearest to a
+            place that the seed selects.
         scattered: structures to remove at random all over the map, in addition
-            to the share `missing`: for each class that you name, the share of
-            its structures to remove, such as `{pole: 0.3}`. The key `seed`
-            replaces the seed of the section, so that two drives can lack
-            different structures.
-        towards: another stage of the map, usually an earlier stage. Only
-            structures that do not exist in that stage are missing. A structure
-            that exists in that stage does not change, even if it has another
-            height in that stage.
+            to `missing`: the share of each class that you name, such as `{pole:
+            0.3}`. The key `seed` replaces the seed of the section, so that two
+            drives can lack different structures.
+        towards: another stage of the map, usually an earlier one. Only
+            structures that do not exist in that stage are missing; those that
+            exist do not change, even if they have another height there.
         years: number of years by which the city has aged since the last stage
             of the map, which must be the stage of the drive; see
             `cns-drake age`.
@@ -330,8 +324,7 @@ class CityConfig(Section):
             multiplied; or event -> rate per year, of which the key `factor`
             multiplies the rates that are not given.
         redraw: number of a city that is sampled anew along the same streets; by
-            default the map's own city. A number gives the same city in all
-            drives.
+            default the map's own. A number gives the same city in all drives.
         seed: seed of the random choices of `missing`, `scattered` and `years`.
     """
 
@@ -420,34 +413,32 @@ _EVERY = "*"
 class Scenario(Section):
     """A vehicle with sensors that follows a route through a stage.
 
-    The vehicle drives in a stage of a map, or in any SDF world. The vehicle
-    follows either lanes of the map's roads (`route`) or given points
-    (`waypoints`).
+    The stage is one of a map, or any SDF world. The vehicle follows lanes of
+    the map's roads (`route`) or given points (`waypoints`).
 
     Attributes:
         name: name of the drive and its files, from letters, digits and
             underscores.
-        base: name or file of another drive. Fields that you leave out here have
-            the values of this base drive.
+        base: name or file of another drive, which has the values of all fields
+            that you leave out here.
         map: name of a shipped map, or a folder with the same layout.
         stage: stage of the map, such as `"01"`.
         world: SDF file of a world to drive in, instead of `map` and `stage`. A
             `world` needs `waypoints`.
         model_paths: folders in which `model://` and `package://` of the `world`
-            are searched, before the folders in the environment variable
-            GZ_SIM_RESOURCE_PATH.
-        without: names of structures to leave out of the world; the names are in
-            the map's `structures.csv`.
+            are searched, before those in GZ_SIM_RESOURCE_PATH.
+        without: names of structures to leave out, as in the map's
+            `structures.csv`.
         city: how the city differs from the stage: what is missing, how long it
             has aged, or which other city lies along the streets.
         title: one line for readers that says what the drive shows.
         route: lanes to follow, road by road. Give either `route` or
             `waypoints`.
-        waypoints: CSV file of points for the car to pass. Required with
-            `world`, because an SDF world has no roads. Without a column `z`,
-            the car drives on the ground below the points.
+        waypoints: CSV file of points for the car to pass; required with
+            `world`. Without a column `z`, the car drives on the ground below
+            the points.
         u_turns: whether the car makes a U-turn where the waypoints lead
-            straight back. Without `u_turns`, such waypoints are an error.
+            straight back, which is an error otherwise.
         aside: lateral offset of the car from the centreline of its lane,
             positive to the right [m]. The offset applies between junctions, as
             far as the road has room.
@@ -457,13 +448,12 @@ class Scenario(Section):
         traffic: vehicles and pedestrians that move.
         transient: temporary changes to the city, such as other parked cars, or
             snow.
-        lidars: LiDARs by name. The name of a LiDAR is also the name of its
-            frame and its topic. By default there is one LiDAR, named `lidar`.
-            The fields of the name `*` are given to every LiDAR.
+        lidars: LiDARs by name, which is also the name of frame and topic. By
+            default there is one, named `lidar`. The fields of the name `*` are
+            given to every LiDAR.
         offset: how far the LiDARs pass from where they are mounted.
-        cameras: cameras by name. The name of a camera is also the name of its
-            optical frame (x right, y down, z ahead) and its topics. By default
-            there is no camera.
+        cameras: cameras by name, which is also the name of the optical frame (x
+            right, y down, z ahead) and the topics.
         imu: the inertial measurement unit.
         weather: fog, rain and snowfall for calibrated returns.
         odometry: how often the vehicle's ground-truth motion is recorded.

@@ -76,25 +76,23 @@ class Response(_Part):
 
     Attributes:
         slope: the intensity of a diffuse target is `full` plus `slope` times
-            the natural logarithm of its energy. With a slope of 0, this formula
-            does not hold: intensity is proportional to energy, as the data
-            sheet says.
+            the natural logarithm of its energy. With 0, it is proportional to
+            energy, as the data sheet says.
         full: intensity of an energy of 1, if `slope` is not 0.
         far: range up to which the unit compensates intensity for distance [m],
-            if `slope` is not 0. With a slope of 0, the unit compensates at
-            every range.
+            if `slope` is not 0; with a slope of 0, it does so at every range.
         floor: least intensity. Lower intensities are reported as 0, whatever
             the gain.
         least: least energy of a reported echo, even at close range, where the
             unit reduces its power.
         gain: standard deviation of the gain over the lasers; the mean gain is
             1.
-        dim: lowers the gains of dim lasers. If a gain is more than one standard
-            deviation below the mean, the part beyond one standard deviation is
-            multiplied by 1 + `dim`.
-        flicker: the shots of a laser are alternately brighter and darker, by a
-            fraction of the intensity that is constant for the laser. `flicker`
-            is the standard deviation of this fraction over the lasers.
+        dim: lowers the gains of dim lasers: the part of a gain that is more
+            than one standard deviation below the mean is multiplied by 1 +
+            `dim`.
+        flicker: standard deviation over the lasers of the fraction of the
+            intensity, constant for a laser, by which its shots are alternately
+            brighter and darker.
         speckle: standard deviation of the intensity of single shots, as a
             fraction of the intensity.
     """
@@ -117,13 +115,13 @@ class Head(_Part):
         blocks: for each block of lasers, from the top: lowest elevation [deg],
             height above the origin [m], and a factor by which the range errors
             are multiplied.
-        alternate: range offset [m]. Every second laser, starting with the
-            first, measures ranges that are too long by this offset; all other
-            lasers measure ranges that are too short by this offset. The offset
-            is part of the lasers' constant range errors.
+        alternate: range offset [m], part of the lasers' constant range errors:
+            every second laser, starting with the first, measures ranges that
+            are too long by this offset, and the others ranges that are too
+            short by it.
         tick_deg: step in which azimuths are reported [deg]; 0 for exact
-            azimuths. With a step, each laser has an azimuth offset of its own,
-            of up to one step.
+            azimuths. With a step, each laser has an azimuth offset of up to one
+            step.
         elevations_deg: elevation of each laser of one real unit, from the top;
             empty if only the nominal elevations are known.
     """
@@ -211,9 +209,9 @@ class ReturnsSheet(_Part):
             reflectivities from 0 to 1 have intensities from 0 to this value.
         angle_error_deg: standard deviation of a laser's elevation and azimuth
             [deg].
-        own_part: fraction of `range_floor` that is an error that stays constant
-            for a laser. The other fraction varies from shot to shot; the
-            squares of both fractions add up to 1.
+        own_part: fraction of `range_floor` that is a constant error of a laser.
+            The rest varies from shot to shot; the squares of both fractions add
+            up to 1.
         response: how the unit converts energy to intensity.
         head: positions of the lasers.
         unknown: what the data sheet does not state, in words.
@@ -308,8 +306,8 @@ class LidarSheet(_Part, ABC):
     """The data sheet of a LiDAR: the fields of every kind of LiDAR.
 
     Attributes:
-        pattern: kind of LiDAR: `spinning` (the default), `rosette` or
-            `nodding`. Each kind has further fields.
+        pattern: kind of LiDAR: `spinning`, `rosette` or `nodding`. Each kind
+            has further fields.
         ranges: nearest and farthest measured range [m].
         period: duration of a revolution, or of a frame of a LiDAR that does not
             spin [s]; by default 0.05 s for a spinning LiDAR, and 0.1 s for

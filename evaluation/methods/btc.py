@@ -86,9 +86,9 @@ class BtcConfig(MethodConfig):
             that are merged; [O] 0.1.
         merge_distance_limit: largest distance from the centre of a plane to
             another plane with which it is merged [m]; [O] 0.3.
-        image_axes: axes of the image on a plane. `public` copies the authors'
-            program, in which a wrong term tilts the second axis out of the
-            plane; `orthogonal` corrects it. [P] public.
+        image_axes: axes of the image on a plane: those of the authors' program,
+            in which a wrong term tilts the second axis out of the plane
+            (`public`), or corrected ones (`orthogonal`). [P] public.
         resolution: side of a cell of the image on a plane [m]; [O] 0.5.
         height_range: smallest and largest height of a point that is used,
             measured from the ground [m]; [O] -1, 4.
@@ -100,8 +100,7 @@ class BtcConfig(MethodConfig):
             layers is used [m]; [O] 2.
         max_keypoints: largest number of keypoints per place; [O] 500.
         num_neighbours: number of keypoints from which the triangles of a
-            keypoint are formed: the keypoint itself and the nearest keypoints;
-            [O] 10.
+            keypoint are formed: itself and the nearest; [O] 10.
         side_range: smallest and largest length of a triangle's sides [m]; [O]
             2, 50.
         side_resolution: step to which side lengths are rounded in the hash

@@ -64,10 +64,9 @@ class RingPlusPlusConfig(MethodConfig):
         half_width: half the side of the square map from above [m]. The protocol
             uses points up to 100 m away; RING++ leaves out the points beyond
             this square.
-        crop: which points of the map are used: `square` uses all points,
-            `round` only the points within `half_width` of the map's centre. If
-            the LiDAR is rotated, a square contains other points than before,
-            but a circle contains the same points.
+        crop: which points of the map are used: all (`square`), or those within
+            `half_width` of the map's centre (`round`), the same at each heading
+            of the LiDAR.
         min_height: smallest height of a point that is used, measured from the
             ground [m]; the authors have z > -1.0 m for a LiDAR at 1.73 m.
         max_height: largest height of a point that is used, measured from the
@@ -80,8 +79,8 @@ class RingPlusPlusConfig(MethodConfig):
         cells: number of rows and of columns of the map from above, and also of
             angles and of rays of its Radon transform.
         candidates: number of places that a query is compared with by all radial
-            frequencies: the most similar ones by the lowest 20. By default
-            these are all places, as in the authors' program.
+            frequencies: the most similar ones by the lowest 20; by default all,
+            as in the authors' program.
     """
 
     half_width: PositiveFloat = 70.0

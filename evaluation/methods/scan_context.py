@@ -69,9 +69,8 @@ class ScanContextConfig(MethodConfig):
         sectors: number of sectors of the polar context; [T], [C] 60.
         max_range: range up to which the polar context has rings [m]; [T], [C]
             80.
-        far_points: what happens to points beyond `max_range`. With `last-ring`
-            they count in the last ring, as in [T]; with `dropped` they are left
-            out, as in [C].
+        far_points: whether points beyond `max_range` count in the last ring
+            (`last-ring`), as in [T], or are left out (`dropped`), as in [C].
         min_points: least number of points in a filled cell of the polar
             context; [T] 5, [C] 1.
         cart_cell: length and width of a cell of the Cartesian context [m]; [T]
@@ -81,11 +80,9 @@ class ScanContextConfig(MethodConfig):
         lateral_shift: distance by which the variant `augmented-polar` shifts
             the copies of a place to each side [m]; [T] 2.
         candidates: number of contexts that the search in the KD-tree returns
-            for each context of a place: n * `candidates` contexts if a place
-            has n contexts; [E] 50.
-        search_ratio: share of all shifts of the context that are compared. The
-            compared shifts lie around the shift that fits the aligning key
-            best; [C] 0.1.
+            for each context of a place; [E] 50.
+        search_ratio: share of all shifts of the context that are compared,
+            around the shift that fits the aligning key best; [C] 0.1.
     """
 
     variant: Variant = "augmented-polar"

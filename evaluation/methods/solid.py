@@ -35,22 +35,21 @@ class SolidConfig(MethodConfig):
 
     Attributes:
         voxel_size: side of the voxels to which each cloud is first downsampled
-            [m]; [P] 1.0. ([C] has 0.4, but only [P] is for LiDARs whose field
-            of view resembles the field of view of the `cns` LiDAR.)
+            [m]; [P] 1.0. ([C] has 0.4, but only [P] is for LiDARs with a field
+            of view like that of `cns`.)
         min_range: smallest range of a point that is used [m]; [P] 3.
         max_range: largest range of a point that is used [m]; [P] 80, for a
-            LiDAR whose field of view resembles the field of view of the `cns`
-            LiDAR.
+            LiDAR with a field of view like that of `cns`.
         ranges: number of bins of equal length in range, from 0 to `max_range`;
             [P], [C] 40.
         azimuths: number of equal cells of azimuth, over 360 deg; [P], [C] 60.
         elevations: number of equal cells of elevation over the field of view;
-            [P], [C] the number of beams of the LiDAR. By default the number of
-            beams of the drive's LiDAR, or 32 if its model is unknown [S].
-        lowest_deg: lower limit of the field of view [deg]. By default the limit
-            of the drive's LiDAR, or -22.5 if its model is unknown [S].
-        highest_deg: upper limit of the field of view [deg]. By default the
-            limit of the drive's LiDAR, or 22.5 if its model is unknown [S].
+            [P], [C] the number of beams of the LiDAR. By default that of the
+            drive's LiDAR, or 32 if its model is unknown [S].
+        lowest_deg: lower limit of the field of view [deg]. By default that of
+            the drive's LiDAR, or -22.5 if its model is unknown [S].
+        highest_deg: upper limit of the field of view [deg]. By default that of
+            the drive's LiDAR, or 22.5 if its model is unknown [S].
     """
 
     voxel_size: PositiveFloat = 1.0

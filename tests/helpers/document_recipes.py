@@ -494,15 +494,10 @@ RECIPES = {
         prints=("trend/index.html",),
         makes=("trend/results.csv",),
     ),
-    "random cities": Recipe(
-        "about: Do the methods rank alike in five",
-        changes=(("suburbia", "town"), ("[1, 2, 3, 4, 5]", "[1, 2]")),
-        file="random.yaml",
-    ),
-    "study of random cities": Recipe(
-        ".venv/bin/cns-drake study random.yaml",
+    "study of redrawn cities": Recipe(
+        ".venv/bin/cns-drake study redrawn.yaml",
         changes=(("--output", "--method solid --output"),),
-        after=("random cities", "start a city"),
+        after=("redrawn cities", "start a city"),
         prints=("random/index.html",),
     ),
     "experiments": Recipe(
@@ -616,7 +611,7 @@ RECIPES = {
     ),
     "redrawn cities": Recipe(
         "both: {city: {redraw: [1, 2, 3]}}\nmaps: riverside",
-        changes=(("riverside", "town"), ("1, 2, 3", "1")),
+        changes=(("riverside", "town"), ("1, 2, 3", "1, 2")),
         file="redrawn.yaml",
     ),
     "drives through redrawn cities": Recipe(
@@ -894,7 +889,6 @@ NOT_RUN: dict[str | tuple[str, ...], str] = {
     ".venv/bin/mypy && .venv/bin/lint-imports": (
         "these read this project, not an example; `.ci/run` runs them"
     ),
-    "\\includegraphics": "a line for LaTeX",
     "mcap recover": "a program of others",
     "ros2 bag": "needs ROS 2; test_mcap_recorder and others read "
     "recordings with rosbags' reader of rosbag2 folders",

@@ -63,8 +63,8 @@ class BuildingPlan(_Model):
         at: `[x, y]` of the centre of the footprint [m].
         size: `[width along the front, depth]` of a rectangular footprint [m].
             Give `size` or `outline`.
-        outline: corners of the footprint [m], relative to `at` and before the
-            building is rotated by `yaw_deg`.
+        outline: corners of the footprint [m], relative to `at`, before the
+            rotation by `yaw_deg`.
         yaw_deg: heading of the building [deg]. At 0 its front faces the
             direction -y.
         height: height of the parapet, ridge or spire [m].
@@ -169,8 +169,7 @@ class ScatterPlan(_Model):
         clearance: smallest distance of the objects from buildings and streets
             [m].
         ground: kinds of ground on which the objects can stand.
-        kind: first part of the names in the tables; by default `tree`, `car`,
-            `truck` or `sign`, or else the name of the object.
+        kind: first part of the names in the tables, as for a single object.
     """
 
     objects: Weights = Field(min_length=1)
@@ -194,10 +193,8 @@ class LinePlan(_Model):
             line, or several end to end if the part is long or steep.
         yaw_deg: angle by which each object is rotated from its usual heading
             along the line [deg].
-        kind: first part of the names in the tables; by default `tree`, `car`,
-            `truck` or `sign`, or else the name of the object.
-        parameters: settings of the objects, such as `{height: 1.1}` for a
-            `garden_wall`.
+        kind: first part of the names in the tables, as for a single object.
+        parameters: settings of the objects, as for a single object.
     """
 
     objects: Weights = Field(min_length=1)
@@ -258,8 +255,8 @@ class DistrictPlan(_Model):
     Attributes:
         name: unique name, from lower-case letters, digits and underscores. The
             random numbers of the district depend on this name.
-        block: `[x, y]` of a point [m]. The district fills the block between
-            streets that contains this point. Give `block`, `area` or neither.
+        block: `[x, y]` of a point [m]: the district fills the block between
+            streets around it. Give `block`, `area` or neither.
         area: corners of the district [m]. A district with neither `block` nor
             `area` gets all ground that belongs to no other district.
         ground: kind of ground of the district.
@@ -275,7 +272,7 @@ class DistrictPlan(_Model):
         lines: objects along lines.
         scatter: objects scattered at random.
         street: objects on the sidewalks in front of the district; by default
-            the objects that the field `street` of the city lists.
+            those of the city's field `street`.
     """
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")

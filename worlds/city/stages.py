@@ -31,8 +31,7 @@ class Growth(_Model):
             ground below them [m].
         structures: names of the structures, as in `structures.csv`. `*` stands
             for any text and `?` for any one character.
-        but: names of exceptions: structures that match `structures`, but do not
-            belong to the group.
+        but: names of exceptions to `structures`.
     """
 
     height: float = Field(gt=2.0, allow_inf_nan=False)
@@ -47,13 +46,12 @@ class Stage(_Model):
         story: text that says which changes a visitor would see until the next
             stage.
         absent: structures that the next stage has and this one lacks: lists of
-            names, each under a heading of your choice. Not in the last stage.
+            names, under headings of your choice. Not in the last stage.
         lower: groups of buildings and plants that are lower than in the next
-            stage, each under a heading of your choice. Not in the last stage.
+            stage, in the same way.
         sites: groups of buildings that are under construction in this stage
-            only, each under a heading of your choice: a frame of the given
-            height, with scaffolds and a crane. The lot must measure at least 16
-            m by 16 m. Not in the last stage.
+            only, in the same way: a frame of the given height, with scaffolds
+            and a crane. The lot must measure at least 16 m by 16 m.
     """
 
     story: str
@@ -65,11 +63,9 @@ class Stage(_Model):
 class Stages(_Model):
     """The file `stages.yaml`: how the city looked in each stage.
 
-    The last stage is the whole city. Each earlier stage lists the structures
-    that exist in the next stage but not in this stage, and the structures that
-    are lower than in the next stage. A later stage therefore contains all
-    structures of the earlier stages, with one exception: temporary objects,
-    such as a market on an empty lot, are removed when the lot is built on.
+    The last stage is the whole city, and each earlier one lists how it differs
+    from the next. Temporary objects, such as a market on an empty lot, are
+    removed when the lot is built on; all other structures stay.
 
     Attributes:
         stages: stages by number, in ascending order. A number has two digits in

@@ -16,8 +16,8 @@ class CameraSection(Section):
     """A pinhole camera without distortion. It does not see its own car.
 
     Attributes:
-        width: width of the image in pixels, at least 2.
-        height: height of the image in pixels, at least 2.
+        width: width of the image in pixels.
+        height: height of the image in pixels.
         rate: images per second [Hz]. The scan rate of the first LiDAR must be a
             multiple.
         fov_y_deg: vertical field of view [deg]; by default one radian.

@@ -36,15 +36,13 @@ class Fleet(Section):
 
     Each drive has a route that is sampled at random, its LiDARs near the
     query's, in the next lane, or there and facing backwards; and trees with or
-    without leaves. The random choices for a car in a year do not depend on the
-    numbers of cars and of years, so a larger fleet contains the drives of a
-    smaller fleet.
+    without leaves. A larger fleet contains the drives of a smaller one.
 
     Attributes:
         cars: number of drives per year.
         years: number of years. The first drives take place this number of years
             before the query, whose city has aged by at least as many
-            (`query.city.years`), and the last drives one year before it.
+            (`query.city.years`), and the last ones one year before it.
         length: smallest length of a route [m].
         seed: seed of the random choices.
     """

@@ -109,14 +109,16 @@ def _built(
         )
         known: set[str] = set()
         for condition in experiment.conditions:
-            for seed in experiment.seeds:
+            # A condition without random numbers has the least seed, in whatever
+            # order the seeds are given.
+            for seed in sorted(experiment.seeds):
                 try:
                     pair = maker.build(condition, seed)
                 except MissingError as error:
                     label = condition.factors.get(CAUSE, "a condition")
                     on_note(f"{label} left out: {error}")
                     break
-                # A condition without random numbers is measured once.
+                # It is measured once.
                 drawn = pair_fingerprint(pair, simulated_drives(pair))
                 key = f"{condition.factors} {drawn}"
                 if key not in known:

@@ -386,7 +386,7 @@ def _as_written(error: InputError, source: str, condition: Condition) -> str:
     That can be `both` or a case, of which the drive's section knows nothing.
     """
     fault, field = str(error), error.field
-    for side in ("database", "query"):
+    for side in ("database", "query", "protocol"):
         start = f"{source}: {side}"
         if field and fault.startswith(start):
             break

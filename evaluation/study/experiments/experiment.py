@@ -135,18 +135,16 @@ class MadeMap(Section):
 
     Attributes:
         name: name of the new map.
-        age: name of the map to age. Give either a map to age or a file to
-            import.
+        age: name of the map to age; give this or `import`.
         years: number of years by which to age the map.
         import_file: file of a real city to import, in the folder `files` of the
             experiment.
         sha256: SHA-256 digest of the imported file, so that everyone imports
             the same file.
-        grow: share of the imported buildings, sampled at random, that change
-            between the first stage and today: in the first stage they are
-            missing, or lower than today.
+        grow: share of the imported buildings, sampled at random, that are
+            missing or lower in the first stage.
         plain: whether windows, roofs and kerbs that the file lacks are left
-            out, as by the option `--plain` of `cns-drake import`.
+            out, as by `--plain` of `cns-drake import`.
         seed: seed of all random numbers.
     """
 
@@ -189,39 +187,38 @@ class Experiment(Section):
     Attributes:
         name: name of the experiment in all tables.
         about: the question in words.
-        maps: maps to use: names of shipped maps, folders of maps, folders of
-            recordings, or maps to make. By default the shipped cities.
+        maps: names of shipped maps, folders of maps, folders of recordings, or
+            maps to make.
         files: folder with the files that the field `import` of a map names.
         drives: which drives of a map are compared: the last drive with one
-            along the same route (`same-route`, the default), with each earlier
-            drive (`stages`), in both directions if there are two (`both-ways`),
-            or with the first (`first-and-last`).
-        both: scenario fields of both drives. A list of values makes the field a
+            along the same route (`same-route`), with each earlier drive
+            (`stages`), in both directions if there are two (`both-ways`), or
+            with the first (`first-and-last`).
+        both: scenario fields of both drives. A list of values makes a field a
             factor, which varies.
-        database: scenario fields of the drive that makes the database. A list
-            of values makes the field a factor. `sessions` is a list of several
-            such drives, of which `keep` selects places and `maintain` updates
-            the maps.
-        query: scenario fields of the drive that makes the queries. A list of
-            values makes the field a factor.
+        database: scenario fields of the drive that makes the database, in the
+            same way. `sessions` is a list of several such drives, of which
+            `keep` selects places and `maintain` updates the maps.
+        query: scenario fields of the drive that makes the queries, in the same
+            way.
         cases: kinds of change by name. Each sets fields of one or both drives
             or of the protocol, or is a list of other cases to combine; a list
             of values sets its levels, the weakest first. Each is compared with
             the case `none`, which changes nothing.
         levels: which levels of each case to measure, as numbers from 1; by
-            default all. If a number in this list exceeds the number of a case's
-            levels, the last level of the case is measured instead.
-        design: how factors are combined. `product`: each value of a factor with
-            each value of all other factors. `one-at-a-time`: each value of a
-            factor, while all other factors have the baseline's values.
+            default all. A case with fewer levels is measured at its last one
+            instead.
+        design: how factors are combined: each value of a factor with each value
+            of all others (`product`), or while all others have the baseline's
+            values (`one-at-a-time`).
         tasks: tasks to measure, as a list of names; to change settings, a
             mapping from each name to its settings.
         methods: methods to run, as a list of names or Python files; to change
             settings, a mapping from each name to its settings. A setting with a
-            list of values is a factor. By default the standard methods.
+            list of values is a factor.
         metrics: metrics that the page shows, the most important first: names,
             or Python files with metrics of your own. By default the main
-            metrics of each task. `results.csv` contains all metrics.
+            metrics of each task.
         seeds: seeds of all random numbers. Each condition is measured with each
             seed.
         protocol: `random-yaw`, `paper` or `recorded`; a list of these names,
@@ -229,17 +226,13 @@ class Experiment(Section):
             `base` provides the rest.
         baseline: values of some factors, such as `{both.stage: last}`, or of a
             method's setting: each condition is compared with the one that has
-            these values, and its own values of all other factors. By default,
-            it is the one with the first value of each factor, and without a
-            cause of change.
+            these values, and its own values of all other factors.
         frozen: table of the shipped worlds, such as `levels.csv`, with a
-            fingerprint of each level's drives. The table protects a benchmark
-            from changes: if a drive no longer has its fingerprint, the study
-            stops with an error.
+            fingerprint of each level's drives. If a drive no longer has its
+            fingerprint, the study stops with an error.
         charts: charts to show on the page of the experiment.
-        quick: fields to replace if `--quick` is given. `tasks`, `methods` and
-            lists are replaced as a whole; in other mappings, only the fields
-            that you name are replaced.
+        quick: fields to replace if `--quick` is given: `tasks`, `methods` and
+            lists as a whole, of other mappings only the fields that you name.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.-]*$")]

@@ -58,9 +58,8 @@ def value_of(values):
         return KINDS[values]
     if choices := re.findall(r"`(.*?)`", values):
         return choices[-1]
-    least, most = re.search(
-        r"(?:from|above) (\S+)(?: to (\S+))?", values
-    ).groups()
+    limits = re.search(r"(?:from|above) (\S+)(?: to (\S+))?", values)
+    least, most = limits.groups() if limits else ("0", None)
     number = min(math.ceil(float(least) + 0.1), float(most or math.inf))
     several = re.match(r"(\d) numbers", values)
     return str([number] * int(several[1])) if several else f"{number:g}"

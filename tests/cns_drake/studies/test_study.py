@@ -268,6 +268,9 @@ def test_a_condition_without_draws_is_measured_once(town, tmp_path, jobs_done):
             assert after["relative_auc"] == pytest.approx(
                 after["auc"] / before["auc"], abs=1e-6
             )
+    # In another order, they are the same.
+    measure(wanted.replaced(seeds=(6, 4, 5)), tmp_path)
+    assert jobs_done[-2:] == [[], []]
 
 
 @pytest.mark.slow

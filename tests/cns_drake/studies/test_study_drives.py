@@ -210,6 +210,10 @@ FAULTS = [
     ("database: {foo: 1}", "database: foo: Extra"),
     ("query: {transient: {snoww: 1}}", "query: transient.snoww: .* snow?"),
     ("query: {transient: {snow: 2}}", "query: transient.snow: "),
+    (
+        "cases: {a: {protocol: {radius: [5, x]}}}",
+        "cases.a.protocol: radius: Input should be a valid number",
+    ),
     ("query: {transient: [{snow: 0}, 3]}", "query: transient: "),
     ("query: {lidars: {lidar: {colums: 9}}}", "query: lidars.lidar.colums: "),
     ("query: {traffic: 3}", "query: traffic: "),
