@@ -47,9 +47,9 @@ TABLES = (
     "docs/notes/new_plans.csv",
 )
 COLUMNS = (
-    "part", "pairs", "verified", "method", "networks", "cities", "queries",
-    "loss", "low", "high", "verdict", "networks_over_a_tenth", "runs",
-    "coverage", "survives", "does_not_survive",
+    "part", "pairs", "verified", "method", "network", "networks", "cities",
+    "queries", "loss", "low", "high", "verdict", "networks_over_a_tenth",
+    "runs", "coverage", "survives", "does_not_survive",
 )  # fmt: skip
 LEAST_CHANGE = 0.01
 # Loss with which both verdicts are wrong.
@@ -258,7 +258,17 @@ def lines(runs: int) -> Iterator[dict[str, object]]:
                 loss > A_TENTH for loss in survival.of_cities.values()
             ),
         }
-        if choice == "first" and verified == "1":
+        if choice == "first":
+            for name, loss in survival.of_cities.items():
+                yield {
+                    "part": "network",
+                    "pairs": choice,
+                    "verified": verified,
+                    "method": method,
+                    "network": name,
+                    "loss": f"{loss:.3f}",
+                }
+        if runs and choice == "first" and verified == "1":
             for true in (effects, effects.of_loss(A_TENTH)):
                 yield {
                     "part": "simulated",
