@@ -167,3 +167,18 @@ def test_predictions_that_hold_are_counted():
     forests = [row for row in hold if "Wild-Places" in row["source"]]
     names = [row["quantity"].partition(":")[2] for row in forests]
     assert len(set(names)) == len(names), "none holds in both forests"
+
+
+@pytest.mark.parametrize("candidates", ["25", "50"])
+@pytest.mark.parametrize("sector", ["hidden_60", "hidden_120"])
+def test_the_number_of_shifts_decides_with_a_hidden_sector(candidates, sector):
+    found = means(
+        "forest_task.csv",
+        "cause",
+        "search_ratio",
+        value="r1",
+        candidates=candidates,
+    )
+    assert found[f"{sector}_against", "0.1"] < 0.05
+    assert found[f"{sector}_against", "1.0"] > 0.5
+    assert min(found[sector, "0.1"], found["against", "0.1"]) > 0.95
