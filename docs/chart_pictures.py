@@ -102,6 +102,44 @@ def _retained_in_old_map(furniture: str) -> dict[str, np.ndarray]:
     return {city: np.mean(some, axis=0) for city, some in found.items()}
 
 
+def survival(path: Path) -> None:
+    """Draws which places six methods still find, by road networks."""
+    rows = [
+        row
+        for row in csv_rows("network_survival.csv")
+        if (row["pairs"], row["verified"]) == ("first", "1")
+    ]
+    found = sorted(
+        (row for row in rows if row["part"] == "found"),
+        key=lambda row: float(row["loss"]),
+    )
+    figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
+    axes = figure.subplots()
+    axes.axvspan(90.0, 110.0, color=PALE, alpha=0.2, lw=0)
+    for y, row in enumerate(found):
+        colour, _, marker = METHOD_STYLES[row["method"]]
+        kept, *ends = (
+            100.0 * (1.0 - float(row[name])) for name in ("loss", "low", "high")
+        )
+        axes.plot(ends, [y, y], color=colour, lw=5, alpha=0.4)
+        axes.plot(kept, y, marker, color=colour, ms=8)
+        shares = [
+            100.0 * (1.0 - float(one["loss"]))
+            for one in rows
+            if (one["part"], one["method"]) == ("network", row["method"])
+        ]
+        axes.plot(shares, [y + 0.35] * len(shares), "|", color=INK, ms=6)
+    axes.set_yticks(range(len(found)), [title(row["method"]) for row in found])
+    axes.set(xlim=(-2.0, 110.0), ylim=(len(found) - 0.4, -0.6))
+    axes.set_xlabel(
+        "places that are still found [%]; bar: 95 % interval;\n"
+        "tick: a road network; grey: where methods survive"
+    )
+    make_plain(axes)
+    add_heading(figure, "Places that are still found in rebuilt cities")
+    figure.savefig(path, dpi=DPI)
+
+
 def ranking(path: Path) -> None:
     """Draws the ranks of methods over the radius of a match, by AUC strict.
 

@@ -3,11 +3,11 @@
     python docs/survival.py
 
 The losses are those of the shipped tables (source `tables`: a query every 10 m,
-one draw of the random yaw; `figure-1`: the same without fresh Metropolis, which
-has the stages of Metropolis cleared), of `notes/yaw_draws.csv` (source `draws`:
+one draw of the random yaw), of `notes/yaw_draws.csv` (source `draws`:
 a query every 30 m, each draw and the mean of all, at four radii of a match),
-and of `notes/new_plans.csv` (source `networks`, `extracts` of OpenStreetMap,
-and `towns` of CARLA's; a method counts where its control finds anything).
+and of `notes/new_plans.csv` (source `extracts` of OpenStreetMap, and `towns` of
+CARLA's; a method counts where its control finds anything). Verdicts by road
+networks are in `notes/network_survival.csv`.
 """
 
 from __future__ import annotations
@@ -62,13 +62,6 @@ def lines() -> Iterator[tuple[object, ...]]:
         rows = retained_in_cities(verified)
         for one in judge_survival(rows):
             yield "tables", "7.5", "0", *_cells(verified, one)
-        others = [
-            row
-            for row in rows
-            if row.map != "metropolis" or row["both.city.redraw.frozen"] is None
-        ]
-        for one in judge_survival(others):
-            yield "figure-1", "7.5", "0", *_cells(verified, one)
         yield from _on_networks(verified)
     # The lost shares of the pairs of each city.
     losses: dict[tuple[str, ...], dict[str, dict[str, list[float]]]] = {}
@@ -104,9 +97,7 @@ def _on_networks(verified: bool) -> Iterator[tuple[object, ...]]:
         of_method = [row for row in rows if row.method == method]
         towns = [row for row in of_method if row.map.startswith("town")]
         extracts = [row for row in of_method if row not in towns]
-        for source, some in (
-            ("networks", of_method), ("extracts", extracts), ("towns", towns),
-        ):  # fmt: skip
+        for source, some in (("extracts", extracts), ("towns", towns)):
             for one in judge_survival(some):
                 yield source, "7.5", "0", *_cells(verified, one)
 

@@ -77,8 +77,6 @@ CITIES = (
     (1.0, 0.1),
     (0.05, 0.1),
 )
-# Intraclass correlations of the results on one road network.
-ALIKE = (0.13, 0.5, 0.75)
 # Steps between the mean results of methods.
 STEPS = (0.01, 0.05, 0.15)
 # Lengths of straight routes [m].
@@ -362,52 +360,21 @@ def city_row(city: int, pair: int, value: float) -> Row:
     )
 
 
-def on_networks(
-    rng: np.random.Generator, mean: float, spread: float, alike: float
-) -> np.ndarray:
-    """Returns results (12,) of cities, of which three share a road network.
-
-    A city has the result of its network, or one of its own. Two cities of one
-    network have the intraclass correlation `alike`, and each city the same
-    distribution as in `cities`.
-    """
-    of_network = np.repeat(beta(rng, mean, spread, 4), 3)
-    own = beta(rng, mean, spread, 12)
-    return np.where(rng.random(12) < np.sqrt(alike), of_network, own)
-
-
 def cities(
     runs: int, scenarios: Sequence[Sequence[float]] = CITIES
 ) -> Iterator[dict[str, object]]:
     """Means over cities, and survival, with unequal numbers of pairs."""
-    yield from _cities(runs, scenarios, (1, 2, 4, 8, 12), (0.0,))
-
-
-def networks(
-    runs: int, scenarios: Sequence[Sequence[float]] = CITIES
-) -> Iterator[dict[str, object]]:
-    """The same for twelve cities on four road networks."""
-    yield from _cities(runs, scenarios, (12,), ALIKE)
-
-
-def _cities(
-    runs: int,
-    scenarios: Sequence[Sequence[float]],
-    numbers: Sequence[int],
-    correlations: Sequence[float],
-) -> Iterator[dict[str, object]]:
     for mean, correlation in scenarios:
-        for number, alike in itertools.product(numbers, correlations):
+        spread = np.sqrt(mean * (1.0 - mean) * correlation)
+        for number in (1, 2, 4, 8, 12):
             rng = np.random.default_rng(number)
             count, kept = Count(mean), Count(1.0 - mean)
             for _ in range(runs):
-                if alike:
-                    results = on_networks(rng, mean, correlation, alike)
-                else:
-                    results = beta(rng, mean, correlation, number)
                 rows = [
                     city_row(k, pair, float(value))
-                    for k, value in enumerate(results)
+                    for k, value in enumerate(
+                        beta(rng, mean, correlation, number)
+                    )
                     for pair in range(int(rng.integers(1, 4)))
                 ]
                 (ranked,) = rank_methods(rows)
@@ -415,19 +382,15 @@ def _cities(
                     count.add(ranked.interval)
                 (one,) = judge_survival(rows)
                 kept.add(one.interval, one.verdict == "survives")
-            spread = np.sqrt(mean * (1.0 - mean) * correlation)
-            scenario = f"mean {mean:g}, deviation {spread:.2f}"
-            if alike:
-                scenario += f", four networks alike by {alike:g}"
             for name, some, has_size in (
                 ("mean over cities", count, False),
                 ("loss, and survival", kept, mean <= 0.9),
             ):
                 yield {
-                    "part": "networks" if alike else "cities",
+                    "part": "cities",
                     "units": number,
                     "conditions": "",
-                    "scenario": scenario,
+                    "scenario": f"mean {mean:g}, deviation {spread:.2f}",
                     "quantity": name,
                     **some.columns(has_size),
                 }
@@ -512,7 +475,6 @@ PARTS = {
     "excesses": two_causes,
     "differences": differences,
     "cities": cities,
-    "networks": networks,
     "rare": rare_failures,
     "rankings": rankings,
 }

@@ -29,6 +29,7 @@ BY_HAND = {
     "interruptions.py",
     "interval_coverage.py",
     "lidar_odometry.py",
+    "network_verdicts.py",
     "peers.py",
     "predicts_failure.py",
     "real_or_simulated.py",
