@@ -59,7 +59,6 @@ def test_made_up_answers_have_the_loss_of_their_effects():
 
 
 def test_the_model_finds_the_effects_of_made_up_answers():
-    pytest.importorskip("gpboost", reason="it is in the extra `benchmark`")
     drawn = EFFECTS.made_up(alike(300, 60), np.random.default_rng(4))
     found = fitted(drawn)
     assert found.fixed == pytest.approx(EFFECTS.fixed, abs=0.2)
