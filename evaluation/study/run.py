@@ -56,7 +56,7 @@ def measure_pairs(
     left = [one for one in _alike(pairs, store) if not one.is_done()]
     drives = _drives_of(left, shown, store)
     readings = _jobs(
-        (one.words, ReadDrive(data))
+        (one.words, ReadDrive(one, data))
         for one, data in drives.values()
         if data.store is not None
     )
@@ -84,10 +84,16 @@ class ReadDrive(Step):
     """A job step that reads a drive for several pairs.
 
     Attributes:
+        drive: the drive.
         data: what is asked of the drive, and the store.
     """
 
+    drive: StudyDrive
     data: DriveData
+
+    @property
+    def words(self) -> str:
+        return self.drive.words
 
     @property
     def output(self) -> Path:
@@ -117,6 +123,10 @@ class MeasurePair(Step):
     tasks: tuple[Task, ...]
     store: Store
     drives: Mapping[str, DriveData] = field(default_factory=dict)
+
+    @property
+    def words(self) -> str:
+        return self.pairs[0].title
 
     @property
     def output(self) -> Path:
@@ -221,7 +231,7 @@ def _drives_of(
 
 
 def _measurements(steps: Iterable[MeasurePair]) -> list[Job]:
-    return _jobs((one.pairs[0].title, one) for one in steps)
+    return _jobs((one.words, one) for one in steps)
 
 
 def _jobs(steps: Iterable[tuple[str, Step]]) -> list[Job]:

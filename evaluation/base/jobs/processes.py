@@ -294,7 +294,7 @@ def _run_job(job: bytes, reporter: Reporter) -> tuple[str, str]:
             place = step.output
 
         def note_waiting() -> None:
-            reporter.note(f"{place}: another process works on it; waiting")
+            reporter.note(f"{step.words}: another process works on it; waiting")
 
         alone = exclusive(place, note_waiting) if place else nullcontext()
         with alone:

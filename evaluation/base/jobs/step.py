@@ -72,6 +72,11 @@ class Step(abc.ABC):
         `evaluation.base.file_locks.exclusive`.
         """
 
+    @property
+    def words(self) -> str:
+        """What the step works on, for messages."""
+        return str(self.output)
+
     @abc.abstractmethod
     def is_done(self) -> bool:
         """Returns whether all files of the step exist and are up to date.
