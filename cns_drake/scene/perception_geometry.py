@@ -38,12 +38,7 @@ from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.mesh_files import MeshFiles, mesh_shape_key
 from cns_drake.scene.structure_names import part_name, structure_name
 from cns_drake.scene.surfaces import LARGEST_SIZE, Surface, TriangleSurface
-from evaluation.base import (
-    InputError,
-    cos,
-    reading,
-    sin,
-)
+from evaluation.base import InputError, cos, reading, sin
 
 # The corners of a unit cube, and its faces, counter-clockwise from outside.
 _CUBE_CORNERS = np.array(

@@ -56,9 +56,7 @@ from evaluation.lidar_sheets import (
     make_sheet,
     read_sheet,
 )
-from evaluation.lidar_sheets import (
-    LIDAR_PRESETS as LIDAR_PRESETS,
-)
+from evaluation.lidar_sheets import LIDAR_PRESETS as LIDAR_PRESETS
 
 if TYPE_CHECKING:
     from cns_drake.sensors.returns.calibrated import CalibratedReturns

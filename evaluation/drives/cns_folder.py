@@ -29,10 +29,7 @@ from evaluation.base import (
 )
 from evaluation.clouds import read_cloud
 from evaluation.drives.data_set import DataSet
-from evaluation.drives.drive import (
-    IMU_DTYPE,
-    as_given,
-)
+from evaluation.drives.drive import IMU_DTYPE, as_given
 from evaluation.drives.drive_scenario import SCENARIO
 from evaluation.drives.scan_files import (
     FileDrive,

@@ -42,10 +42,7 @@ from evaluation.base import (
     value_errors,
 )
 from evaluation.drives.data_set import DataSet
-from evaluation.drives.drive import (
-    as_given,
-    index_instances,
-)
+from evaluation.drives.drive import as_given, index_instances
 from evaluation.drives.scan_files import (
     BinDrive,
     OwnPoses,

@@ -57,11 +57,7 @@ from evaluation.drives.point_cloud2 import (
 from evaluation.drives.point_layouts import from_layout
 from evaluation.drives.rosbag_file import RosbagFile, check_finished
 from evaluation.drives.scan_files import are_returns
-from evaluation.drives.stamped_poses import (
-    PosedScans,
-    PoseSteps,
-    StampedPoses,
-)
+from evaluation.drives.stamped_poses import PosedScans, PoseSteps, StampedPoses
 from evaluation.drives.trajectories import read_trajectory
 
 _IMU_TOPIC = "/imu/data"

@@ -13,10 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
-from evaluation.base import (
-    NS_PER_S,
-    arctan2,
-)
+from evaluation.base import NS_PER_S, arctan2
 
 LayoutName = Literal["cns", "ouster", "velodyne", "autoware"]
 _MM_PER_M = 1e3

@@ -4,10 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluation.drives.drive import (
-    Drive,
-    poses_frame,
-)
+from evaluation.drives.drive import Drive, poses_frame
 from evaluation.drives.drive_views import MovedDrive
 from evaluation.drives.trajectories import read_trajectory
 

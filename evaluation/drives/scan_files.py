@@ -19,10 +19,7 @@ from evaluation.base import (
 from evaluation.clouds import bin_dtype
 from evaluation.drives.drive import Drive, as_given, poses_frame
 from evaluation.drives.drive_scenario import SCENARIO, read_scenario
-from evaluation.drives.lidar_fields import (
-    LidarField,
-    lidar_field,
-)
+from evaluation.drives.lidar_fields import LidarField, lidar_field
 from evaluation.drives.stamped_poses import StampedPoses
 from evaluation.drives.text_tables import check_increasing, parse_stamps_ns
 from evaluation.drives.trajectories import read_trajectory

@@ -13,11 +13,7 @@ from worlds.imports.building_years import stands_today
 from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity
 from worlds.imports.former_buildings import with_former_buildings
-from worlds.imports.imported_objects import (
-    FARTHEST,
-    ImportedObject,
-    boxes_of,
-)
+from worlds.imports.imported_objects import FARTHEST, ImportedObject, boxes_of
 from worlds.imports.options import ImportOptions
 
 

@@ -39,10 +39,7 @@ from cns_drake.sensors.published_sensor import (
     publish_measurements,
     section_of,
 )
-from evaluation.base import (
-    check_type,
-    of_type,
-)
+from evaluation.base import check_type, of_type
 
 # Beyond, events hardly advance the time of a long simulation [1/s].
 _HIGHEST_SAMPLE_RATE = 1e6

@@ -55,13 +55,7 @@ from cns_drake.sensors.lidar.seen_geometry import (
     SeenGeometry,
     Structures,
 )
-from evaluation.base import (
-    NS_PER_S,
-    check_type,
-    of_type,
-    product,
-    rotated,
-)
+from evaluation.base import NS_PER_S, check_type, of_type, product, rotated
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.

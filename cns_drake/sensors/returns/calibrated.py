@@ -25,13 +25,7 @@ from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
 from cns_drake.sensors.returns.surface_texture import with_texture
 from cns_drake.sensors.returns.tables import join
 from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
-from evaluation.base import (
-    arcsin,
-    arctan2,
-    check_fields,
-    cos,
-    sin,
-)
+from evaluation.base import arcsin, arctan2, check_fields, cos, sin
 from evaluation.lidar_sheets import ReturnsSheet, find_sheet
 from worlds.shapes import StructureTable
 

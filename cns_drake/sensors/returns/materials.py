@@ -5,15 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.scene import (
-    PerceptionGeometry,
-    Surface,
-    is_closed,
-)
-from worlds.shapes import (
-    StructureEntry,
-    StructureTable,
-)
+from cns_drake.scene import PerceptionGeometry, Surface, is_closed
+from worlds.shapes import StructureEntry, StructureTable
 
 # Kinds of materials.
 LAMBERT, RETRO, GLASS, LEAVES, BEADS, SPRAYS = range(6)

@@ -9,11 +9,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import PrismaticJoint, SpatialInertia
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import (
-    DiagramBuilder,
-    LeafSystem,
-    PortDataType,
-)
+from pydrake.systems.framework import DiagramBuilder, LeafSystem, PortDataType
 import pytest
 
 from cns_drake import (

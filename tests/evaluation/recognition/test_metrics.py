@@ -3,12 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from evaluation.recognition import (
-    METRICS,
-    judge,
-    numbers_of,
-    weighted_metrics,
-)
+from evaluation.recognition import METRICS, judge, numbers_of, weighted_metrics
 
 NAN = np.nan
 

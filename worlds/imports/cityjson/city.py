@@ -14,20 +14,12 @@ from shapely.geometry.base import BaseGeometry
 
 from worlds.imports import colours
 from worlds.imports.building_years import construction_year, demolition_year
-from worlds.imports.cityjson.city_file import (
-    CityFile,
-    CityGeometry,
-    CityObject,
-)
+from worlds.imports.cityjson.city_file import CityFile, CityGeometry, CityObject
 from worlds.imports.cityjson.reading import read_cityjson
 from worlds.imports.faces import face_triangles, joined_triangles, valid_area
 from worlds.imports.faults import ImportFaults
 from worlds.imports.foreign_city import ForeignCity
-from worlds.imports.imported_objects import (
-    Base,
-    ImportedObject,
-    make_object,
-)
+from worlds.imports.imported_objects import Base, ImportedObject, make_object
 from worlds.shapes import GROUND_CLASSES, Finish, UpperSides, turned_up
 
 # A geometry of a lower level of detail is left out if a higher one covers more

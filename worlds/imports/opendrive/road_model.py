@@ -10,14 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evaluation.base import (
-    cos,
-    power,
-    sin,
-)
-from worlds.imports.opendrive.curves import (
-    Shape,
-)
+from evaluation.base import cos, power, sin
+from worlds.imports.opendrive.curves import Shape
 
 
 @dataclass(frozen=True)

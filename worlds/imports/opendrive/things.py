@@ -20,13 +20,7 @@ from worlds.imports.imported_objects import make_object
 from worlds.imports.opendrive.lanes import TYPES, stations
 from worlds.imports.opendrive.road_model import ImportedRoad, Thing
 from worlds.imports.solids import extruded
-from worlds.shapes import (
-    GRID,
-    OBJECTS,
-    Structure,
-    placed,
-    tree,
-)
+from worlds.shapes import GRID, OBJECTS, Structure, placed, tree
 
 # A last repetition may be beyond its stretch by this share of the distance.
 _ROUNDING = 1e-9

@@ -54,11 +54,7 @@ from worlds.imports.opendrive.things import thing_structures
 from worlds.imports.options import ImportOptions
 from worlds.imports.report import ImportReport
 from worlds.maps import MESH_FOLDER
-from worlds.shapes import (
-    GROUND_CLASSES,
-    Structure,
-    surface_mesh,
-)
+from worlds.shapes import GROUND_CLASSES, Structure, surface_mesh
 
 # Height of sidewalks above the road if the file states none [m].
 _KERB_HEIGHT = 0.1

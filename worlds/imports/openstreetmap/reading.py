@@ -16,10 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from evaluation.base import InputError, check_regular
 from worlds.imports.faces import is_tangled
 from worlds.imports.faults import WHOLE_FILE, ImportFaults
-from worlds.imports.openstreetmap.element_kinds import (
-    element_kind,
-    is_building,
-)
+from worlds.imports.openstreetmap.element_kinds import element_kind, is_building
 from worlds.imports.openstreetmap.features import (
     OsmArea,
     OsmFeatures,
