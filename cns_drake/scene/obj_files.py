@@ -15,6 +15,7 @@ import hashlib
 from importlib.metadata import version
 import json
 import mmap
+import os
 from pathlib import Path
 import struct
 import sys
@@ -78,7 +79,7 @@ class ObjFiles:
     """Reads OBJ files; a context manager, which keeps what it has read."""
 
     def __init__(self) -> None:
-        self._folders: dict[Path, _Folder] = {}
+        self._folders: dict[str, _Folder] = {}
 
     def __enter__(self) -> ObjFiles:
         return self
@@ -87,16 +88,17 @@ class ObjFiles:
         for folder in self._folders.values():
             folder.keep()
 
-    def faces(self, path: Path) -> ObjFaces:
+    def faces(self, path: Path | str) -> ObjFaces:
         """Checks a file; see `check_obj`.
 
         Raises:
             ValueError: `check_obj` refuses the file.
             InputError: the file cannot be read.
         """
-        return self._folder(path).mesh(path.name).faces
+        folder, name = self._split(path)
+        return folder.mesh(name).faces
 
-    def surface(self, path: Path) -> Surface:
+    def surface(self, path: Path | str) -> Surface:
         """Returns the surface of a file, in read-only arrays.
 
         Returns:
@@ -106,13 +108,16 @@ class ObjFiles:
             RuntimeError, ValueError: the file is not a valid OBJ file.
             InputError: the file cannot be read.
         """
-        return self._folder(path).surface(path.name)
+        folder, name = self._split(path)
+        return folder.surface(name)
 
-    def _folder(self, path: Path) -> _Folder:
-        folder = self._folders.get(path.parent)
+    def _split(self, path: Path | str) -> tuple[_Folder, str]:
+        # Path takes longer, and a city has thousands of meshes.
+        place, name = os.path.split(path)
+        folder = self._folders.get(place)
         if folder is None:
-            folder = self._folders[path.parent] = _Folder(path.parent)
-        return folder
+            folder = self._folders[place] = _Folder(Path(place))
+        return folder, name
 
 
 class _Folder:

@@ -388,25 +388,30 @@ class _Reader:
         `ray_casting`), so what is beyond the others' places stays. So do meshes
         whose copies share one surface, and what other poses move.
         """
-        copies = Counter(
-            mesh_shape_key(visual.shape)
+        # Visual -> path and key of its mesh: Drake takes long to tell them.
+        meshes = {
+            id(visual): (
+                str(visual.shape.source().path()),
+                mesh_shape_key(visual.shape),
+            )
             for visuals in self._visuals.values()
             for visual in visuals
             if isinstance(visual.shape, Mesh)
-        )
+        }
+        copies = Counter(key for _, key in meshes.values())
         unseen = []
         for scope, visuals in self._unmoved():
             far: dict[int, UnseenMesh] = {}
             boxes = []
             for visual in visuals:
-                if isinstance(visual.shape, Mesh) and not visual.frame:
-                    path = str(visual.shape.source().path())
-                    number = copies[mesh_shape_key(visual.shape)]
-                    found = _box_of_mesh(objs, path, visual, number)
-                    if found is not None:
-                        name = f"{scope}::{visual.name}"
-                        far[id(visual)] = UnseenMesh(name, path, found[1])
-                        boxes.append(found[0])
+                if id(visual) not in meshes or visual.frame:
+                    continue
+                path, mesh = meshes[id(visual)]
+                found = _box_of_mesh(objs, path, visual, copies[mesh])
+                if found is not None:
+                    name = f"{scope}::{visual.name}"
+                    far[id(visual)] = UnseenMesh(name, path, found[1])
+                    boxes.append(found[0])
             if not far:
                 continue
             for key, is_near in zip(
@@ -852,7 +857,7 @@ def _box_of_mesh(
     if not (visual.is_perceived() and path.lower().endswith(".obj")):
         return None
     try:
-        faces = objs.faces(Path(path))
+        faces = objs.faces(path)
     except (InputError, ValueError):
         return None  # Whoever reads it tells the fault.
     if faces.box is None or faces.num_triangles == 0:
