@@ -50,7 +50,7 @@ _LARGEST = 1 << 30
 _SUFFIX = ".meshes"
 # At the end of a file: length and CRC-32 of the index before it.
 _TRAILER = struct.Struct("<QI")
-# vertices (N, 3), float64 [m], and triangles (M, 3), int32.
+# Vertices (N, 3), float64 [m], and triangles (M, 3), int32.
 Surface = tuple[np.ndarray, np.ndarray]
 
 
